@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// A position reading and the only place where counts become an angle.
+#pragma once
+
+#include <cstdint>
+
+#include "absenc/core/bits.hpp"
+#include "absenc/core/time.hpp"
+
+namespace absenc {
+
+/// One position as an encoder reported it, with what of it may be trusted.
+struct Reading {
+  std::uint64_t singleturn = 0;       // counts, 0 .. 2^singleturn_bits - 1
+  std::uint64_t multiturn = 0;        // revolutions, 0 .. 2^multiturn_bits - 1
+  unsigned singleturn_bits = 0;       // 0: the reply carries no single-turn position
+  unsigned multiturn_bits = 0;        // 0: the reply carries no revolutions
+  unsigned singleturn_valid_bits = 0; // the top bits that hold; 0: do not use the position
+  bool multiturn_valid = false;
+  bool ready = true;                  // false while the encoder says that it is starting
+  std::uint32_t status = 0;           // bits named by the unit's status field
+  std::uint32_t alarms = 0;           // bits named by the unit's alarms field
+  Time latched{};                     // when the encoder took the position
+  Time received{};                    // when the last byte of the reply was there
+
+  [[nodiscard]] constexpr bool singleturn_valid() const {
+    return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
+  }
+};
+
+/// Degrees, 0 to below 360. A revolution has 2^bits counts, not 2^bits - 1.
+[[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
+  return 360.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << bits);
+}
+
+/// The shortest way from `from` to `to` on a circle of 2^bits counts: -2^(bits-1) .. 2^(bits-1) - 1. 1 to 63 bits.
+[[nodiscard]] constexpr std::int64_t wrapped_difference(std::uint64_t to, std::uint64_t from, unsigned bits) {
+  const std::uint64_t difference = (to - from) & low_mask(bits);
+  const std::uint64_t half = std::uint64_t{1} << (bits - 1);
+  return static_cast<std::int64_t>(difference ^ half) - static_cast<std::int64_t>(half);
+}
+
+}  // namespace absenc

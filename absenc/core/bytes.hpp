@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Views of bytes and a fixed-capacity buffer: what every layer passes around without a heap.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace absenc {
+
+using Bytes = std::span<const std::uint8_t>;
+using MutableBytes = std::span<std::uint8_t>;
+
+/// At most Capacity items, stored inside the object. Appending to a full buffer is refused, never truncated.
+template <class Item, std::size_t Capacity>
+class Buffer {
+ public:
+  constexpr Buffer() = default;
+
+  /// False, and nothing stored, when the buffer is full.
+  constexpr bool push_back(const Item& item) {
+    if (size_ == Capacity) return false;
+    items_[size_++] = item;
+    return true;
+  }
+
+  /// False, and nothing stored, when `items` do not all fit.
+  constexpr bool append(std::span<const Item> items) {
+    if (items.size() > Capacity - size_) return false;
+    for (const Item& item : items) items_[size_++] = item;
+    return true;
+  }
+
+  constexpr void clear() { size_ = 0; }
+  /// Keeps the first `size` items; a larger `size` changes nothing.
+  constexpr void truncate(std::size_t size) {
+    if (size < size_) size_ = size;
+  }
+  /// Drops the first `count` items (all of them when there are fewer).
+  constexpr void drop_front(std::size_t count) {
+    if (count > size_) count = size_;
+    for (std::size_t i = count; i < size_; ++i) items_[i - count] = items_[i];
+    size_ -= count;
+  }
+
+  [[nodiscard]] constexpr std::size_t size() const { return size_; }
+  [[nodiscard]] constexpr bool empty() const { return size_ == 0; }
+  [[nodiscard]] constexpr bool full() const { return size_ == Capacity; }
+  [[nodiscard]] static constexpr std::size_t capacity() { return Capacity; }
+
+  constexpr Item& operator[](std::size_t index) { return items_[index]; }
+  constexpr const Item& operator[](std::size_t index) const { return items_[index]; }
+  [[nodiscard]] constexpr std::span<const Item> view() const { return {items_.data(), size_}; }
+  constexpr operator std::span<const Item>() const { return view(); }
+
+ private:
+  std::array<Item, Capacity> items_{};
+  std::size_t size_ = 0;
+};
+
+template <std::size_t Capacity>
+using ByteBuffer = Buffer<std::uint8_t, Capacity>;
+
+}  // namespace absenc

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cyclic redundancy checks of 3 to 16 bits, in the parameters of the Rocksoft model (width, poly, init, refin,
+// refout, xorout). `crc_bitwise` is the definition; `Crc` is the same thing with a table made at compile time.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+
+namespace absenc {
+
+/// `poly` in normal notation (the highest power left out): x8+x5+x3+x2+x+1 is 0x2F.
+struct CrcParameters {
+  unsigned width;  // 3 to 16
+  std::uint16_t poly;
+  std::uint16_t init;
+  bool refin;
+  bool refout;
+  std::uint16_t xorout;
+
+  friend constexpr bool operator==(const CrcParameters&, const CrcParameters&) = default;
+};
+
+/// One bit at a time, straight from the definition: the reference the fast engine is tested against.
+[[nodiscard]] constexpr std::uint16_t crc_bitwise(const CrcParameters& parameters, Bytes bytes) {
+  const std::uint32_t top = std::uint32_t{1} << (parameters.width - 1);
+  const auto mask = static_cast<std::uint32_t>(low_mask(parameters.width));
+  std::uint32_t remainder = parameters.init & mask;
+  for (const std::uint8_t byte : bytes) {
+    for (unsigned i = 0; i < 8; ++i) {
+      const unsigned position = parameters.refin ? i : 7 - i;
+      const bool bit = ((byte >> position) & 1) != 0;
+      const bool feedback = ((remainder & top) != 0) != bit;
+      remainder = (remainder << 1) & mask;
+      if (feedback) remainder ^= parameters.poly;
+    }
+  }
+  if (parameters.refout) remainder = static_cast<std::uint32_t>(reflect(remainder, parameters.width));
+  return static_cast<std::uint16_t>((remainder ^ parameters.xorout) & mask);
+}
+
+/// How much constant memory the fast engine may take.
+enum class CrcTable {
+  byte,    // 256 entries, one look-up a byte: 256 bytes up to width 8, 512 above
+  nibble,  // 16 entries, two look-ups a byte: 16 or 32 bytes, for firmware
+};
+
+/// Table-driven engine. The remainder is kept reflected when `refin` is set and left-aligned in `Word`
+/// otherwise, so that widths that are no multiple of 8 (3 to 7, 9 to 15) need no special case.
+template <CrcParameters parameters, CrcTable table_kind = CrcTable::byte>
+class Crc {
+  static_assert(parameters.width >= 3 && parameters.width <= 16, "widths from 3 to 16 bits");
+
+ public:
+  using Word = std::conditional_t<(parameters.width <= 8), std::uint8_t, std::uint16_t>;
+
+  constexpr Crc() = default;
+
+  constexpr void update(std::uint8_t byte) {
+    if constexpr (table_kind == CrcTable::byte) {
+      step<8>(byte);
+    } else if constexpr (parameters.refin) {
+      step<4>(byte & 0xF);
+      step<4>(byte >> 4);
+    } else {
+      step<4>(byte >> 4);
+      step<4>(byte & 0xF);
+    }
+  }
+
+  constexpr void update(Bytes bytes) {
+    for (const std::uint8_t byte : bytes) update(byte);
+  }
+
+  [[nodiscard]] constexpr Word value() const {
+    std::uint32_t result = parameters.refin ? remainder_ : remainder_ >> spare_bits;
+    if constexpr (parameters.refin != parameters.refout) {
+      result = static_cast<std::uint32_t>(reflect(result, parameters.width));
+    }
+    return static_cast<Word>((result ^ parameters.xorout) & low_mask(parameters.width));
+  }
+
+  [[nodiscard]] static constexpr Word of(Bytes bytes) {
+    Crc crc;
+    crc.update(bytes);
+    return crc.value();
+  }
+
+  /// Constant memory of the table.
+  static constexpr std::size_t table_bytes = (std::size_t{1} << (table_kind == CrcTable::byte ? 8 : 4)) * sizeof(Word);
+
+ private:
+  static constexpr unsigned word_bits = sizeof(Word) * 8;
+  static constexpr unsigned spare_bits = word_bits - parameters.width;
+
+  // The polynomial as the remainder is kept.
+  static constexpr std::uint32_t poly = parameters.refin
+                                            ? static_cast<std::uint32_t>(reflect(parameters.poly, parameters.width))
+                                            : std::uint32_t{parameters.poly} << spare_bits;
+
+  // What `bits` bits of input do to an otherwise empty remainder.
+  static constexpr Word advance(std::uint32_t input, unsigned bits) {
+    std::uint32_t remainder = 0;
+    if constexpr (parameters.refin) {
+      remainder = input;
+      for (unsigned i = 0; i < bits; ++i) remainder = (remainder >> 1) ^ ((remainder & 1) != 0 ? poly : 0);
+    } else {
+      const std::uint32_t top = std::uint32_t{1} << (word_bits - 1);
+      remainder = input << (word_bits - bits);
+      for (unsigned i = 0; i < bits; ++i) {
+        remainder = (remainder << 1) ^ ((remainder & top) != 0 ? poly : 0);
+      }
+    }
+    return static_cast<Word>(remainder);
+  }
+
+  static constexpr unsigned input_bits = table_kind == CrcTable::byte ? 8 : 4;
+  static constexpr auto table = [] {
+    std::array<Word, std::size_t{1} << input_bits> entries{};
+    for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = advance(i, input_bits);
+    return entries;
+  }();
+  static_assert(sizeof(table) == table_bytes);
+
+  template <unsigned bits>
+  constexpr void step(std::uint32_t input) {
+    // A remainder narrower than the input shifts out completely: >> and << on 32 bits yield 0 then.
+    const std::uint32_t remainder = remainder_;
+    if constexpr (parameters.refin) {
+      const std::uint32_t index = (remainder ^ input) & low_mask(bits);
+      remainder_ = static_cast<Word>((remainder >> bits) ^ table[index]);
+    } else {
+      const std::uint32_t index = ((remainder >> (word_bits - bits)) ^ input) & low_mask(bits);
+      remainder_ = static_cast<Word>((remainder << bits) ^ table[index]);
+    }
+  }
+
+  static constexpr Word initial = parameters.refin
+                                      ? static_cast<Word>(reflect(parameters.init, parameters.width))
+                                      : static_cast<Word>((parameters.init & low_mask(parameters.width)) << spare_bits);
+  Word remainder_ = initial;
+};
+
+}  // namespace absenc

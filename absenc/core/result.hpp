@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can go wrong between a host and an encoder, and a value-or-error with the member names of std::expected.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+namespace absenc {
+
+/// Grouped by who must act. Alarms and warnings that an encoder reports in a good frame are data, not errors.
+enum class Error : std::uint8_t {
+  none,
+  // the caller
+  invalid_argument,
+  unsupported,
+  buffer_too_small,
+  // the line
+  timeout,
+  line_stuck,
+  bad_framing,
+  truncated,
+  // the frame
+  wrong_length,
+  unexpected_reply,
+  bad_checksum,
+  out_of_range,
+  sequence_mismatch,
+  cross_check_failed,
+  // the encoder refused
+  busy,
+  request_rejected,
+};
+
+struct ErrorText {
+  std::string_view name;         // as printed by the command and written in vectors
+  std::string_view description;  // what happened
+  std::string_view advice;       // what to try
+};
+
+/// Indexed by the enumerator.
+inline constexpr std::array<ErrorText, 16> error_texts{{
+    {"none", "no error", ""},
+    {"invalid_argument", "an argument is outside what the protocol can carry", "check the value against its range"},
+    {"unsupported", "this encoder or model does not have that", "`absenc list` shows what each one supports"},
+    {"buffer_too_small", "the caller's buffer is too small", "pass a larger one"},
+    {"timeout", "the encoder did not answer", "check supply, A/B polarity, baud rate and that the encoder has started"},
+    {"line_stuck", "the data line never changed its level", "check the wiring and the encoder's supply"},
+    {"bad_framing", "what came is not a frame of this protocol", "check line settings and wiring"},
+    {"truncated", "the frame does not fit into what was sampled", "lower the clock rate"},
+    {"wrong_length", "the reply has the wrong number of bytes",
+     "check the echo setting and that only one encoder answers"},
+    {"unexpected_reply", "the reply does not belong to the request", "check protocol, model and address"},
+    {"bad_checksum", "the checksum of the reply is wrong", "check shielding, termination and baud rate"},
+    {"out_of_range", "bits that must be zero are set", "check the resolution or the model"},
+    {"sequence_mismatch", "the sequence counter did not move as it should", "the reply may be a repeated one"},
+    {"cross_check_failed", "parts of the reply contradict each other", "treat the reading as invalid and read again"},
+    {"busy", "the encoder stayed busy", "wait and try again"},
+    {"request_rejected", "the encoder refused the request", "check that the request is allowed, then send it again"},
+}};
+
+[[nodiscard]] constexpr const ErrorText& text_of(Error error) {
+  return error_texts[static_cast<std::size_t>(error)];
+}
+
+/// A value or an Error other than `none`. Reading the value of a failed result is undefined, as in std::expected.
+template <class T>
+class [[nodiscard]] Result {
+ public:
+  constexpr Result(T value) : value_(std::move(value)) {}
+  constexpr Result(Error error) : error_(error) {}
+
+  [[nodiscard]] constexpr bool has_value() const { return error_ == Error::none; }
+  constexpr explicit operator bool() const { return has_value(); }
+  constexpr const T& operator*() const { return value_; }
+  constexpr T& operator*() { return value_; }
+  constexpr const T* operator->() const { return &value_; }
+  constexpr T* operator->() { return &value_; }
+  [[nodiscard]] constexpr const T& value() const { return value_; }
+  [[nodiscard]] constexpr Error error() const { return error_; }
+  [[nodiscard]] constexpr T value_or(T other) const { return has_value() ? value_ : other; }
+
+ private:
+  T value_{};
+  Error error_ = Error::none;
+};
+
+}  // namespace absenc
