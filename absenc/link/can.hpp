@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// A classic CAN data frame, the item of CAN links.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "absenc/core/bytes.hpp"
+
+namespace absenc {
+
+struct CanFrame {
+  std::uint32_t id = 0;  // 11 bits, or 29 when `extended`
+  bool extended = false;
+  bool remote = false;
+  std::uint8_t size = 0;  // 0 to 8
+  std::array<std::uint8_t, 8> data{};
+
+  [[nodiscard]] constexpr Bytes bytes() const { return {data.data(), size}; }
+  friend constexpr bool operator==(const CanFrame&, const CanFrame&) = default;
+};
+
+}  // namespace absenc

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// The conversation between a protocol and whatever carries it: a machine is fed events and asked for steps.
+// It owns no port and no clock, so the same object runs over a real port, on a microcontroller and in virtual time.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "absenc/core/time.hpp"
+#include "absenc/link/can.hpp"
+#include "absenc/link/line.hpp"
+
+namespace absenc {
+
+/// What a machine wants next. Times are protocol time: the carrier adds its own latency to `answer` and `gap`.
+/// Item is std::uint8_t (characters, SPI bytes, clocked bits packed MSB first) or CanFrame.
+template <class Item>
+struct Step {
+  enum class Kind : std::uint8_t {
+    wait,       // until the next event
+    transfer,   // not before `at`: send `out` (exchange: and receive max(out, expect) items; clocked: clock `bits`)
+    pulse,      // not before `at`: drive `line` active for `width`
+    configure,  // switch this end of the line to `settings`
+    emit,       // a result is ready to be looked at; ask again
+    done,       // the conversation is over
+  };
+
+  Kind kind = Kind::wait;
+  std::span<const Item> out{};  // valid until the next feed
+  std::size_t expect = 0;       // transfer, wait: items still due; 0: unknown, or none
+  std::size_t bits = 0;         // transfer on a clocked link: number of clocks
+  Time at{};                    // transfer, pulse: not before; wait: a `timer` event is due then, if that lies ahead
+  Time answer{};                // transfer, wait: `silence` when nothing has come this long after `sent`; 0: no limit
+  Time gap{};                   // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
+  Time width{};                 // pulse
+  Line line{};                  // pulse
+  LineSettings settings{};      // configure
+};
+
+/// What happened. `at` is the time at which it was complete: the end of the last bit.
+template <class Item>
+struct Event {
+  enum class Kind : std::uint8_t {
+    sent,        // the transfer has left (exchange and clocked, device side: the host has stopped clocking)
+    received,    // `items` came
+    silence,     // the `answer` or `gap` limit of the last step has passed
+    timer,       // the `at` of the last wait has come
+    selected,    // device side: chip select or first clock edge; the next step should be what it drives
+    triggered,   // device side: a pulse on `line` has begun
+    line_error,  // a character with a wrong stop or parity bit, or sent at another rate, came
+  };
+
+  Kind kind = Kind::timer;
+  Time at{};
+  std::span<const Item> items{};  // received: valid during the call
+  std::size_t bits = 0;           // sent, device side of a clocked link: number of clocks seen
+  Line line{};                    // triggered
+  Time width{};                   // triggered: how long the pulse lasts; 0: not known yet
+};
+
+/// After each `feed`, call `next` until it returns `wait` or `done`. Both in one context: interrupts queue events.
+template <class Item>
+struct Machine {
+  virtual void feed(const Event<Item>& event) = 0;
+  virtual Step<Item> next(Time now) = 0;
+
+ protected:
+  ~Machine() = default;  // a public virtual destructor would link operator delete
+};
+
+}  // namespace absenc
