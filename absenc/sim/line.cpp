@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+// The heart of sim::Line: serves machines, keeps the time and its deadlines. What the wires do: line_wires.cpp.
+#include "absenc/sim/line.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "absenc/sim/line_state.hpp"
+
+namespace absenc::sim {
+
+template <class Item>
+Line<Item>::Line(LinkKind kind, LineSettings settings) : kind_(kind), settings_(settings) {
+  if (settings.rate == 0) throw std::invalid_argument("a line needs a rate");
+}
+
+template <class Item>
+Line<Item>::~Line() = default;
+
+template <class Item>
+auto Line<Item>::attach(Role role, Machine<Item>& machine, OnEmit on_emit) -> Node {
+  auto state = std::make_unique<State>();
+  state->role = role;
+  state->machine = &machine;
+  state->on_emit = std::move(on_emit);
+  state->settings = settings_;
+  state->quiet_since = now_;
+  nodes_.push_back(std::move(state));
+  const Node node = nodes_.size() - 1;
+  serve(node);
+  return node;
+}
+
+template <class Item>
+void Line<Item>::replace(Node node, Machine<Item>& machine) {
+  State& state = *nodes_[node];
+  state.machine = &machine;
+  state.done = false;
+  state.doing = Step<Item>::Kind::wait;
+  ++state.begin_generation;
+  state.on_wire = 0;
+  state.quiet_since = now_;
+  state.heard = false;
+  state.silence_told = false;
+  serve(node);
+}
+
+template <class Item>
+void Line<Item>::wake(Node node) {
+  serve(node);
+}
+
+template <class Item>
+void Line<Item>::set_echo(Node node, bool echo) {
+  nodes_[node]->echo = echo;
+}
+
+template <class Item>
+void Line<Item>::observe(Observer observer) {
+  observer_ = std::move(observer);
+}
+
+template <class Item>
+bool Line<Item>::done(Node node) const {
+  return nodes_[node]->done;
+}
+
+// The node whose timer or silence comes first.
+template <class Item>
+auto Line<Item>::next_deadline() const -> Node {
+  Node first = 0;
+  for (Node node = 1; node < nodes_.size(); ++node) {
+    if (nodes_[node]->due < nodes_[first]->due) first = node;
+  }
+  return first;
+}
+
+template <class Item>
+Time Line<Item>::next_event() const {
+  if (nodes_.empty()) return never;
+  const Time due = nodes_[next_deadline()]->due;
+  return happenings_.empty() ? due : std::min(due, happenings_.top().at);
+}
+
+template <class Item>
+void Line<Item>::schedule(typename Happening::Kind kind, Time at, Node node) {
+  happenings_.push({kind, std::max(at, now_), order_++, node, nodes_[node]->begin_generation});
+}
+
+template <class Item>
+bool Line<Item>::step() {
+  using Kind = typename Happening::Kind;
+  const Time time = next_event();
+  if (time == never) return false;
+  now_ = time;
+  // At one time deadlines come after what ends then (a character has arrived) and before the arbitration.
+  const Node late = next_deadline();
+  if (happenings_.empty() || happenings_.top().at > time ||
+      (happenings_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
+    deadline(late);
+    return true;
+  }
+  const Happening happening = happenings_.top();
+  happenings_.pop();
+  const Node node = happening.node;
+  const bool current = happening.generation == nodes_[node]->begin_generation;
+  switch (happening.kind) {
+    case Kind::begin:
+      if (current) begin(node);
+      break;
+    case Kind::character:
+      if (current) end_character(node);
+      break;
+    case Kind::exchanged:
+      if (current) end_exchange(node);
+      break;
+    case Kind::finished:
+      if (current) finish(node);
+      break;
+    case Kind::frame:  // the bus is free again even when the sender is gone
+      frame_on_bus_ = false;
+      if (current) end_frame(node);
+      schedule(Kind::arbitrate, now_, node);
+      break;
+    case Kind::arbitrate:
+      arbitrate();
+      break;
+  }
+  return true;
+}
+
+template <class Item>
+void Line<Item>::run_until(Time limit) {
+  while (next_event() <= limit && step()) {
+  }
+  now_ = std::max(now_, limit);
+}
+
+template <class Item>
+bool Line<Item>::run(Node node, Time limit) {
+  while (!done(node)) {
+    if (next_event() > limit || !step()) return false;
+  }
+  return true;
+}
+
+template <class Item>
+void Line<Item>::feed(Node node, const Event<Item>& event) {
+  if (nodes_[node]->done) return;
+  nodes_[node]->machine->feed(event);
+  serve(node);
+}
+
+// Asks the machine for steps until it waits.
+template <class Item>
+void Line<Item>::serve(Node node) {
+  using Kind = typename Step<Item>::Kind;
+  State& state = *nodes_[node];
+  while (!state.done) {
+    const Step<Item> step = state.machine->next(now_);
+    switch (step.kind) {
+      case Kind::wait:
+        state.waiting = step;
+        state.timer_due = step.at > now_ ? step.at : never;
+        arm(state);
+        return;
+      case Kind::emit:
+        if (state.on_emit && !state.on_emit()) state.done = true;
+        break;
+      case Kind::done:
+        state.done = true;
+        break;
+      case Kind::configure:
+        state.settings = step.settings;
+        break;
+      case Kind::transfer:
+      case Kind::pulse:
+        take_up(node, step);
+        break;
+    }
+  }
+  state.due = never;  // done: nothing wakes it any more
+}
+
+// A transfer or pulse: now, or when its time has come.
+template <class Item>
+void Line<Item>::take_up(Node node, const Step<Item>& step) {
+  State& state = *nodes_[node];
+  // A device asked by chip select or clock answers into the exchange that is going on.
+  const bool driven = state.role == Role::device && step.kind == Step<Item>::Kind::transfer &&
+                      (kind_ == LinkKind::exchange || kind_ == LinkKind::clocked);
+  if (!driven && state.doing != Step<Item>::Kind::wait) {
+    throw std::logic_error("a machine began a transfer or pulse before its last one was sent");
+  }
+  state.doing = step.kind;
+  state.begun = false;
+  state.out.assign(step.out.begin(), step.out.end());
+  state.on_wire = 0;
+  state.bits = step.bits;
+  state.expect = step.expect;
+  state.width = step.width;
+  state.pulse_line = step.line;
+  ++state.begin_generation;
+  // Not at once: whoever else is asked or attached at this time comes first, in whatever order.
+  if (!driven) schedule(Happening::Kind::begin, step.at, node);
+}
+
+template <class Item>
+void Line<Item>::arm(State& state) {
+  state.due = state.timer_due;
+  const Time limit = state.heard ? state.waiting.gap : state.waiting.answer;
+  if (state.doing == Step<Item>::Kind::wait && limit.count() > 0 && !state.silence_told) {
+    state.due = std::min(state.due, std::max(now_, state.quiet_since + limit));
+  }
+}
+
+template <class Item>
+void Line<Item>::deadline(Node node) {
+  State& state = *nodes_[node];
+  if (state.timer_due <= now_) {
+    state.timer_due = never;
+    feed(node, {.kind = Event<Item>::Kind::timer, .at = now_});
+    return;
+  }
+  // A character that has begun is no silence: its end arms the limit again.
+  if (busy_towards(state)) {
+    state.due = std::min(now_ + state.settings.character(), state.timer_due);
+    return;
+  }
+  state.silence_told = true;
+  feed(node, {.kind = Event<Item>::Kind::silence, .at = now_});
+}
+
+template <class Item>
+void Line<Item>::finish(Node node) {
+  State& state = *nodes_[node];
+  state.doing = Step<Item>::Kind::wait;
+  state.quiet_since = now_;
+  state.heard = false;
+  state.silence_told = false;
+  feed(node, {.kind = Event<Item>::Kind::sent, .at = now_});
+}
+
+template class Line<std::uint8_t>;
+template class Line<CanFrame>;
+
+}  // namespace absenc::sim

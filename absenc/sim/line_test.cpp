@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// What tests/shape_test.cpp does not need of sim::Line.
+#include "absenc/sim/line.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace absenc::sim {
+namespace {
+
+using std::chrono::microseconds;
+using Byte = std::uint8_t;
+
+// Does one step when it is asked, and waits otherwise.
+class Puppet final : public Machine<Byte> {
+ public:
+  void feed(const Event<Byte>& event) override {
+    static constexpr const char* names[] = {"sent", "received", "silence", "timer", "selected", "triggered", "error"};
+    log += std::to_string(event.at.count()) + ' ' + names[static_cast<int>(event.kind)] + ' ';
+  }
+  Step<Byte> next(Time) override {
+    const Step<Byte> step = todo.value_or(idle);
+    todo.reset();
+    return step;
+  }
+  std::optional<Step<Byte>> todo;
+  Step<Byte> idle{};
+  std::string log;
+};
+
+const std::vector<Byte> two{1, 2};
+const Step<Byte> send_two{.kind = Step<Byte>::Kind::transfer, .out = two};
+
+struct LineTest : testing::Test {
+  Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
+  Puppet device;
+  Puppet host;
+  Line<Byte>::Node device_node = line.attach(Role::device, device);
+  Line<Byte>::Node host_node = line.attach(Role::host, host);
+};
+
+TEST_F(LineTest, WakeAsksForAStepWithoutAnEvent) {
+  EXPECT_EQ(line.next_event(), never);
+  EXPECT_FALSE(line.step());
+  line.run_until(microseconds(7));
+  EXPECT_EQ(line.now(), microseconds(7));
+  host.todo = send_two;
+  line.wake(host_node);
+  EXPECT_EQ(line.next_event(), microseconds(7));
+  line.run_until(microseconds(100));
+  EXPECT_EQ(device.log, "17000 received 27000 received ");
+}
+
+TEST_F(LineTest, ReplaceCutsOffWhatIsBeingSent) {
+  host.todo = send_two;
+  line.wake(host_node);
+  line.run_until(microseconds(15));
+  Puppet successor;
+  successor.idle.answer = microseconds(20);
+  line.replace(host_node, successor);
+  EXPECT_FALSE(line.run(host_node, microseconds(100)));
+  EXPECT_EQ(device.log, "10000 received ");
+  EXPECT_EQ(host.log, "");
+  EXPECT_EQ(successor.log, "35000 silence ");
+}
+
+TEST_F(LineTest, ReplaceAfterDone) {
+  host.todo = Step<Byte>{.kind = Step<Byte>::Kind::done};
+  line.wake(host_node);
+  EXPECT_TRUE(line.done(host_node));
+  host.todo = send_two;
+  line.wake(host_node);  // a machine that is done is not asked again
+  EXPECT_EQ(line.next_event(), never);
+  line.replace(host_node, host);
+  EXPECT_FALSE(line.done(host_node));
+  EXPECT_EQ(line.next_event(), Time{});
+}
+
+TEST_F(LineTest, TimerInThePastIsNoTimerAndDoesNotHideTheSilence) {
+  host.idle = {.at = microseconds(10), .answer = microseconds(30)};
+  host.todo = send_two;
+  line.wake(host_node);
+  line.run_until(microseconds(200));
+  EXPECT_EQ(host.log, "10000 timer 20000 sent 50000 silence ");
+}
+
+TEST_F(LineTest, ObserverSeesWhatIsOnTheWire) {
+  std::string seen;
+  line.observe([&](Line<Byte>::Node sender, Time start, Time end, const Byte& item) {
+    seen += std::to_string(sender) + ' ' + std::to_string(start.count()) + '-' + std::to_string(end.count()) + ' ' +
+            std::to_string(item) + ' ';
+  });
+  host.todo = send_two;
+  line.wake(host_node);
+  line.run_until(microseconds(100));
+  EXPECT_EQ(seen, "1 0-10000 1 1 10000-20000 2 ");
+}
+
+TEST(FullDuplex, EachDirectionIsAWireOfItsOwn) {
+  Line<Byte> line(LinkKind::full_duplex, {.rate = 1'000'000});
+  const std::vector<Byte> other{6, 7};
+  Puppet one;
+  Puppet another;
+  Puppet host;
+  one.todo = another.todo = send_two;
+  another.todo->out = other;
+  another.todo->at = microseconds(5);
+  host.todo = Step<Byte>{.kind = Step<Byte>::Kind::transfer, .out = std::span(other).first(1)};
+  std::string items;
+  line.observe([&](Line<Byte>::Node sender, Time, Time, const Byte& item) {
+    items += std::to_string(sender) + ':' + std::to_string(item) + ' ';
+  });
+  line.attach(Role::device, one);
+  line.attach(Role::device, another);
+  line.attach(Role::host, host);
+  line.run_until(microseconds(100));
+  EXPECT_EQ(items, "0:0 2:6 1:0 0:2 1:2 ");  // the devices' bytes are ANDed, the host's is whole
+  EXPECT_EQ(host.log, "10000 received 10000 sent 20000 received ");
+  EXPECT_EQ(one.log, "10000 received 20000 sent ");  // of the host, not of the other device
+}
+
+// Sends one frame when its timer comes, or at a time.
+class CanPuppet final : public Machine<CanFrame> {
+ public:
+  CanPuppet(std::uint32_t id, Time at, bool by_timer) : frame_{.id = id}, at_(at), by_timer_(by_timer) {}
+  void feed(const Event<CanFrame>& event) override {
+    if (event.kind == Event<CanFrame>::Kind::timer) by_timer_ = false;
+    for (const CanFrame& frame : event.items)
+      log += std::to_string(event.at.count()) + ' ' + std::to_string(frame.id) + ' ';
+    if (event.kind == Event<CanFrame>::Kind::line_error) log += "error ";
+  }
+  Step<CanFrame> next(Time) override {
+    if (by_timer_) return {.at = at_};
+    if (sent_) return {};
+    sent_ = true;
+    return {.kind = Step<CanFrame>::Kind::transfer, .out = {&frame_, 1}, .at = at_};
+  }
+  std::string log;
+
+ private:
+  CanFrame frame_;
+  Time at_;
+  bool by_timer_;
+  bool sent_ = false;
+};
+
+struct CanLine : testing::Test {
+  Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};  // an empty frame takes 47 us
+  CanPuppet host{0, microseconds(1'000'000), false};
+  std::string run(CanPuppet first, CanPuppet second) {
+    line.attach(Role::device, first);
+    line.attach(Role::device, second);
+    line.attach(Role::host, host);
+    line.run_until(microseconds(1000));
+    return host.log;
+  }
+};
+
+TEST_F(CanLine, WhoeverBeginsAtOneTimeTakesPartInTheArbitration) {
+  EXPECT_EQ(run({5, microseconds(10), false}, {4, microseconds(10), true}), "57000 4 104000 5 ");
+}
+
+TEST_F(CanLine, SameIdentifierLaterIsNoClash) {
+  EXPECT_EQ(run({5, microseconds(10), false}, {5, microseconds(20), false}), "57000 5 104000 5 ");
+}
+
+TEST_F(CanLine, IdenticalFramesAreOne) {
+  EXPECT_EQ(run({5, microseconds(10), false}, {5, microseconds(10), false}), "57000 5 ");
+}
+
+TEST(LineSettingsOfALine, RateIsNeeded) { EXPECT_THROW(Line<Byte>(LinkKind::can, {}), std::invalid_argument); }
+
+}  // namespace
+}  // namespace absenc::sim

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+// What happens on the wires of sim::Line: characters, exchanges, clocked bits, CAN frames, pulses.
+#include <algorithm>
+#include <stdexcept>
+#include <type_traits>
+
+#include "absenc/sim/line.hpp"
+#include "absenc/sim/line_state.hpp"
+
+namespace absenc::sim {
+
+namespace {
+
+// A UART samples the stop bit in its middle: two clocks that differ by more than 5 % no longer understand each other.
+bool understand(const LineSettings& a, const LineSettings& b) {
+  const std::uint64_t larger = std::max(a.rate, b.rate);
+  const std::uint64_t difference = larger - std::min(a.rate, b.rate);
+  return difference * 20 <= larger && a.parity == b.parity;
+}
+
+// The arbitration field as a number: 11 identifier bits, RTR or SRR, IDE, 18 identifier bits, RTR. The lower one wins.
+std::uint32_t arbitration_field(const CanFrame& frame) {
+  const std::uint32_t remote = frame.remote ? 1 : 0;
+  if (!frame.extended) return frame.id << 21 | remote << 20;
+  return (frame.id >> 18) << 21 | 3u << 19 | (frame.id & 0x3FFFF) << 1 | remote;
+}
+
+// With the interframe space, without stuff bits.
+std::size_t frame_bits(const CanFrame& frame) {
+  return 47 + (frame.remote ? 0 : 8u * frame.size) + (frame.extended ? 20 : 0);
+}
+
+}  // namespace
+
+template <class Item>
+void Line<Item>::begin(Node node) {
+  State& state = *nodes_[node];
+  state.begun = true;
+  state.start = now_;
+  state.index = 0;
+  if (state.doing == Step<Item>::Kind::pulse) {
+    schedule(Happening::Kind::finished, now_ + state.width, node);
+    for (Node other = 0; other < nodes_.size(); ++other) {
+      if (other == node) continue;
+      feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .line = state.pulse_line, .width = state.width});
+    }
+  } else if (kind_ == LinkKind::exchange || kind_ == LinkKind::clocked) {
+    begin_exchange(node);
+  } else if (state.out.empty()) {
+    schedule(Happening::Kind::finished, now_, node);
+  } else if (kind_ == LinkKind::can) {
+    schedule(Happening::Kind::arbitrate, now_, node);
+  } else {
+    begin_characters(node);
+  }
+}
+
+template <class Item>
+bool Line<Item>::hears(const State& receiver, const State& sender) const {
+  if (&receiver == &sender) return sender.echo;
+  return kind_ != LinkKind::full_duplex || receiver.role != sender.role;
+}
+
+template <class Item>
+bool Line<Item>::busy_towards(const State& node) const {
+  return std::any_of(nodes_.begin(), nodes_.end(), [&](const auto& other) {
+    return other.get() != &node && other->on_wire > 0 && other->doing == Step<Item>::Kind::transfer &&
+           hears(node, *other);
+  });
+}
+
+template <class Item>
+void Line<Item>::begin_characters(Node node) {
+  State& state = *nodes_[node];
+  state.each = state.settings.character();
+  state.on_wire = state.out.size();
+  schedule(Happening::Kind::character, now_ + state.each, node);
+  frame_character(node);
+}
+
+// Every receiver that is idle takes the character that begins now as its own.
+template <class Item>
+void Line<Item>::frame_character(Node sender) {
+  for (const auto& receiver : nodes_) {
+    if (!hears(*receiver, *nodes_[sender]) || now_ < receiver->framed_until) continue;
+    receiver->framed_sender = sender;
+    receiver->framed_from = now_;
+    receiver->framed_until = now_ + nodes_[sender]->each;
+  }
+}
+
+template <class Item>
+void Line<Item>::end_character(Node node) {
+  State& sender = *nodes_[node];
+  Item item = sender.out[sender.index];
+  const Time from = now_ - sender.each;
+  for (const auto& other : nodes_) {
+    const bool same_pair = kind_ == LinkKind::half_duplex || other->role == sender.role;
+    if (other.get() != &sender && same_pair) item = other->overlaid(item, from, now_);
+  }
+  if (observer_) observer_(node, from, now_, item);
+  const std::uint64_t generation = sender.begin_generation;
+  const bool last = ++sender.index == sender.out.size();
+  if (last) {
+    schedule(Happening::Kind::finished, now_, node);
+  } else {
+    schedule(Happening::Kind::character, now_ + sender.each, node);
+  }
+  for (Node other = 0; other < nodes_.size(); ++other) {
+    State& receiver = *nodes_[other];
+    if (!hears(receiver, sender)) continue;
+    if (receiver.framed_sender == node && receiver.framed_from == from) {
+      hear(other, node, item, false);
+    } else {  // part of another sender's character, but no silence either
+      receiver.quiet_since = now_;
+      if (!receiver.done) arm(receiver);
+    }
+  }
+  if (!last && generation == sender.begin_generation) frame_character(node);
+}
+
+template <class Item>
+void Line<Item>::hear(Node node, Node sender, const Item& item, bool garbled) {
+  State& state = *nodes_[node];
+  state.quiet_since = now_;
+  state.silence_told = false;
+  if (state.doing == Step<Item>::Kind::wait) state.heard = true;
+  if (garbled || !understand(state.settings, nodes_[sender]->settings)) {
+    feed(node, {.kind = Event<Item>::Kind::line_error, .at = now_});
+  } else {
+    feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = {&item, 1}});
+  }
+}
+
+// SPI and clocked links: the host's transfer moves everything at once; only its duration is simulated.
+template <class Item>
+void Line<Item>::begin_exchange(Node node) {
+  State& host = *nodes_[node];
+  host.expect = kind_ == LinkKind::clocked ? (host.bits + 7) / 8 : std::max(host.out.size(), host.expect);
+  if (kind_ == LinkKind::exchange) host.bits = host.expect * 8;
+  for (Node other = 0; other < nodes_.size(); ++other) {
+    if (nodes_[other]->role == Role::host) continue;
+    nodes_[other]->doing = Step<Item>::Kind::wait;
+    nodes_[other]->out.clear();
+    feed(other, {.kind = Event<Item>::Kind::selected, .at = now_});
+  }
+  schedule(Happening::Kind::exchanged, now_ + host.settings.bits(host.bits), node);
+}
+
+template <class Item>
+void Line<Item>::end_exchange(Node node) {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    State& host = *nodes_[node];
+    std::vector<Item> in(host.expect, 0xFF);  // nobody drives: pulled up
+    for (const auto& other : nodes_) {
+      if (other->role == Role::host) continue;
+      for (std::size_t i = 0; i < std::min(in.size(), other->out.size()); ++i) in[i] &= other->out[i];
+    }
+    const std::size_t unclocked = in.size() * 8 - host.bits;
+    if (unclocked != 0) in.back() = static_cast<Item>(in.back() >> unclocked << unclocked);
+    std::vector<Item> out = host.out;
+    out.resize(host.expect, 0);
+    const std::size_t bits = host.bits;
+    for (Node other = 0; other < nodes_.size(); ++other) {
+      if (nodes_[other]->role == Role::host) continue;
+      nodes_[other]->doing = Step<Item>::Kind::wait;
+      if (kind_ == LinkKind::exchange) {
+        feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});
+      }
+      feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits});
+    }
+    finish(node);
+    host.heard = true;
+    feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = in});
+  }
+}
+
+// The pending frame with the lowest arbitration field takes the bus when it is idle.
+template <class Item>
+void Line<Item>::arbitrate() {
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    if (frame_on_bus_) return;
+    Node winner = nodes_.size();
+    std::uint32_t lowest = 0;
+    for (Node node = 0; node < nodes_.size(); ++node) {
+      const State& state = *nodes_[node];
+      if (!state.frame_pending()) continue;
+      const std::uint32_t field = arbitration_field(state.out[state.index]);
+      if (winner != nodes_.size() && field >= lowest) continue;
+      winner = node;
+      lowest = field;
+    }
+    if (winner == nodes_.size()) return;
+    frame_on_bus_ = true;
+    State& state = *nodes_[winner];
+    state.start = now_;
+    schedule(Happening::Kind::frame, now_ + state.settings.bits(frame_bits(state.out[state.index])), winner);
+  }
+}
+
+template <class Item>
+void Line<Item>::end_frame(Node node) {
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    State& sender = *nodes_[node];
+    const CanFrame frame = sender.out[sender.index];
+    if (observer_) observer_(node, sender.start, now_, frame);
+    // Who began with the same arbitration field sent at the same time: unnoticed when all the rest was the same too,
+    // otherwise no frame survives. Nobody repeats it: the clash would never end.
+    std::vector<Node> senders;
+    bool clash = false;
+    for (Node other = 0; other < nodes_.size(); ++other) {
+      const State& state = *nodes_[other];
+      if (!state.frame_pending() || state.start > sender.start) continue;
+      if (arbitration_field(state.out[state.index]) != arbitration_field(frame)) continue;
+      clash = clash || !(state.out[state.index] == frame);
+      senders.push_back(other);
+    }
+    for (const Node other : senders) {
+      if (++nodes_[other]->index == nodes_[other]->out.size()) schedule(Happening::Kind::finished, now_, other);
+    }
+    for (Node other = 0; other < nodes_.size(); ++other) {
+      const bool sent_it = std::find(senders.begin(), senders.end(), other) != senders.end();
+      if (clash || !sent_it || (other == node && sender.echo)) hear(other, node, frame, clash);
+    }
+  }
+}
+
+// line.cpp instantiates the class; these are the members it does not see.
+template void Line<std::uint8_t>::begin(Node);
+template bool Line<std::uint8_t>::hears(const State&, const State&) const;
+template bool Line<std::uint8_t>::busy_towards(const State&) const;
+template void Line<std::uint8_t>::begin_characters(Node);
+template void Line<std::uint8_t>::frame_character(Node);
+template void Line<std::uint8_t>::end_character(Node);
+template void Line<std::uint8_t>::begin_exchange(Node);
+template void Line<std::uint8_t>::end_exchange(Node);
+template void Line<std::uint8_t>::arbitrate();
+template void Line<std::uint8_t>::end_frame(Node);
+template void Line<std::uint8_t>::hear(Node, Node, const std::uint8_t&, bool);
+template void Line<CanFrame>::begin(Node);
+template bool Line<CanFrame>::hears(const State&, const State&) const;
+template bool Line<CanFrame>::busy_towards(const State&) const;
+template void Line<CanFrame>::begin_characters(Node);
+template void Line<CanFrame>::frame_character(Node);
+template void Line<CanFrame>::end_character(Node);
+template void Line<CanFrame>::begin_exchange(Node);
+template void Line<CanFrame>::end_exchange(Node);
+template void Line<CanFrame>::arbitrate();
+template void Line<CanFrame>::end_frame(Node);
+template void Line<CanFrame>::hear(Node, Node, const CanFrame&, bool);
+
+}  // namespace absenc::sim

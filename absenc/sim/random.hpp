@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// A tiny generator (splitmix64) with the same numbers on every platform: a failure is repeated from its seed.
+#pragma once
+
+#include <cstdint>
+
+namespace absenc::sim {
+
+/// Not for secrets.
+class Random {
+ public:
+  explicit constexpr Random(std::uint64_t seed) : state_(seed) {}
+
+  /// 64 random bits.
+  constexpr std::uint64_t next() {
+    state_ += 0x9E3779B97F4A7C15;
+    std::uint64_t mixed = state_;
+    mixed = (mixed ^ (mixed >> 30)) * 0xBF58476D1CE4E5B9;
+    mixed = (mixed ^ (mixed >> 27)) * 0x94D049BB133111EB;
+    return mixed ^ (mixed >> 31);
+  }
+
+  /// 0 to limit - 1, each equally likely; `limit` must not be 0.
+  constexpr std::uint64_t below(std::uint64_t limit) {
+    const std::uint64_t uneven = (0 - limit) % limit;  // 2^64 mod limit: so many values would come once too often
+    std::uint64_t value = next();
+    while (value < uneven) value = next();
+    return value % limit;
+  }
+
+  /// True with this probability: 0 never, 1 always.
+  constexpr bool chance(double probability) { return static_cast<double>(next() >> 11) * 0x1p-53 < probability; }
+
+ private:
+  std::uint64_t state_;
+};
+
+}  // namespace absenc::sim

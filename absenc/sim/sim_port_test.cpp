@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/sim/sim_port.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <stdexcept>
+#include <vector>
+
+#include "absenc/host/drive.hpp"
+
+namespace absenc::sim {
+namespace {
+
+using std::chrono::microseconds;
+using Kind = Event<std::uint8_t>::Kind;
+using StepKind = Step<std::uint8_t>::Kind;
+
+// Answers each byte with itself and its successor 3 us later.
+class Answerer final : public Machine<std::uint8_t> {
+ public:
+  void feed(const Event<std::uint8_t>& event) override {
+    if (event.kind != Kind::received) return;
+    reply_ = {event.items[0], static_cast<std::uint8_t>(event.items[0] + 1)};
+    at_ = event.at + microseconds(3);
+    pending_ = true;
+  }
+  Step<std::uint8_t> next(Time) override {
+    if (!pending_) return {};
+    pending_ = false;
+    return {.kind = StepKind::transfer, .out = reply_, .at = at_};
+  }
+
+ private:
+  std::array<std::uint8_t, 2> reply_{};
+  Time at_{};
+  bool pending_ = false;
+};
+
+// Asks a given number of times, 100 us apart, and emits every answer.
+class Asker final : public Machine<std::uint8_t> {
+ public:
+  explicit Asker(int times) : left_(times) {}
+  void feed(const Event<std::uint8_t>& event) override {
+    if (event.kind == Kind::received) got_ += event.items.size();
+    if (event.kind == Kind::sent) sent_at = event.at;
+    last = event;
+    if (got_ == 2 || event.kind == Kind::silence) result_ = true;
+  }
+  Step<std::uint8_t> next(Time now) override {
+    if (result_) {
+      result_ = false;
+      got_ = 0;
+      --left_;
+      due_ = true;
+      return {.kind = StepKind::emit};
+    }
+    if (left_ == 0) return {.kind = StepKind::done};
+    if (!due_) return {.answer = microseconds(50), .gap = microseconds(20)};
+    due_ = false;
+    asked_at_ = std::max(now, asked_at_ + microseconds(100));
+    return {.kind = StepKind::transfer, .out = request_, .at = asked_at_};
+  }
+  Event<std::uint8_t> last{};
+  Time sent_at{};
+
+ private:
+  static constexpr std::array<std::uint8_t, 1> request_{0x41};
+  int left_;
+  std::size_t got_ = 0;
+  bool result_ = false;
+  bool due_ = true;
+  Time asked_at_ = -microseconds(100);
+};
+
+constexpr LineSettings settings{.rate = 1'000'000};  // a character takes 10 us
+
+TEST(SimPort, VirtualTimeJumpsAndIsExact) {
+  Answerer device;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device);
+  Asker asker(3);
+  std::vector<std::int64_t> times;
+  EXPECT_TRUE(host::drive(asker, port, [&] {
+    times.push_back(asker.last.at.count());
+    return true;
+  }));
+  EXPECT_EQ(times, (std::vector<std::int64_t>{33'000, 133'000, 233'000}));
+}
+
+TEST(SimPort, SilenceAndTimers) {
+  class Mute final : public Machine<std::uint8_t> {
+    void feed(const Event<std::uint8_t>&) override {}
+    Step<std::uint8_t> next(Time) override { return {}; }
+  } mute;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, mute);
+  EXPECT_THROW((void)port.wait({}), std::logic_error);
+  const std::array<std::uint8_t, 2> out{1, 2};
+  port.begin({.kind = StepKind::transfer, .out = out, .at = microseconds(5)});
+  EXPECT_THROW(port.begin({.kind = StepKind::transfer, .out = out}), std::logic_error);
+  const Step<std::uint8_t> patient{.at = microseconds(40), .answer = microseconds(50)};
+  const auto expect = [&](Kind kind, Time at) {
+    const Event<std::uint8_t> event = port.wait(patient);
+    EXPECT_EQ(event.kind, kind);
+    EXPECT_EQ(event.at, at);
+    EXPECT_EQ(port.now(), at);
+  };
+  expect(Kind::sent, microseconds(25));
+  expect(Kind::timer, microseconds(40));
+  expect(Kind::silence, microseconds(75));
+}
+
+TEST(SimPort, ConfigureChangesTheHostsEnd) {
+  Answerer device;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device);
+  port.begin({.kind = StepKind::configure, .settings = {.rate = 2'000'000}});
+  const std::array<std::uint8_t, 1> out{1};
+  port.begin({.kind = StepKind::transfer, .out = out});
+  EXPECT_EQ(port.wait({}).at, microseconds(5));
+}
+
+// A clock that runs 7 us every time somebody looks at it, and 30 us late out of every sleep.
+struct SlowWorld {
+  Time clock = std::chrono::seconds(1000);
+  int sleeps = 0;
+  RealTime real_time() {
+    return {[this] { return clock += microseconds(7); },
+            [this](Time until) {
+              ++sleeps;
+              clock = std::max(clock, until + microseconds(30));
+            }};
+  }
+};
+
+TEST(SimPort, KeepsPaceWithRealTimeAndStampsExactly) {
+  SlowWorld world;
+  Answerer device;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device, world.real_time());
+  Asker asker(50);
+  std::vector<Time> times;
+  EXPECT_TRUE(host::drive(asker, port, [&] {
+    if (times.size() == 10) world.clock += microseconds(5000);  // the caller is busy with something else
+    EXPECT_EQ(asker.last.kind, Kind::received);
+    EXPECT_EQ(asker.last.items.back(), 0x42);
+    EXPECT_EQ(asker.last.at - asker.sent_at, microseconds(23));
+    times.push_back(asker.last.at);
+    return true;
+  }));
+  ASSERT_EQ(times.size(), 50u);
+  EXPECT_LT(times[0], microseconds(200));
+  EXPECT_GE(times[11] - times[10], microseconds(5000));
+  EXPECT_GT(world.sleeps, 20);
+  EXPECT_GE(world.clock - std::chrono::seconds(1000), times.back());
+  EXPECT_LT(world.clock - std::chrono::seconds(1000) - times.back(), microseconds(150));
+}
+
+TEST(SimPort, LimitsDoNotRunWhileNobodyWaits) {
+  SlowWorld world;
+  Answerer device;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device, world.real_time());
+  const std::array<std::uint8_t, 1> out{1};
+  const Step<std::uint8_t> impatient{.answer = microseconds(50), .gap = microseconds(20)};
+  for (int i = 0; i < 2; ++i) {
+    port.begin({.kind = StepKind::transfer, .out = out});
+    EXPECT_EQ(port.wait(impatient).kind, Kind::sent);
+    EXPECT_EQ(port.wait(impatient).kind, Kind::received);
+    EXPECT_EQ(port.wait(impatient).kind, Kind::received);
+    world.clock += microseconds(1000);  // no silence is told for the step before
+    (void)port.now();
+  }
+  EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
+}
+
+TEST(SimPort, BrokenOffSleepLeavesThePortUsable) {
+  Time clock{};
+  bool interrupt = true;
+  Answerer device;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device,
+                             {[&] { return clock; },
+                              [&](Time until) {
+                                if (interrupt) throw std::runtime_error("interrupted");
+                                clock = until;
+                              }});
+  const std::array<std::uint8_t, 1> out{1};
+  port.begin({.kind = StepKind::transfer, .out = out});
+  EXPECT_THROW((void)port.wait({}), std::runtime_error);
+  interrupt = false;
+  EXPECT_EQ(port.wait({}).kind, Kind::sent);
+}
+
+TEST(SimPort, NeedsBothFunctionsOrNone) {
+  Answerer device;
+  EXPECT_THROW(SimPort<std::uint8_t>(LinkKind::half_duplex, settings, device, {[] { return Time{}; }, {}}),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace absenc::sim

@@ -1,0 +1,461 @@
+// SPDX-License-Identifier: Apache-2.0
+// The shape Step, Event, Machine (link/step.hpp) carries every kind of wire: toy machines in virtual time, with
+// exact times. Host and device of every conversation are machines of the same kind.
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absenc/sim/line.hpp"
+
+namespace absenc {
+namespace {
+
+using sim::Role;
+using std::chrono::microseconds;
+using Byte = std::uint8_t;
+
+std::string hex(unsigned value, int digits) {
+  std::string text;
+  for (int i = digits - 1; i >= 0; --i) text += "0123456789ABCDEF"[(value >> (4 * i)) & 0xF];
+  return text;
+}
+std::string text_of(Byte byte) { return hex(byte, 2); }
+std::string text_of(const CanFrame& frame) {
+  std::string text = hex(frame.id, frame.extended ? 8 : 3) + ':';
+  for (const Byte byte : frame.bytes()) text += hex(byte, 2);
+  return text;
+}
+
+// A machine whose reaction to each event is a function. It writes down everything it is told.
+template <class Item>
+class Toy final : public Machine<Item> {
+ public:
+  using Kind = typename Event<Item>::Kind;
+  using React = std::function<void(Toy&, const Event<Item>&)>;
+
+  explicit Toy(React react = {}) : react_(std::move(react)) {}
+
+  void feed(const Event<Item>& event) override {
+    static constexpr const char* names[] = {"sent", "received", "silence", "timer", "selected", "triggered", "error"};
+    log += (log.empty() ? "" : ", ") + std::to_string(event.at.count()) + ' ' + names[static_cast<int>(event.kind)];
+    for (const Item& item : event.items) log += ' ' + text_of(item);
+    if (event.bits != 0) log += ' ' + std::to_string(event.bits);
+    if (event.width.count() != 0) log += ' ' + std::to_string(event.width.count());
+    if (react_) react_(*this, event);
+  }
+  Step<Item> next(Time) override {
+    if (queue_.empty()) return idle;
+    Queued queued = std::move(queue_.front());
+    queue_.pop_front();
+    out_ = std::move(queued.items);
+    queued.step.out = out_;
+    return queued.step;
+  }
+
+  void push(Step<Item> step) { queue_.push_back({step, {}}); }
+  void send(std::vector<Item> items, Time at = {}, std::size_t bits = 0, std::size_t expect = 0) {
+    queue_.push_back(
+        {{.kind = Step<Item>::Kind::transfer, .expect = expect, .bits = bits, .at = at}, std::move(items)});
+  }
+  void emit() { push({.kind = Step<Item>::Kind::emit}); }
+  void finish() { push({.kind = Step<Item>::Kind::done}); }
+
+  Step<Item> idle{};  // what it waits with
+  std::string log;
+
+ private:
+  struct Queued {
+    Step<Item> step;
+    std::vector<Item> items;
+  };
+  React react_;
+  std::deque<Queued> queue_;
+  std::vector<Item> out_;
+};
+
+using ByteToy = Toy<Byte>;
+using CanToy = Toy<CanFrame>;
+using Kind = Event<Byte>::Kind;
+
+// (a) Request and reply on half duplex: 2.5 Mbps, a character is 4 us, the answer begins 3 us after the request.
+struct RequestReply : testing::Test {
+  sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 2'500'000}};
+  std::vector<Byte> answer{0x1A, 0x00, 0x55};
+  std::string due;  // `expect` of every wait
+  std::size_t missing = 3;
+  ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::received) self.send(answer, event.at + microseconds(3));
+  }};
+  ByteToy host{[this](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::received) missing -= event.items.size();
+    self.idle.expect = missing;
+    due += std::to_string(missing);
+    if (missing == 0 || event.kind == Kind::silence) self.finish();
+  }};
+
+  void begin(bool with_device) {
+    if (with_device) line.attach(Role::device, device);
+    host.idle.answer = microseconds(10);
+    host.idle.gap = microseconds(6);
+    host.send({0x1A});
+    EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+    line.run_until(line.now());  // the device's `sent` is at the same time
+  }
+};
+
+TEST_F(RequestReply, TimesAreExactAndBytesAreCountedOneByOne) {
+  begin(true);
+  EXPECT_EQ(host.log, "4000 sent, 11000 received 1A, 15000 received 00, 19000 received 55");
+  EXPECT_EQ(device.log, "4000 received 1A, 19000 sent");
+  EXPECT_EQ(due, "3210");
+}
+
+TEST_F(RequestReply, SilenceWhenNobodyAnswers) {
+  begin(false);
+  EXPECT_EQ(host.log, "4000 sent, 14000 silence");
+}
+
+TEST_F(RequestReply, SilenceWhenTheReplyStops) {
+  answer.resize(2);
+  begin(true);
+  EXPECT_EQ(host.log, "4000 sent, 11000 received 1A, 15000 received 00, 21000 silence");
+}
+
+TEST_F(RequestReply, CharacterThatHasBegunIsNoSilence) {
+  host.idle.at = microseconds(9);  // and a timer in the middle of it is not lost
+  line.attach(Role::device, device);
+  host.idle.answer = microseconds(4);
+  host.send({0x1A});
+  EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+  EXPECT_EQ(host.log, "4000 sent, 9000 timer, 11000 received 1A, 15000 received 00, 19000 received 55");
+}
+
+// (b) An endless stream: nobody asks, many results, the caller ends it.
+TEST(Stream, ManyResultsWithoutARequest) {
+  sim::Line<Byte> line(LinkKind::full_duplex, {.rate = 1'000'000});
+  Byte count = 0;
+  ByteToy device([&](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind != Kind::sent) return;
+    ++count;
+    self.send({0xFF, count, 0x81}, microseconds(100) * (count + 1));
+  });
+  device.send({0xFF, 0, 0x81}, microseconds(100));
+  std::vector<Byte> frame;
+  ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind != Kind::received) return;
+    frame.insert(frame.end(), event.items.begin(), event.items.end());
+    if (frame.size() == 3) self.emit();
+  });
+  host.idle.gap = microseconds(50);
+  std::vector<Byte> results;
+  line.attach(Role::device, device);
+  const auto node = line.attach(Role::host, host, [&] {
+    results.push_back(frame[1]);
+    frame.clear();
+    return results.size() < 3;
+  });
+  EXPECT_TRUE(line.run(node));
+  EXPECT_EQ(results, (std::vector<Byte>{0, 1, 2}));
+  EXPECT_EQ(line.now(), microseconds(330));
+  EXPECT_NE(host.log.find("130000 received 81, 180000 silence, 210000 received FF"), std::string::npos) << host.log;
+}
+
+// (c) Full-duplex SPI, EncoLink's way: every frame brings position, its check and one byte of a register access;
+// the host's second byte carries the request for it. The access needs four frames, each of which is a reading too.
+class ExchangeDevice final : public Machine<Byte> {
+ public:
+  void feed(const Event<Byte>& event) override {
+    if (event.kind == Kind::selected) {
+      const auto position = static_cast<Byte>(event.at / microseconds(1));  // latched now
+      frame_ = {position, static_cast<Byte>(~position), register_byte_};
+      selected_ = true;
+    } else if (event.kind == Kind::received) {
+      hear(event.items[1]);
+    }
+  }
+  Step<Byte> next(Time) override {
+    if (!std::exchange(selected_, false)) return {};
+    return {.kind = Step<Byte>::Kind::transfer, .out = frame_};
+  }
+
+ private:
+  void hear(Byte request) {
+    if (register_byte_ == 0x88) {
+      register_byte_ = static_cast<Byte>(address_ + 0x40);  // the register's value
+    } else if (previous_ == 0xCD) {
+      address_ = request;
+      register_byte_ = 0x88;  // read ready
+    } else {
+      register_byte_ = 0x33;  // idle
+    }
+    previous_ = register_byte_ == 0x33 ? request : Byte{0};
+  }
+  std::vector<Byte> frame_;
+  bool selected_ = false;
+  Byte register_byte_ = 0x33;
+  Byte previous_ = 0;
+  Byte address_ = 0;
+};
+
+class ExchangeHost final : public Machine<Byte> {
+ public:
+  void read_register(Byte address) { requests_ = {0xCD, address}; }
+  void feed(const Event<Byte>& event) override {
+    if (event.kind != Kind::received) return;
+    position = event.items[0];
+    good = event.items[1] == static_cast<Byte>(~position) && event.items.size() == 3;
+    if (value_next_) value = event.items[2];
+    value_next_ = event.items[2] == 0x88;
+    result_ = true;
+    frame_at_ += microseconds(50);
+    due_ = true;
+  }
+  Step<Byte> next(Time) override {
+    if (std::exchange(result_, false)) return {.kind = Step<Byte>::Kind::emit};
+    if (!std::exchange(due_, false)) return {};
+    out_ = {0x00, 0x00};
+    if (!requests_.empty()) {
+      out_[1] = requests_.front();
+      requests_.pop_front();
+    }
+    return {.kind = Step<Byte>::Kind::transfer, .out = out_, .expect = 3, .at = frame_at_};
+  }
+  Byte position = 0;
+  bool good = false;
+  int value = -1;
+
+ private:
+  std::deque<Byte> requests_;
+  std::vector<Byte> out_;
+  Time frame_at_{};
+  bool due_ = true;
+  bool result_ = false;
+  bool value_next_ = false;
+};
+
+TEST(Exchange, RegisterAccessRidesInPositionFrames) {
+  sim::Line<Byte> line(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1});
+  ExchangeDevice device;
+  ExchangeHost host;
+  std::string results;
+  line.attach(Role::device, device);
+  const auto node = line.attach(Role::host, host, [&] {
+    if (host.position == 50) host.read_register(0x4C);  // submitted while the stream goes on
+    results += std::to_string(line.now().count()) + (host.good ? " good " : " bad ") + std::to_string(host.position) +
+               ' ' + std::to_string(host.value) + '\n';
+    return host.value < 0;
+  });
+  EXPECT_TRUE(line.run(node));
+  EXPECT_EQ(results,
+            "24000 good 0 -1\n74000 good 50 -1\n124000 good 100 -1\n174000 good 150 -1\n224000 good 200 -1\n"
+            "274000 good 250 140\n");
+}
+
+// (d) Clocked bits: SSI with 13 bits, 250 kHz, then the word again from its MSB. 0x1234 left-aligned is 91 A0.
+struct Clocked : testing::Test {
+  sim::Line<Byte> line{LinkKind::clocked, {.rate = 250'000}};
+  std::string notes;
+  ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::selected) self.send({0x91, 0xA4, 0x8D, 0x3F});  // 13 + 13 bits, then ones
+    if (event.kind == Kind::sent && event.bits < 13) notes += "too few clocks: " + std::to_string(event.bits);
+  }};
+  ByteToy host{[](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::received) self.finish();
+  }};
+
+  void clock(std::size_t bits) {
+    line.attach(Role::device, device);
+    host.send({}, microseconds(1), bits);
+    EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+  }
+};
+
+TEST_F(Clocked, WordIsPackedMsbFirstAndLeftAligned) {
+  clock(13);
+  EXPECT_EQ(host.log, "53000 sent, 53000 received 91 A0");
+  EXPECT_EQ(device.log, "1000 selected, 53000 sent 13");
+  EXPECT_EQ(notes, "");
+}
+
+TEST_F(Clocked, ReaderClocksOnToCompare) {
+  clock(26);
+  EXPECT_EQ(host.log, "105000 sent, 105000 received 91 A4 8D 00");
+}
+
+TEST_F(Clocked, DeviceNoticesTooFewClocks) {
+  clock(8);
+  EXPECT_EQ(host.log, "33000 sent, 33000 received 91");
+  EXPECT_EQ(notes, "too few clocks: 8");
+}
+
+// (e) CAN at 250 kbit: a frame without data takes 47 bits of 4 us, each data byte 8 more.
+struct Can : testing::Test {
+  sim::Line<CanFrame> line{LinkKind::can, {.rate = 250'000}};
+  static CanFrame frame(std::uint32_t id, Byte data) { return {.id = id, .size = 1, .data = {data}}; }
+  // Starts at the command 01 and then sends every millisecond.
+  static CanToy::React cyclic(std::uint32_t id, Byte data) {
+    return [=, at = Time{}](CanToy& self, const Event<CanFrame>& event) mutable {
+      if (event.kind == CanToy::Kind::received && event.items[0].data[0] == 0x01) {
+        at = event.at;
+      } else if (event.kind != CanToy::Kind::sent) {
+        return;
+      }
+      at += microseconds(1000);
+      self.send({frame(id, data)}, at);
+    };
+  }
+};
+
+TEST_F(Can, StartCommandThenCyclicFramesByArbitration) {
+  CanToy high(cyclic(0x121, 0xB0));
+  CanToy low(cyclic(0x120, 0xA0));  // begins at the same nanosecond, is asked later, and wins
+  CanToy host;
+  host.send({frame(0x200, 0x01)});
+  line.attach(Role::device, high);
+  line.attach(Role::device, low);
+  line.attach(Role::host, host);
+  line.run_until(microseconds(2500));
+  EXPECT_EQ(host.log, "220000 sent, 1440000 received 120:A0, 1660000 received 121:B0, 2440000 received 120:A0");
+  EXPECT_EQ(low.log, "220000 received 200:01, 1440000 sent, 1660000 received 121:B0, 2440000 sent");
+  EXPECT_EQ(high.log, "220000 received 200:01, 1440000 received 120:A0, 1660000 sent, 2440000 received 120:A0");
+}
+
+TEST_F(Can, SameIdentifierWithOtherDataIsALineError) {
+  CanToy one(cyclic(0x120, 0xA0));
+  CanToy two(cyclic(0x120, 0xA1));
+  CanToy host;
+  host.send({frame(0x200, 0x01)});
+  for (CanToy* device : {&one, &two}) line.attach(Role::device, *device);
+  line.attach(Role::host, host);
+  line.run_until(microseconds(2000));
+  EXPECT_EQ(host.log, "220000 sent, 1440000 error");
+  for (CanToy* device : {&one, &two}) EXPECT_EQ(device->log, "220000 received 200:01, 1440000 error, 1440000 sent");
+}
+
+TEST_F(Can, StandardFrameWinsAgainstExtendedOneWithTheSameBeginning) {
+  CanToy extended;
+  extended.send({CanFrame{.id = 0x120u << 18, .extended = true}}, microseconds(10));
+  CanToy standard;
+  standard.send({frame(0x120, 0xA0)}, microseconds(10));
+  line.attach(Role::device, extended);
+  line.attach(Role::device, standard);
+  line.run_until(microseconds(1000));
+  EXPECT_EQ(standard.log, "230000 sent, 498000 received 04800000:");
+}
+
+// (f) A pulse on a line of its own asks for each frame: 10 us wide, the answer begins 30 us after its edge.
+TEST(Trigger, PulseBeforeEachFrame) {
+  sim::Line<Byte> line(LinkKind::half_duplex, {.rate = 1'000'000});
+  ByteToy device([](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::triggered && event.width >= microseconds(10))
+      self.send({0xFF}, event.at + microseconds(30));
+  });
+  const auto pulse = [](ByteToy& toy, Time at, Time width) {
+    toy.push({.kind = Step<Byte>::Kind::pulse, .at = at, .width = width, .line = Line::trigger});
+  };
+  ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));  // too short
+    if (event.kind == Kind::silence) self.finish();
+  });
+  host.idle.answer = microseconds(40);
+  pulse(host, Time{}, microseconds(10));
+  line.attach(Role::device, device);
+  EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+  EXPECT_EQ(host.log, "10000 sent, 40000 received FF, 109000 sent, 149000 silence");
+  EXPECT_EQ(device.log, "0 triggered 10000, 40000 sent, 100000 triggered 9000");
+}
+
+// (g) Another baud rate in the middle: both ends change after the last bit of the answer to the command 19.
+struct BaudChange : testing::Test {
+  static constexpr LineSettings fast{.rate = 2'000'000};
+  sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
+  bool changed = false;
+  ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::received) self.send({event.items[0]}, event.at + microseconds(5));
+    if (event.kind == Kind::line_error) self.send({0xEE}, event.at + microseconds(5));
+    if (event.kind == Kind::sent && !std::exchange(changed, true)) configure(self);
+  }};
+  static void configure(ByteToy& toy) { toy.push({.kind = Step<Byte>::Kind::configure, .settings = fast}); }
+
+  std::string talk(bool host_follows) {
+    ByteToy host([=](ByteToy& self, const Event<Byte>& event) {
+      if (event.kind == Kind::sent) return;
+      if (event.kind != Kind::received || event.items[0] != 0x19) return self.finish();
+      if (host_follows) configure(self);
+      self.send({0x01}, event.at + microseconds(5));
+    });
+    host.send({0x19});
+    line.attach(Role::device, device);
+    EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+    return host.log;
+  }
+};
+
+TEST_F(BaudChange, TalkGoesOn) {
+  EXPECT_EQ(talk(true), "10000 sent, 25000 received 19, 35000 sent, 45000 received 01");
+}
+
+TEST_F(BaudChange, HostThatDoesNotFollowGetsLineErrors) {
+  EXPECT_EQ(talk(false), "10000 sent, 25000 received 19, 40000 sent, 50000 error");
+  EXPECT_EQ(device.log, "10000 received 19, 25000 sent, 40000 error");
+}
+
+// (h) Two nodes answer: the wire carries the AND. A transceiver that cannot mute itself hears its own bytes first.
+struct Collision : testing::Test {
+  sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
+  static ByteToy::React answer(std::vector<Byte> bytes, Time delay) {
+    return [=](ByteToy& self, const Event<Byte>& event) {
+      if (event.kind == Kind::received && event.items[0] == 0x1A) self.send(bytes, event.at + delay);
+    };
+  }
+  std::string ask(ByteToy::React one, ByteToy::React two, bool echo) {
+    ByteToy first(one);
+    ByteToy second(two);
+    ByteToy host;
+    host.send({0x1A}, microseconds(1));
+    line.attach(Role::device, first);
+    line.attach(Role::device, second);
+    line.set_echo(line.attach(Role::host, host), echo);
+    line.run_until(microseconds(100));
+    return host.log;
+  }
+};
+
+TEST_F(Collision, BytesAreTheAnd) {
+  EXPECT_EQ(ask(answer({0xF3, 0x0F}, microseconds(3)), answer({0x35}, microseconds(3)), false),
+            "11000 sent, 24000 received 31, 34000 received 0F");
+}
+
+TEST_F(Collision, OverlapInTheMiddleOfACharacter) {
+  EXPECT_EQ(ask(answer({0xF3, 0x7E}, microseconds(3)), answer({0x3D}, microseconds(7)), false),
+            "11000 sent, 24000 received 31, 34000 received 3C");
+}
+
+TEST_F(Collision, EchoComesBeforeSent) {
+  EXPECT_EQ(ask(answer({0x07}, microseconds(3)), {}, true), "11000 received 1A, 11000 sent, 24000 received 07");
+}
+
+TEST_F(Collision, DeviceHearsARequestDuringItsOwnTransmission) {
+  ByteToy device(answer({0x01, 0x02, 0x03}, microseconds(3)));
+  ByteToy host([](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::received && event.items[0] == 0x01) self.send({0x77}, event.at + microseconds(4));
+  });
+  host.send({0x1A});
+  line.attach(Role::device, device);
+  line.attach(Role::host, host);
+  line.run_until(microseconds(60));
+  EXPECT_EQ(device.log, "10000 received 1A, 37000 received 02, 43000 sent");
+}
+
+TEST_F(Collision, TransferDuringOnesOwnTransferIsABugOfTheMachine) {
+  ByteToy host;
+  host.send({0x01});
+  host.send({0x02});
+  EXPECT_THROW(line.attach(Role::host, host), std::logic_error);
+}
+
+}  // namespace
+}  // namespace absenc
