@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one list of protocol units. The command, the capture decoder and the generic tests walk it.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc {
+
+[[nodiscard]] std::span<const Unit* const> all_units();
+
+/// Null when there is no unit of that id.
+[[nodiscard]] const Unit* find_unit(std::string_view id);
+
+}  // namespace absenc

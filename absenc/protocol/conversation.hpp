@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// The two roles a unit plays: conversations (host side) and virtual encoders (device side). Both are machines.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/link/step.hpp"
+#include "absenc/protocol/field.hpp"
+
+namespace absenc {
+
+/// The last request and what came back, kept so that nobody has to reproduce a bad frame to see it.
+template <class Item>
+struct Exchange {
+  std::span<const Item> sent{};
+  std::span<const Item> received{};
+  Time sent_at{};      // end of the last bit sent
+  Time received_at{};  // end of the last bit received; sent_at when nothing came
+};
+
+/// Host side. At `emit` and `done` the accessors describe the result; they stay valid until the next feed.
+template <class Item>
+struct Conversation : Machine<Item> {
+  /// `none`, or why there is no result. After `done` it tells how the whole procedure ended.
+  [[nodiscard]] virtual Error error() const = 0;
+  /// More than the error's own text, for people: which step failed, what was found. May be empty.
+  [[nodiscard]] virtual std::string_view detail() const { return {}; }
+  /// The position, when the result is one and there was no error; otherwise null.
+  [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
+  /// Every named value of the result. Nothing is put when there was an error.
+  virtual void report(FieldSink& sink) const = 0;
+  [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
+
+ protected:
+  ~Conversation() = default;
+};
+
+/// A timing or access rule that the host broke.
+struct Violation {
+  std::string_view rule;
+  Time at;
+};
+
+/// Device side: a virtual encoder with its own memory, alarms and timing rules.
+template <class Item>
+struct Device : Machine<Item> {
+  enum class PowerOn : std::uint8_t {
+    real,  // with the document's start-up time
+    skip,  // ready at once
+  };
+  virtual void power_on(Time now, PowerOn kind) = 0;
+  virtual void power_off(Time now) = 0;
+  /// Raises the alarms of `bits` (of the unit's alarms field): latched ones until they are cleared by the host,
+  /// the others until `lower_alarms`.
+  virtual void raise_alarms(std::uint32_t bits) = 0;
+  virtual void lower_alarms(std::uint32_t bits) = 0;
+  /// Everything that survives power off. Write to it only while the encoder is off.
+  [[nodiscard]] virtual MutableBytes memory() = 0;
+  /// Counts up with every change of `memory`.
+  [[nodiscard]] virtual std::uint32_t memory_version() const = 0;
+  /// The first rules broken, in order; `violation_count` goes on counting when they no longer fit.
+  [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
+  [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
+  /// Requests answered so far.
+  [[nodiscard]] virtual std::uint64_t answered() const = 0;
+
+ protected:
+  ~Device() = default;
+};
+
+}  // namespace absenc

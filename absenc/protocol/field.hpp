@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Named values of a decoded frame: described once as data by the unit, handed out as numbers.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "absenc/core/bytes.hpp"
+
+namespace absenc {
+
+/// One bit of a status or alarm field.
+struct FlagInfo {
+  std::string_view name;     // "" when the bit has no meaning
+  std::string_view meaning;  // what has happened
+  std::string_view action;   // what the operator must do; "" when nothing
+};
+
+struct FieldInfo {
+  enum class Kind : std::uint8_t {
+    number,
+    boolean,
+    flags,  // bit n is flags[n]
+    real,
+    text,   // ASCII
+    bytes,  // shown as hexadecimal
+  };
+  std::string_view name;
+  Kind kind;
+  std::string_view unit;  // "" for a plain number; "counts", "revolutions", "degC" ...
+  std::string_view meaning;
+  std::span<const FlagInfo> flags{};
+};
+
+struct FieldValue {
+  const FieldInfo* info;
+  std::int64_t number = 0;  // number, boolean, flags
+  double real = 0;
+  Bytes bytes{};  // text, bytes; valid during the call of `put`
+};
+
+struct FieldSink {
+  constexpr virtual void put(const FieldValue& value) = 0;
+
+ protected:
+  constexpr ~FieldSink() = default;
+};
+
+}  // namespace absenc

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/options.hpp"
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc {
+
+Result<std::int64_t> parse_number(std::string_view text) {
+  const bool negative = text.starts_with('-');
+  if (negative) text.remove_prefix(1);
+  unsigned base = 10;
+  if (text.starts_with("0x") || text.starts_with("0X")) {
+    base = 16;
+    text.remove_prefix(2);
+  }
+  if (text.empty()) return Error::invalid_argument;
+  std::int64_t value = 0;
+  for (const char c : text) {
+    unsigned digit = base;
+    if (c >= '0' && c <= '9') digit = static_cast<unsigned>(c - '0');
+    if (c >= 'a' && c <= 'f') digit = static_cast<unsigned>(c - 'a' + 10);
+    if (c >= 'A' && c <= 'F') digit = static_cast<unsigned>(c - 'A' + 10);
+    if (digit >= base) return Error::invalid_argument;
+    if (value > (INT64_MAX - digit) / base) return Error::invalid_argument;
+    value = value * base + digit;
+  }
+  return negative ? -value : value;
+}
+
+namespace {
+
+Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
+  for (std::size_t i = 0; i < option.choices.size(); ++i) {
+    if (option.choices[i] == text) return static_cast<std::int64_t>(i);
+  }
+  if (!option.choices.empty()) return Error::invalid_argument;
+  const Result<std::int64_t> number = parse_number(text);
+  if (!number || *number < option.minimum || *number > option.maximum) return Error::invalid_argument;
+  return number;
+}
+
+bool agrees(const Model& model, std::span<const bool> set, const Options& options) {
+  for (const OptionValue& value : model.values) {
+    if (set[value.option] && options[value.option] != value.value) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+OptionError resolve_options(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
+                            Options& resolved) {
+  Options options;
+  std::array<bool, maximum_options> set{};
+  for (std::size_t i = 0; i < unit.options.size(); ++i) options.values[i] = unit.options[i].default_value;
+
+  for (const OptionText& setting : settings) {
+    std::size_t index = 0;
+    while (index < unit.options.size() && unit.options[index].name != setting.name) ++index;
+    if (index == unit.options.size()) return {OptionError::Kind::unknown_option, setting.name, nullptr};
+    const Option& option = unit.options[index];
+    const Result<std::int64_t> value = parse_value(option, setting.value);
+    if (!value) return {OptionError::Kind::bad_value, setting.value, &option};
+    options.values[index] = *value;
+    set[index] = true;
+  }
+
+  for (const Model& candidate : unit.models) {
+    if (model.empty() ? agrees(candidate, set, options) : candidate.name == model) {
+      options.model = &candidate;
+      break;
+    }
+  }
+  if (options.model != nullptr) {
+    for (const OptionValue& value : options.model->values) {
+      if (!set[value.option]) options.values[value.option] = value.value;
+    }
+  } else if (!model.empty()) {
+    return {OptionError::Kind::unknown_model, model, nullptr};
+  }
+  resolved = options;
+  return {};
+}
+
+}  // namespace absenc

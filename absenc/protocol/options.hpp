@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can be set about a unit, as data: bits, checks, profiles. A model is a named set of option values.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "absenc/core/result.hpp"
+
+namespace absenc {
+
+inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
+
+/// A number in a range, or one of `choices` (then the value is the index into it).
+struct Option {
+  std::string_view name;
+  std::string_view meaning;
+  std::int64_t default_value;
+  std::int64_t minimum = 0;
+  std::int64_t maximum = 0;
+  std::span<const std::string_view> choices{};
+  bool probeable = false;  // whether captured frames can tell which value is right
+};
+
+struct OptionValue {
+  std::size_t option;  // index into the unit's options
+  std::int64_t value;
+};
+
+struct Model {
+  std::string_view name;
+  std::string_view meaning;
+  std::uint32_t maximum_rpm;  // fastest shaft for which a position is specified
+  std::span<const OptionValue> values;
+};
+
+inline constexpr std::size_t maximum_options = 16;
+
+/// The value of every option of one unit, by the index of the option.
+struct Options {
+  std::array<std::int64_t, maximum_options> values{};
+  const Model* model = nullptr;  // null: no known model has these values
+
+  [[nodiscard]] constexpr std::int64_t operator[](std::size_t option) const { return values[option]; }
+};
+
+/// An option as the user wrote it.
+struct OptionText {
+  std::string_view name;
+  std::string_view value;
+};
+
+/// Why options could not be resolved: `text` is the name or value at fault, `option` the one it was meant for.
+struct OptionError {
+  enum class Kind : std::uint8_t { none, unknown_model, unknown_option, bad_value } kind = Kind::none;
+  std::string_view text{};
+  const Option* option = nullptr;
+};
+
+struct Unit;
+
+/// Option values from a model and single settings, which override it. Without a model name (empty), the first model
+/// that agrees with all the settings is taken; when none does, the unit's defaults, which know no particular model.
+[[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
+                                          std::span<const OptionText> settings, Options& resolved);
+
+/// A whole number, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.
+[[nodiscard]] Result<std::int64_t> parse_number(std::string_view text);
+
+}  // namespace absenc

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// The descriptor of one protocol: everything the neutral layers and the command know about it, as data and functions.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "absenc/core/shaft.hpp"
+#include "absenc/link/can.hpp"
+#include "absenc/link/line.hpp"
+#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/field.hpp"
+#include "absenc/protocol/options.hpp"
+
+namespace absenc {
+
+/// What a command is for. The command-line verbs look a unit's commands up by this.
+enum class Verb : std::uint8_t {
+  read,  // the position, with all the alarms the unit can tell; the first such command is the one `read` uses
+  read_part,
+  info,
+  temperature,
+  clear_alarms,
+  zero,
+  reset_multiturn,
+  memory_read,
+  memory_write,
+  config_get,
+  config_set,
+  run,  // a procedure only this unit has
+};
+
+struct Argument {
+  std::string_view name;
+  std::string_view meaning;
+  std::int64_t minimum;
+  std::int64_t maximum;
+  std::int64_t default_value = 0;
+  bool required = true;
+};
+
+using Arguments = std::span<const std::int64_t>;  // one value for each Argument of the command, defaults filled in
+
+struct Command {
+  std::string_view name;
+  Verb verb;
+  std::uint8_t id;  // the unit's own number for it
+  std::string_view meaning;
+  std::span<const Argument> arguments{};
+  bool changes_encoder = false;
+  bool repeatable = true;  // whether the same request may be sent again after an error
+};
+
+/// A frame in the form its link carries.
+struct Frame {
+  Bytes bytes{};
+  std::size_t bits = 0;           // clocked links: how many bits of `bytes` count
+  const CanFrame* can = nullptr;  // CAN links
+
+  [[nodiscard]] constexpr bool empty() const { return bytes.empty() && can == nullptr; }
+};
+
+/// One expected value of a vector.
+struct Expected {
+  std::string_view field;
+  std::int64_t number = 0;
+};
+
+/// A frame with what it must decode to. `options` is "name=value name=value".
+struct Vector {
+  std::string_view id;
+  std::string_view meaning;
+  std::string_view source;
+  std::string_view options;
+  Bytes request;
+  Bytes reply;
+  std::span<const Expected> fields{};
+  Error error = Error::none;
+};
+
+enum class Direction : std::uint8_t { request, reply };
+
+/// Where a frame ends in a run of bytes.
+struct Delimit {
+  enum class Kind : std::uint8_t {
+    complete,    // the first `size` bytes are one frame
+    incomplete,  // a frame may have begun; at least `size` bytes in all are needed
+    no_frame,    // the first byte begins no frame
+  } kind;
+  std::size_t size = 0;
+};
+
+/// A machine of whichever item its link carries; exactly one pointer is set, or none when it could not be made.
+template <template <class> class Role>
+struct Any {
+  Role<std::uint8_t>* bytes = nullptr;
+  Role<CanFrame>* frames = nullptr;
+};
+
+/// Bits of a position; 0: it has no such part.
+struct Resolution {
+  unsigned singleturn_bits = 0;
+  unsigned multiturn_bits = 0;
+};
+
+struct Unit {
+  std::string_view id;
+  std::string_view name;      // maker and protocol, for people
+  std::string_view document;  // the source
+  LinkKind link;
+  LineSettings line;
+  std::span<const Option> options;
+  std::span<const Model> models;
+  std::span<const FieldInfo> fields;
+  std::span<const Command> commands;
+  std::span<const Vector> vectors;
+  const FieldInfo* status;  // the flags of Reading::status; null when the unit has none
+  const FieldInfo* alarms;  // the flags of Reading::alarms
+  std::size_t host_storage;    // bytes that `host` needs, suitably aligned for any type
+  std::size_t device_storage;  // bytes that `device` needs
+
+  /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
+  Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
+  /// The request of a command. Errors: invalid_argument, buffer_too_small.
+  Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
+                                MutableBytes request);
+  Delimit (*delimit)(const Options& options, Direction direction, Bytes bytes);
+  Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
+                            std::span<std::byte> storage);
+  Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
+  /// What the options make of a position.
+  Resolution (*resolution)(const Options& options);
+  /// Whether a flip of this bit of a good reply must be noticed; null: every bit.
+  bool (*covered)(const Options& options, Frame request, std::size_t bit) = nullptr;
+};
+
+/// The first command with this verb, or null.
+[[nodiscard]] constexpr const Command* find_command(const Unit& unit, Verb verb) {
+  for (const Command& command : unit.commands) {
+    if (command.verb == verb) return &command;
+  }
+  return nullptr;
+}
+
+[[nodiscard]] constexpr const Command* find_command(const Unit& unit, std::string_view name) {
+  for (const Command& command : unit.commands) {
+    if (command.name == name) return &command;
+  }
+  return nullptr;
+}
+
+}  // namespace absenc
