@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// The only file that includes every unit: adding a protocol is its folder and one line here.
+#include "absenc/protocol/all.hpp"
+
+#include <array>
+
+#include "absenc/protocol/tformat/unit.hpp"
+
+namespace absenc {
+
+namespace {
+constexpr std::array units{
+    &tformat::unit,
+};
+}  // namespace
+
+std::span<const Unit* const> all_units() { return units; }
+
+const Unit* find_unit(std::string_view id) {
+  for (const Unit* unit : units) {
+    if (unit->id == id) return unit;
+  }
+  return nullptr;
+}
+
+}  // namespace absenc

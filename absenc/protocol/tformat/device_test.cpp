@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: Apache-2.0
+// The virtual Smart-Abs against the paragraphs of its specification, asked by hand-made bytes.
+#include "absenc/protocol/tformat/device.hpp"
+
+#include <gtest/gtest.h>
+
+#include "absenc/core/hex.hpp"
+#include "absenc/protocol/tformat/bench_test.hpp"
+
+namespace absenc::tformat {
+namespace {
+
+using testing::Bench;
+using PowerOn = Device<std::uint8_t>::PowerOn;
+using Wire = std::vector<std::uint8_t>;
+
+Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
+Wire wire(const Reply& reply) { return wire(encode_reply(reply).view()); }
+Wire wire(const Request& request) { return wire(encode_request(request).view()); }
+
+void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
+  for (unsigned i = 0; i < times; ++i) {
+    EXPECT_EQ(bench.raw({control_field(id)}).size(), 6u);
+    bench.pass(reset_interval);
+  }
+}
+
+Wire memory_write(Bench& bench, std::uint8_t address, std::uint8_t value) {
+  return bench.raw(wire(Request{DataId::write_memory, address, value}));
+}
+Wire memory_read(Bench& bench, std::uint8_t address) {
+  return bench.raw(wire(Request{DataId::read_memory, address}));
+}
+
+TEST(TformatDevice, AnswersEveryDataId) {
+  Bench bench;
+  bench.shaft.put(4660, 0x12345);
+  EXPECT_EQ(bench.raw({0x02}), wire(Reply{.id = DataId::singleturn, .singleturn = 0x12345}));
+  EXPECT_EQ(bench.raw({0x8A}), wire(Reply{.id = DataId::multiturn, .multiturn = 4660}));
+  EXPECT_EQ(bench.raw({0x92}), wire(Reply{.id = DataId::encoder_id, .encoder_id = 0x11}));
+  const Wire everything = bench.raw({0x1A});
+  EXPECT_EQ(everything, wire(Reply{.singleturn = 0x12345, .multiturn = 4660, .encoder_id = 0x11}));
+  for (const std::uint8_t field : std::to_array<std::uint8_t>({0xBA, 0xC2, 0x62})) {
+    EXPECT_EQ(bench.raw({field}), wire(Reply{.id = *data_id(field), .singleturn = 0x12345}));
+  }
+  EXPECT_EQ(memory_read(bench, 1), wire(hex<"EA0100EB">));
+  EXPECT_EQ(memory_write(bench, 1, 0x5A), wire(hex<"32015A69">));
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+}
+
+TEST(TformatDevice, AnswersThreeMicrosecondsAfterTheRequest) {
+  Bench bench;
+  testing::RawHost host({0x1A}, 5us);
+  bench.run(host);
+  EXPECT_EQ(host.sent_at, 9us);
+  EXPECT_EQ(host.first_byte_at, 9us + 3us + 4us);
+}
+
+TEST(TformatDevice, CountsRoundTheTurnAndBelowZero) {
+  Bench bench;
+  bench.shaft.put(-1, 0x1FFFF);
+  const Reply reply = bench.everything();
+  EXPECT_EQ(reply.singleturn, 0x1FFFFu);
+  EXPECT_EQ(reply.multiturn, 0xFFFFu);
+}
+
+// ---- Abnormal requests (8.4, 9.4)
+
+TEST(TformatDevice, AbnormalRequestsAreAnsweredLikeId3) {
+  Bench bench;
+  const Wire plain = wire(Reply{.encoder_id = 0x11});
+  const Wire parity = wire(Reply{.status = status::parity_error, .encoder_id = 0x11});
+  EXPECT_EQ(bench.raw({0x9A}), parity);                                         // parity of ID 3
+  EXPECT_EQ(bench.raw({control_field(0x4)}), plain);                            // unknown id
+  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);                              // CRC
+  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                                    // cut short
+  EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);                 // busy bit in a request
+  EXPECT_EQ(bench.raw({0x00}), Wire{});                                         // sync code: no answer
+  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);                                    // ... but the next start is found
+  EXPECT_EQ(memory_write(bench, 127, 6), plain);                                // closed page
+  EXPECT_EQ(memory_write(bench, 127, 7), wire(hex<"327F074A">));
+  bench.pass(memory_time);
+  EXPECT_EQ(memory_read(bench, 3), plain);  // page 7 is closed but for 4 and 5
+  EXPECT_EQ(memory_write(bench, 5, 1), plain);
+  EXPECT_EQ(memory_read(bench, 4), wire(hex<"EA04DA34">));
+  EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 35}));
+}
+
+TEST(TformatDevice, ADamagedCharacterIsADelimiterError) {
+  Bench bench;
+  LineSettings slow = line_settings;
+  slow.rate = 1'000'000;
+  struct WrongRate final : Machine<std::uint8_t> {
+    explicit WrongRate(LineSettings rate) : settings(rate) {}
+    void feed(const Event<std::uint8_t>&) override {}
+    Step<std::uint8_t> next(Time) override {
+      using Kind = Step<std::uint8_t>::Kind;
+      if (step == 0) return ++step, Step<std::uint8_t>{.kind = Kind::configure, .settings = settings};
+      if (step == 1) return ++step, Step<std::uint8_t>{.kind = Kind::transfer, .out = byte};
+      return {.at = never};
+    }
+    LineSettings settings;
+    int step = 0;
+    std::array<std::uint8_t, 1> byte{0x1A};
+  } host(slow);
+  std::vector<std::uint8_t> answer;
+  bench.line.observe([&answer](auto sender, Time, Time, std::uint8_t byte) {
+    if (sender == 0) answer.push_back(byte);
+  });
+  bench.line.attach(sim::Role::host, host);
+  bench.pass(1ms);
+  EXPECT_EQ(answer, wire(Reply{.status = status::delimiter_error, .encoder_id = 0x11}));
+}
+
+// ---- Memory (6.3.5)
+
+TEST(TformatDevice, IsBusyFor18MillisecondsAfterAWrite) {
+  Bench bench;
+  memory_write(bench, 5, 0x77);
+  const Time written = bench.line.now();
+  EXPECT_EQ(memory_read(bench, 5), wire(hex<"EA85006F">));
+  EXPECT_EQ(memory_write(bench, 6, 1), wire(hex<"328600B4">));
+  bench.line.run_until(written + memory_time);
+  EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 0x77}));
+  EXPECT_EQ(memory_read(bench, 6), wire(Reply{.id = DataId::read_memory, .address = 6}));  // was not executed
+  EXPECT_EQ(bench.encoder.writes(), 1u);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);  // asking a writing encoder whether it is ready is allowed
+}
+
+TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
+  Bench bench;
+  for (std::uint8_t page = 0; page < user_pages; ++page) {
+    memory_write(bench, 127, page);
+    bench.pass(memory_time);
+    memory_write(bench, 126, static_cast<std::uint8_t>(0xA0 + page));
+    bench.pass(memory_time);
+  }
+  EXPECT_EQ(bench.encoder.writes(), 6u);  // page changes do not wear
+  memory_write(bench, 127, 2);
+  memory_read(bench, 126);
+  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, "memory access before the page is ready");
+  bench.pass(memory_time);
+  EXPECT_EQ(memory_read(bench, 126)[2], 0xA2);
+  // Page 0 after power on.
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(memory_read(bench, 126)[2], 0xA0);
+}
+
+// ---- Resets (10)
+
+TEST(TformatDevice, TenRequestsMakeAReset) {
+  Bench bench;
+  bench.shaft.put(7, 1000);
+  bench.encoder.raise_alarms(alarms::over_heat | alarms::counter_overflow);
+  reset(bench, DataId::clear_alarms, 9);
+  EXPECT_NE(bench.everything().alarms, 0);  // and this read starts the count again
+  reset(bench, DataId::clear_alarms, 9);
+  EXPECT_NE(bench.raw({0xBA})[1] & status::alarm, 0);  // the tenth still shows the old errors
+  bench.pass(reset_interval);
+  EXPECT_EQ(bench.everything().alarms, 0);
+  EXPECT_EQ(bench.everything().multiturn, 7u);
+  reset(bench, DataId::reset_multiturn);
+  EXPECT_EQ(bench.everything().multiturn, 0u);
+  EXPECT_EQ(bench.everything().singleturn, 1000u);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+}
+
+TEST(TformatDevice, ZeroTakes18MillisecondsAndSurvivesPowerOff) {
+  Bench bench;
+  bench.shaft.put(7, 1000);
+  reset(bench, DataId::zero);
+  EXPECT_EQ(bench.everything().singleturn, 1000u);
+  EXPECT_EQ(memory_read(bench, 1)[1] & busy_bit, busy_bit);
+  bench.pass(memory_time);
+  EXPECT_EQ(bench.everything().singleturn, 0u);
+  EXPECT_EQ(bench.everything().multiturn, 7u);
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().singleturn, 0u);
+  bench.shaft.put(7, 999);
+  EXPECT_EQ(bench.everything().singleturn, 0x1FFFFu);
+  EXPECT_EQ(bench.everything().multiturn, 6u);
+}
+
+TEST(TformatDevice, ResetsSentTooFastOrOnATurningShaftDoNothing) {
+  Bench bench;
+  bench.shaft.put(3, 0);
+  for (unsigned i = 0; i < 20; ++i) {  // the next request right behind each reply: 31 us apart
+    testing::RawHost host({0x62}, bench.line.now());
+    if (bench.host == Bench::none) bench.host = bench.line.attach(sim::Role::host, host);
+    else bench.line.replace(bench.host, host);
+    while (host.reply.size() < 6) bench.line.step();
+  }
+  EXPECT_EQ(bench.encoder.everything(bench.line.now()).multiturn, 3u);
+  ASSERT_GT(bench.encoder.violation_count(), 0u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, "reset sent too fast: less than 40 us after the one before");
+
+  Bench turning;
+  turning.shaft.put(3, 0);
+  turning.shaft.spin(10, Time{});
+  reset(turning, DataId::reset_multiturn);
+  EXPECT_EQ(turning.everything().multiturn, 3u);
+  ASSERT_EQ(turning.encoder.violation_count(), 1u);
+  EXPECT_EQ(turning.encoder.violations()[0].rule, "reset while the shaft turns");
+}
+
+TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
+  Bench bench;
+  testing::RawHost host({0x1A, 0x1A});
+  bench.run(host);
+  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, "request during the encoder's transmission");
+}
+
+// ---- Alarms (6.5)
+
+TEST(TformatDevice, OverHeatIsLatchedUntilCooledAndCleared) {
+  Bench bench;
+  bench.encoder.set_environment({.temperature = 90});
+  EXPECT_EQ(bench.everything().alarms, 0);
+  bench.encoder.set_environment({.temperature = 91});
+  const Reply hot = bench.everything();
+  EXPECT_EQ(hot.alarms, alarms::over_heat);
+  EXPECT_EQ(hot.status, status::alarm);
+  reset(bench, DataId::clear_alarms);
+  EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
+  bench.encoder.set_environment({.temperature = 60});
+  EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
+  reset(bench, DataId::clear_alarms);
+  EXPECT_EQ(bench.everything().alarms, 0);
+}
+
+TEST(TformatDevice, CounterOverflowGoesOnModulo65536) {
+  Bench bench;
+  bench.shaft.put(65535, 5);
+  EXPECT_EQ(bench.everything().alarms, 0);
+  bench.shaft.put(65536, 5);
+  EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
+  EXPECT_EQ(bench.everything().multiturn, 0u);
+  EXPECT_EQ(bench.everything().status, 0);  // SF does not show it
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
+}
+
+TEST(TformatDevice, FullAbsoluteStatusClearsBelow100Rpm) {
+  Bench bench;
+  bench.encoder.power_off(bench.line.now());
+  bench.shaft.put(0, 0x12345);
+  bench.shaft.spin(100, bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  const Reply fast = bench.everything();
+  EXPECT_EQ(fast.alarms, alarms::full_absolute_status);
+  EXPECT_EQ(fast.singleturn & 0xFFF, 0u);  // only the top 5 bits hold
+  bench.shaft.spin(99, bench.line.now());
+  EXPECT_EQ(bench.everything().alarms, 0);
+  bench.shaft.spin(3000, bench.line.now());
+  EXPECT_EQ(bench.everything().alarms, 0);  // it arises at power on only
+}
+
+TEST(TformatDevice, BatteryFlags) {
+  Bench bench;
+  bench.shaft.put(9, 0);
+  bench.encoder.set_environment({.battery_millivolts = 3050});
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
+  bench.encoder.set_environment({});
+  EXPECT_EQ(bench.everything().alarms, 0);  // not latched
+  bench.encoder.set_environment({.battery_millivolts = 2600});
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises with the power off only
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  const Reply lost = bench.everything();
+  EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
+  EXPECT_FALSE(to_reading({}, lost).multiturn_valid);
+  bench.encoder.set_environment({});
+  reset(bench, DataId::reset_multiturn);
+  EXPECT_EQ(bench.everything().alarms, 0);
+}
+
+TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
+  Bench bench;
+  bench.shaft.spin(6000, bench.line.now());
+  bench.encoder.power_off(bench.line.now());
+  bench.pass(1s);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().alarms & alarms::over_speed, 0);
+  bench.encoder.power_off(bench.line.now());
+  bench.shaft.spin(6100, bench.line.now());
+  bench.pass(1s);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().alarms & alarms::over_speed, alarms::over_speed);
+}
+
+TEST(TformatDevice, CountingAndMultiturnErrorsEndWithThePower) {
+  Bench bench;
+  bench.encoder.raise_alarms(alarms::counting_error | alarms::multiturn_error | alarms::over_speed);
+  EXPECT_EQ(bench.everything().status, status::counting_error | status::alarm);
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().alarms, alarms::over_speed);
+}
+
+TEST(TformatDevice, IsSilentWhileItStarts) {
+  for (const bool battery : {true, false}) {
+    testing::TestShaft shaft;
+    VirtualEncoder encoder({}, shaft);
+    encoder.set_environment({.battery_millivolts = battery ? 3600 : 0});
+    encoder.power_on(Time{}, PowerOn::real);
+    sim::Line<std::uint8_t> line(LinkKind::half_duplex, line_settings);
+    line.attach(sim::Role::device, encoder);
+    const Time start = battery ? start_up_with_battery : start_up_without_battery;
+    testing::RawHost early({0x1A}, start - 1ms);
+    const auto host = line.attach(sim::Role::host, early);
+    ASSERT_TRUE(line.run(host));
+    EXPECT_TRUE(early.reply.empty());
+    testing::RawHost late({0x1A}, start);
+    line.replace(host, late);
+    ASSERT_TRUE(line.run(host));
+    ASSERT_EQ(late.reply.size(), 11u);
+    EXPECT_EQ(late.reply[9], battery ? 0 : alarms::battery_alarm | alarms::battery_error);
+  }
+}
+
+}  // namespace
+}  // namespace absenc::tformat

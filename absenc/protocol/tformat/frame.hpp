@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tamagawa T-format frames (RS-485, 2.5 Mbps, 8N1, LSB first): encode, decode and every check a frame allows.
+// Paragraph numbers are those of the TS5700N8500 specification; README.md draws the frames.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <type_traits>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/crc.hpp"
+#include "absenc/core/result.hpp"
+
+namespace absenc::tformat {
+
+/// Data ID codes of Table 1.
+enum class DataId : std::uint8_t {
+  singleturn = 0,
+  multiturn = 1,
+  encoder_id = 2,
+  everything = 3,
+  write_memory = 6,
+  clear_alarms = 7,
+  zero = 8,
+  reset_multiturn = 0xC,
+  read_memory = 0xD,
+};
+
+/// Bits of the status field SF (6.3.2). The low four are information bits, always 0.
+namespace status {
+inline constexpr std::uint8_t information = 0x0F;
+inline constexpr std::uint8_t counting_error = 0x10;   // ea0
+inline constexpr std::uint8_t alarm = 0x20;            // ea1: over-heat, multi-turn error, battery error or alarm
+inline constexpr std::uint8_t parity_error = 0x40;     // ca0, of the request
+inline constexpr std::uint8_t delimiter_error = 0x80;  // ca1, of the request
+inline constexpr std::uint8_t rejected = parity_error | delimiter_error;
+}  // namespace status
+
+/// Bits of ALMC (Table 3).
+namespace alarms {
+inline constexpr std::uint8_t over_speed = 0x01;
+inline constexpr std::uint8_t full_absolute_status = 0x02;
+inline constexpr std::uint8_t counting_error = 0x04;
+inline constexpr std::uint8_t counter_overflow = 0x08;
+inline constexpr std::uint8_t over_heat = 0x10;
+inline constexpr std::uint8_t multiturn_error = 0x20;
+inline constexpr std::uint8_t battery_error = 0x40;
+inline constexpr std::uint8_t battery_alarm = 0x80;
+inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | battery_error | battery_alarm;
+inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
+/// Held until a reset request or, some of them, until power off (6.5).
+inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
+}  // namespace alarms
+
+/// What a model's frames carry, and how strictly they are checked.
+struct Format {
+  unsigned singleturn_bits = 17;  // 1 to 24
+  unsigned multiturn_bits = 16;   // 0 to 24
+  int encoder_id = 0x11;          // ENID; -1: any
+  bool strict = true;             // also the checks that only a specification-true encoder passes
+};
+
+inline constexpr std::uint8_t page_select_address = 127;
+inline constexpr std::uint8_t busy_bit = 0x80;      // of ADF, in replies
+inline constexpr unsigned full_absolute_bits = 5;   // of the position hold with full_absolute_status (5.4.1)
+inline constexpr std::size_t request_capacity = 4;
+inline constexpr std::size_t reply_capacity = 11;
+using RequestBytes = ByteBuffer<request_capacity>;
+using ReplyBytes = ByteBuffer<reply_capacity>;
+
+/// G(X) = X^8 + 1 (6.3.4): the same as the exclusive OR of all bytes, which is how `checksum` computes it.
+inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
+
+[[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
+  std::uint64_t sum = 0;
+  if (!std::is_constant_evaluated()) {
+    for (; bytes.size() >= sizeof sum; bytes = bytes.subspan(sizeof sum)) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, bytes.data(), sizeof word);
+      sum ^= word;
+    }
+    sum ^= sum >> 32;
+    sum ^= sum >> 16;
+    sum ^= sum >> 8;
+  }
+  for (const std::uint8_t byte : bytes) sum ^= byte;
+  return static_cast<std::uint8_t>(sum);
+}
+
+/// Sync code 010, the id, its even parity (6.3.1).
+[[nodiscard]] constexpr std::uint8_t control_field(std::uint8_t id) {
+  return static_cast<std::uint8_t>(0x02 | (id & 0xF) << 3 | (odd_parity(id & 0xF) ? 0x80 : 0));
+}
+[[nodiscard]] constexpr std::uint8_t control_field(DataId id) { return control_field(static_cast<std::uint8_t>(id)); }
+
+[[nodiscard]] constexpr bool has_sync_code(std::uint8_t field) { return (field & 0x07) == 0x02; }
+
+[[nodiscard]] constexpr bool is_memory_access(DataId id) {
+  return id == DataId::read_memory || id == DataId::write_memory;
+}
+[[nodiscard]] constexpr bool is_reset(DataId id) {
+  return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;
+}
+
+/// The id of a control field, whatever its parity; nothing for an id that Table 1 does not list.
+[[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
+  const auto id = static_cast<DataId>((field >> 3) & 0xF);
+  switch (id) {
+    case DataId::singleturn:
+    case DataId::multiturn:
+    case DataId::encoder_id:
+    case DataId::everything:
+    case DataId::write_memory:
+    case DataId::clear_alarms:
+    case DataId::zero:
+    case DataId::reset_multiturn:
+    case DataId::read_memory:
+      return id;
+  }
+  return std::nullopt;
+}
+
+[[nodiscard]] constexpr std::size_t request_length(DataId id) {
+  if (id == DataId::write_memory) return 4;
+  if (id == DataId::read_memory) return 3;
+  return 1;
+}
+
+[[nodiscard]] constexpr std::size_t reply_length(DataId id) {
+  switch (id) {
+    case DataId::everything:
+      return 11;
+    case DataId::encoder_id:
+    case DataId::write_memory:
+    case DataId::read_memory:
+      return 4;
+    default:
+      return 6;
+  }
+}
+
+struct Request {
+  DataId id = DataId::everything;
+  std::uint8_t address = 0;  // memory access: 0 to 127
+  std::uint8_t value = 0;    // write_memory
+};
+
+/// Fields that the id does not carry are 0.
+struct Reply {
+  DataId id = DataId::everything;
+  std::uint8_t status = 0;
+  std::uint32_t singleturn = 0;
+  std::uint32_t multiturn = 0;
+  std::uint8_t encoder_id = 0;
+  std::uint8_t alarms = 0;
+  std::uint8_t address = 0;
+  bool busy = false;
+  std::uint8_t value = 0;
+};
+
+[[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
+  RequestBytes bytes;
+  bytes.push_back(control_field(request.id));
+  if (!is_memory_access(request.id)) return bytes;
+  bytes.push_back(request.address & 0x7F);
+  if (request.id == DataId::write_memory) bytes.push_back(request.value);
+  bytes.push_back(checksum(bytes));
+  return bytes;
+}
+
+/// Errors: wrong_length; bad_framing (sync code); bad_checksum (parity of the id, or CRC); unsupported (an id that
+/// Table 1 does not list); out_of_range (the busy bit is 0 in requests).
+[[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
+  if (bytes.empty()) return Error::wrong_length;
+  if (!has_sync_code(bytes[0])) return Error::bad_framing;
+  if (bytes[0] != control_field(bytes[0] >> 3)) return Error::bad_checksum;  // the length depends on the id
+  const std::optional<DataId> id = data_id(bytes[0]);
+  if (!id) return Error::unsupported;
+  if (bytes.size() != request_length(*id)) return Error::wrong_length;
+  if (!is_memory_access(*id)) return Request{*id};
+  if (checksum(bytes) != 0) return Error::bad_checksum;
+  if ((bytes[1] & busy_bit) != 0) return Error::out_of_range;
+  return Request{*id, bytes[1], *id == DataId::write_memory ? bytes[2] : std::uint8_t{0}};
+}
+
+[[nodiscard]] constexpr ReplyBytes encode_reply(const Reply& reply) {
+  ReplyBytes bytes;
+  const auto append = [&bytes](std::uint32_t value, unsigned count) {
+    for (unsigned i = 0; i < count; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+  };
+  bytes.push_back(control_field(reply.id));
+  if (is_memory_access(reply.id)) {
+    bytes.push_back(static_cast<std::uint8_t>((reply.address & 0x7F) | (reply.busy ? busy_bit : 0)));
+    bytes.push_back(reply.value);
+  } else {
+    bytes.push_back(reply.status);
+    if (reply.id == DataId::multiturn) {
+      append(reply.multiturn, 3);
+    } else if (reply.id == DataId::encoder_id) {
+      bytes.push_back(reply.encoder_id);
+    } else {
+      append(reply.singleturn, 3);
+    }
+    if (reply.id == DataId::everything) {
+      bytes.push_back(reply.encoder_id);
+      append(reply.multiturn, 3);
+      bytes.push_back(reply.alarms);
+    }
+  }
+  bytes.push_back(checksum(bytes));
+  return bytes;
+}
+
+/// SF as the alarms demand it (6.3.2): over_speed, full_absolute_status and counter_overflow do not show in it.
+[[nodiscard]] constexpr std::uint8_t status_for(std::uint8_t almc) {
+  return static_cast<std::uint8_t>(((almc & alarms::counting_error) != 0 ? status::counting_error : 0) |
+                                   ((almc & alarms::shown_in_status) != 0 ? status::alarm : 0));
+}
+
+namespace detail {
+
+// The fields of a reply of the right length and checksum, unchecked.
+[[nodiscard]] constexpr Reply split_reply(DataId id, Bytes bytes) {
+  Reply reply{.id = id};
+  if (is_memory_access(id)) {
+    reply.address = bytes[1] & 0x7F;
+    reply.busy = (bytes[1] & busy_bit) != 0;
+    reply.value = bytes[2];
+    return reply;
+  }
+  const auto load = [bytes](std::size_t at) {
+    return static_cast<std::uint32_t>(bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16);
+  };
+  reply.status = bytes[1];
+  if (id == DataId::encoder_id) {
+    reply.encoder_id = bytes[2];
+  } else if (id == DataId::multiturn) {
+    reply.multiturn = load(2);
+  } else {
+    reply.singleturn = load(2);
+  }
+  if (id == DataId::everything) {
+    reply.encoder_id = bytes[5];
+    reply.multiturn = load(6);
+    reply.alarms = bytes[9];
+  }
+  return reply;
+}
+
+[[nodiscard]] constexpr Error check_memory_reply(const Format& format, const Request& request, const Reply& reply) {
+  if (reply.address != request.address) return Error::unexpected_reply;
+  // Table 5: a busy encoder answers 00, an accepted write echoes its value.
+  if (reply.busy) return format.strict && reply.value != 0 ? Error::unexpected_reply : Error::none;
+  if (request.id == DataId::write_memory && reply.value != request.value) return Error::unexpected_reply;
+  return Error::none;
+}
+
+[[nodiscard]] constexpr Error check_data_reply(const Format& format, const Reply& reply) {
+  if ((reply.status & status::rejected) != 0) return Error::request_rejected;
+  if (format.strict && (reply.status & status::information) != 0) return Error::unexpected_reply;
+  const bool has_id = reply.id == DataId::encoder_id || reply.id == DataId::everything;
+  if (has_id && format.encoder_id >= 0 && reply.encoder_id != format.encoder_id) return Error::unexpected_reply;
+  if (reply.singleturn > low_mask(format.singleturn_bits)) return Error::out_of_range;
+  if (reply.multiturn > low_mask(format.multiturn_bits)) return Error::out_of_range;
+  if (format.strict && reply.id == DataId::everything &&
+      (reply.status & (status::counting_error | status::alarm)) != status_for(reply.alarms)) {
+    return Error::cross_check_failed;
+  }
+  return Error::none;
+}
+
+}  // namespace detail
+
+/// Whether the bytes so far begin an ID-3 reply to a request of another id: how the encoder answers whatever it
+/// cannot accept (8.4, 9.4).
+[[nodiscard]] constexpr bool begins_rejection(DataId asked, Bytes reply) {
+  return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
+}
+
+/// How many bytes the reply to `asked` has, as far as the bytes that came so far tell.
+[[nodiscard]] constexpr std::size_t expected_length(DataId asked, Bytes so_far) {
+  return reply_length(begins_rejection(asked, so_far) ? DataId::everything : asked);
+}
+
+/// Checks in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the first that fails
+/// names the error. A busy memory reply is no error: `busy` is set.
+[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+  const bool rejection = begins_rejection(request.id, bytes);
+  if (bytes.size() != reply_length(rejection ? DataId::everything : request.id)) return Error::wrong_length;
+  if (checksum(bytes) != 0) return Error::bad_checksum;
+  if (rejection) return Error::request_rejected;
+  if (bytes[0] != control_field(request.id)) return Error::unexpected_reply;
+  const Reply reply = detail::split_reply(request.id, bytes);
+  const Error error = is_memory_access(request.id) ? detail::check_memory_reply(format, request, reply)
+                                                   : detail::check_data_reply(format, reply);
+  if (error != Error::none) return error;
+  return reply;
+}
+
+/// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. Other replies need what
+/// ID 3 said since the encoder was switched on (`known_alarms`), since SF hides over_speed and full_absolute_status:
+/// without it no more is promised than what holds even with these set.
+[[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
+                                           std::optional<std::uint8_t> known_alarms = std::nullopt) {
+  const bool has_all = reply.id == DataId::everything;
+  const bool has_turns = has_all || reply.id == DataId::multiturn;
+  const bool has_position = has_all || (reply.id != DataId::multiturn && reply.id != DataId::encoder_id &&
+                                        !is_memory_access(reply.id));
+  const bool alarms_known = has_all || known_alarms.has_value();
+  const std::uint8_t almc = has_all ? reply.alarms : known_alarms.value_or(alarms::full_absolute_status);
+  const bool counting_error =
+      (reply.status & status::counting_error) != 0 || (almc & alarms::counting_error) != 0;
+
+  Reading reading;
+  reading.status = reply.status;
+  reading.alarms = alarms_known ? almc : 0;
+  if (has_position) {
+    reading.singleturn = reply.singleturn;
+    reading.singleturn_bits = format.singleturn_bits;
+    reading.singleturn_valid_bits = format.singleturn_bits;
+    if ((almc & alarms::full_absolute_status) != 0 && full_absolute_bits < format.singleturn_bits) {
+      reading.singleturn_valid_bits = full_absolute_bits;
+    }
+    if (counting_error) reading.singleturn_valid_bits = 0;
+  }
+  if (has_turns) {
+    reading.multiturn = reply.multiturn;
+    reading.multiturn_bits = format.multiturn_bits;
+    reading.multiturn_valid = format.multiturn_bits != 0 && alarms_known && (almc & alarms::turns_lost) == 0;
+    // SF may have got an alarm that `known_alarms` is too old to have.
+    if (!has_all && (reply.status & status::alarm) != 0) reading.multiturn_valid = false;
+  }
+  return reading;
+}
+
+}  // namespace absenc::tformat

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/tformat/frame.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+#include "absenc/core/hex.hpp"
+
+namespace absenc::tformat {
+namespace {
+
+constexpr std::array all_ids{DataId::singleturn,   DataId::multiturn, DataId::encoder_id,
+                             DataId::everything,   DataId::write_memory, DataId::clear_alarms,
+                             DataId::zero,         DataId::reset_multiturn, DataId::read_memory};
+
+TEST(TformatFrame, ControlFieldsOfTable1) {
+  const std::array<std::uint8_t, 9> table{0x02, 0x8A, 0x92, 0x1A, 0x32, 0xBA, 0xC2, 0x62, 0xEA};
+  for (std::size_t i = 0; i < all_ids.size(); ++i) EXPECT_EQ(control_field(all_ids[i]), table[i]);
+}
+
+TEST(TformatFrame, ChecksumIsTheCrcOfTheSpecification) {
+  std::vector<std::uint8_t> bytes;
+  for (unsigned i = 0; i < 64; ++i) {
+    EXPECT_EQ(checksum(bytes), crc_bitwise(crc_parameters, bytes));
+    bytes.push_back(static_cast<std::uint8_t>(i * 73 + 19));
+  }
+}
+
+TEST(TformatFrame, EveryControlFieldIsJudged) {
+  for (unsigned field = 0; field < 256; ++field) {
+    const std::array<std::uint8_t, 1> bytes{static_cast<std::uint8_t>(field)};
+    const Result<Request> request = decode_request(bytes);
+    if ((field & 7) != 2) {
+      EXPECT_EQ(request.error(), Error::bad_framing);
+    } else if (bytes[0] != control_field(bytes[0] >> 3)) {
+      EXPECT_EQ(request.error(), Error::bad_checksum) << field;
+    } else if (!data_id(bytes[0])) {
+      EXPECT_EQ(request.error(), Error::unsupported) << field;
+    } else if (is_memory_access(*data_id(bytes[0]))) {
+      EXPECT_EQ(request.error(), Error::wrong_length) << field;
+    } else {
+      EXPECT_TRUE(request.has_value()) << field;
+    }
+  }
+}
+
+// How many of the two-bit errors of an 11-byte reply pass: all that X^8 + 1 lets through, then with the fixed bits
+// checked, then with SF and ALMC compared.
+TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
+  const Format format;
+  const ReplyBytes good = encode_reply({.singleturn = 0x12345, .multiturn = 0x1234, .encoder_id = 0x11});
+  unsigned crc_passes = 0;
+  unsigned lax_passes = 0;
+  unsigned strict_passes = 0;
+  unsigned pairs = 0;
+  for (unsigned a = 0; a < 88; ++a) {
+    for (unsigned b = a + 1; b < 88; ++b) {
+      ReplyBytes bad = good;
+      bad[a / 8] ^= static_cast<std::uint8_t>(1u << a % 8);
+      bad[b / 8] ^= static_cast<std::uint8_t>(1u << b % 8);
+      ++pairs;
+      const Error error = decode_reply(format, {DataId::everything}, bad).error();
+      if (error != Error::bad_checksum) ++crc_passes;
+      if (error == Error::none) ++strict_passes;
+      // The level between: bits 4 to 7 of SF may be anything.
+      bad[1] &= 0x0F;
+      bad[10] = checksum(bad.view().first(10));
+      const Error fixed_bits = decode_reply(format, {DataId::everything}, bad).error();
+      const bool passes = fixed_bits == Error::none || fixed_bits == Error::cross_check_failed;
+      if (error != Error::bad_checksum && passes) ++lax_passes;
+    }
+  }
+  EXPECT_EQ(pairs, 3828u);
+  EXPECT_EQ(crc_passes, 440u);
+  EXPECT_EQ(lax_passes, 150u);
+  EXPECT_EQ(strict_passes, 102u);
+}
+
+TEST(TformatFrame, RepliesComeBackAsTheyWereMade) {
+  for (const DataId id : all_ids) {
+    Reply reply{.id = id};
+    if (is_memory_access(id)) {
+      reply.address = 0x55;
+      reply.value = 0xA7;
+    } else {
+      if (id != DataId::encoder_id && id != DataId::multiturn) reply.singleturn = 0x1F00F;
+      if (id == DataId::multiturn || id == DataId::everything) reply.multiturn = 0xABCD;
+      if (id == DataId::encoder_id || id == DataId::everything) reply.encoder_id = 0x11;
+      if (id == DataId::everything) reply.alarms = alarms::battery_alarm | alarms::over_speed;
+      reply.status = status_for(reply.alarms);
+    }
+    const ReplyBytes bytes = encode_reply(reply);
+    ASSERT_EQ(bytes.size(), reply_length(id));
+    const Result<Reply> back = decode_reply({}, {id, 0x55, 0xA7}, bytes);
+    ASSERT_TRUE(back.has_value()) << static_cast<int>(id) << text_of(back.error()).name;
+    EXPECT_EQ(encode_reply(*back).view().size(), bytes.size());
+    EXPECT_EQ(back->singleturn, reply.singleturn);
+    EXPECT_EQ(back->multiturn, reply.multiturn);
+    EXPECT_EQ(back->status, reply.status);
+    EXPECT_EQ(back->alarms, reply.alarms);
+    EXPECT_EQ(back->value, reply.value);
+    EXPECT_EQ(back->address, reply.address);
+  }
+}
+
+TEST(TformatFrame, ARefusalIsToldApartFromAWrongLength) {
+  const ReplyBytes refusal = encode_reply({.status = status::parity_error, .encoder_id = 0x11});
+  EXPECT_EQ(decode_reply({}, {DataId::singleturn}, refusal).error(), Error::request_rejected);
+  EXPECT_EQ(decode_reply({}, {DataId::everything}, refusal).error(), Error::request_rejected);
+  EXPECT_EQ(decode_reply({}, {DataId::singleturn}, refusal.view().first(6)).error(), Error::wrong_length);
+  ReplyBytes damaged = refusal;
+  damaged[4] ^= 1;
+  EXPECT_EQ(decode_reply({}, {DataId::singleturn}, damaged).error(), Error::bad_checksum);
+}
+
+// Paragraph 6.5: which alarm takes what of a reading away.
+TEST(TformatFrame, ValidityOfEachPart) {
+  struct Row {
+    std::uint8_t almc;
+    unsigned singleturn_valid_bits;
+    bool multiturn_valid;
+  };
+  for (const Row& row : {Row{0, 17, true}, Row{alarms::over_speed, 17, false},
+                         Row{alarms::full_absolute_status, 5, true}, Row{alarms::counting_error, 0, true},
+                         Row{alarms::counter_overflow, 17, true}, Row{alarms::over_heat, 17, true},
+                         Row{alarms::multiturn_error, 17, false}, Row{alarms::battery_error, 17, false},
+                         Row{alarms::battery_alarm, 17, true},
+                         Row{alarms::battery_error | alarms::battery_alarm, 17, false}}) {
+    const Reading reading = to_reading({}, {.status = status_for(row.almc), .alarms = row.almc});
+    EXPECT_EQ(reading.singleturn_valid_bits, row.singleturn_valid_bits) << int{row.almc};
+    EXPECT_EQ(reading.multiturn_valid, row.multiturn_valid) << int{row.almc};
+    EXPECT_EQ(reading.singleturn_valid(), row.singleturn_valid_bits == 17);
+  }
+}
+
+TEST(TformatFrame, PartialRepliesPromiseNoMoreThanIsKnown) {
+  const Reply part{.id = DataId::singleturn, .singleturn = 77};
+  EXPECT_EQ(to_reading({}, part).singleturn_valid_bits, 5u);
+  EXPECT_EQ(to_reading({}, part, 0).singleturn_valid_bits, 17u);
+  EXPECT_EQ(to_reading({}, part).multiturn_bits, 0u);
+  const Reply turns{.id = DataId::multiturn, .multiturn = 5};
+  EXPECT_FALSE(to_reading({}, turns).multiturn_valid);
+  EXPECT_TRUE(to_reading({}, turns, 0).multiturn_valid);
+  EXPECT_FALSE(to_reading({}, turns, alarms::over_speed).multiturn_valid);
+  const Reply alarmed{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
+  EXPECT_FALSE(to_reading({}, alarmed, 0).multiturn_valid);
+}
+
+}  // namespace
+}  // namespace absenc::tformat

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// Host side of the T-format: each class is one conversation, a machine without port, clock or heap.
+// README.md describes the procedures; link/step.hpp how to run a machine.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/tformat/frame.hpp"
+#include "absenc/protocol/tformat/timing.hpp"
+
+namespace absenc::tformat {
+
+/// One request and its checked reply at a time; a subclass decides what comes next.
+class Procedure : public Conversation<std::uint8_t> {
+ public:
+  void feed(const Event<std::uint8_t>& event) final;
+  Step<std::uint8_t> next(Time now) final;
+  [[nodiscard]] Error error() const final { return error_; }
+  [[nodiscard]] std::string_view detail() const final { return detail_; }
+  [[nodiscard]] Exchange<std::uint8_t> exchange() const final;
+
+  [[nodiscard]] const Format& format() const { return format_; }
+
+ protected:
+  /// How often a request that reads or selects a page is sent before its error counts. Resets and writes are never
+  /// repeated.
+  explicit Procedure(const Format& format, unsigned read_attempts) : format_(format), read_attempts_(read_attempts) {}
+  ~Procedure() = default;
+
+  /// Sends `request`, not before `earliest`.
+  void ask(const Request& request, Time earliest = {});
+  void finish(Error error = Error::none, std::string_view detail = {});
+
+  /// The reply passed every check (`busy` may be set). Calls `ask` or `finish`.
+  virtual void answered(const Reply& reply) = 0;
+  /// No good reply came. Calls `ask` or `finish`; by default the procedure ends with this error.
+  virtual void failed(Error error) { finish(error); }
+
+  [[nodiscard]] const Request& request() const { return request_; }
+  [[nodiscard]] Time sent_at() const { return sent_at_; }
+  [[nodiscard]] Time received_at() const { return received_at_; }
+
+ private:
+  enum class State : std::uint8_t { ready, sending, receiving, settling, ending, done };
+
+  void received(const Event<std::uint8_t>& event);
+  void conclude();
+  void start(Time earliest);
+  [[nodiscard]] bool selects_page() const;
+  [[nodiscard]] std::size_t expected() const { return expected_length(request_.id, reply_bytes_); }
+
+  Format format_;
+  unsigned read_attempts_;
+  unsigned attempts_left_ = 0;
+  State state_ = State::done;
+  bool disturbed_ = false;  // something came before the request was out, or a damaged character
+  Request request_{};
+  RequestBytes request_bytes_;
+  // One character more than the longest reply tells "too long"; the rest of a flood is only counted out.
+  ByteBuffer<4 * reply_capacity> reply_bytes_;
+  Time earliest_{};
+  Time sent_at_{};
+  Time received_at_{};
+  Error error_ = Error::none;
+  std::string_view detail_{};
+};
+
+/// Data IDs 0 to 3. ID 3 carries everything. SF hides over_speed, full_absolute_status and counter_overflow, so
+/// unless `known_alarms` (the ALMC of an ID 3 reply since power on) is given, IDs 0 and 1 are preceded by an ID 3,
+/// and an alarm that newly appears in their SF is followed by one, whose reply is the result then.
+class ReadPosition final : public Procedure {
+ public:
+  explicit ReadPosition(const Format& format, DataId id = DataId::everything,
+                        std::optional<std::uint8_t> known_alarms = std::nullopt);
+
+  [[nodiscard]] const Reading* reading() const override;
+  void report(FieldSink& sink) const override;
+  /// Of the last good exchange.
+  [[nodiscard]] const Reply& reply() const { return reply_; }
+
+ private:
+  void answered(const Reply& reply) override;
+
+  DataId id_;
+  bool part_read_ = false;  // ID 0 or 1 has been answered
+  std::optional<std::uint8_t> known_alarms_;
+  Reply reply_{};
+  Reading reading_{};
+};
+
+/// Data IDs 7 (latched alarms), 8 (single-turn zero here) and C (turns and latched alarms): makes sure that the shaft
+/// stands still, sends ten requests, reads back what became of it. Errors: invalid_argument (the shaft turns, or ID 7
+/// would hide a battery_error), cross_check_failed (the encoder did not do it), or that of an exchange.
+class Reset final : public Procedure {
+ public:
+  Reset(const Format& format, DataId id);
+
+  [[nodiscard]] const Reading* reading() const override;  // after the reset
+  void report(FieldSink& sink) const override;
+
+ private:
+  enum class Phase : std::uint8_t { first_look, second_look, requests, verify };
+  void answered(const Reply& reply) override;
+  void failed(Error error) override;
+  void second_look(const Reply& reply);
+  void verify(const Reply& reply);
+  void go_on();
+
+  DataId id_;
+  Phase phase_ = Phase::first_look;
+  unsigned sent_requests_ = 0;
+  Reply reply_{};
+  Reading reading_{};
+};
+
+/// Selects the page and reads `count` bytes. Errors: invalid_argument (closed area), busy.
+class ReadMemory : public Procedure {
+ public:
+  /// Page 0 to 5 or 7, address 0 to 126, count 1 to 127 - address.
+  ReadMemory(const Format& format, std::uint8_t page, std::uint8_t address, std::uint8_t count = 1);
+
+  void report(FieldSink& sink) const override;
+  [[nodiscard]] Bytes data() const { return data_; }
+
+ private:
+  void answered(const Reply& reply) override;
+  void ask_next(Time earliest = {});
+
+  std::uint8_t page_;
+  std::uint8_t address_;
+  std::uint8_t count_;
+  ByteBuffer<page_addresses> data_;
+  Time give_up_{};
+};
+
+/// Page 7 address 5: degrees Celsius, within 3 degC, accurate from 5 s after power on.
+class ReadTemperature final : public ReadMemory {
+ public:
+  explicit ReadTemperature(const Format& format) : ReadMemory(format, service_page, temperature_address) {}
+  void report(FieldSink& sink) const override;
+};
+
+/// Page 7 address 4: degrees Celsius, or off.
+class ReadOverheatThreshold final : public ReadMemory {
+ public:
+  explicit ReadOverheatThreshold(const Format& format) : ReadMemory(format, service_page, overheat_address) {}
+  void report(FieldSink& sink) const override;
+};
+
+enum class Wear : std::uint8_t {
+  avoid,   // a byte that already holds the value is not written (100 000 writes in a life)
+  accept,  // write it all the same
+};
+
+/// Selects the page, reads, writes what differs, waits, selects the page again so that the EEPROM itself is read, and
+/// compares. Errors: invalid_argument (closed area), busy, cross_check_failed (another value is there now).
+class WriteMemory : public Procedure {
+ public:
+  WriteMemory(const Format& format, std::uint8_t page, std::uint8_t address, std::uint8_t value,
+              Wear wear = Wear::avoid);
+
+  void report(FieldSink& sink) const override;
+  /// Whether a write was sent.
+  [[nodiscard]] bool written() const { return written_; }
+  [[nodiscard]] std::uint8_t value() const { return value_; }
+
+ private:
+  enum class Phase : std::uint8_t { select, compare, write, select_again, read_back };
+  void answered(const Reply& reply) override;
+  void failed(Error error) override;
+  void select(Phase phase, Time earliest);
+
+  std::uint8_t page_;
+  std::uint8_t address_;
+  std::uint8_t value_;
+  Wear wear_;
+  Phase phase_ = Phase::select;
+  bool written_ = false;
+  Time give_up_{};
+};
+
+/// Page 7 address 4: over_heat above `degrees` (1 to 127), 0: never.
+class WriteOverheatThreshold final : public WriteMemory {
+ public:
+  WriteOverheatThreshold(const Format& format, std::uint8_t degrees)
+      : WriteMemory(format, service_page, overheat_address, encoded(degrees)) {}
+  /// The byte in memory (7.2).
+  [[nodiscard]] static constexpr std::uint8_t encoded(std::uint8_t degrees) {
+    return degrees == 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(0x80 | degrees);
+  }
+  void report(FieldSink& sink) const override;
+};
+
+}  // namespace absenc::tformat
