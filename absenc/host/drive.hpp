@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs a machine on a port until it is done: the loop that every carrier of a real line has.
+#pragma once
+
+#include "absenc/link/port.hpp"
+
+namespace absenc::host {
+
+/// `on_emit()` is called for every `emit` step and returns whether to go on. Returns true when the machine is done,
+/// false when `on_emit` stopped it. What a port throws passes through.
+template <class Item, class OnEmit>
+bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
+  // Between events the machine's time stands still: looking at the clock more often only costs.
+  for (Time now = port.now();;) {
+    const Step<Item> step = machine.next(now);
+    switch (step.kind) {
+      case Step<Item>::Kind::done:
+        return true;
+      case Step<Item>::Kind::emit:
+        if (!on_emit()) return false;
+        break;
+      case Step<Item>::Kind::wait: {
+        const Event<Item> event = port.wait(step);
+        now = event.at;
+        machine.feed(event);
+        break;
+      }
+      case Step<Item>::Kind::transfer:
+      case Step<Item>::Kind::pulse:
+      case Step<Item>::Kind::configure:
+        port.begin(step);
+        break;
+    }
+  }
+}
+
+}  // namespace absenc::host

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Takes the local echo of an RS-485 adapter out of what a conversation hears: by count, never by comparing, because a
+// good reply may equal its request byte for byte. The removed bytes are compared to find a disturbed line.
+#pragma once
+
+#include <cstdint>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/link/step.hpp"
+
+namespace absenc::host {
+
+enum class EchoMode : std::uint8_t {
+  automatic,  // found out from the first good exchange
+  on,
+  off,
+};
+
+/// Stands between a conversation and its port.
+class EchoFilter final : public Machine<std::uint8_t> {
+ public:
+  explicit EchoFilter(EchoMode mode) : mode_(mode) {}
+
+  /// The conversation to serve from now on.
+  void attach(Machine<std::uint8_t>& inner) { inner_ = &inner; }
+  /// How the conversation ended. In automatic mode only a good one makes what was found final.
+  void conclude(bool good);
+
+  void feed(const Event<std::uint8_t>& event) override;
+  Step<std::uint8_t> next(Time now) override;
+
+  /// What is known: `automatic` while nothing is.
+  [[nodiscard]] EchoMode mode() const { return mode_; }
+  /// Whether the echo of the last request came back and nothing else.
+  [[nodiscard]] bool only_echo() const { return only_echo_; }
+
+ private:
+  static constexpr std::size_t capacity = 256;
+
+  void received(const Event<std::uint8_t>& event);
+  void strip(const Event<std::uint8_t>& event);
+  void hold(const Event<std::uint8_t>& event);
+  void decide(Time at);
+  void pass(Time at, Bytes bytes);
+  [[nodiscard]] EchoMode working_mode() const { return mode_ == EchoMode::automatic ? found_ : mode_; }
+
+  EchoMode mode_;
+  EchoMode found_ = EchoMode::automatic;  // in this conversation
+  Machine<std::uint8_t>* inner_ = nullptr;
+  ByteBuffer<capacity> sent_;
+  ByteBuffer<capacity> held_;    // automatic: heard before it is known what is echo
+  std::size_t echo_due_ = 0;     // on: echo bytes still to come
+  std::size_t reply_due_ = 0;    // items the conversation expects
+  bool passed_ = false;          // something of the reply went to the conversation
+  bool only_echo_ = false;
+};
+
+}  // namespace absenc::host

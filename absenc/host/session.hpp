@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs a unit's commands on a port: repeats what may be repeated, removes echo, validates the first position, counts.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+#include "absenc/host/drive.hpp"
+#include "absenc/host/echo.hpp"
+#include "absenc/host/first_reading.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::host {
+
+struct Counters {
+  std::uint64_t good = 0;      // conversations that ended well
+  std::uint64_t repeated = 0;  // attempts after an error
+  std::array<std::uint64_t, error_texts.size()> errors{};  // of each kind, repeated ones included
+
+  [[nodiscard]] constexpr std::uint64_t bad() const {
+    std::uint64_t sum = 0;
+    for (const std::uint64_t count : errors) sum += count;
+    return sum;
+  }
+};
+
+template <class Item>
+class Session {
+ public:
+  /// `storage` takes one conversation at a time: unit.host_storage bytes, aligned for any type.
+  Session(const Unit& unit, const Options& options, Port<Item>& port, std::span<std::byte> storage,
+          EchoMode echo = EchoMode::off, unsigned attempts = 3)
+      : unit_(&unit),
+        options_(options),
+        port_(&port),
+        storage_(storage),
+        echo_(echo),
+        attempts_(attempts),
+        first_(options.model != nullptr ? options.model->maximum_rpm : 0) {}
+
+  /// One command to its end, repeatable ones up to `attempts` times. `on_emit(conversation)` is called for each
+  /// result but the last and returns whether to go on. The conversation returned tells how it ended; it is null when
+  /// the unit cannot run the command, and valid until the next call.
+  template <class OnEmit>
+  const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
+    const unsigned attempts = command.repeatable ? attempts_ : 1;
+    for (unsigned attempt = 1;; ++attempt) {
+      Conversation<Item>* conversation = make(command, arguments);
+      if (conversation == nullptr) return nullptr;
+      drive_one(*conversation, on_emit);
+      const Error error = conversation->error();
+      echo_.conclude(error == Error::none);
+      if (error == Error::none) {
+        ++counters_.good;
+        return conversation;
+      }
+      ++counters_.errors[static_cast<std::size_t>(error)];
+      // An encoder that was silent may have been switched off: what it says next has to be confirmed.
+      if (error == Error::timeout) confirmed_ = false;
+      if (attempt >= attempts || error == Error::invalid_argument) return conversation;
+      ++counters_.repeated;
+    }
+  }
+  const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
+    return run(command, arguments, [](const Conversation<Item>&) { return true; });
+  }
+
+  /// The position. After opening and after silence it is read until two readings in a row agree; when none of ten
+  /// does, the last one is returned and `confirmed` is false.
+  const Conversation<Item>* read(const Command& command) {
+    const Conversation<Item>* conversation = run(command);
+    if (confirmed_ || conversation == nullptr) return conversation;
+    first_.start_again();
+    for (unsigned i = 0; i < 10; ++i) {
+      if (conversation->error() != Error::none || conversation->reading() == nullptr) return conversation;
+      confirmed_ = first_.confirms(*conversation->reading());
+      if (confirmed_) return conversation;
+      conversation = run(command);
+    }
+    return conversation;
+  }
+
+  [[nodiscard]] bool confirmed() const { return confirmed_; }
+  [[nodiscard]] const Counters& counters() const { return counters_; }
+  [[nodiscard]] const EchoFilter& echo() const { return echo_; }
+
+ private:
+  Conversation<Item>* make(const Command& command, Arguments arguments) {
+    const Any<Conversation> made = unit_->host(options_, command, arguments, storage_);
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      return made.frames;
+    } else {
+      return made.bytes;
+    }
+  }
+
+  template <class OnEmit>
+  void drive_one(Conversation<Item>& conversation, OnEmit&& on_emit) {
+    const auto emit = [&] { return on_emit(conversation); };
+    if constexpr (std::is_same_v<Item, std::uint8_t>) {
+      if (echo_.mode() != EchoMode::off) {
+        echo_.attach(conversation);
+        drive(echo_, *port_, emit);
+        return;
+      }
+    }
+    drive(conversation, *port_, emit);
+  }
+
+  const Unit* unit_;
+  Options options_;
+  Port<Item>* port_;
+  std::span<std::byte> storage_;
+  EchoFilter echo_;
+  unsigned attempts_;
+  FirstReading first_;
+  bool confirmed_ = false;
+  Counters counters_;
+};
+
+}  // namespace absenc::host

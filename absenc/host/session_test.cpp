@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sessions, echo removal and the first reading, with a T-format encoder in virtual time.
+#include "absenc/host/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "absenc/protocol/all.hpp"
+#include "absenc/sim/faults.hpp"
+#include "absenc/sim/sim_port.hpp"
+
+namespace absenc::host {
+namespace {
+
+using Wire = std::vector<std::uint8_t>;
+
+struct Still final : Shaft {
+  [[nodiscard]] ShaftState at(Time) const override { return state; }
+  ShaftState state{};
+};
+
+/// A virtual encoder with faults, a port to it, and a session.
+struct Bench {
+  explicit Bench(EchoMode mode, sim::FaultRates rates = {}, unsigned attempts = 3) {
+    EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
+    device_storage.resize(unit.device_storage);
+    host_storage.resize(unit.host_storage);
+    device = unit.device(options, shaft, device_storage).bytes;
+    device->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    faulty = std::make_unique<sim::FaultyDevice>(*device, rates, 1);
+    port = std::make_unique<sim::SimPort<std::uint8_t>>(unit.link, unit.line, *faulty);
+    session = std::make_unique<Session<std::uint8_t>>(unit, options, *port, host_storage, mode, attempts);
+  }
+  const Conversation<std::uint8_t>& read() { return *session->read(*find_command(unit, Verb::read)); }
+
+  const Unit& unit = *find_unit("tformat");
+  Options options;
+  Still shaft;
+  std::vector<std::byte> device_storage;
+  std::vector<std::byte> host_storage;
+  Device<std::uint8_t>* device = nullptr;
+  std::unique_ptr<sim::FaultyDevice> faulty;
+  std::unique_ptr<sim::SimPort<std::uint8_t>> port;
+  std::unique_ptr<Session<std::uint8_t>> session;
+};
+
+sim::FaultRates always(sim::FaultKind kind) {
+  sim::FaultRates rates;
+  rates[kind] = 1;
+  return rates;
+}
+
+// ---- Echo
+
+struct EchoRow {
+  EchoMode mode;
+  bool echo;
+  bool good;
+};
+
+class Echo : public ::testing::TestWithParam<EchoRow> {};
+
+TEST_P(Echo, IsRemovedByCount) {
+  Bench bench(GetParam().mode);
+  bench.port->set_echo(GetParam().echo);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(bench.read().error() == Error::none, GetParam().good);
+  }
+  // Read, page select (its reply equals its request), memory read.
+  const auto* temperature = bench.session->run(*find_command(bench.unit, Verb::temperature));
+  EXPECT_EQ(temperature->error() == Error::none, GetParam().good);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, Echo,
+                         ::testing::Values(EchoRow{EchoMode::automatic, false, true},
+                                           EchoRow{EchoMode::automatic, true, true},
+                                           EchoRow{EchoMode::on, true, true}, EchoRow{EchoMode::off, false, true},
+                                           EchoRow{EchoMode::off, true, false}, EchoRow{EchoMode::on, false, false}));
+
+TEST(EchoFilter, FindsOutByItselfAndRemembers) {
+  for (const bool echo : {false, true}) {
+    Bench bench(EchoMode::automatic);
+    bench.port->set_echo(echo);
+    EXPECT_EQ(bench.read().error(), Error::none);
+    EXPECT_EQ(bench.session->echo().mode(), echo ? EchoMode::on : EchoMode::off);
+  }
+}
+
+TEST(EchoFilter, NamesALineOnWhichOnlyTheEchoComesBack) {
+  for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
+    Bench bench(mode, always(sim::FaultKind::silence));
+    bench.port->set_echo(true);
+    EXPECT_EQ(bench.read().error(), Error::timeout);
+    EXPECT_TRUE(bench.session->echo().only_echo());
+  }
+}
+
+TEST(EchoFilter, OneByteTooManyIsNotTakenForAnEcho) {
+  // The first reply has a byte behind it that makes it as long as echo and reply.
+  struct TooLong final : Machine<std::uint8_t> {
+    explicit TooLong(Machine<std::uint8_t>& encoder) : device(encoder) {}
+    void feed(const Event<std::uint8_t>& event) override { device.feed(event); }
+    Step<std::uint8_t> next(Time now) override {
+      Step<std::uint8_t> step = device.next(now);
+      if (step.kind == Step<std::uint8_t>::Kind::transfer && !done) {
+        out.assign(step.out.begin(), step.out.end());
+        out.push_back(0);
+        step.out = out;
+        done = true;
+      }
+      return step;
+    }
+    Machine<std::uint8_t>& device;
+    Wire out;
+    bool done = false;
+  };
+  Bench bench(EchoMode::automatic);
+  TooLong too_long(*bench.device);
+  sim::SimPort<std::uint8_t> port(bench.unit.link, bench.unit.line, too_long);
+  Session<std::uint8_t> session(bench.unit, bench.options, port, bench.host_storage, EchoMode::automatic);
+  EXPECT_EQ(session.read(*find_command(bench.unit, Verb::read))->error(), Error::none);
+  EXPECT_EQ(session.echo().mode(), EchoMode::off);
+  EXPECT_EQ(session.counters().bad(), 1u);
+}
+
+TEST(EchoFilter, ADisturbedEchoIsNoticed) {
+  // With `echo` as a fault of the far end, garbage in front of it stands where the echo should be.
+  sim::FaultRates rates = always(sim::FaultKind::echo);
+  Bench good(EchoMode::on, rates);
+  EXPECT_EQ(good.read().error(), Error::none);
+  rates[sim::FaultKind::corrupt] = 1;
+  Bench bad(EchoMode::on, rates, 1);
+  EXPECT_NE(bad.read().error(), Error::none);
+}
+
+// ---- Sessions
+
+TEST(Session, RepeatsWhatMayBeRepeated) {
+  Bench bench(EchoMode::off, always(sim::FaultKind::truncate));
+  EXPECT_EQ(bench.session->run(*find_command(bench.unit, Verb::read))->error(), Error::wrong_length);
+  EXPECT_EQ(bench.device->answered(), 3u);
+  EXPECT_EQ(bench.session->counters().repeated, 2u);
+  EXPECT_EQ(bench.session->counters().errors[static_cast<std::size_t>(Error::wrong_length)], 3u);
+  bench.session->run(*find_command(bench.unit, Verb::zero));
+  EXPECT_EQ(bench.device->answered(), 6u);  // one look at the position, tried three times; the reset itself never
+}
+
+// Request, 3 us, 11 characters: 51 us a reading are what the document allows.
+TEST(Session, LeavesTheBusNoIdleTime) {
+  Bench bench(EchoMode::off);
+  constexpr int readings = 1000;
+  for (int i = 0; i < readings; ++i) ASSERT_EQ(bench.read().error(), Error::none);
+  const Time allowed = readings * (bench.unit.line.character() * 12 + std::chrono::microseconds(3));
+  const double use = static_cast<double>(allowed.count()) / static_cast<double>(bench.port->now().count());
+  std::printf("%.4f of the readings a second that the document's times allow\n", use);
+  EXPECT_GE(use, 0.99);
+}
+
+TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
+  Bench bench(EchoMode::off);
+  EXPECT_EQ(bench.read().error(), Error::none);
+  EXPECT_EQ(bench.device->answered(), 2u);
+  EXPECT_TRUE(bench.session->confirmed());
+  bench.read();
+  EXPECT_EQ(bench.device->answered(), 3u);
+  bench.faulty->set_rates(always(sim::FaultKind::silence));
+  EXPECT_EQ(bench.read().error(), Error::timeout);
+  EXPECT_FALSE(bench.session->confirmed());
+  bench.faulty->set_rates({});
+  const auto before = bench.device->answered();
+  EXPECT_EQ(bench.read().error(), Error::none);
+  EXPECT_EQ(bench.device->answered(), before + 2);
+}
+
+TEST(Session, AnInvalidPositionIsNeverConfirmed) {
+  Bench bench(EchoMode::off);
+  bench.device->raise_alarms(0x04);  // counting_error
+  const auto& reading = bench.read();
+  EXPECT_EQ(reading.error(), Error::none);
+  EXPECT_FALSE(reading.reading()->singleturn_valid());
+  EXPECT_FALSE(bench.session->confirmed());
+}
+
+constexpr Reading reading_at(std::uint64_t singleturn, std::uint64_t multiturn, Time latched) {
+  return {.singleturn = singleturn,
+          .multiturn = multiturn,
+          .singleturn_bits = 17,
+          .multiturn_bits = 16,
+          .singleturn_valid_bits = 17,
+          .multiturn_valid = true,
+          .latched = latched};
+}
+
+TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
+  using std::chrono::microseconds;
+  // 6000 rpm are 100 turns a second: 13 107 counts in 1 ms.
+  const auto confirmed = [](std::uint64_t singleturn, std::uint64_t multiturn) {
+    FirstReading first(6000);
+    EXPECT_FALSE(first.confirms(reading_at(0, 0, {})));
+    return first.confirms(reading_at(singleturn, multiturn, microseconds(1000)));
+  };
+  EXPECT_TRUE(confirmed(13'107, 0));
+  EXPECT_FALSE(confirmed(13'120, 0));
+  EXPECT_TRUE(confirmed(131'072 - 13'107, 65'535));  // backwards over both wraps
+  EXPECT_FALSE(confirmed(0, 1));
+  EXPECT_FALSE(confirmed(0, 32'768));
+}
+
+TEST(FirstReading, WaitsUntilTheEncoderIsReady) {
+  FirstReading first(0);
+  Reading starting = reading_at(5, 5, {});
+  starting.ready = false;
+  EXPECT_FALSE(first.confirms(starting));
+  EXPECT_FALSE(first.confirms(reading_at(5, 5, {})));
+  EXPECT_FALSE(first.confirms(starting));
+  EXPECT_FALSE(first.confirms(reading_at(5, 5, {})));
+  EXPECT_TRUE(first.confirms(reading_at(5, 5, {})));
+}
+
+}  // namespace
+}  // namespace absenc::host
