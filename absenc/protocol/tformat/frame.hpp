@@ -3,6 +3,7 @@
 // Paragraph numbers are those of the TS5700N8500 specification; README.md draws the frames.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -188,30 +189,27 @@ struct Reply {
 }
 
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Reply& reply) {
-  ReplyBytes bytes;
-  const auto append = [&bytes](std::uint32_t value, unsigned count) {
-    for (unsigned i = 0; i < count; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+  std::array<std::uint8_t, reply_capacity> frame{control_field(reply.id), reply.status};
+  const auto store = [&frame](std::size_t at, std::uint32_t value) {
+    for (std::size_t i = 0; i < 3; ++i) frame[at + i] = static_cast<std::uint8_t>(value >> (8 * i));
   };
-  bytes.push_back(control_field(reply.id));
   if (is_memory_access(reply.id)) {
-    bytes.push_back(static_cast<std::uint8_t>((reply.address & 0x7F) | (reply.busy ? busy_bit : 0)));
-    bytes.push_back(reply.value);
+    frame[1] = static_cast<std::uint8_t>((reply.address & 0x7F) | (reply.busy ? busy_bit : 0));
+    frame[2] = reply.value;
+  } else if (reply.id == DataId::encoder_id) {
+    frame[2] = reply.encoder_id;
   } else {
-    bytes.push_back(reply.status);
-    if (reply.id == DataId::multiturn) {
-      append(reply.multiturn, 3);
-    } else if (reply.id == DataId::encoder_id) {
-      bytes.push_back(reply.encoder_id);
-    } else {
-      append(reply.singleturn, 3);
-    }
-    if (reply.id == DataId::everything) {
-      bytes.push_back(reply.encoder_id);
-      append(reply.multiturn, 3);
-      bytes.push_back(reply.alarms);
-    }
+    store(2, reply.id == DataId::multiturn ? reply.multiturn : reply.singleturn);
   }
-  bytes.push_back(checksum(bytes));
+  if (reply.id == DataId::everything) {
+    frame[5] = reply.encoder_id;
+    store(6, reply.multiturn);
+    frame[9] = reply.alarms;
+  }
+  const std::size_t length = reply_length(reply.id);
+  frame[length - 1] = checksum(Bytes(frame).first(length - 1));
+  ReplyBytes bytes;
+  bytes.append(Bytes(frame).first(length));
   return bytes;
 }
 
