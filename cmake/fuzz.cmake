@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+# One libFuzzer executable per *_fuzz.cpp in build/fuzz/fuzzers, and a tool that writes the vectors as seeds.
+if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  message(FATAL_ERROR "ABSENC_FUZZ needs clang: cmake --preset fuzz")
+endif()
+
+file(GLOB_RECURSE fuzz_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/absenc/*_fuzz.cpp")
+foreach(source IN LISTS fuzz_sources)
+  cmake_path(GET source STEM name)
+  add_executable(${name} "${source}")
+  absenc_settings(${name})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/fuzzers")
+  target_link_libraries(${name} PRIVATE absenc::absenc)
+  target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+endforeach()
+
+add_executable(write_fuzz_seeds tests/write_fuzz_seeds.cpp)
+absenc_settings(write_fuzz_seeds)
+target_link_libraries(write_fuzz_seeds PRIVATE absenc::absenc)

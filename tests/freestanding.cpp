@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Instantiates the templates of the freestanding layers, so that the ARM build sees what they would link.
+#include <array>
+#include <cstdint>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/crc.hpp"
+#include "absenc/core/gray.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/host/drive.hpp"
+#include "absenc/link/can.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc {
+
+inline constexpr CrcParameters modbus{16, 0x8005, 0xFFFF, true, true, 0x0000};
+inline constexpr CrcParameters biss{6, 0x03, 0x00, false, false, 0x3F};
+
+template class Buffer<std::uint8_t, 64>;
+template class Buffer<CanFrame, 4>;
+template class Crc<modbus, CrcTable::byte>;
+template class Crc<modbus, CrcTable::nibble>;
+template class Crc<biss, CrcTable::byte>;
+template class Crc<biss, CrcTable::nibble>;
+template class Result<std::uint64_t>;
+template class Result<Reading>;
+
+// Not static: what nobody uses would not be compiled.
+bool drive_bytes(Machine<std::uint8_t>& machine, Port<std::uint8_t>& port) {
+  return host::drive(machine, port, [] { return true; });
+}
+
+bool drive_frames(Machine<CanFrame>& machine, Port<CanFrame>& port) {
+  return host::drive(machine, port, [] { return true; });
+}
+
+std::uint64_t helpers(Bytes bytes, MutableBytes out) {
+  store_big_endian(out, load_little_endian(bytes));
+  store_little_endian(out, load_big_endian(bytes));
+  return gray_decode(gray_encode(reflect(bytes.size(), 64))) + (odd_parity(bytes.size()) ? 1u : 0u) +
+         static_cast<std::uint64_t>(wrapped_difference(1, 2, 17)) + static_cast<std::uint64_t>(degrees(1, 17));
+}
+
+// A machine with its own state and every pointer to a unit: virtual tables and the list of units.
+struct Idle final : Machine<std::uint8_t> {
+  void feed(const Event<std::uint8_t>&) override {}
+  Step<std::uint8_t> next(Time) override { return {.kind = Step<std::uint8_t>::Kind::done}; }
+};
+
+std::size_t run_idle(Port<std::uint8_t>& port) {
+  static Idle idle;
+  return drive_bytes(idle, port) ? all_units().size() : text_of(Error::timeout).name.size();
+}
+
+}  // namespace absenc

@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# usage: freestanding.sh LINKED.o OBJECT.o...
+# Fails when the objects, linked into one, need more than a compiler brings along; prints their sizes.
+set -euo pipefail
+nm=${NM:-arm-none-eabi-nm}
+size=${SIZE:-arm-none-eabi-size}
+
+# A global destructor asks for the first; the rest of __aeabi_ is arithmetic, memcpy and stack unwinding tables.
+forbidden='^__aeabi_atexit$'
+allowed=(
+  memcpy memmove memset memcmp strlen
+  '__aeabi_[a-z0-9_]+'
+  '__gnu_thumb1_case_[a-z]+'
+  '__[a-z]+[sd]i[23]'  # libgcc: __popcountsi2, __clzdi2 ...
+  __cxa_pure_virtual   # in the table of every abstract class; never called
+)
+pattern=$(IFS='|'; echo "^(${allowed[*]})\$")
+
+linked=$1
+shift
+status=0
+while read -r _ symbol; do
+  if [[ $symbol =~ $pattern && ! $symbol =~ $forbidden ]]; then continue; fi
+  status=1
+  for object in "$@"; do
+    if "$nm" -u "$object" | grep -qw -- "$symbol"; then
+      echo "not freestanding: ${object#"$PWD"/} needs $(c++filt "$symbol")" >&2
+    fi
+  done
+done < <("$nm" -u "$linked")
+
+"$size" "$linked" "$@" | sed -E "s|$PWD/(CMakeFiles/[^/]*/\./)?||"
+exit $status

@@ -1,0 +1,174 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- tools; os needs core, link."""
+
+import os
+import re
+import tempfile
+import unittest
+from pathlib import Path
+
+SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parent.parent))
+
+# What a layer may include, itself aside.
+BELOW = {
+    "core": set(),
+    "link": {"core"},
+    "protocol": {"core", "link"},
+    "host": {"core", "link", "protocol"},
+    "sim": {"core", "link", "protocol"},
+    "capture": {"core", "link", "protocol"},
+    "os": {"core", "link"},
+}
+FREESTANDING = {"core", "link", "protocol", "host"}
+FREESTANDING_HEADERS = set(
+    """algorithm array bit cfloat chrono climits compare concepts cstddef cstdint cstring initializer_list iterator
+    limits new numbers numeric optional ratio span string_view tuple type_traits utility version""".split()
+)
+# Each costs seconds for every file that includes it.
+HEAVY = ("CLI/", "toml++/", "nlohmann/")
+LIGHT = {"nlohmann/json_fwd.hpp"}
+OS_HEADER = re.compile(
+    r"^(sys|linux|asm|asm-generic|net|netinet|arpa)/|"
+    r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal)\.h(pp)?$"
+)
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+BUILT_ON = re.compile(r"^Built on: *(.+)$", re.MULTILINE)
+
+
+def is_test(path):
+    return re.search(r"_(test|fuzz|bench)\.[ch]pp$", path.name) or path.name.startswith("test_")
+
+
+def unit_of(path):
+    """protocol/tformat/frame.hpp -> tformat; protocol/unit.hpp -> None."""
+    return path.parts[2] if path.parts[:2] == ("absenc", "protocol") and len(path.parts) > 3 else None
+
+
+def built_on(root, unit):
+    readme = root / "absenc" / "protocol" / unit / "README.md"
+    match = BUILT_ON.search(readme.read_text(encoding="utf-8")) if readme.exists() else None
+    return set(re.findall(r"[a-z0-9_]+", match.group(1))) if match else set()
+
+
+def layer_fault(root, path, target):
+    """Why the file at `path` must not include the project's header `target`, or None."""
+    layer = path.parts[1] if path.parts[0] == "absenc" else path.parts[0]
+    if not (root / target).is_file():
+        return "is no path from the repository root"
+    if target.parts[0] != "absenc":
+        return None if target.parts[0] == path.parts[0] or is_test(path) else f"is not for {layer}"
+    if is_test(path) or path.parts[0] in ("tests", "bench", "examples"):
+        return None
+    if is_test(target):
+        return "is only for tests"
+    unit, other = unit_of(path), unit_of(target)
+    if other and other != unit and path != Path("absenc/protocol/all.cpp"):
+        if unit is None:
+            return "names a unit: go through absenc/protocol/all.hpp"
+        if other not in built_on(root, unit):
+            return f'is another unit: say "Built on: {other}" in the README.md of {unit}'
+    if layer in BELOW and target.parts[1] not in BELOW[layer] | {layer}:
+        return f"is not below {layer}"
+    return None
+
+
+def system_fault(path, header):
+    """Why the file at `path` must not include <header>, or None."""
+    in_absenc = path.parts[0] == "absenc"
+    if in_absenc and path.parts[1] in FREESTANDING and not is_test(path):
+        return None if header in FREESTANDING_HEADERS else "is not a freestanding header"
+    at_os = path.parts[:2] == ("absenc", "os") or path.parts[0] == "bench"
+    return "belongs into absenc/os" if OS_HEADER.search(header) and not at_os else None
+
+
+def faults(root):
+    found = []
+    heavy = {}
+    for top in ("absenc", "tools", "tests", "bench", "examples"):
+        for file in sorted((root / top).rglob("*.[ch]pp")):
+            path = file.relative_to(root)
+            for bracket, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
+                fault = layer_fault(root, path, Path(name)) if bracket == '"' else system_fault(path, name)
+                if bracket == "<" and name.startswith("absenc/"):
+                    fault = "is ours: write it in quotes"
+                if fault:
+                    found.append(f"{path}: {name} {fault}")
+                if name.startswith(HEAVY) and name not in LIGHT:
+                    heavy.setdefault(name.split("/")[0], set()).add(path)
+    for library, paths in heavy.items():
+        if len(paths) > 1 or any(path.suffix == ".hpp" for path in paths):
+            found.append(f"{library}: to be included by one .cpp only, not by {', '.join(sorted(map(str, paths)))}")
+    return found
+
+
+class IncludeDirection(unittest.TestCase):
+    def test_the_sources(self):
+        self.assertTrue((SOURCE / "absenc" / "core").is_dir(), SOURCE)
+        self.assertEqual(faults(SOURCE), [])
+
+
+class TheCheckItself(unittest.TestCase):
+    """A small tree that is right, and one wrong line at a time added to it."""
+
+    GOOD = {
+        "absenc/core/bits.hpp": "#include <cstdint>\n",
+        "absenc/link/step.hpp": '#include "absenc/core/bits.hpp"\n',
+        "absenc/protocol/unit.hpp": '#include "absenc/link/step.hpp"\n',
+        "absenc/protocol/all.hpp": '#include "absenc/protocol/unit.hpp"\n',
+        "absenc/protocol/all.cpp": '#include "absenc/protocol/one/unit.hpp"\n#include "absenc/protocol/two/unit.hpp"\n',
+        "absenc/protocol/one/unit.hpp": '#include "absenc/protocol/unit.hpp"\n',
+        "absenc/protocol/one/one_test.cpp": '#include <vector>\n#include "absenc/sim/line.hpp"\n',
+        "absenc/protocol/one/test_line.hpp": '#include "absenc/sim/line.hpp"\n',
+        "absenc/protocol/two/README.md": "Two.\n\nBuilt on: one\n",
+        "absenc/protocol/two/unit.hpp": '#include "absenc/protocol/one/unit.hpp"\n',
+        "absenc/host/drive.hpp": '#include "absenc/link/step.hpp"\n',
+        "absenc/sim/line.hpp": '#include <vector>\n#include "absenc/link/step.hpp"\n',
+        "absenc/os/serial.cpp": '#include <sys/ioctl.h>\n#include "absenc/link/step.hpp"\n',
+        "tools/absenc/main.cpp": '#include <CLI/CLI.hpp>\n#include "absenc/protocol/all.hpp"\n',
+        "tools/absenc/text.hpp": "#include <string>\n",
+    }
+
+    def faults_with(self, path, line):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, text in self.GOOD.items():
+                file = Path(folder, name)
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(text + (line + "\n" if name == path else ""), encoding="utf-8")
+            return faults(Path(folder))
+
+    def test_a_good_tree_passes(self):
+        self.assertEqual(self.faults_with(None, ""), [])
+
+    def test_each_wrong_line_is_found(self):
+        for path, line in (
+            ("absenc/core/bits.hpp", '#include "absenc/link/step.hpp"'),
+            ("absenc/core/bits.hpp", "#include <string>"),
+            ("absenc/core/bits.hpp", "  #  include <vector>"),
+            ("absenc/core/bits.hpp", "#include <absenc/core/bits.hpp>"),
+            ("absenc/core/bits.hpp", '#include "bits.hpp"'),
+            ("absenc/core/bits.hpp", '#include "tools/absenc/text.hpp"'),
+            ("absenc/link/step.hpp", '#include "absenc/protocol/unit.hpp"'),
+            ("absenc/protocol/unit.hpp", '#include "absenc/protocol/one/unit.hpp"'),
+            ("absenc/protocol/unit.hpp", '#include "absenc/host/drive.hpp"'),
+            ("absenc/protocol/one/unit.hpp", '#include "absenc/protocol/two/unit.hpp"'),
+            ("absenc/protocol/one/unit.hpp", '#include "absenc/protocol/one/test_line.hpp"'),
+            ("absenc/protocol/one/unit.hpp", '#include "absenc/sim/line.hpp"'),
+            ("absenc/protocol/one/one_test.cpp", "#include <termios.h>"),
+            ("absenc/host/drive.hpp", "#include <functional>"),
+            ("absenc/host/drive.hpp", '#include "absenc/protocol/one/unit.hpp"'),
+            ("absenc/sim/line.hpp", '#include "absenc/host/drive.hpp"'),
+            ("absenc/sim/line.hpp", '#include "absenc/os/none.hpp"'),
+            ("absenc/sim/line.hpp", "#include <unistd.h>"),
+            ("absenc/os/serial.cpp", '#include "absenc/protocol/unit.hpp"'),
+            ("tools/absenc/main.cpp", '#include "absenc/protocol/one/unit.hpp"'),
+            ("tools/absenc/main.cpp", "#include <linux/spi/spidev.h>"),
+            ("tools/absenc/text.hpp", "#include <CLI/CLI.hpp>"),
+            ("tools/absenc/text.hpp", "#include <nlohmann/json.hpp>"),
+        ):
+            with self.subTest(path=path, line=line):
+                self.assertEqual(len(self.faults_with(path, line)), 1, self.faults_with(path, line))
+
+
+if __name__ == "__main__":
+    unittest.main()
