@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/emulator_port.hpp"
+
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/inotify.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <termios.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <utility>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::os {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t most_clients = 32;
+
+void check(bool good, const std::string& what) {
+  if (!good) throw system_failure(what, errno);
+}
+
+}  // namespace
+
+EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_port) {
+  set_latency(2ms);
+  open_terminal();
+  if (tcp_port) listen_on(*tcp_port);
+  for (const Descriptor* end : {&master_, &watch_, &listener_}) {
+    if (*end) poller().add(end->get());
+  }
+  link_ = std::move(link);
+  if (!link_.empty()) make_link();  // last: whoever waits for it may open it
+}
+
+EmulatorPort::~EmulatorPort() {
+  std::error_code ignored;
+  if (!link_.empty() && fs::read_symlink(link_, ignored) == terminal_) fs::remove(link_, ignored);
+}
+
+void EmulatorPort::open_terminal() {
+  const std::string what = "making a pseudo-terminal";
+  master_ = Descriptor(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  check(static_cast<bool>(master_) && ::grantpt(master_.get()) == 0 && ::unlockpt(master_.get()) == 0, what);
+  std::array<char, 64> name{};
+  check(::ptsname_r(master_.get(), name.data(), name.size()) == 0, what);
+  terminal_ = name.data();
+  slave_ = Descriptor(::open(terminal_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  check(static_cast<bool>(slave_), what);
+  termios settings{};
+  check(::tcgetattr(slave_.get(), &settings) == 0, what);
+  ::cfmakeraw(&settings);  // the echo of a terminal would send the host's requests back to it
+  check(::tcsetattr(slave_.get(), TCSANOW, &settings) == 0, what);
+  // After our own open, which is not to be seen. Without inotify only comfort is lost.
+  watch_ = Descriptor(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC));
+  if (watch_) ::inotify_add_watch(watch_.get(), terminal_.c_str(), IN_OPEN | IN_CLOSE);
+}
+
+void EmulatorPort::listen_on(std::uint16_t port) {
+  const std::string what = "listening on TCP port " + std::to_string(port);
+  listener_ = Descriptor(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  check(static_cast<bool>(listener_), what);
+  const int on = 1;
+  ::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(port);
+  socklen_t size = sizeof address;
+  auto* const generic = reinterpret_cast<sockaddr*>(&address);
+  if (::bind(listener_.get(), generic, size) < 0) {
+    if (errno != EADDRINUSE) throw system_failure(what, errno);
+    throw Failure(Failure::Kind::in_use, "TCP port " + std::to_string(port) + " is in use: choose another, or 0");
+  }
+  check(::listen(listener_.get(), 8) == 0 && ::getsockname(listener_.get(), generic, &size) == 0, what);
+  tcp_port_ = ntohs(address.sin_port);
+}
+
+void EmulatorPort::make_link() const {
+  std::error_code error;
+  if (const auto there = fs::symlink_status(link_, error); fs::exists(there)) {
+    const bool ours = fs::is_symlink(there) && fs::read_symlink(link_, error).native().starts_with("/dev/pts/");
+    if (!ours) {
+      throw Failure(Failure::Kind::in_use,
+                    link_ + " exists and is no link to a pseudo-terminal: remove it, or choose another path");
+    }
+    fs::remove(link_, error);
+  }
+  fs::create_symlink(terminal_, link_, error);
+  if (error) throw system_failure("making the link " + link_, error.value());
+}
+
+std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> ready) {
+  // First of all, so that nothing that comes now is taken for a remainder.
+  if (std::find(ready.begin(), ready.end(), watch_.get()) != ready.end()) users_changed();
+  std::size_t filled = 0;
+  for (const int descriptor : ready) {
+    if (descriptor == watch_.get() || filled == into.size()) continue;
+    if (descriptor == listener_.get()) {
+      accept_client();
+      continue;
+    }
+    const ssize_t size = ::read(descriptor, into.data() + filled, into.size() - filled);
+    if (size > 0) {
+      filled += static_cast<std::size_t>(size);
+    } else if (descriptor != master_.get() && (size == 0 || (errno != EAGAIN && errno != EINTR))) {
+      drop_client(descriptor);
+    }
+  }
+  return filled;
+}
+
+void EmulatorPort::drop_client(int descriptor) {
+  poller().remove(descriptor);
+  std::erase_if(clients_, [descriptor](const Descriptor& client) { return client.get() == descriptor; });
+}
+
+void EmulatorPort::accept_client() {
+  Descriptor client(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+  if (!client || clients_.size() == most_clients) return;  // too many: closed at once
+  const int on = 1;
+  ::setsockopt(client.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  poller().add(client.get());
+  clients_.push_back(std::move(client));
+}
+
+// A program has opened or closed the slave. Because we keep it open, it never gets the clean start of a real port:
+// an exclusive mode (TIOCEXCL) that the last user left would lock the next one out, and the next one would read
+// replies to the last one. Replies of this moment are left alone: they may be on their way to another user.
+void EmulatorPort::users_changed() {
+  std::array<std::byte, 4096> events;
+  while (::read(watch_.get(), events.data(), events.size()) > 0) {
+  }
+  ::ioctl(slave_.get(), TIOCNXCL);
+  if (os::now() - sent_at() < 200ms) return;
+  ::tcflush(slave_.get(), TCIFLUSH);
+}
+
+void EmulatorPort::write_all(Bytes bytes) {
+  write_terminal(bytes);
+  for (const Descriptor& client : clients_) {
+    const ssize_t size = ::send(client.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    dropped_ += bytes.size() - static_cast<std::size_t>(std::max<ssize_t>(size, 0));
+  }
+}
+
+void EmulatorPort::write_terminal(Bytes bytes) {
+  const ssize_t size = ::write(master_.get(), bytes.data(), bytes.size());
+  dropped_ += bytes.size() - static_cast<std::size_t>(std::max<ssize_t>(size, 0));
+}
+
+}  // namespace absenc::os

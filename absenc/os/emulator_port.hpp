@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// The line of a virtual encoder: a pseudo-terminal and, if asked, TCP, for any program to connect to.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absenc/os/stream_port.hpp"
+
+namespace absenc::os {
+
+/// All ends are one line: the device hears what comes from any of them, and each gets what the device sends. Like a
+/// wire, the line keeps nothing: what nobody reads is lost. Latency is 2 ms at first: a pause that long is a gap.
+class EmulatorPort final : public StreamPort {
+ public:
+  /// `link`: path of a symbolic link to the pseudo-terminal, removed at the end; empty: none. It replaces a link to a
+  /// pseudo-terminal and nothing else. `tcp_port`: listens there on 127.0.0.1; 0: on a free one.
+  /// Throws Failure: `in_use` for either, `system`.
+  explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
+  ~EmulatorPort() override;
+
+  /// What to open: the link if there is one, otherwise the pseudo-terminal.
+  [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_ : link_; }
+  /// 0 when it does not listen.
+  [[nodiscard]] std::uint16_t tcp_port() const { return tcp_port_; }
+  /// Bytes that an end did not take because it did not read.
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+
+ private:
+  std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
+  void write_all(Bytes bytes) override;
+  void drive(Line, bool) override {}
+  void apply(const LineSettings&) override {}  // a line without a rate suits every rate
+
+  void open_terminal();
+  void listen_on(std::uint16_t port);
+  void make_link() const;
+  void users_changed();
+  void accept_client();
+  void drop_client(int descriptor);
+  void write_terminal(Bytes bytes);
+
+  Descriptor master_;
+  Descriptor slave_;  // kept open: without it the master fails whenever no program has the slave open
+  Descriptor watch_;  // inotify: programs that open or close the slave
+  Descriptor listener_;
+  std::vector<Descriptor> clients_;
+  std::string terminal_;
+  std::string link_;
+  std::uint16_t tcp_port_ = 0;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace absenc::os

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/emulator_port.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/ioctl.h>
+
+#include <fstream>
+#include <memory>
+
+#include "absenc/os/serial.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/os/tcp.hpp"
+#include "absenc/os/testing.hpp"
+
+namespace absenc::os {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace testing;
+using Kind = ByteEvent::Kind;
+namespace fs = std::filesystem;
+
+constexpr LineSettings fast{.rate = 2'500'000};
+const Data request{0x1A, 0x00, 0x0A, 0xFF};
+
+Data receive(StreamPort& port) {
+  ByteEvent event = port.wait({.at = never, .answer = 5s});
+  if (event.kind == Kind::sent) event = port.wait({.at = never, .answer = 5s});
+  EXPECT_EQ(event.kind, Kind::received);
+  return data(event.items);
+}
+
+void expect_quiet(StreamPort& port) {
+  ByteEvent event = port.wait({.at = port.now() + 5ms});
+  if (event.kind == Kind::sent) event = port.wait({.at = port.now() + 5ms});
+  EXPECT_EQ(event.kind, Kind::timer);
+}
+
+TEST(EmulatorPort, TalksToASerialPort) {
+  EmulatorPort device;
+  SerialPort host(device.path(), fast);
+  host.begin(transfer(request));
+  EXPECT_EQ(receive(device), request);
+  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // 2 ms
+  const Data reply{1, 2, 3};
+  device.begin(transfer(reply));
+  EXPECT_EQ(receive(host), reply);
+  expect_quiet(device);  // no echo
+  EXPECT_EQ(device.dropped(), 0u);
+}
+
+TEST(EmulatorPort, IsOneLineForAllItsEnds) {
+  EmulatorPort device({}, 0);
+  ASSERT_NE(device.tcp_port(), 0);
+  SerialPort serial(device.path(), fast);
+  TcpPort first("127.0.0.1", device.tcp_port());
+  {
+    TcpPort second("127.0.0.1", device.tcp_port());
+    for (StreamPort* host :
+         {static_cast<StreamPort*>(&second), static_cast<StreamPort*>(&first), static_cast<StreamPort*>(&serial)}) {
+      host->begin(transfer(request));
+      EXPECT_EQ(receive(device), request);
+    }
+    const Data reply{1, 2, 3};
+    device.begin(transfer(reply));
+    EXPECT_EQ(receive(serial), reply);
+    EXPECT_EQ(receive(first), reply);
+    EXPECT_EQ(receive(second), reply);
+  }
+  expect_quiet(device);          // sees `second` go
+  for (int i = 0; i < 2; ++i) {  // a first write to a closed connection succeeds
+    device.begin(transfer(request));
+    EXPECT_EQ(receive(first), request);
+  }
+  EXPECT_EQ(device.dropped(), 0u);
+}
+
+TEST(EmulatorPort, RefusesClientsAboveItsLimit) {
+  EmulatorPort device({}, 0);
+  std::vector<std::unique_ptr<TcpPort>> hosts;
+  for (int i = 0; i < 33; ++i) {
+    hosts.push_back(std::make_unique<TcpPort>("127.0.0.1", device.tcp_port()));
+    expect_quiet(device);
+  }
+  hosts.front()->begin(transfer(request));
+  EXPECT_EQ(receive(device), request);
+  hosts.back()->set_end(now() + 5s);
+  EXPECT_EQ(failure_of([&] { static_cast<void>(hosts.back()->wait({.at = never})); }).kind(), Failure::Kind::lost);
+}
+
+TEST(EmulatorPort, GoesOnWhenAUserLeaves) {
+  EmulatorPort device;
+  for (int i = 0; i < 3; ++i) {
+    SerialPort host(device.path(), fast);
+    host.begin(transfer(request));
+    EXPECT_EQ(receive(device), request);
+    device.begin(transfer(request));
+    EXPECT_EQ(receive(host), request);
+  }
+  expect_quiet(device);
+}
+
+TEST(EmulatorPort, KeepsNothingForTheNextUser) {
+  EmulatorPort device;
+  const Data frame(1000, 0x55);
+  while (device.dropped() == 0) device.begin(transfer(frame));  // nobody reads
+  const Time written = now();
+  sleep_until(written + 200ms);  // later than anything that may be on its way
+  // Not a SerialPort, which discards by itself.
+  const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
+  put(host.get(), request);
+  EXPECT_EQ(receive(device), request);
+  device.begin(transfer(request));
+  EXPECT_EQ(get(host.get()), request);
+}
+
+TEST(EmulatorPort, LeavesAReplyAloneWhenAnotherProgramLooks) {
+  EmulatorPort device;
+  const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
+  device.begin(transfer(request));
+  Descriptor(::open(device.path().c_str(), O_RDWR | O_NOCTTY)).close();
+  expect_quiet(device);
+  EXPECT_EQ(get(host.get()), request);
+}
+
+TEST(EmulatorPort, IsNotLockedByAUserWhoLeft) {
+  EmulatorPort device;
+  Descriptor(::open(device.path().c_str(), O_RDWR | O_NOCTTY)).close();
+  {
+    const Descriptor greedy(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
+    ASSERT_EQ(::ioctl(greedy.get(), TIOCEXCL), 0);
+  }
+  expect_quiet(device);
+  // As root we could open it anyway: ask for the flag.
+  const Descriptor next(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
+  int exclusive = 1;
+  ASSERT_EQ(::ioctl(next.get(), TIOCGEXCL, &exclusive), 0);
+  EXPECT_EQ(exclusive, 0);
+}
+
+TEST(EmulatorPort, EndsInTime) {
+  EmulatorPort device;
+  device.set_end(now() + 3ms);
+  EXPECT_THROW(static_cast<void>(device.wait({.at = never})), Ended);
+}
+
+TEST(EmulatorPort, IgnoresRatesAndWires) {
+  EmulatorPort device;
+  device.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 9600}});
+  device.begin({.kind = ByteStep::Kind::pulse});
+  EXPECT_EQ(device.wait({}).kind, Kind::sent);
+}
+
+TEST(EmulatorPort, LinksToItself) {
+  const TemporaryDirectory directory;
+  const fs::path link = directory.path() / "encoder";
+  fs::create_symlink("/dev/pts/999999", link);  // of an emulator that was killed
+  {
+    EmulatorPort device(link);
+    EXPECT_EQ(device.path(), link);
+    SerialPort host(link, fast);
+    host.begin(transfer(request));
+    EXPECT_EQ(receive(device), request);
+  }
+  EXPECT_FALSE(fs::exists(fs::symlink_status(link)));
+}
+
+TEST(EmulatorPort, ReplacesNothingButLinksToPseudoTerminals) {
+  const TemporaryDirectory directory;
+  const fs::path file = directory.path() / "file", link = directory.path() / "link";
+  std::ofstream(file) << "precious";
+  fs::create_symlink(file, link);
+  for (const fs::path& path : {file, link, directory.path()}) {
+    EXPECT_EQ(failure_of([&] { const EmulatorPort device(path); }).kind(), Failure::Kind::in_use) << path;
+  }
+  EXPECT_EQ(fs::file_size(file), 8u);
+  EXPECT_TRUE(fs::is_symlink(link));
+  const auto nowhere = [&] { const EmulatorPort device(directory.path() / "no" / "where"); };
+  EXPECT_EQ(failure_of(nowhere).kind(), Failure::Kind::system);
+}
+
+TEST(EmulatorPort, RemovesOnlyItsOwnLink) {
+  const TemporaryDirectory directory;
+  const fs::path link = directory.path() / "encoder";
+  {
+    const EmulatorPort device(link);
+    fs::remove(link);
+    fs::create_symlink("/dev/pts/999999", link);
+  }
+  EXPECT_TRUE(fs::is_symlink(link));
+}
+
+TEST(EmulatorPort, SaysThatItsTcpPortIsInUse) {
+  const EmulatorPort device({}, 0);
+  const auto second = [&] { const EmulatorPort other({}, device.tcp_port()); };
+  EXPECT_EQ(failure_of(second).kind(), Failure::Kind::in_use);
+}
+
+}  // namespace
+}  // namespace absenc::os

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the ports of this folder throw.
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+namespace absenc::os {
+
+/// Trouble with a port. `what()` says what happened and what to try, for people.
+class Failure : public std::runtime_error {
+ public:
+  enum class Kind : std::uint8_t {
+    not_found,      // no such port, host or listener
+    no_permission,  // it is there, but not for this user
+    in_use,         // another program has it
+    unsupported,    // this port cannot do what was asked
+    bad_rate,       // this port cannot do that baud rate
+    lost,           // it was there and went away
+    system,         // anything else that the operating system refused
+  };
+
+  Failure(Kind kind, const std::string& sentence) : std::runtime_error(sentence), kind_(kind) {}
+  [[nodiscard]] Kind kind() const { return kind_; }
+
+ private:
+  Kind kind_;
+};
+
+/// "<what> failed: <text of error>"; `error` is a value of errno.
+[[nodiscard]] inline Failure system_failure(const std::string& what, int error) {
+  return {Failure::Kind::system, what + " failed: " + std::generic_category().message(error)};
+}
+
+/// Thrown out of every wait of this folder after SIGINT or SIGTERM (os/signals.hpp).
+struct Interrupted {};
+
+/// Thrown by a port when the time given to `StreamPort::set_end` has come.
+struct Ended {};
+
+}  // namespace absenc::os

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a command asks the operating system about itself: its standard streams, its processor time, files it replaces.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "absenc/core/time.hpp"
+
+namespace absenc::os {
+
+/// From here on a closed pipe is an error of writing, no longer the end of the process, and a standard stream that was
+/// closed cannot become a port: that gets the lowest free number, and with standard output closed the readings would
+/// go to the encoder. Writing to a standard output that was closed fails. Throws Failure.
+void protect_standard_streams();
+
+[[nodiscard]] bool is_terminal(int descriptor);
+
+/// User and system time of this process so far.
+[[nodiscard]] Time processor_time();
+
+/// Whether `replace_file` may replace this existing file. A file that is itself protected is not to be replaced,
+/// although its directory would allow it. Returns 0 or a value of errno.
+[[nodiscard]] int replaceable(const std::string& path);
+
+enum class Durable : std::uint8_t { no, yes };
+
+/// Writes a new file and puts it in the place of the old one, so that there is always a whole one. `Durable::yes`
+/// waits for the disk. Throws Failure.
+void replace_file(const std::string& path, std::string_view content, Durable durable);
+
+}  // namespace absenc::os

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/serial.hpp"
+
+#include <fcntl.h>
+#include <linux/serial.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <termios.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <string_view>
+
+#include "absenc/os/error.hpp"
+
+namespace absenc::os {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+Descriptor open_terminal(const std::string& path) {
+  Descriptor descriptor(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  if (!descriptor) throw open_failure(path, errno);
+  // Before anything waits for it: epoll refuses plain files.
+  if (!terminal_state(descriptor.get())) throw open_failure(path, ENOTTY);
+  return descriptor;
+}
+
+bool is_pseudo_terminal(int descriptor) {
+  struct stat status {};
+  // 136 to 143: slaves of Unix98 pseudo-terminals (Documentation/admin-guide/devices.txt).
+  return ::fstat(descriptor, &status) == 0 && major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143;
+}
+
+std::string_view name_of(Parity parity) {
+  switch (parity) {
+    case Parity::odd:
+      return "odd";
+    case Parity::even:
+      return "even";
+    case Parity::none:
+      break;
+  }
+  return "no";
+}
+
+}  // namespace
+
+SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485)
+    : DescriptorPort(open_terminal(path), "the port " + path), path_(path), pseudo_(is_pseudo_terminal(descriptor())) {
+  const auto before = terminal_state(descriptor());
+  if (!before) throw open_failure(path, ENOTTY);
+  before_ = *before;
+  lock();
+  ::tcflush(descriptor(), TCOFLUSH);  // what another program left unsent must not hold us up
+  try {
+    apply(settings);
+    set_direction(rs485);
+  } catch (...) {
+    restore_terminal(descriptor(), before_);
+    throw;
+  }
+  shorten_latency();
+  ::tcflush(descriptor(), TCIFLUSH);
+}
+
+SerialPort::~SerialPort() {
+  restore_terminal(descriptor(), before_);
+  if (!pseudo_) ::ioctl(descriptor(), TIOCNXCL);
+}
+
+// flock keeps out every program that asks, root's as well; TIOCEXCL those that do not ask, but for root's.
+void SerialPort::lock() const {
+  if (::flock(descriptor(), LOCK_EX | LOCK_NB) < 0) throw open_failure(path_, errno);
+  // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps its side of the slave open, so that
+  // the flag would outlive us and lock the next user out.
+  if (!pseudo_) ::ioctl(descriptor(), TIOCEXCL);
+}
+
+void SerialPort::apply(const LineSettings& settings) {
+  if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
+  const LineSettings given = set_terminal(descriptor(), settings);
+  if (!rates_agree(settings.rate, given.rate)) {
+    throw Failure(Failure::Kind::bad_rate,
+                  "the port " + path_ + " cannot do " + std::to_string(settings.rate) + " baud, its nearest rate is " +
+                      std::to_string(nearest_rate(settings.rate, given.rate, clock_of_rates())) +
+                      ": use that, or another adapter");
+  }
+  if (pseudo_) return;  // it has no line: parity is taken back, characters take no time
+  if (given.parity != settings.parity || given.stop_bits != settings.stop_bits) {
+    throw Failure(Failure::Kind::unsupported,
+                  "the port " + path_ + " cannot do " + std::string(name_of(settings.parity)) + " parity with " +
+                      std::to_string(settings.stop_bits) + " stop bits: use another adapter");
+  }
+  set_character_time(settings.character());
+}
+
+std::uint32_t SerialPort::clock_of_rates() const {
+  serial_struct serial{};
+  if (::ioctl(descriptor(), TIOCGSERIAL, &serial) < 0 || serial.baud_base < 0) return 0;
+  return static_cast<std::uint32_t>(serial.baud_base);
+}
+
+void SerialPort::set_direction(Rs485 rs485) {
+  serial_rs485 direction{};
+  const bool known = ::ioctl(descriptor(), TIOCGRS485, &direction) == 0;
+  if (rs485 == Rs485::off) {
+    if (!known || (direction.flags & SER_RS485_ENABLED) == 0) return;
+    direction.flags &= ~static_cast<std::uint32_t>(SER_RS485_ENABLED);
+    ::ioctl(descriptor(), TIOCSRS485, &direction);
+    return;
+  }
+  if (known) {
+    direction.flags |= SER_RS485_ENABLED | SER_RS485_RTS_ON_SEND;
+    direction.flags &= ~static_cast<std::uint32_t>(SER_RS485_RTS_AFTER_SEND);
+    kernel_direction_ = ::ioctl(descriptor(), TIOCSRS485, &direction) == 0;
+  }
+  if (rs485 == Rs485::on && !kernel_direction_) {
+    throw Failure(Failure::Kind::unsupported, "the driver of the port " + path_ +
+                                                  " cannot switch the direction of RS-485: use an adapter that "
+                                                  "does it by itself, without asking for the kernel's help");
+  }
+}
+
+void SerialPort::shorten_latency() {
+  // USB frames, the receive FIFO's own time-out (4 characters) and scheduling. On a pseudo-terminal it is scheduling
+  // alone, of two processes, which a busy machine may hold up for a time slice or two.
+  set_latency(pseudo_ ? 20ms : 10ms);
+  if (pseudo_) return;
+  serial_struct serial{};
+  if (::ioctl(descriptor(), TIOCGSERIAL, &serial) == 0) {
+    serial.flags |= ASYNC_LOW_LATENCY;
+    ::ioctl(descriptor(), TIOCSSERIAL, &serial);
+  }
+  std::error_code ignored;
+  const std::string terminal = std::filesystem::canonical(path_, ignored).filename();
+  if (const auto milliseconds = latency_timer(terminal)) {
+    set_latency(latency() + std::chrono::milliseconds(*milliseconds));
+    if (*milliseconds > 1) {
+      notes_.push_back("the latency timer of " + terminal + " is " + std::to_string(*milliseconds) +
+                       " ms, which limits the readings a second: echo 1 | sudo tee /sys/class/tty/" + terminal +
+                       "/device/latency_timer");
+    }
+  }
+}
+
+void SerialPort::drive(Line line, bool active) {
+  const int wire = line == Line::trigger ? TIOCM_RTS : TIOCM_DTR;
+  if (::ioctl(descriptor(), active ? TIOCMBIS : TIOCMBIC, &wire) < 0) {
+    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " has no " +
+                                                  (line == Line::trigger ? "RTS" : "DTR") +
+                                                  " line for the pulse: use an adapter that brings it out");
+  }
+}
+
+}  // namespace absenc::os

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/serial_settings.hpp"
+
+#include <asm/termbits.h>
+#include <sys/ioctl.h>
+
+#include <bit>
+#include <cerrno>
+
+#include "absenc/os/error.hpp"
+
+namespace absenc::os {
+
+namespace {
+
+static_assert(sizeof(termios2) == sizeof(TerminalState));
+
+void write_line(termios2& state, const LineSettings& settings) {
+  state.c_iflag = 0;
+  state.c_oflag = 0;
+  state.c_lflag = 0;
+  state.c_cflag &= ~static_cast<tcflag_t>(CBAUD | CIBAUD | CSIZE | CSTOPB | PARENB | PARODD | CMSPAR | CRTSCTS);
+  state.c_cflag |= BOTHER | CS8 | CREAD | CLOCAL;
+  if (settings.parity != Parity::none) state.c_cflag |= PARENB;
+  if (settings.parity == Parity::odd) state.c_cflag |= PARODD;
+  if (settings.stop_bits == 2) state.c_cflag |= CSTOPB;
+  state.c_ispeed = settings.rate;
+  state.c_ospeed = settings.rate;
+  state.c_cc[VMIN] = 1;  // a read that finds nothing is EAGAIN, so that 0 is left to mean the end
+  state.c_cc[VTIME] = 0;
+}
+
+LineSettings read_line(const termios2& state) {
+  LineSettings settings;
+  settings.rate = state.c_ospeed;
+  if ((state.c_cflag & PARENB) != 0) settings.parity = (state.c_cflag & PARODD) != 0 ? Parity::odd : Parity::even;
+  settings.stop_bits = (state.c_cflag & CSTOPB) != 0 ? 2 : 1;
+  return settings;
+}
+
+}  // namespace
+
+std::optional<TerminalState> terminal_state(int descriptor) {
+  termios2 state{};
+  if (::ioctl(descriptor, TCGETS2, &state) < 0) return std::nullopt;
+  return std::bit_cast<TerminalState>(state);
+}
+
+void restore_terminal(int descriptor, const TerminalState& state) { ::ioctl(descriptor, TCSETSW2, &state); }
+
+LineSettings set_terminal(int descriptor, const LineSettings& settings) {
+  termios2 state{};
+  if (::ioctl(descriptor, TCGETS2, &state) < 0) throw system_failure("reading the port's settings", errno);
+  write_line(state, settings);
+  int result = 0;
+  do {
+    result = ::ioctl(descriptor, TCSETSW2, &state);
+  } while (result < 0 && errno == EINTR);
+  if (result < 0 || ::ioctl(descriptor, TCGETS2, &state) < 0) throw system_failure("setting up the port", errno);
+  return read_line(state);
+}
+
+}  // namespace absenc::os

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// The handler makes an eventfd readable that every wait watches. Against blocking the signals outside ppoll: prompts
+// and computations can be interrupted as well, all threads wake, and a line that is never quiet cannot hide a signal.
+#include "absenc/os/signals.hpp"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdint>
+#include <ctime>
+#include <stdexcept>
+
+#include "absenc/os/error.hpp"
+
+namespace absenc::os {
+
+namespace {
+
+// What a handler may touch must be free of locks.
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+std::atomic<int> wake{-1};  // the eventfd
+std::atomic<bool> came{false};
+
+void on_signal(int) {
+  const int saved = errno;
+  came = true;
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = ::write(wake, &one, sizeof one);
+  errno = saved;
+}
+
+void install() {
+  wake = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+  if (wake < 0) throw system_failure("eventfd", errno);
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  // Without SA_RESTART: a prompt that reads the terminal returns as well.
+  for (const int signal : {SIGINT, SIGTERM}) {
+    if (::sigaction(signal, &action, nullptr) < 0) throw system_failure("sigaction", errno);
+  }
+}
+
+timespec time_left(Time deadline) {
+  using std::chrono::duration_cast, std::chrono::seconds;
+  const Time left = std::max(deadline - now(), Time{});
+  const auto whole = duration_cast<seconds>(left);
+  return {whole.count(), (left - whole).count()};
+}
+
+}  // namespace
+
+void catch_interrupts() {
+  static const bool once = (install(), true);
+  static_cast<void>(once);
+}
+
+bool interrupted() { return came; }
+
+int interrupt_descriptor() { return wake.load(std::memory_order_relaxed); }
+
+bool take_interrupt() {
+  std::uint64_t count = 0;
+  return ::read(wake, &count, sizeof count) > 0;
+}
+
+Time now() {
+  timespec time{};
+  ::clock_gettime(CLOCK_MONOTONIC, &time);
+  return std::chrono::seconds(time.tv_sec) + Time(time.tv_nsec);
+}
+
+bool wait_for(std::span<pollfd> watched, Time deadline) {
+  if (watched.size() > most_watched) throw std::length_error("too many descriptors to wait for");
+  std::array<pollfd, most_watched + 1> all;
+  std::copy(watched.begin(), watched.end(), all.begin());
+  pollfd& signal = all[watched.size()];
+  signal = {interrupt_descriptor(), POLLIN, 0};  // -1: not looked at
+  for (;;) {
+    timespec timeout{};
+    if (deadline != never) timeout = time_left(deadline);
+    const int ready = ::ppoll(all.data(), watched.size() + 1, deadline == never ? nullptr : &timeout, nullptr);
+    if (ready < 0) {
+      if (errno == EINTR) continue;  // ours is readable now, any other is none of our business
+      throw system_failure("ppoll", errno);
+    }
+    if (signal.revents != 0) {
+      if (take_interrupt()) throw Interrupted{};
+      continue;
+    }
+    std::copy_n(all.begin(), watched.size(), watched.begin());
+    return ready > 0;
+  }
+}
+
+void sleep_until(Time time) {
+  while (now() < time) wait_for({}, time);
+}
+
+}  // namespace absenc::os

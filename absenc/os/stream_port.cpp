@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/stream_port.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <utility>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::os {
+
+using namespace std::chrono_literals;
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+StreamPort::StreamPort() : quiet_since_(os::now()) {}
+
+Time StreamPort::now() {
+  told_ = os::now();
+  return told_;
+}
+
+void StreamPort::begin(const ByteStep& step) {
+  switch (step.kind) {
+    case ByteStep::Kind::transfer:
+      // The first comparison spares most transfers a look at the clock.
+      if (step.at > told_ + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
+      if (!step.out.empty()) write_all(step.out);
+      mark_sent(std::max(os::now(), sent_at_) + character_time_ * static_cast<std::int64_t>(step.out.size()));
+      break;
+    case ByteStep::Kind::pulse:
+      reach(step.at);
+      pulse(step);
+      break;
+    case ByteStep::Kind::configure:
+      reach(sent_at_);  // what is on its way leaves with the old settings
+      apply(step.settings);
+      break;
+    case ByteStep::Kind::wait:
+    case ByteStep::Kind::emit:
+    case ByteStep::Kind::done:
+      break;
+  }
+}
+
+ByteEvent StreamPort::wait(const ByteStep& step) {
+  // A timer stays due when another event came in its moment and the machine asks for it once more.
+  armed_ = step.at > told_ || step.at == armed_ ? step.at : never;
+  if (std::exchange(sent_pending_, false)) return tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
+
+  const Time limit = heard_ ? step.gap : step.answer;
+  const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency_ : never;
+  const Time due = std::min(armed_, quiet_end);
+  for (;;) {
+    const std::span<const int> ready = poller_.wait(std::min(due, end_));
+    const Time time = os::now();
+    if (time >= end_) throw Ended{};
+    if (!ready.empty()) {
+      // Bytes go before limits: that we come late to look is not the fault of the other side.
+      if (const std::size_t size = read_some(buffer_, ready); size > 0) {
+        heard_ = true;
+        silence_told_ = false;
+        quiet_since_ = std::max(time, sent_at_);  // an echo comes before the computed end of sending
+        return tell({.kind = ByteEvent::Kind::received, .at = quiet_since_, .items = {buffer_.data(), size}});
+      }
+    } else if (time >= armed_ && armed_ <= quiet_end) {
+      armed_ = never;
+      return tell({.kind = ByteEvent::Kind::timer, .at = time});
+    } else if (time >= quiet_end) {
+      silence_told_ = true;
+      return tell({.kind = ByteEvent::Kind::silence, .at = time});
+    }
+  }
+}
+
+// The machine's time is that of its last event.
+ByteEvent StreamPort::tell(const ByteEvent& event) {
+  told_ = event.at;
+  return event;
+}
+
+// The kernel wakes up to 100 us late (timer slack and scheduling): the rest is spent looking at the clock.
+void StreamPort::reach(Time time) {
+  constexpr Time wake_up = 100us;
+  if (time - os::now() > wake_up) sleep_until(std::min(time - wake_up, end_));
+  while (os::now() < time) {
+    if (os::now() >= end_) throw Ended{};
+  }
+}
+
+void StreamPort::pulse(const ByteStep& step) {
+  drive(step.line, true);
+  try {
+    reach(os::now() + step.width);
+  } catch (...) {
+    drive(step.line, false);
+    throw;
+  }
+  drive(step.line, false);
+  mark_sent(os::now());
+}
+
+void StreamPort::mark_sent(Time at) {
+  sent_at_ = at;
+  quiet_since_ = at;
+  sent_pending_ = true;
+  heard_ = false;
+  silence_told_ = false;
+}
+
+void StreamPort::drive(Line, bool) {
+  throw Failure(Failure::Kind::unsupported, "this kind of port has no trigger and clear lines: use a serial port");
+}
+
+void StreamPort::apply(const LineSettings& settings) {
+  throw Failure(Failure::Kind::unsupported,
+                "this kind of port cannot change to " + std::to_string(settings.rate) + " baud: use a serial port");
+}
+
+DescriptorPort::DescriptorPort(Descriptor descriptor, std::string name)
+    : descriptor_(std::move(descriptor)), name_(std::move(name)) {
+  const int flags = ::fcntl(descriptor_.get(), F_GETFL);
+  if (flags < 0 || ::fcntl(descriptor_.get(), F_SETFL, flags | O_NONBLOCK) < 0) throw system_failure(name_, errno);
+  poller().add(descriptor_.get());
+}
+
+ssize_t DescriptorPort::write_some(Bytes bytes) { return ::write(descriptor(), bytes.data(), bytes.size()); }
+
+std::size_t DescriptorPort::read_some(MutableBytes into, std::span<const int>) {
+  const ssize_t size = ::read(descriptor(), into.data(), into.size());
+  if (size > 0) return static_cast<std::size_t>(size);
+  if (size == 0) fail(0);
+  if (errno != EAGAIN && errno != EINTR) fail(errno);
+  return 0;
+}
+
+void DescriptorPort::write_all(Bytes bytes) {
+  constexpr Time patience = 3s;  // a line always moves: longer than the slowest one needs for a full buffer
+  for (;;) {
+    const ssize_t size = write_some(bytes);
+    if (size < 0 && errno != EAGAIN && errno != EINTR) fail(errno);
+    if (size > 0) bytes = bytes.subspan(static_cast<std::size_t>(size));
+    if (bytes.empty()) return;
+    pollfd writable{descriptor(), POLLOUT, 0};
+    const Time limit = os::now() + patience;
+    if (wait_for({&writable, 1}, std::min(limit, end()))) continue;
+    if (os::now() >= end()) throw Ended{};
+    throw Failure(Failure::Kind::lost, name_ + " takes no more bytes: is the other end still running?");
+  }
+}
+
+void DescriptorPort::fail(int error) const {
+  switch (error) {
+    case 0:  // end of file
+    case EIO:
+    case ENXIO:
+    case ENODEV:
+    case EPIPE:
+    case ECONNRESET:
+    case ETIMEDOUT:
+      throw Failure(Failure::Kind::lost, name_ + " went away: unplugged, or closed at the other end?");
+    default:
+      throw system_failure(name_, error);
+  }
+}
+
+}  // namespace absenc::os

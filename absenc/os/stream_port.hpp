@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps and events (link/step.hpp) over anything that carries a stream of bytes: the timing all such ports share,
+// and the port over one file descriptor.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/link/port.hpp"
+#include "absenc/os/descriptor.hpp"
+#include "absenc/os/poller.hpp"
+
+namespace absenc::os {
+
+/// Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
+///
+/// A transfer begins at `at`, never earlier; `begin` blocks until then. `timer` is reported when the `at` of a wait
+/// lay ahead of the last event, or of the last call of `now`.
+class StreamPort : public Port<std::uint8_t> {
+ public:
+  StreamPort(const StreamPort&) = delete;
+  StreamPort& operator=(const StreamPort&) = delete;
+  virtual ~StreamPort() = default;
+
+  [[nodiscard]] Time now() final;
+  void begin(const Step<std::uint8_t>& step) final;
+  [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) final;
+
+  /// What the way between the line and this program adds to the answer and gap limits of a step.
+  [[nodiscard]] Time latency() const { return latency_; }
+  void set_latency(Time latency) { latency_ = latency; }
+
+  /// A transfer due within `slack` is sent at once: for a virtual encoder, whose line takes no time. 0 at first.
+  void set_send_slack(Time slack) { send_slack_ = slack; }
+
+  /// From `end` on the port throws Ended. `never` at first.
+  void set_end(Time end) { end_ = end; }
+
+ protected:
+  StreamPort();
+
+  /// Line time of a character: `sent` is computed from it, because tcdrain blocks for milliseconds. 0 at first: a
+  /// transfer has left when it is written.
+  void set_character_time(Time time) { character_time_ = time; }
+  [[nodiscard]] Time end() const { return end_; }
+  /// End of the last transfer.
+  [[nodiscard]] Time sent_at() const { return sent_at_; }
+
+  /// Where bytes come from: to be filled by the derived port.
+  [[nodiscard]] Poller& poller() { return poller_; }
+  /// What has come on these descriptors, as far as it fits; 0 when that was not bytes.
+  virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
+  virtual void write_all(Bytes bytes) = 0;
+  /// Both throw `unsupported` unless overridden.
+  virtual void drive(Line line, bool active);
+  virtual void apply(const LineSettings& settings);
+
+ private:
+  Event<std::uint8_t> tell(const Event<std::uint8_t>& event);
+  void reach(Time time);
+  void pulse(const Step<std::uint8_t>& step);
+  void mark_sent(Time at);
+
+  Poller poller_;
+  Time latency_{};
+  Time send_slack_{};
+  Time end_ = never;
+  Time character_time_{};
+
+  Time told_{};                // the time that the machine knows: of `now`, or of its last event
+  Time armed_ = never;         // the `timer` that was promised and not yet reported
+  Time sent_at_{};             // end of the last transfer
+  Time quiet_since_;           // end of the last transfer, or time of the last bytes
+  bool sent_pending_ = false;  // `sent` is to be reported
+  bool heard_ = false;         // bytes since the last transfer
+  bool silence_told_ = false;  // one `silence` for each transfer, or bytes
+  std::array<std::uint8_t, 4096> buffer_;
+};
+
+/// A stream port over one descriptor that reads and writes. Its latency is 0 at first.
+class DescriptorPort : public StreamPort {
+ public:
+  /// `name` as in "the port /dev/ttyUSB0", for messages. Makes the descriptor non-blocking.
+  DescriptorPort(Descriptor descriptor, std::string name);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ protected:
+  [[nodiscard]] int descriptor() const { return descriptor_.get(); }
+
+  /// As write(2).
+  virtual ssize_t write_some(Bytes bytes);
+
+  std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
+  void write_all(Bytes bytes) override;
+
+ private:
+  [[noreturn]] void fail(int error) const;
+
+  Descriptor descriptor_;
+  std::string name_;
+};
+
+}  // namespace absenc::os
