@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the end-to-end tests share: the command, an emulator that runs beside it, and a line with a fake encoder."""
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import tty
+import unittest
+
+ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
+PATIENCE = 60.0  # seconds after which a test gives up; nothing takes that long unless it hangs
+
+
+def absenc(*arguments, **settings):
+    """Runs the command to its end."""
+    settings.setdefault("stdin", subprocess.DEVNULL)
+    return subprocess.run([ABSENC, *arguments], capture_output=True, text=True, timeout=PATIENCE, **settings)
+
+
+def read_line(stream, deadline):
+    """One line of an unbuffered binary stream, or None when the deadline comes or the stream ends first."""
+    line = b""
+    while not line.endswith(b"\n"):
+        left = deadline - time.monotonic()
+        if left <= 0 or not select.select([stream], [], [], left)[0]:
+            return None
+        byte = os.read(stream.fileno(), 1)
+        if not byte:
+            return None
+        line += byte
+    return line.decode()
+
+
+def end(process, number=signal.SIGTERM):
+    """Sends the signal and returns what the process leaves: status, standard output, standard error."""
+    if process.poll() is None:
+        process.send_signal(number)
+    out, err = process.communicate(timeout=PATIENCE)
+    return process.returncode, out.decode(), err.decode()
+
+
+class Emulator:
+    """`absenc emulate`, ready to be opened."""
+
+    def __init__(self, directory, *arguments, protocol="tformat", name="encoder"):
+        self.path = os.path.join(directory, name)
+        command = [ABSENC, "emulate", protocol, "--pty", self.path, *arguments]
+        self.process = subprocess.Popen(command, bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE)
+        self.ready = self.line()
+        if self.ready is None:
+            raise AssertionError(f"the emulator did not become ready: {end(self.process)}")
+
+    def line(self):
+        return read_line(self.process.stdout, time.monotonic() + PATIENCE)
+
+    def end(self, number=signal.SIGTERM):
+        return end(self.process, number)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.end()
+
+
+class FakeEncoder:
+    """Answers every byte 1A on a pseudo-terminal with the same bytes."""
+
+    def __init__(self, reply):
+        self.reply = bytes(reply)
+        self.master, self.slave = os.openpty()
+        tty.setraw(self.slave)
+        self.path = os.ttyname(self.slave)
+        self.wake, self.waker = os.pipe()
+        self.thread = threading.Thread(target=self.serve)
+
+    def serve(self):
+        while True:
+            ready, _, _ = select.select([self.master, self.wake], [], [])
+            if self.wake in ready:
+                return
+            if 0x1A in os.read(self.master, 64):
+                os.write(self.master, self.reply)
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        os.write(self.waker, b"x")
+        self.thread.join()
+        for descriptor in (self.master, self.slave, self.wake, self.waker):
+            os.close(descriptor)
+
+
+class Case(unittest.TestCase):
+    """A test with a directory of its own that anybody may look into."""
+
+    def setUp(self):
+        self.directory = tempfile.mkdtemp(prefix="absenc-test-")
+        os.chmod(self.directory, 0o755)
+        self.addCleanup(shutil.rmtree, self.directory)
+
+    def file(self, name, text=None):
+        path = os.path.join(self.directory, name)
+        if text is not None:
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(text)
+        return path
+
+    def assert_good(self, result):
+        self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
+
+    def assert_wrong_usage(self, result, *words):
+        """Exit status 2, a sentence with these words, and nothing on standard output."""
+        self.assertEqual(result.returncode, 2, f"{result.stdout}\n{result.stderr}")
+        self.assertEqual(result.stdout, "")
+        self.assert_sentence(result.stderr, *words)
+
+    def assert_failed(self, result, *words):
+        self.assertEqual(result.returncode, 1, f"{result.stdout}\n{result.stderr}")
+        self.assert_sentence(result.stderr, *words)
+
+    def assert_sentence(self, text, *words):
+        self.assertTrue(text.startswith("absenc: "), text)
+        for word in words:
+            self.assertIn(word, text)
+
+
+def json_lines(text):
+    return [json.loads(line) for line in text.splitlines()]

@@ -1,0 +1,442 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc emulate tformat` against a T-format client that shares no code with it."""
+import os
+import re
+import select
+import signal
+import socket
+import stat
+import subprocess
+import time
+import tty
+import unittest
+
+from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, read_line
+
+REPLY_LENGTH = {0x0: 6, 0x1: 6, 0x2: 4, 0x3: 11, 0x6: 4, 0x7: 6, 0x8: 6, 0xC: 6, 0xD: 4}
+ALARMS = ["over_speed", "full_absolute_status", "counting_error", "counter_overflow", "over_heat", "multiturn_error",
+          "battery_error", "battery_alarm"]
+COUNTING_ERROR, ALARM = 0x10, 0x20  # in SF
+
+
+def control_field(data_id):
+    parity = bin(data_id).count("1") & 1
+    return 0b010 | data_id << 3 | parity << 7
+
+
+def crc(data):
+    """X^8 + 1, least significant bit first."""
+    register = 0
+    for byte in data:
+        for bit in range(8):
+            top = register >> 7
+            register = (register << 1 & 0xFF) | (top ^ (byte >> bit & 1))
+    return int(f"{register:08b}"[::-1], 2)
+
+
+class Client:
+    """The host's end of the line: `exchange` sends a request and returns as many bytes as came."""
+
+    def __init__(self, descriptor):
+        self.descriptor = descriptor
+
+    @staticmethod
+    def open(path):
+        descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(descriptor)
+        return Client(descriptor)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        os.close(self.descriptor)
+
+    def send(self, data):
+        os.write(self.descriptor, bytes(data))
+
+    def receive(self, length, patience=PATIENCE):
+        data = b""
+        deadline = time.monotonic() + patience
+        while len(data) < length:
+            if not select.select([self.descriptor], [], [], max(0, deadline - time.monotonic()))[0]:
+                break
+            data += os.read(self.descriptor, 256)
+        return data
+
+    def exchange(self, data_id, *body, length=None):
+        request = bytes([control_field(data_id), *body])
+        if body:
+            request += bytes([crc(request)])
+        self.send(request)
+        return self.receive(length or REPLY_LENGTH[data_id])
+
+    def read_memory(self, address):
+        """(busy, value)"""
+        reply = self.exchange(0xD, address)
+        assert len(reply) == 4 and crc(reply[:3]) == reply[3] and reply[0] == 0xEA, reply
+        assert reply[1] & 0x7F == address, reply
+        return bool(reply[1] & 0x80), reply[2]
+
+    def write_memory(self, address, value):
+        return self.exchange(0x6, address, value)
+
+    def wait_until_written(self, address):
+        """Polls the busy bit; returns whether it was seen, and the value at the address then."""
+        deadline = time.monotonic() + PATIENCE
+        was_busy = False
+        while time.monotonic() < deadline:
+            busy, value = self.read_memory(address)
+            if not busy:
+                return was_busy, value
+            was_busy = True
+        raise AssertionError("busy without end")
+
+    def select_page(self, page):
+        reply = self.write_memory(127, page)
+        assert reply[1:3] == bytes([127, page]), reply
+        assert self.wait_until_written(127)[1] == page
+
+
+class EmulateCase(Case):
+    def emulator(self, *arguments, **settings):
+        emulator = Emulator(self.directory, *arguments, **settings)
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def client(self, *arguments):
+        client = Client.open(self.emulator(*arguments).path)
+        self.addCleanup(client.__exit__)
+        return client
+
+    def assert_reply(self, reply, data_id, status, body):
+        wanted = bytes([control_field(data_id), status]) + bytes(body)
+        self.assertEqual(reply.hex(" "), (wanted + bytes([crc(wanted)])).hex(" "))
+
+
+class DataIds(EmulateCase):
+    def test_positions(self):
+        client = self.client("--singleturn", "0x1ABCD", "--multiturn", "0x1234")
+        self.assert_reply(client.exchange(0), 0, 0, [0xCD, 0xAB, 0x01])
+        self.assert_reply(client.exchange(1), 1, 0, [0x34, 0x12, 0x00])
+        self.assert_reply(client.exchange(2), 2, 0, [0x11])
+        self.assert_reply(client.exchange(3), 3, 0, [0xCD, 0xAB, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00])
+
+    def test_other_model(self):
+        client = self.client("--model", "23-bit", "--singleturn", str(2**23 - 1), "--multiturn", "65535")
+        self.assert_reply(client.exchange(2), 2, 0, [0x17])
+        self.assert_reply(client.exchange(3), 3, 0, [0xFF, 0xFF, 0x7F, 0x17, 0xFF, 0xFF, 0x00, 0x00])
+
+    def reset(self, client, data_id, times):
+        """Sends the request so often, 100 us apart; returns the last reply."""
+        reply = b""
+        for _ in range(times):
+            reply = client.exchange(data_id)
+            apart = time.monotonic() + 100e-6
+            while time.monotonic() < apart:
+                pass
+        return reply
+
+    def test_nine_resets_do_nothing(self):
+        client = self.client("--alarm", "over_speed", "--multiturn", "7")
+        self.reset(client, 0x7, 9)
+        self.assertEqual(client.exchange(3)[9], 0x01)
+        self.reset(client, 0x7, 9)  # the other request has started the count again
+        self.assertEqual(client.exchange(3)[9], 0x01)
+        self.reset(client, 0xC, 5)
+        self.reset(client, 0x7, 5)
+        self.assertEqual(client.exchange(3)[6:10], bytes([7, 0, 0, 0x01]))
+
+    def test_clear_alarms(self):
+        client = self.client("--alarm", "multiturn_error", "--multiturn", "7")
+        self.assert_reply(self.reset(client, 0x7, 10), 0x7, ALARM, [0, 0, 0])  # the tenth still shows it
+        self.assert_reply(client.exchange(3), 3, 0, [0, 0, 0, 0x11, 7, 0, 0, 0])
+
+    def test_reset_multiturn(self):
+        client = self.client("--alarm", "battery_error", "--singleturn", "5", "--multiturn", "7")
+        self.assert_reply(self.reset(client, 0xC, 10), 0xC, ALARM, [5, 0, 0])
+        self.assert_reply(client.exchange(3), 3, 0, [5, 0, 0, 0x11, 0, 0, 0, 0])
+
+    def test_zero(self):
+        client = self.client("--singleturn", "1000", "--multiturn", "7")
+        self.assert_reply(self.reset(client, 0x8, 10), 0x8, 0, [0xE8, 0x03, 0])
+        client.wait_until_written(0)
+        self.assert_reply(client.exchange(3), 3, 0, [0, 0, 0, 0x11, 7, 0, 0, 0])
+
+    def test_memory(self):
+        client = self.client()
+        self.assertEqual(client.read_memory(5), (False, 0))
+        before = time.monotonic()
+        self.assertEqual(client.write_memory(5, 0x5A).hex(" "), "32 05 5a 6d")
+        was_busy, value = client.wait_until_written(5)
+        took = time.monotonic() - before
+        self.assertEqual(value, 0x5A)
+        self.assertTrue(was_busy or took > 0.018)
+        self.assertGreaterEqual(took, 0.018)
+        self.assertEqual(client.read_memory(6), (False, 0))
+
+    def test_a_busy_encoder_does_not_write(self):
+        client = self.client()
+        client.write_memory(5, 0x5A)
+        reply = client.write_memory(6, 0x77)
+        client.wait_until_written(5)
+        if reply[1] & 0x80:  # unless this machine took 18 ms for it
+            self.assertEqual(reply[2], 0)
+            self.assertEqual(client.read_memory(6), (False, 0))
+
+    def test_pages(self):
+        client = self.client()
+        for page in (0, 3, 5):
+            client.select_page(page)
+            client.write_memory(126, 0x40 + page)
+            client.wait_until_written(126)
+        for page in (5, 0, 3):
+            client.select_page(page)
+            self.assertEqual(client.read_memory(126), (False, 0x40 + page))
+            self.assertEqual(client.read_memory(127), (False, page))
+
+    def test_service_page(self):
+        client = self.client()
+        client.select_page(7)
+        self.assertEqual(client.read_memory(5), (False, 35))
+        self.assertEqual(client.read_memory(4), (False, 0xDA))
+        client.write_memory(4, 0x80 + 20)  # it is 35 degC warm
+        client.wait_until_written(4)
+        self.assertEqual(client.exchange(3)[9], 0x10)
+
+    def test_what_it_cannot_accept(self):
+        """Answered like ID 3, except a wrong sync code, which is not answered at all."""
+        client = self.client()
+        everything = client.exchange(3)
+        self.assertEqual(client.exchange(0x4, length=11), everything)                 # unknown id
+        client.send([0x9A])                                                           # wrong parity
+        self.assertEqual(client.receive(11)[:2], bytes([0x1A, 0x40]))
+        client.send([0xEA, 5, 0])                                                     # wrong CRC
+        self.assertEqual(client.receive(11), everything)
+        self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)         # closed page
+        client.send([0xEA])                                                           # cut short
+        self.assertEqual(client.receive(11), everything)
+        client.send([0x19, 0x1A])                                                     # no sync code, then a request
+        self.assertEqual(client.receive(12, patience=0.05), everything)
+
+
+class Behaviour(EmulateCase):
+    def test_alarms(self):
+        for bit, name in enumerate(ALARMS):
+            with self.subTest(name), Emulator(self.directory, "--alarm", name) as emulator:
+                with Client.open(emulator.path) as client:
+                    reply = client.exchange(3)
+                    status = COUNTING_ERROR if bit == 2 else ALARM if bit >= 4 else 0
+                    self.assertEqual((reply[1], reply[9]), (status, 1 << bit))
+                    self.assertEqual(crc(reply[:-1]), reply[-1])
+
+    def test_several_alarms(self):
+        client = self.client("--alarm", "battery_error", "--alarm", "battery_alarm")
+        self.assertEqual(client.exchange(3)[9], 0xC0)
+
+    def test_corrupt(self):
+        emulator = self.emulator("--fault", "corrupt=1")
+        with Client.open(emulator.path) as client:
+            replies = [client.exchange(3) for _ in range(20)]
+        good = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
+        self.assertTrue(all(len(reply) == 11 and reply != good for reply in replies))
+        # Two flips in the same column pass this checksum.
+        self.assertGreater(sum(crc(reply[:-1]) != reply[-1] for reply in replies), 10)
+        self.assertIn("faults injected: 20 corrupt", emulator.end()[2])
+
+    def test_silence(self):
+        emulator = self.emulator("--fault", "silence=1")
+        with Client.open(emulator.path) as client:
+            client.send([0x1A])
+            self.assertEqual(client.receive(1, patience=0.1), b"")
+        self.assertIn("faults injected: 1 silence", emulator.end()[2])
+
+    def test_delay(self):
+        client = self.client("--fault", "delay=1")
+        before = time.monotonic()
+        self.assert_reply(client.exchange(2), 2, 0, [0x11])
+        self.assertGreaterEqual(time.monotonic() - before, 0.05)
+
+    def test_seed(self):
+        series = []
+        for seed in ("7", "7", "8"):
+            with Emulator(self.directory, "--fault", "corrupt=1", "--seed", seed) as emulator:
+                with Client.open(emulator.path) as client:
+                    series.append([client.exchange(3) for _ in range(5)])
+        self.assertEqual(series[0], series[1])
+        self.assertNotEqual(series[0], series[2])
+
+    def test_motion(self):
+        client = self.client("--motion", "rpm=60")
+        seen = {client.exchange(0)[2:5] for _ in range(50)}
+        self.assertGreater(len(seen), 10)
+
+    def test_motion_from_file(self):
+        path = self.file("motion.csv", "seconds,degrees\n0,0\n0.01,90\n")
+        client = self.client("--motion", f"file={path}")
+        deadline = time.monotonic() + PATIENCE
+        while client.exchange(0)[2:5] != bytes([0, 0x80, 0]) and time.monotonic() < deadline:
+            pass
+        self.assertEqual(client.exchange(0)[2:5], bytes([0, 0x80, 0]))
+
+    def test_power_on_takes_its_time(self):
+        before = time.monotonic()
+        client = self.client("--power-on", "real")
+        reply = b""
+        while not reply and time.monotonic() < before + PATIENCE:
+            client.send([0x92])
+            reply = client.receive(4, patience=0.02)
+        self.assertEqual(reply, bytes([0x92, 0, 0x11, 0x83]))
+        self.assertGreaterEqual(time.monotonic() - before, 1.0)
+
+    def test_tcp(self):
+        emulator = self.emulator("--tcp", "0", "--singleturn", "5")
+        line = emulator.line()
+        self.assertRegex(line, r"^ready: tcp:127\.0\.0\.1:\d+\n$")
+        port = int(line.rsplit(":", 1)[1])
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
+            ends = [Client(connection.fileno()), Client.open(emulator.path)]
+            for asking, listening in (ends, ends[::-1]):  # one line: both hear the reply
+                self.assert_reply(asking.exchange(0), 0, 0, [5, 0, 0])
+                self.assert_reply(listening.receive(6), 0, 0, [5, 0, 0])
+            ends[1].__exit__()
+        in_use = absenc("emulate", "tformat", "--tcp", str(port), "--for", "60")
+        self.assert_failed(in_use, f"TCP port {port} is in use")
+
+
+class Life(EmulateCase):
+    def test_ready_line(self):
+        emulator = self.emulator()
+        self.assertEqual(emulator.ready, f"ready: {emulator.path}\n")
+        self.assertTrue(stat.S_ISCHR(os.stat(emulator.path).st_mode))
+
+    def test_without_a_path(self):
+        process = subprocess.Popen([ABSENC, "emulate", "tformat"], bufsize=0, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE)
+        try:
+            ready = read_line(process.stdout, time.monotonic() + PATIENCE)
+            self.assertRegex(ready, r"^ready: /dev/pts/\d+\n$")
+            with Client.open(ready[7:].strip()) as client:
+                self.assertEqual(len(client.exchange(3)), 11)
+        finally:
+            end(process)
+
+    def test_signals_end_it_with_a_summary(self):
+        for number in (signal.SIGTERM, signal.SIGINT):
+            with self.subTest(number):
+                emulator = Emulator(self.directory)
+                with Client.open(emulator.path) as client:
+                    for _ in range(3):
+                        client.exchange(3)
+                status, out, err = emulator.end(number)
+                self.assertEqual((status, out), (0, ""))
+                self.assertRegex(err, r"^absenc: 3 requests answered in ")
+                self.assertFalse(os.path.lexists(emulator.path))
+
+    def test_violations(self):
+        emulator = self.emulator()
+        with Client.open(emulator.path) as client:
+            client.write_memory(127, 3)
+            self.assertTrue(client.read_memory(0)[0])
+        err = emulator.end()[2]
+        self.assertRegex(err, r"rules that the host broke: 1\n    at \d+\.\d{6} s: memory access before the page is ready")
+
+    def test_it_ends_by_itself(self):
+        before = time.monotonic()
+        result = absenc("emulate", "tformat", "--for", "0.2")
+        self.assert_good(result)
+        self.assertGreaterEqual(time.monotonic() - before, 0.2)
+        self.assertIn("0 requests answered", result.stderr)
+
+    def test_a_path_that_is_taken(self):
+        path = self.file("precious", "data")
+        self.assert_failed(absenc("emulate", "tformat", "--pty", path, "--for", "60"), path, "remove it")
+        with open(path, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "data")
+
+    def test_two_programs_beside_each_other(self):
+        with Emulator(self.directory, "--singleturn", "1", name="one") as one, \
+                Emulator(self.directory, "--singleturn", "2", name="two") as two:
+            with Client.open(one.path) as first, Client.open(two.path) as second:
+                self.assertEqual((first.exchange(0)[2], second.exchange(0)[2]), (1, 2))
+
+
+class Memory(EmulateCase):
+    def content(self):
+        with open(self.file("memory"), "rb") as file:
+            return file.read()
+
+    def write_and_end(self, address, value, *arguments):
+        with Emulator(self.directory, "--memory", self.file("memory"), *arguments) as emulator:
+            with Client.open(emulator.path) as client:
+                client.write_memory(address, value)
+                client.wait_until_written(address)
+            self.assertEqual(emulator.end()[0], 0)
+
+    def test_it_survives_a_restart(self):
+        self.write_and_end(5, 0x5A)
+        self.write_and_end(6, 0x77)
+        client = self.client("--memory", self.file("memory"))
+        self.assertEqual([client.read_memory(address)[1] for address in (4, 5, 6)], [0, 0x5A, 0x77])
+
+    def test_it_can_be_read_by_people(self):
+        self.write_and_end(17, 0x5A)
+        text = self.content().decode()
+        self.assertTrue(text.startswith("absenc memory 1\nprotocol: tformat\nmodel: TS5700N8500\nsize: "), text)
+        self.assertIn("\n0010: 00 5A 00", text)
+
+    def test_it_is_made_before_the_encoder_is_ready(self):
+        self.emulator("--memory", self.file("memory"))
+        self.assertIn(b"size: ", self.content())
+
+    def test_it_is_saved_while_the_encoder_runs(self):
+        client = self.client("--memory", self.file("memory"))
+        client.write_memory(0, 0xAB)
+        client.wait_until_written(0)
+        client.write_memory(1, 0xCD)  # within a second of the first: later, but without another request
+        deadline = time.monotonic() + PATIENCE
+        while b"\n0000: AB CD" not in self.content() and time.monotonic() < deadline:
+            select.select([], [], [], 0.01)
+        self.assertIn(b"\n0000: AB CD", self.content())
+
+    def test_a_link_stays_a_link(self):
+        os.symlink(self.file("elsewhere"), self.file("memory"))
+        self.write_and_end(0, 1)
+        self.assertTrue(os.path.islink(self.file("memory")))
+        self.assertIn(b"\n0000: 01", self.content())
+
+    def assert_refused(self, *words, arguments=()):
+        before = self.content()
+        result = absenc("emulate", "tformat", "--memory", self.file("memory"), "--for", "60", *arguments)
+        self.assert_failed(result, self.file("memory"), *words)
+        self.assertEqual(result.stdout, "")
+        self.assertEqual(self.content(), before)
+        self.assertEqual(os.listdir(self.directory), ["memory"])
+
+    def test_another_model_is_refused(self):
+        self.write_and_end(0, 1)
+        self.assert_refused("model TS5700N8500", "23-bit", arguments=["--model", "23-bit"])
+
+    def test_damaged_files_are_refused(self):
+        self.write_and_end(0, 1)
+        good = self.content().decode()
+        size = re.search(r"size: (\d+)", good).group(1)
+        for damaged, words in [(good.replace(f"size: {size}", "size: 3"), [f"size 3, but the virtual encoder has {size}"]),
+                               (good[:len(good) // 2], ["line"]),
+                               (good[:good.rindex("02F0")], [f"it ends after 752 of {size} bytes"]),
+                               (good + "02FF: 00\n", [f"more than {size} bytes"]),
+                               (good.replace("0010:", "0011:"), ["line 6", "0010"]),
+                               (good.replace("0020: 00", "0020: 0x"), ["line 7", "hexadecimal"]),
+                               (good.replace("tformat", "esl"), ["protocol esl"]),
+                               ("", ["no memory file"]), ("precious\n", ["no memory file"])]:
+            with self.subTest(words):
+                self.file("memory", damaged)
+                self.assert_refused(*words)
+
+    def test_a_file_that_cannot_be_made(self):
+        path = self.file("nowhere/memory")
+        self.assert_failed(absenc("emulate", "tformat", "--memory", path, "--for", "60"), path, "No such file")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,454 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc read`, `run` and `bench` over the real serial path, and what they say when something is wrong."""
+import json
+import os
+import pty
+import re
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import time
+import unittest
+
+from command_support import ABSENC, PATIENCE, Case, Emulator, FakeEncoder, absenc, end, json_lines, read_line
+
+GOOD_REPLY = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
+NOBODY = 65534
+
+
+class ReadCase(Case):
+    def emulator(self, *arguments):
+        emulator = Emulator(self.directory, *arguments)
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def encoder(self, *arguments, latency=300, more=""):
+        """The address of an emulator, with patience for a machine that is busy with other tests."""
+        return f"tformat:{self.emulator(*arguments).path}?latency={latency}{more}"
+
+    def start(self, *arguments, **settings):
+        settings.setdefault("stdin", subprocess.DEVNULL)
+        process = subprocess.Popen([ABSENC, *arguments], bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   **settings)
+        self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
+        return process
+
+    def first_line(self, process):
+        line = read_line(process.stdout, time.monotonic() + PATIENCE)
+        self.assertIsNotNone(line)
+        return line
+
+
+class Readings(ReadCase):
+    def test_words(self):
+        result = absenc("read", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
+        self.assert_good(result)
+        self.assertRegex(result.stdout, r"^204\.799 deg +74565 counts +4660 turns +no alarms\n$")
+        self.assertEqual(result.stderr, "")
+
+    def test_digits_of_the_resolution(self):
+        result = absenc("read", self.encoder("--model", "23-bit", "--singleturn", "1", more="&model=23-bit"))
+        self.assertRegex(result.stdout, r"^ *0\.00004 deg +1 counts")
+
+    def test_json(self):
+        result = absenc("read", self.encoder("--singleturn", "74565", "--multiturn", "4660"), "--json", "--count", "3",
+                        "--rate", "0")
+        self.assert_good(result)
+        readings = json_lines(result.stdout)
+        self.assertEqual(len(readings), 3)
+        times = [reading.pop("time_s") for reading in readings]
+        self.assertEqual(times, sorted(times))
+        self.assertEqual(readings[0], {
+            "protocol": "tformat", "angle_deg": 360 * 74565 / 2**17, "singleturn": 74565, "singleturn_bits": 17,
+            "singleturn_valid": True, "singleturn_valid_bits": 17, "multiturn": 4660, "multiturn_bits": 16,
+            "multiturn_valid": True, "status": [], "alarms": [], "confirmed": True, "ok": True})
+
+    def test_csv(self):
+        result = absenc("read", self.encoder("--multiturn", "7", "--alarm", "over_speed"), "--csv", "--count", "2")
+        self.assert_good(result)
+        header, *rows = [line.split(",") for line in result.stdout.splitlines()]
+        self.assertEqual(header, ["time_s", "angle_deg", "singleturn", "singleturn_valid", "multiturn",
+                                  "multiturn_valid", "status", "alarms"])
+        self.assertEqual(len(rows), 2)
+        self.assertEqual(rows[0][1:], ["0", "0", "true", "7", "false", "", "over_speed"])
+        self.assertEqual(result.stderr, "")
+
+    def test_alarms_are_explained_once(self):
+        result = absenc("read", self.encoder("--alarm", "battery_alarm"), "--count", "3", "--rate", "0")
+        self.assertEqual(result.stdout.count("alarms: battery_alarm"), 3)
+        self.assertEqual(result.stderr.count("the battery is below 3.1 V"), 1)
+        self.assertIn("replace the battery", result.stderr)
+
+    def test_invalid_parts_are_no_numbers(self):
+        for alarm, words, invalid in [
+                ("battery_error", r"^ *0\.000 deg +0 counts +turns INVALID \(12\) +alarms: battery_error\n", "multiturn"),
+                ("counting_error", r"^position INVALID \(0\) +12 turns +alarms: counting_error\n", "singleturn"),
+                ("full_absolute_status", r"^position INVALID \(only the top 5 of 17 bits hold: 0 deg\)", "singleturn")]:
+            with self.subTest(alarm):
+                with Emulator(self.directory, "--multiturn", "12", "--alarm", alarm) as emulator:
+                    address = f"tformat:{emulator.path}?latency=300"
+                    self.assertRegex(absenc("read", address).stdout, words)
+                    reading = json.loads(absenc("read", address, "--json").stdout)
+                for part in ("singleturn", "multiturn"):
+                    self.assertEqual(reading[part + "_valid"], part != invalid)
+                self.assertEqual(reading["angle_deg"] is None, invalid == "singleturn")
+
+    def test_a_turning_shaft(self):
+        address = self.encoder("--motion", "rpm=60")
+        readings = json_lines(absenc("read", address, "--json", "--count", "20", "--rate", "200").stdout)
+        for before, after in zip(readings, readings[1:]):
+            turned = (after["angle_deg"] - before["angle_deg"]) % 360
+            # One revolution a second. The reading is dated when its request was out, the encoder answers later.
+            self.assertAlmostEqual(turned, 360 * (after["time_s"] - before["time_s"]), delta=360 * 0.3)
+            self.assertGreater(turned, 0)
+
+    def test_rate(self):
+        before = time.monotonic()
+        self.assert_good(absenc("read", self.encoder(), "--count", "11", "--rate", "50"))
+        self.assertGreaterEqual(time.monotonic() - before, 10 / 50)
+
+    def test_tcp(self):
+        emulator = self.emulator("--tcp", "0", "--singleturn", "5")
+        port = emulator.line().strip().rsplit(":", 1)[1]
+        for host in ("127.0.0.1", "localhost"):
+            result = absenc("read", f"tformat:tcp:{host}:{port}", "--json")
+            self.assert_good(result)
+            self.assertEqual(json.loads(result.stdout)["singleturn"], 5)
+
+    def test_echo_is_removed(self):
+        for echo in ("", "&echo=auto", "&echo=on"):
+            with self.subTest(echo), Emulator(self.directory, "--fault", "echo=1", "--singleturn", "5") as emulator:
+                result = absenc("read", f"tformat:{emulator.path}?latency=300{echo}", "--json", "--count", "3")
+                self.assert_good(result)
+                self.assertEqual([reading["singleturn"] for reading in json_lines(result.stdout)], [5, 5, 5])
+
+    def test_options_beside_the_encoder(self):
+        emulator = self.emulator("--model", "23-bit", "--singleturn", "8000000")
+        result = absenc("read", f"tformat:{emulator.path}", "--option", "model=23-bit", "--option", "latency=300")
+        self.assert_good(result)
+
+
+class Simulated(ReadCase):
+    def test_without_hardware(self):
+        result = absenc("read", "sim:tformat?singleturn=5&multiturn=7", "--json")
+        self.assert_good(result)
+        reading = json.loads(result.stdout)
+        self.assertEqual((reading["singleturn"], reading["multiturn"]), (5, 7))
+
+    def test_motion(self):
+        result = absenc("read", "sim:tformat?motion=rpm=60&model=23-bit", "--count", "5", "--rate", "100", "--json")
+        readings = json_lines(result.stdout)
+        self.assertEqual(len({reading["angle_deg"] for reading in readings}), 5)
+        self.assertEqual(readings[0]["singleturn_bits"], 23)
+
+    def test_faults_and_alarms(self):
+        self.assert_failed(absenc("read", "sim:tformat?fault=silence=1"), "timeout", "the virtual encoder")
+        result = absenc("read", "sim:tformat?alarm=over_heat&alarm=battery_alarm", "--json")
+        self.assertEqual(json.loads(result.stdout)["alarms"], ["over_heat", "battery_alarm"])
+
+
+class Trouble(ReadCase):
+    """Each message says what happened, what went over the line, and what to try."""
+
+    def test_silence(self):
+        result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}")
+        self.assert_failed(result, "absenc: timeout: the encoder did not answer", "sent 1A to ", "at 2500000 baud",
+                           "Try: check supply")
+        self.assertRegex(result.stderr, r"nothing came back within 100 us \+ \d+ ms for the way\n")
+        self.assertEqual(result.stdout, "")
+
+    def test_silence_as_json(self):
+        result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}", "--json", "--count", "2")
+        self.assertEqual(result.returncode, 1)
+        for line in json_lines(result.stdout):
+            self.assertEqual((line["ok"], line["error"], line["sent"], line["received"]), (False, "timeout", "1A", ""))
+            self.assertTrue(line["message"])
+
+    def test_corruption(self):
+        result = absenc("read", self.encoder("--fault", "corrupt=1", latency=20), "--json", "--count", "20", "--rate", "0")
+        self.assertEqual(result.returncode, 1)
+        lines = json_lines(result.stdout)
+        self.assertEqual([line["ok"] for line in lines], [False] * 20)
+        bad = [line for line in lines if line["error"] == "bad_checksum"]
+        self.assertGreater(len(bad), 10)
+        self.assertRegex(bad[0]["received"], r"^([0-9A-F]{2} ){10}[0-9A-F]{2}$")
+
+    def test_a_stream_goes_on_and_advice_comes_once(self):
+        result = absenc("read", self.encoder("--fault", "silence=1", latency=0), "--count", "3", "--rate", "0")
+        self.assert_failed(result)
+        self.assertEqual(result.stderr.count("absenc: timeout"), 3)
+        self.assertEqual(result.stderr.count("Try:"), 1)
+
+    def test_echo_that_is_not_expected(self):
+        result = absenc("read", self.encoder("--fault", "echo=1", latency=20, more="&echo=off"))
+        self.assert_failed(result, "wrong_length", "after the adapter's echo", "received 1A 1A 00", "set echo=on")
+
+    def test_echo_that_does_not_come(self):
+        result = absenc("read", self.encoder(latency=20, more="&echo=on"))
+        self.assert_failed(result, "if no echo is taken from it", "set echo=off")
+
+    def test_only_echo(self):
+        for echo in ("auto", "on", "off"):
+            with self.subTest(echo), FakeEncoder([0x1A]) as fake:
+                result = absenc("read", f"tformat:{fake.path}?latency=20&echo={echo}")
+                self.assert_failed(result, "only the request itself came back", "received 1A", "Try: check supply")
+
+    def test_one_byte_too_long(self):
+        for extra in (0x00, 0x1A):
+            with self.subTest(extra), FakeEncoder(GOOD_REPLY + bytes([extra])) as fake:
+                result = absenc("read", f"tformat:{fake.path}?latency=20&echo=off")
+                self.assert_failed(result, "wrong_length", "the first 11 bytes are a good reply, but 1 byte more came")
+
+    def test_one_byte_too_short(self):
+        with FakeEncoder(GOOD_REPLY[:-1]) as fake:
+            result = absenc("read", f"tformat:{fake.path}?latency=20")
+            self.assert_failed(result, "wrong_length", "received 1A 00 00 00 00 11 00 00 00 00 ")
+
+    def test_another_model(self):
+        result = absenc("read", self.encoder("--model", "23-bit", latency=20))
+        self.assert_failed(result, "unexpected_reply", "a good reply of the model 23-bit", "Try: set model=23-bit")
+
+    def test_no_such_port(self):
+        result = absenc("read", "tformat:/dev/ttyABSENC9")
+        self.assert_failed(result, "there is no port /dev/ttyABSENC9")
+        ports = [f"/dev/{name}" for name in sorted(os.listdir("/sys/class/tty"))
+                 if os.path.exists(f"/sys/class/tty/{name}/device")
+                 and self.first(f"/sys/class/tty/{name}/type") != "0"]
+        for port in ports:
+            self.assertIn(port, result.stderr)
+
+    @staticmethod
+    def first(path):
+        try:
+            with open(path, encoding="ascii") as file:
+                return file.readline().strip()
+        except OSError:
+            return ""
+
+    def test_no_port_at_all(self):
+        self.assert_failed(absenc("read", f"tformat:{self.file('file', 'text')}"), "not a serial port")
+
+    def test_nobody_listens(self):
+        with socket.socket() as listener:
+            listener.bind(("127.0.0.1", 0))  # reserved, but not listening
+            result = absenc("read", f"tformat:tcp:127.0.0.1:{listener.getsockname()[1]}")
+        self.assert_failed(result, "nothing listens on 127.0.0.1")
+
+    def test_unplugged(self):
+        emulator = self.emulator()
+        process = self.start("read", f"tformat:{emulator.path}", "--count", "0", "--rate", "0")
+        self.first_line(process)
+        emulator.end()
+        _, err = process.communicate(timeout=PATIENCE)
+        self.assertEqual(process.returncode, 1)
+        self.assertIn("went away", err.decode())
+
+
+class OrdinaryUser(ReadCase):
+    """Root may open everything: then these are run as nobody, with a copy of the command that nobody may run."""
+
+    def setUp(self):
+        super().setUp()
+        self.command = ABSENC
+        self.settings = {}
+        if os.getuid() == 0:
+            self.command = self.file("absenc")
+            shutil.copy(ABSENC, self.command)
+            os.chmod(self.command, 0o755)
+            self.settings = {"user": NOBODY, "group": NOBODY, "extra_groups": []}
+
+    def as_user(self, *arguments):
+        return subprocess.run([self.command, *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False,
+                              stdin=subprocess.DEVNULL, **self.settings)
+
+    def test_in_use(self):
+        emulator = self.emulator()
+        if self.settings:
+            os.chown(emulator.path, NOBODY, NOBODY)
+        address = f"tformat:{emulator.path}?latency=300"
+        first = subprocess.Popen([self.command, "read", address, "--count", "0"], bufsize=0, stdout=subprocess.PIPE,
+                                 stderr=subprocess.PIPE, **self.settings)
+        try:
+            self.first_line(first)
+            second = self.as_user("read", address)
+            self.assert_failed(second, emulator.path, "in use", f"process {first.pid}")
+            self.assertIsNotNone(read_line(first.stdout, time.monotonic() + PATIENCE))  # not disturbed
+        finally:
+            end(first)
+        self.assert_good(self.as_user("read", address))
+
+    @unittest.skipUnless(os.getuid() == 0, "only root can give a port to another group")
+    def test_no_permission(self):
+        import grp
+        emulator = self.emulator()
+        group = grp.getgrnam("dialout")
+        os.chown(emulator.path, 0, group.gr_gid)
+        os.chmod(emulator.path, 0o660)
+        self.assert_failed(self.as_user("read", f"tformat:{emulator.path}"), "no permission", "the group dialout",
+                           "usermod -aG dialout")
+
+    def test_memory_file_of_another(self):
+        path = self.file("memory")
+        self.assert_good(absenc("emulate", "tformat", "--memory", path, "--for", "0.01"))
+        os.chmod(path, 0o444)
+        result = self.as_user("emulate", "tformat", "--memory", path, "--for", "60")
+        self.assert_failed(result, path, "cannot be written")
+
+
+class Ends(ReadCase):
+    def test_interrupted_stream(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(number), Emulator(self.directory) as emulator:
+                process = self.start("read", f"tformat:{emulator.path}?latency=300", "--count", "0", "--rate", "100")
+                self.first_line(process)
+                status, _, err = end(process, number)
+                self.assertEqual(status, 0, err)
+                self.assertRegex(err, r"^absenc: \d+ good readings and 0 failed ones in [\d.]+ m?s; exchanges: \d+ good")
+
+    def test_interrupted_stream_of_failures(self):
+        process = self.start("read", self.encoder("--fault", "silence=1", latency=0), "--count", "0", "--json")
+        self.first_line(process)
+        status, _, err = end(process, signal.SIGINT)
+        self.assertEqual(status, 1)
+        self.assertRegex(err, r"0 good readings and \d+ failed ones .*\d+ timeout")
+
+    def test_interrupted_readings(self):
+        process = self.start("read", self.encoder(), "--count", "1000")
+        self.first_line(process)
+        status, _, err = end(process, signal.SIGINT)
+        self.assertEqual((status, err), (1, "absenc: interrupted\n"))
+
+    def test_interrupted_wait_for_an_answer(self):
+        emulator = self.emulator("--fault", "silence=1")
+        process = self.start("read", f"tformat:{emulator.path}?latency=60000")
+        deadline = time.monotonic() + PATIENCE
+        while not self.handles_interrupts(process.pid) and time.monotonic() < deadline:
+            pass
+        self.assertEqual(end(process, signal.SIGINT)[::2], (1, "absenc: interrupted\n"))
+
+    @staticmethod
+    def handles_interrupts(pid):
+        with open(f"/proc/{pid}/status", encoding="ascii") as file:
+            mask = int(re.search(r"^SigCgt:\s*(\w+)$", file.read(), re.MULTILINE).group(1), 16)
+        return bool(mask >> (signal.SIGINT - 1) & 1)
+
+    def test_a_reader_that_goes_away(self):
+        for form in ([], ["--json"], ["--csv"]):
+            with self.subTest(form), Emulator(self.directory) as emulator:
+                process = self.start("read", f"tformat:{emulator.path}?latency=300", "--count", "0", "--rate", "0", *form)
+                self.first_line(process)
+                process.stdout.close()
+                self.assertEqual(process.wait(PATIENCE), 0)
+                self.assertEqual(process.stderr.read(), b"")
+                process.stderr.close()
+
+    def test_head(self):
+        result = subprocess.run(["sh", "-c", '"$0" read sim:tformat --count 0 --rate 0 | head -1', ABSENC],
+                                capture_output=True, text=True, timeout=PATIENCE, check=False)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertEqual(len(result.stdout.splitlines()), 1)
+
+    def test_closed_output_does_not_become_the_port(self):
+        emulator = self.emulator()
+        result = subprocess.run(["sh", "-c", '"$0" read "tformat:$1?latency=300" >&-', ABSENC, emulator.path],
+                                capture_output=True, text=True, timeout=PATIENCE, check=False)
+        self.assert_failed(result, "standard output cannot be written")
+        # Two requests of one byte, and not the text of a reading.
+        self.assertIn("absenc: 2 requests answered", emulator.end()[2])
+
+
+class Run(ReadCase):
+    def test_fields(self):
+        address = self.encoder()
+        self.assertRegex(absenc("run", address, "temperature").stdout, r"^temperature_c +35 degC ")
+        result = absenc("run", address, "temperature", "--json")
+        self.assertEqual(json.loads(result.stdout), {"ok": True, "fields": {"temperature_c": 35}})
+
+    def test_memory(self):
+        address = self.encoder()
+        for value, written in (("0x42", True), ("66", False)):
+            result = absenc("run", address, "memory-write", "5", value, "3", "--yes", "--json")
+            self.assertEqual(json.loads(result.stdout),
+                             {"ok": True, "fields": {"page": 3, "address": 5, "value": 66, "written": written}})
+        result = absenc("run", address, "memory-read", "4", "3", "3", "--json")
+        self.assertEqual(json.loads(result.stdout)["fields"]["data"], "004200")
+
+    def test_zero(self):
+        address = self.encoder("--singleturn", "1000", "--multiturn", "7")
+        self.assert_good(absenc("run", address, "zero", "--yes"))
+        reading = json.loads(absenc("read", address, "--json").stdout)
+        self.assertEqual((reading["singleturn"], reading["multiturn"]), (0, 7))
+
+    def test_a_turning_shaft_is_not_zeroed(self):
+        result = absenc("run", self.encoder("--motion", "rpm=60"), "zero", "--yes", "--json")
+        self.assertEqual(result.returncode, 1)
+        answer = json.loads(result.stdout)
+        self.assertEqual((answer["ok"], answer["error"]), (False, "invalid_argument"))
+        self.assertIn("the shaft is turning", answer["message"])
+
+    def test_nobody_to_ask(self):
+        emulator = self.emulator("--singleturn", "1000")
+        self.assert_wrong_usage(absenc("run", f"tformat:{emulator.path}", "zero"), "--yes", "zero changes the encoder")
+        self.assertIn("0 requests answered", emulator.end()[2])
+
+    def ask(self, address, answer):
+        """Runs `zero` on a terminal; returns the exit status and what was shown there."""
+        terminal, ours = pty.openpty()
+        process = subprocess.Popen([ABSENC, "run", address, "zero"], stdin=ours, stdout=subprocess.DEVNULL, stderr=ours)
+        os.close(ours)
+        shown = b""
+        while b"[y/N] " not in shown:
+            self.assertTrue(select.select([terminal], [], [], PATIENCE)[0], shown)
+            shown += os.read(terminal, 1024)
+        os.write(terminal, answer)
+        status = process.wait(PATIENCE)
+        try:
+            while True:
+                shown += os.read(terminal, 1024)
+        except OSError:  # the other end is closed and everything was read
+            os.close(terminal)
+        return status, shown.decode()
+
+    def test_question(self):
+        address = self.encoder("--singleturn", "1000")
+        for answer in (b"n\n", b"\n", b"yeah\n", b"\x04"):
+            with self.subTest(answer):
+                status, shown = self.ask(address, answer)
+                self.assertEqual(status, 1)
+                self.assertIn("make this the zero of the turn", shown)
+                self.assertIn("nothing was changed", shown)
+        self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 1000)
+        for answer in (b"y\n", b"yes\n"):
+            self.assertEqual(self.ask(address, answer)[0], 0)
+        self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 0)
+
+    def test_closed_memory(self):
+        result = absenc("run", self.encoder(), "memory-read", "5", "6")
+        self.assert_failed(result, "invalid_argument", "this area is closed")
+
+
+class Bench(ReadCase):
+    def test_json(self):
+        result = absenc("bench", self.encoder(), "--seconds", "0.2", "--json")
+        self.assert_good(result)
+        measured = json.loads(result.stdout)
+        self.assertGreater(measured["readings_per_s"], 10)
+        latency = measured["latency_us"]
+        self.assertEqual(sorted(latency.values()), [latency[name] for name in ("p50", "p90", "p99", "p99.9", "max")])
+        self.assertGreater(measured["cpu_us_per_reading"], 0)
+        self.assertGreater(measured["line_share"], 0)
+
+    def test_words(self):
+        result = absenc("bench", self.encoder(), "--seconds", "0.1")
+        self.assert_good(result)
+        for word in ("a second", "latency", "99.9 %", "processor", "2500000 baud"):
+            self.assertIn(word, result.stdout)
+
+    def test_silence(self):
+        self.assert_failed(absenc("bench", "sim:tformat?fault=silence=1"), "timeout")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/process.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+struct Measurement {
+  std::vector<Time> latencies;  // of good readings, sorted
+  std::uint64_t failed = 0;
+  Time duration{};
+  Time processor{};
+  std::uint64_t items = 0;
+};
+
+Measurement measure(Encoder& encoder, double seconds) {
+  Measurement measurement;
+  encoder.read();  // the first one is read twice, and echo is found out
+  const Time start = os::now();
+  const Time end = start + Time(static_cast<std::int64_t>(seconds * 1e9));
+  const Time processor_before = os::processor_time();
+  const std::uint64_t items_before = encoder.items();
+  Time before = start;
+  try {
+    while (before < end && !os::interrupted()) {
+      const Outcome outcome = encoder.read();
+      const Time after = os::now();
+      if (outcome.error == Error::none) {
+        measurement.latencies.push_back(after - before);
+      } else {
+        ++measurement.failed;
+      }
+      before = after;
+    }
+  } catch (const os::Interrupted&) {  // what was measured until then counts
+  }
+  measurement.duration = before - start;
+  measurement.processor = os::processor_time() - processor_before;
+  measurement.items = encoder.items() - items_before;
+  std::sort(measurement.latencies.begin(), measurement.latencies.end());
+  return measurement;
+}
+
+// The smallest latency that `share` of the readings do not exceed.
+Time percentile(const std::vector<Time>& sorted, double share) {
+  const auto rank = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
+  return sorted[std::min(rank, sorted.size() - 1)];
+}
+
+struct Percentile {
+  std::string_view name;
+  double share;
+};
+constexpr std::array<Percentile, 4> percentiles{{{"50", 0.5}, {"90", 0.9}, {"99", 0.99}, {"99.9", 0.999}}};
+
+// How much of the time characters were on the line; 0 when the line has no rate, or carries no characters.
+double line_share(const Encoder& encoder, const Measurement& measurement) {
+  const LineSettings& line = encoder.uri().line;
+  const LinkKind link = encoder.unit().link;
+  if (line.rate == 0 || (link != LinkKind::half_duplex && link != LinkKind::full_duplex)) return 0;
+  return static_cast<double>(measurement.items) * static_cast<double>(line.character().count()) /
+         static_cast<double>(measurement.duration.count());
+}
+
+double readings_a_second(const Measurement& measurement) {
+  const double seconds = std::chrono::duration<double>(measurement.duration).count();
+  return static_cast<double>(measurement.latencies.size()) / seconds;
+}
+
+double microseconds(Time time) { return static_cast<double>(time.count()) / 1e3; }
+
+Json to_json(const Encoder& encoder, const Measurement& measurement) {
+  Json latency = Json::object();
+  for (const auto& [name, share] : percentiles) {
+    latency.set(fmt::format("p{}", name), microseconds(percentile(measurement.latencies, share)));
+  }
+  latency.set("max", microseconds(measurement.latencies.back()));
+  const auto count = static_cast<double>(measurement.latencies.size());
+  return Json::object()
+      .set("protocol", encoder.unit().id)
+      .set("seconds", std::chrono::duration<double>(measurement.duration).count())
+      .set("readings", measurement.latencies.size())
+      .set("failed", measurement.failed)
+      .set("readings_per_s", readings_a_second(measurement))
+      .set("latency_us", latency)
+      .set("cpu_us_per_reading", microseconds(measurement.processor) / count)
+      .set("line_share", line_share(encoder, measurement))
+      .set("errors", errors_to_json(encoder.counters()))
+      .set("ok", true);
+}
+
+std::string to_text(const Encoder& encoder, const Measurement& measurement) {
+  std::string latencies;
+  for (const auto& [name, share] : percentiles) {
+    latencies += fmt::format("{} % {}, ", name, tool::to_text(percentile(measurement.latencies, share)));
+  }
+  const auto count = static_cast<std::int64_t>(measurement.latencies.size());
+  std::vector<std::vector<std::string>> rows{
+      {"readings", fmt::format("{} in {}: {:.0f} a second", count, tool::to_text(measurement.duration),
+                               readings_a_second(measurement))},
+      {"latency", fmt::format("{}longest {}", latencies, tool::to_text(measurement.latencies.back()))},
+      {"processor", fmt::format("{} a reading", tool::to_text(measurement.processor / count))},
+      {"exchanges", summary(encoder.counters())},
+  };
+  const double share = line_share(encoder, measurement);
+  if (share > 0) {
+    rows.push_back({"line", fmt::format("what was sent and received fills {:.1f} % of the time at {} baud", 100 * share,
+                                        encoder.uri().line.rate)});
+  }
+  return table(rows);
+}
+
+int run_bench(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const double seconds = invocation.real("--seconds", 5, 0.01, 86400);
+  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const bool json = invocation.has("--json");
+  const Outcome first = encoder->read();
+  if (first.error != Error::none) {
+    const Trouble trouble = encoder->trouble(first);
+    if (json) {
+      print_line(trouble.json().line());
+    } else {
+      print_message(trouble.text());
+    }
+    return exit_failed;
+  }
+  const Measurement measurement = measure(*encoder, seconds);
+  if (measurement.latencies.empty()) {
+    throw ToolFailure(fmt::format("there was no good reading; exchanges: {}", summary(encoder->counters())));
+  }
+  print_line(json ? to_json(*encoder, measurement).line() : to_text(*encoder, measurement));
+  return measurement.failed == 0 ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 4> parameters{{
+    {"encoder", "", "as for `absenc read`", "", true},
+    {"--seconds", "S", "how long", "5"},
+    {"--json", "", "one JSON object"},
+    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+}};
+
+constexpr std::array<Example, 2> examples{{
+    {"absenc bench tformat:/dev/ttyUSB0", "how fast this adapter is"},
+    {"absenc bench tformat:tcp:192.168.1.20:4001 --seconds 60 --json", "a serial server for a minute"},
+}};
+
+}  // namespace
+
+const Subcommand bench_subcommand{
+    "bench", "measure readings a second, latency, errors and processor time", "", parameters, examples, run_bench};
+
+}  // namespace absenc::tool

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+#include <optional>
+
+#include "absenc/host/drive.hpp"
+#include "absenc/os/emulator_port.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/memory_file.hpp"
+#include "tools/absenc/memory_keeper.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/unit_text.hpp"
+#include "tools/absenc/virtual_device.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+// A host on a pseudo-terminal waits milliseconds for what takes microseconds on a wire.
+constexpr Time send_slack = 500us;
+constexpr Time late_reply = 50ms;
+
+DeviceSettings device_settings(const Invocation& invocation) {
+  DeviceSettings settings;
+  if (invocation.has("--singleturn")) settings.singleturn = invocation.number("--singleturn", 0, 0, INT64_MAX);
+  if (invocation.has("--multiturn")) settings.multiturn = invocation.number("--multiturn", 0, 0, INT64_MAX);
+  settings.motion = invocation.text("--motion", "still");
+  for (const std::string& alarm : invocation.texts("--alarm")) settings.alarms.push_back(alarm);
+  for (const std::string& fault : invocation.texts("--fault")) settings.faults.push_back(fault);
+  settings.seed = static_cast<std::uint64_t>(invocation.number("--seed", 1, 0, INT64_MAX));
+  settings.delay = late_reply;
+  const std::string_view power_on = invocation.text("--power-on", "skip");
+  if (power_on != "real" && power_on != "skip") {
+    throw UsageError(fmt::format("--power-on is \"{}\", but must be real or skip", power_on));
+  }
+  settings.real_power_on = power_on == "real";
+  return settings;
+}
+
+std::string fault_counts(const sim::FaultyDevice& faults) {
+  std::vector<std::string> counts;
+  for (std::size_t i = 0; i < sim::fault_names.size(); ++i) {
+    const std::uint64_t count = faults.count(static_cast<sim::FaultKind>(i));
+    if (count != 0) counts.push_back(fmt::format("{} {}", count, sim::fault_names[i]));
+  }
+  return counts.empty() ? "none" : fmt::format("{}", fmt::join(counts, ", "));
+}
+
+void summarize(const VirtualDevice& device, const os::EmulatorPort& port, Time start) {
+  const Device<std::uint8_t>& encoder = *device.device().bytes;
+  print_message(fmt::format("{} requests answered in {}", encoder.answered(), to_text(os::now() - start)));
+  if (device.faults() != nullptr) print_note(fmt::format("  faults injected: {}", fault_counts(*device.faults())));
+  if (port.dropped() != 0) print_note(fmt::format("  bytes that nobody read: {}", port.dropped()));
+  if (encoder.violation_count() == 0) return;
+  print_note(fmt::format("  rules that the host broke: {}", encoder.violation_count()));
+  for (const Violation& violation : encoder.violations()) {
+    const double seconds = std::chrono::duration<double>(violation.at - start).count();
+    print_note(fmt::format("    at {:.6f} s: {}", seconds, violation.rule));
+  }
+  if (encoder.violation_count() > encoder.violations().size()) print_note("    ...");
+}
+
+// Until a signal or the end of the time.
+void serve(Machine<std::uint8_t>& machine, os::EmulatorPort& port) {
+  try {
+    host::drive(machine, port, [] { return true; });
+  } catch (const os::Interrupted&) {
+  } catch (const os::Ended&) {
+  }
+}
+
+std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
+  if (!invocation.has("--tcp")) return std::nullopt;
+  return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
+}
+
+int run_emulate(const Invocation& invocation) {
+  os::catch_interrupts();
+  const Unit& unit = require_unit(invocation.text("protocol"));
+  const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
+  VirtualDevice device(unit, options, device_settings(invocation));
+  const double seconds = invocation.real("--for", 0, 0.001, 1e9);
+  const std::optional<std::uint16_t> listen = tcp_port(invocation);
+  if (device.bytes() == nullptr || (unit.link != LinkKind::half_duplex && unit.link != LinkKind::full_duplex)) {
+    throw UsageError(fmt::format("{} does not go over a serial line: use sim:{}", unit.id, unit.id));
+  }
+  Device<std::uint8_t>& encoder = *device.device().bytes;
+  const MemoryFile file(std::string(invocation.text("--memory")), unit.id,
+                        options.model != nullptr ? options.model->name : "none");
+  const bool keeps_memory = invocation.has("--memory");
+  if (keeps_memory) file.load(encoder.memory());
+
+  os::EmulatorPort port(std::string(invocation.text("--pty")), listen);
+  port.set_send_slack(send_slack);
+  const Time start = port.now();
+  if (seconds > 0) port.set_end(start + Time(static_cast<std::int64_t>(seconds * 1e9)));
+  device.power_on(start);
+  print_line(fmt::format("ready: {}", port.path()));
+  if (listen) print_line(fmt::format("ready: tcp:127.0.0.1:{}", port.tcp_port()));
+
+  MemoryKeeper<std::uint8_t> keeper(*device.bytes(), encoder, file);
+  serve(keeps_memory ? static_cast<Machine<std::uint8_t>&>(keeper) : *device.bytes(), port);
+  const bool saved = !keeps_memory || keeper.finish();
+  summarize(device, port, start);
+  return saved ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 14> parameters{{
+    {"protocol", "", "see `absenc list`", "", true},
+    {"--pty", "PATH", "where to put the link to the pseudo-terminal", "only the pseudo-terminal itself"},
+    {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
+    {"--model", "NAME", "which model of the protocol", "the first that agrees with the options"},
+    {"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true},
+    {"--singleturn", "COUNTS", "position within the turn at the start", "0"},
+    {"--multiturn", "TURNS", "turns at the start", "0"},
+    {"--motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV (lines of seconds,degrees)", "still"},
+    {"--alarm", "NAME", "raise this alarm", "", false, true},
+    {"--fault", "KIND=RATE",
+     "how often a reply is damaged, from 0 to 1; kinds: drop, corrupt, truncate, delay, echo, "
+     "garbage, silence, repeat, request_corrupt",
+     "", false, true},
+    {"--seed", "N", "another series of faults", "1"},
+    {"--memory", "FILE", "keep the encoder's memory in this file; it is made if missing"},
+    {"--power-on", "real|skip", "whether the encoder takes its time to start", "skip"},
+    {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
+}};
+
+constexpr std::array<Example, 2> examples{{
+    {"absenc emulate tformat --pty /tmp/encoder --motion rpm=60", "a turning encoder; read it as tformat:/tmp/encoder"},
+    {"absenc emulate tformat --tcp 4001 --alarm battery_alarm --fault corrupt=0.01 --memory encoder.txt",
+     "one that misbehaves, for whoever connects, and remembers what was written"},
+}};
+
+}  // namespace
+
+const Subcommand emulate_subcommand{
+    "emulate",
+    "be a virtual encoder on a pseudo-terminal or TCP port",
+    "Prints \"ready: PATH\" when it can be opened, and with --tcp also \"ready: tcp:127.0.0.1:PORT\".\n"
+    "At the end, a summary goes to standard error: requests, faults, and the rules that the host broke.",
+    parameters,
+    examples,
+    run_emulate};
+
+}  // namespace absenc::tool

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/encoder.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "tools/absenc/diagnosis.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/unit_text.hpp"
+#include "tools/absenc/wire_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+Frame to_frame(Bytes bytes) { return {.bytes = bytes}; }
+Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty() ? nullptr : &frames.front()}; }
+
+template <class Item>
+class EncoderOn final : public Encoder {
+ public:
+  EncoderOn(const EncoderUri& uri, Link link, Port<Item>& port)
+      : Encoder(uri),
+        link_(std::move(link)),
+        port_(port),
+        storage_(std::make_unique<std::byte[]>(uri.unit->host_storage)),
+        session_(*uri.unit, uri.options, port_, {storage_.get(), uri.unit->host_storage}, uri.echo) {}
+
+  Outcome read() override {
+    const Command* command = find_command(unit(), Verb::read);
+    if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
+    return outcome(*command, session_.read(*command));
+  }
+
+  Outcome run(const Command& command, Arguments arguments) override {
+    return outcome(command, session_.run(command, arguments));
+  }
+
+  void report(FieldSink& sink) const override { last_->report(sink); }
+  bool confirmed() const override { return session_.confirmed(); }
+  const host::Counters& counters() const override { return session_.counters(); }
+  std::uint64_t items() const override { return port_.items_sent + port_.items_received; }
+  Time now() override { return port_.now(); }
+
+  Trouble trouble(const Outcome& outcome) const override {
+    Trouble trouble{.error = outcome.error};
+    const bool callers_fault = outcome.error <= Error::buffer_too_small;
+    if (callers_fault || port_.sent.empty()) {
+      trouble.message = describe(outcome.error, outcome.detail, {});
+      return trouble;
+    }
+    const Diagnosis diagnosis = diagnose_last();
+    trouble.message = describe(outcome.error, outcome.detail, diagnosis.finding);
+    trouble.sent = wire_text(port_.sent);
+    trouble.received = wire_text(port_.received);
+    trouble.exchange = exchange(trouble);
+    trouble.advice = diagnosis.advice.empty() ? std::string(text_of(outcome.error).advice) : diagnosis.advice;
+    return trouble;
+  }
+
+ private:
+  Outcome outcome(const Command& command, const Conversation<Item>* conversation) {
+    if (conversation == nullptr) {
+      throw UsageError(fmt::format("{} cannot run {} with these options", unit().id, command.name));
+    }
+    last_ = conversation;
+    return {conversation->error(), conversation->detail(), conversation->reading()};
+  }
+
+  [[nodiscard]] Diagnosis diagnose_last() const {
+    const Frame sent = to_frame(std::span<const Item>(port_.sent));
+    const std::span<const Item> received(port_.received);
+    const auto diagnosed = [&](std::span<const Item> reply) {
+      return diagnose(unit(), uri().options, sent, to_frame(reply));
+    };
+    const bool takes_echo = session_.echo().mode() == host::EchoMode::on && received.size() > port_.sent.size();
+    if (!takes_echo) return diagnosed(received);
+    FieldTable ignored;
+    if (unit().decode(uri().options, sent, to_frame(received), ignored) == Error::none) {
+      return {"it is a good reply if no echo is taken from it", "set echo=off or echo=auto"};
+    }
+    return diagnosed(received.subspan(port_.sent.size()));
+  }
+
+  [[nodiscard]] std::string exchange(const Trouble& trouble) const {
+    const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_.place);
+    if (port_.received.empty()) {
+      const std::string latency =
+          link_.latency > Time{} ? fmt::format(" + {} for the way", to_text(link_.latency)) : "";
+      return fmt::format("{}; nothing came back within {}{}", sent, to_text(port_.answer), latency);
+    }
+    const Time after = port_.first_received_at - port_.sent_at;
+    const std::string later = after > Time{} ? fmt::format(" {} later", to_text(after)) : "";
+    return fmt::format("{}; received {}{}", sent, trouble.received, later);
+  }
+
+  [[nodiscard]] std::string wire_text(const std::vector<Item>& items) const {
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      std::string text;
+      for (const CanFrame& frame : items) {
+        text += (text.empty() ? "" : " ") + to_wire_text(unit().link, {.can = &frame});
+      }
+      return text;
+    } else {
+      constexpr std::size_t most_shown = 64;
+      const std::string text = to_hex(Bytes(items).first(std::min(items.size(), most_shown)));
+      return items.size() <= most_shown ? text : fmt::format("{} ... ({} bytes)", text, items.size());
+    }
+  }
+
+  Link link_;
+  WatchedPort<Item> port_;
+  std::unique_ptr<std::byte[]> storage_;
+  host::Session<Item> session_;
+  const Conversation<Item>* last_ = nullptr;
+};
+
+}  // namespace
+
+std::string Trouble::text() const {
+  std::string lines = fmt::format("{}: {}", text_of(error).name, message);
+  if (!exchange.empty()) lines += fmt::format("\n  {}", exchange);
+  if (!advice.empty()) lines += fmt::format("\n  Try: {}", advice);
+  return lines;
+}
+
+Json Trouble::json() const {
+  Json json = Json::object().set("ok", false).set("error", text_of(error).name).set("message", message);
+  if (!advice.empty()) json.set("advice", advice);
+  return json.set("sent", sent).set("received", received);
+}
+
+std::unique_ptr<Encoder> Encoder::open(const EncoderUri& uri) {
+  Link link = open_link(uri);
+  for (const std::string& note : link.notes) print_message(fmt::format("note: {}", note));
+  if (Port<std::uint8_t>* port = link.bytes) {
+    return std::make_unique<EncoderOn<std::uint8_t>>(uri, std::move(link), *port);
+  }
+  Port<CanFrame>* port = link.frames;
+  return std::make_unique<EncoderOn<CanFrame>>(uri, std::move(link), *port);
+}
+
+std::string summary(const host::Counters& counters) {
+  std::string text = fmt::format("{} good", counters.good);
+  if (counters.bad() == 0) return text;
+  std::vector<std::string> kinds;
+  for (std::size_t i = 0; i < counters.errors.size(); ++i) {
+    if (counters.errors[i] != 0) kinds.push_back(fmt::format("{} {}", counters.errors[i], error_texts[i].name));
+  }
+  return text + fmt::format(", {} failed ({}), {} repeated", counters.bad(), fmt::join(kinds, ", "), counters.repeated);
+}
+
+Json errors_to_json(const host::Counters& counters) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < counters.errors.size(); ++i) {
+    if (counters.errors[i] != 0) json.set(error_texts[i].name, counters.errors[i]);
+  }
+  return json;
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// An opened encoder: runs the commands of its unit, whatever its link carries, and explains what went wrong.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "absenc/host/session.hpp"
+#include "tools/absenc/json.hpp"
+#include "tools/absenc/link.hpp"
+
+namespace absenc::tool {
+
+/// How a command ended; valid until the next one.
+struct Outcome {
+  Error error = Error::none;
+  std::string_view detail{};
+  const Reading* reading = nullptr;  // null when it failed, or is no position
+};
+
+/// A failed command in words. The texts but `error` may be empty.
+struct Trouble {
+  Error error = Error::none;
+  std::string message{};   // what happened, and what the reply turns out to be
+  std::string exchange{};  // what was sent, what came back and when
+  std::string advice{};    // what to try
+  std::string sent{};      // hexadecimal or as the link's wire text
+  std::string received{};
+
+  /// Of several lines, without the last line end.
+  [[nodiscard]] std::string text() const;
+  /// {"ok":false,"error":...}
+  [[nodiscard]] Json json() const;
+};
+
+class Encoder {
+ public:
+  /// Prints what could be better about the port. Throws os::Failure, UsageError.
+  [[nodiscard]] static std::unique_ptr<Encoder> open(const EncoderUri& uri);
+  virtual ~Encoder() = default;
+
+  /// The position, with all the alarms the unit can tell. Throws UsageError when the unit has none.
+  virtual Outcome read() = 0;
+  virtual Outcome run(const Command& command, Arguments arguments) = 0;
+  /// The fields of the last outcome.
+  virtual void report(FieldSink& sink) const = 0;
+  /// Of the last outcome.
+  [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
+  /// Whether two positions in a row agreed since the encoder was opened or silent.
+  [[nodiscard]] virtual bool confirmed() const = 0;
+  [[nodiscard]] virtual const host::Counters& counters() const = 0;
+  /// Bytes or frames over the line so far, both ways.
+  [[nodiscard]] virtual std::uint64_t items() const = 0;
+  /// The clock of the readings.
+  [[nodiscard]] virtual Time now() = 0;
+
+  [[nodiscard]] const EncoderUri& uri() const { return uri_; }
+  [[nodiscard]] const Unit& unit() const { return *uri_.unit; }
+
+ protected:
+  explicit Encoder(const EncoderUri& uri) : uri_(uri) {}
+
+ private:
+  EncoderUri uri_;
+};
+
+/// "1234 readings, 2 failed attempts (2 bad_checksum), 2 repeated"
+[[nodiscard]] std::string summary(const host::Counters& counters);
+
+/// {"timeout":2}: only what happened.
+[[nodiscard]] Json errors_to_json(const host::Counters& counters);
+
+}  // namespace absenc::tool

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/encoder_uri.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "absenc/os/serial_ports.hpp"
+#include "absenc/protocol/all.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/nearest.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+std::int64_t number_of(const OptionText& setting, std::int64_t minimum, std::int64_t maximum) {
+  const Result<std::int64_t> number = parse_number(setting.value);
+  if (number && *number >= minimum && *number <= maximum) return *number;
+  throw UsageError(fmt::format("{} is \"{}\", but must be a whole number from {} to {}", setting.name, setting.value,
+                               minimum, maximum));
+}
+
+// The index of auto, on or off.
+std::size_t switch_of(const OptionText& setting) {
+  constexpr std::array<std::string_view, 3> words{"auto", "on", "off"};
+  const auto found = std::find(words.begin(), words.end(), setting.value);
+  if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
+  throw UsageError(fmt::format("{} is \"{}\", but must be auto, on or off", setting.name, setting.value));
+}
+
+void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
+  const std::string value(setting.value);
+  if (setting.name == "baud") {
+    uri.line.rate = static_cast<std::uint32_t>(number_of(setting, 1, 100'000'000));
+  } else if (setting.name == "rs485") {
+    constexpr std::array modes{os::Rs485::automatic, os::Rs485::on, os::Rs485::off};
+    uri.rs485 = modes[switch_of(setting)];
+  } else if (setting.name == "latency") {
+    uri.latency = std::chrono::milliseconds(number_of(setting, 0, 60'000));
+  } else if (setting.name == "echo") {
+    constexpr std::array modes{host::EchoMode::automatic, host::EchoMode::on, host::EchoMode::off};
+    uri.echo = modes[switch_of(setting)];
+  } else if (setting.name == "motion") {
+    uri.device.motion = value;
+  } else if (setting.name == "singleturn") {
+    uri.device.singleturn = number_of(setting, 0, INT64_MAX);
+  } else if (setting.name == "multiturn") {
+    uri.device.multiturn = number_of(setting, 0, INT64_MAX);
+  } else if (setting.name == "alarm") {
+    uri.device.alarms.push_back(value);
+  } else if (setting.name == "fault") {
+    uri.device.faults.push_back(value);
+  } else if (setting.name == "seed") {
+    uri.device.seed = static_cast<std::uint64_t>(number_of(setting, 0, INT64_MAX));
+  }
+}
+
+bool allowed(const LinkParameter& parameter, Place place) {
+  return place == Place::serial ? parameter.serial : place == Place::tcp ? parameter.tcp : parameter.sim;
+}
+
+// Takes what is a link parameter; the rest are options of the unit.
+void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
+  std::vector<OptionText> options;
+  for (const OptionText& setting : settings) {
+    const auto parameter = std::find_if(link_parameters.begin(), link_parameters.end(),
+                                        [&](const LinkParameter& one) { return one.name == setting.name; });
+    if (parameter == link_parameters.end()) {
+      options.push_back(setting);
+    } else if (!allowed(*parameter, uri.place)) {
+      throw UsageError(fmt::format("{} cannot be set here, it is for: {}", setting.name, parameter->places));
+    } else {
+      set_link_parameter(uri, setting);
+    }
+  }
+  std::vector<std::string_view> names;
+  for (const LinkParameter& parameter : link_parameters) {
+    if (allowed(parameter, uri.place)) names.push_back(parameter.name);
+  }
+  uri.options = require_options(*uri.unit, {}, options, names);
+}
+
+std::string examples(std::string_view unit) {
+  const std::vector<std::string> ports = os::serial_ports();
+  return fmt::format("{0}:{1}, {0}:tcp:HOST:PORT or sim:{0}", unit, ports.empty() ? "/dev/ttyUSB0" : ports.front());
+}
+
+void parse_tcp(EncoderUri& uri, std::string_view where) {
+  const std::size_t colon = where.rfind(':');
+  const std::string_view host = where.substr(0, colon);
+  // The colons of an IPv6 address are not the one before the port.
+  const bool bare_ipv6 = !host.starts_with('[') && host.find(':') != std::string_view::npos;
+  if (colon == std::string_view::npos || host.empty() || bare_ipv6 || (host.starts_with('[') && !host.ends_with(']'))) {
+    throw UsageError(
+        fmt::format("\"tcp:{}\" is no TCP address: write tcp:HOST:PORT, an IPv6 address in brackets, as "
+                    "in tcp:[::1]:4001",
+                    where));
+  }
+  uri.host = host;
+  uri.port = static_cast<std::uint16_t>(number_of({"the TCP port", where.substr(colon + 1)}, 1, 65535));
+}
+
+void parse_where(EncoderUri& uri, std::string_view address) {
+  const std::size_t colon = address.find(':');
+  const std::string_view unit = address.substr(0, colon);
+  if (unit.empty() || unit.find('/') != std::string_view::npos) {
+    throw UsageError(fmt::format("\"{}\" does not say which protocol: write it before the port, as in tformat:{}",
+                                 address, address.starts_with('/') ? address : "/dev/ttyUSB0"));
+  }
+  if (unit == "sim") {
+    if (colon == std::string_view::npos || colon + 1 == address.size()) {
+      throw UsageError(fmt::format("\"{}\" does not say which encoder: write sim:{}", address, all_units()[0]->id));
+    }
+    uri.place = Place::sim;
+    uri.unit = &require_unit(address.substr(colon + 1));
+    return;
+  }
+  uri.unit = &require_unit(unit);
+  if (colon == std::string_view::npos || colon + 1 == address.size()) {
+    throw UsageError(fmt::format("\"{}\" does not say where the encoder is: write {}", address, examples(unit)));
+  }
+  const std::string_view where = address.substr(colon + 1);
+  if (where.starts_with("tcp:")) {
+    uri.place = Place::tcp;
+    return parse_tcp(uri, where.substr(4));
+  }
+  uri.path = where;
+}
+
+}  // namespace
+
+EncoderUri parse_encoder(std::string_view text, std::span<const std::string> more) {
+  EncoderUri uri;
+  const std::size_t question = std::min(text.find('?'), text.size());
+  parse_where(uri, text.substr(0, question));
+  uri.line = uri.unit->line;
+  const bool half_duplex = uri.unit->link == LinkKind::half_duplex;
+  if (half_duplex) uri.echo = host::EchoMode::automatic;
+  if (!half_duplex) uri.rs485 = os::Rs485::off;
+
+  std::vector<OptionText> settings;
+  std::string_view rest = text.substr(std::min(question + 1, text.size()));
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find('&'), rest.size());
+    settings.push_back(split_setting(rest.substr(0, end)));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  for (const std::string& setting : more) settings.push_back(split_setting(setting));
+  take_settings(uri, settings);
+  return uri;
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/help.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+namespace absenc::tool {
+
+namespace {
+
+constexpr std::array<Example, 4> general_examples{{
+    {"absenc list", "which encoders are supported"},
+    {"absenc emulate tformat --pty /tmp/encoder", "a virtual encoder for any program to open"},
+    {"absenc read tformat:/tmp/encoder --count 0", "its position, until Ctrl-C"},
+    {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"", "what a captured frame says"},
+}};
+
+std::string title(const Parameter& parameter) {
+  if (!parameter.is_option()) return fmt::format("<{}>{}", parameter.name, parameter.repeatable ? "..." : "");
+  if (parameter.value.empty()) return std::string(parameter.name);
+  return fmt::format("{} {}", parameter.name, parameter.value);
+}
+
+std::string words(const Parameter& parameter) {
+  std::string text(parameter.meaning);
+  if (parameter.is_option() && parameter.repeatable) text += "; may be given more than once";
+  if (!parameter.fallback.empty()) text += fmt::format(" (default: {})", parameter.fallback);
+  return text;
+}
+
+constexpr std::size_t text_width = 100;
+
+// Words from column `indent` on, broken before the text gets too wide.
+std::string wrapped(std::string_view text, std::size_t indent) {
+  std::string lines;
+  std::size_t column = indent;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    const std::string_view word = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (column != indent && column + 1 + word.size() > text_width) {
+      lines += '\n' + std::string(indent, ' ');
+      column = indent;
+    } else if (column != indent) {
+      lines += ' ';
+      ++column;
+    }
+    lines += word;
+    column += word.size();
+  }
+  return lines;
+}
+
+std::string parameter_lines(std::span<const Parameter> parameters, bool options) {
+  constexpr std::size_t indent = 24;
+  std::string text;
+  for (const Parameter& parameter : parameters) {
+    if (parameter.is_option() != options) continue;
+    const std::string left = fmt::format("  {:<{}}", title(parameter), indent - 4);
+    text += left;
+    text += left.size() < indent - 1 ? std::string(indent - left.size(), ' ') : '\n' + std::string(indent, ' ');
+    text += wrapped(words(parameter), indent) + '\n';
+  }
+  return text;
+}
+
+std::string example_lines(std::span<const Example> examples) {
+  std::string text;
+  for (const Example& example : examples) text += fmt::format("  {}\n      {}\n", example.command, example.meaning);
+  return text;
+}
+
+}  // namespace
+
+std::string usage(const Subcommand& subcommand) {
+  std::string text = fmt::format("absenc {}", subcommand.name);
+  for (const Parameter& parameter : subcommand.parameters) {
+    if (parameter.is_option()) continue;
+    text += parameter.required ? fmt::format(" {}", title(parameter)) : fmt::format(" [{}]", title(parameter));
+  }
+  const bool has_options = std::any_of(subcommand.parameters.begin(), subcommand.parameters.end(),
+                                       [](const Parameter& parameter) { return parameter.is_option(); });
+  return has_options ? text + " [options]" : text;
+}
+
+std::string help(const Subcommand& subcommand) {
+  std::string text = fmt::format("{}\n\nUsage: {}\n", subcommand.summary, usage(subcommand));
+  if (!subcommand.description.empty()) text += fmt::format("\n{}\n", subcommand.description);
+  const std::string arguments = parameter_lines(subcommand.parameters, false);
+  if (!arguments.empty()) text += fmt::format("\nArguments:\n{}", arguments);
+  text +=
+      fmt::format("\nOptions:\n{}{:<24}{}\n", parameter_lines(subcommand.parameters, true), "  --help", "this text");
+  return text + fmt::format("\nExamples:\n{}", example_lines(subcommand.examples));
+}
+
+std::string help() {
+  std::string text =
+      "absenc: absolute encoders - read them, set them up, emulate them, decode what was captured\n\n"
+      "Usage: absenc <verb> ...\n\nVerbs:\n";
+  for (const Subcommand* subcommand : all_subcommands()) {
+    text += fmt::format("  {:<10}{}\n", subcommand->name, subcommand->summary);
+  }
+  text +=
+      "\nAn encoder is its protocol and where it is connected:\n"
+      "  tformat:/dev/ttyUSB0            a serial port\n"
+      "  tformat:tcp:192.168.1.20:4001   a serial server on the network\n"
+      "  sim:tformat                     a virtual encoder inside the command: no hardware needed\n"
+      "with options behind it, as in \"tformat:/dev/ttyUSB0?model=23-bit&echo=on\".\n";
+  text += fmt::format("\nExamples:\n{}", example_lines(general_examples));
+  return text +
+         "\n`absenc <verb> --help` explains a verb, `absenc --version` prints the version.\n"
+         "Exit status: 0 good, 1 the encoder or the line failed, 2 wrong usage.\n";
+}
+
+}  // namespace absenc::tool

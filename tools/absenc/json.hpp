@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// A JSON value to be printed on one line. The library behind it is seen by json.cpp alone: it is slow to compile.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace absenc::tool {
+
+class Json {
+ public:
+  /// null
+  Json();
+  Json(bool value);
+  Json(std::int64_t value);
+  template <std::integral Integer>
+  Json(Integer value) : Json(static_cast<std::int64_t>(value)) {}
+  Json(double value);
+  Json(std::string_view text);
+  Json(const char* text) : Json(std::string_view(text)) {}
+  Json(const std::string& text) : Json(std::string_view(text)) {}
+  [[nodiscard]] static Json object();
+  [[nodiscard]] static Json array();
+
+  Json(const Json& other);
+  Json(Json&& other) noexcept;
+  Json& operator=(Json other) noexcept;
+  ~Json();
+
+  /// Objects keep the order in which names were set. Setting a name again replaces its value.
+  Json& set(std::string_view name, Json value);
+  Json& append(Json value);
+  [[nodiscard]] bool empty() const;
+  [[nodiscard]] bool is_text() const;
+
+  /// One line without its end. Bytes that are no UTF-8 become U+FFFD.
+  [[nodiscard]] std::string line() const;
+
+ private:
+  struct Value;
+  std::unique_ptr<Value> value_;
+};
+
+}  // namespace absenc::tool

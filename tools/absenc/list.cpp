@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+
+#include "absenc/protocol/all.hpp"
+#include "tools/absenc/encoder_uri.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+std::string option_values(const Unit& unit, const Model& model) {
+  std::vector<std::string> settings;
+  for (const OptionValue& value : model.values) {
+    const Option& option = unit.options[value.option];
+    settings.push_back(fmt::format("{}={}", option.name, to_text(option, value.value)));
+  }
+  return fmt::format("{}", fmt::join(settings, " "));
+}
+
+std::string argument_names(const Command& command) {
+  std::string text(command.name);
+  for (const Argument& argument : command.arguments) {
+    text += argument.required ? fmt::format(" <{}>", argument.name) : fmt::format(" [{}]", argument.name);
+  }
+  return text;
+}
+
+// Rows indented below their heading; nothing when there are none.
+std::string section(std::string_view heading, Rows rows) {
+  if (rows.empty()) return {};
+  for (auto& row : rows) row.front().insert(0, "  ");
+  return fmt::format("\n{}\n{}", heading, table(rows));
+}
+
+std::string supported_encoders() {
+  Rows rows{{"PROTOCOL", "MODEL", "WHAT", "LINE"}};
+  for (const Unit* unit : all_units()) {
+    for (const Model& model : unit->models) {
+      rows.push_back({std::string(unit->id), std::string(model.name), std::string(model.meaning), line_of(*unit)});
+    }
+    if (unit->models.empty()) rows.push_back({std::string(unit->id), "", std::string(unit->name), line_of(*unit)});
+  }
+  return table(rows) + "\n`absenc list <protocol>` shows its models, options, commands and fields.";
+}
+
+Rows option_rows(const Unit& unit) {
+  Rows rows;
+  for (const Option& option : unit.options) {
+    rows.push_back({std::string(option.name), range_of(option),
+                    fmt::format("default {}", to_text(option, option.default_value)), std::string(option.meaning)});
+  }
+  return rows;
+}
+
+Rows port_rows() {
+  Rows rows;
+  for (const LinkParameter& parameter : link_parameters) {
+    rows.push_back({fmt::format("{}={}", parameter.name, parameter.value), std::string(parameter.places),
+                    std::string(parameter.meaning)});
+  }
+  return rows;
+}
+
+Rows command_rows(const Unit& unit) {
+  Rows rows;
+  for (const Command& command : unit.commands) {
+    std::string meaning(command.meaning);
+    if (command.changes_encoder) meaning += " (changes the encoder)";
+    rows.push_back({argument_names(command), meaning});
+    for (const Argument& argument : command.arguments) {
+      std::string words = fmt::format("{} ({} to {})", argument.meaning, argument.minimum, argument.maximum);
+      if (!argument.required) words += fmt::format(", default {}", argument.default_value);
+      rows.push_back({fmt::format("  {}", argument.name), "  " + words});
+    }
+  }
+  return rows;
+}
+
+Rows field_rows(const Unit& unit) {
+  Rows rows;
+  for (const FieldInfo& field : unit.fields) {
+    rows.push_back({std::string(field.name), std::string(field.unit), std::string(field.meaning)});
+    for (const FlagInfo& flag : field.flags) {
+      if (flag.name.empty()) continue;
+      rows.push_back({fmt::format("  {}", flag.name), "", std::string(flag.meaning)});
+      if (!flag.action.empty()) rows.push_back({"", "", fmt::format("  -> {}", flag.action)});
+    }
+  }
+  return rows;
+}
+
+std::string details(const Unit& unit) {
+  std::string text = table(Rows{{std::string(unit.id), std::string(unit.name)},
+                                {"document", std::string(unit.document)},
+                                {"line", line_of(unit)}});
+  Rows models;
+  for (const Model& model : unit.models) {
+    models.push_back({std::string(model.name), std::string(model.meaning), option_values(unit, model)});
+  }
+  text += section("Models (--model NAME, or ?model=NAME behind an encoder; the first is the default)", models);
+  text += section("Options (--option NAME=VALUE, or ?NAME=VALUE behind an encoder)", option_rows(unit));
+  text += section("Settings of the port (?NAME=VALUE behind an encoder)", port_rows());
+  text += section(fmt::format("Commands (absenc run {}:PORT <command>)", unit.id), command_rows(unit));
+  text += section("Fields", field_rows(unit));
+  return text;
+}
+
+Json models_json(const Unit& unit) {
+  Json models = Json::array();
+  for (const Model& model : unit.models) {
+    Json options = Json::object();
+    for (const OptionValue& value : model.values) {
+      const Option& option = unit.options[value.option];
+      options.set(option.name, to_json(option, value.value));
+    }
+    models.append(Json::object()
+                      .set("name", model.name)
+                      .set("meaning", model.meaning)
+                      .set("maximum_rpm", model.maximum_rpm)
+                      .set("options", options));
+  }
+  return models;
+}
+
+Json options_json(const Unit& unit) {
+  Json options = Json::array();
+  for (const Option& option : unit.options) {
+    Json json = Json::object().set("name", option.name).set("meaning", option.meaning);
+    json.set("default", to_json(option, option.default_value));
+    if (option.choices.empty()) {
+      json.set("minimum", option.minimum).set("maximum", option.maximum);
+    } else {
+      Json choices = Json::array();
+      for (std::size_t i = 0; i < option.choices.size(); ++i) {
+        choices.append(to_json(option, static_cast<std::int64_t>(i)));
+      }
+      json.set("choices", choices);
+    }
+    options.append(json);
+  }
+  return options;
+}
+
+Json commands_json(const Unit& unit) {
+  Json commands = Json::array();
+  for (const Command& command : unit.commands) {
+    Json arguments = Json::array();
+    for (const Argument& argument : command.arguments) {
+      Json json = Json::object().set("name", argument.name).set("meaning", argument.meaning);
+      json.set("minimum", argument.minimum).set("maximum", argument.maximum).set("required", argument.required);
+      if (!argument.required) json.set("default", argument.default_value);
+      arguments.append(json);
+    }
+    commands.append(Json::object()
+                        .set("name", command.name)
+                        .set("verb", name_of(command.verb))
+                        .set("meaning", command.meaning)
+                        .set("changes_encoder", command.changes_encoder)
+                        .set("arguments", arguments));
+  }
+  return commands;
+}
+
+Json fields_json(const Unit& unit) {
+  static constexpr std::array<std::string_view, 6> kinds{"number", "boolean", "flags", "real", "text", "bytes"};
+  Json fields = Json::array();
+  for (const FieldInfo& field : unit.fields) {
+    Json json = Json::object().set("name", field.name).set("kind", kinds[static_cast<std::size_t>(field.kind)]);
+    json.set("unit", field.unit).set("meaning", field.meaning);
+    Json flags = Json::array();
+    for (const FlagInfo& flag : field.flags) {
+      if (flag.name.empty()) continue;
+      flags.append(Json::object().set("name", flag.name).set("meaning", flag.meaning).set("action", flag.action));
+    }
+    if (!flags.empty()) json.set("flags", flags);
+    fields.append(json);
+  }
+  return fields;
+}
+
+Json unit_json(const Unit& unit) {
+  static constexpr std::array<std::string_view, 3> parities{"none", "odd", "even"};
+  return Json::object()
+      .set("protocol", unit.id)
+      .set("name", unit.name)
+      .set("document", unit.document)
+      .set("link", name_of(unit.link))
+      .set("line", Json::object()
+                       .set("rate", unit.line.rate)
+                       .set("parity", parities[static_cast<std::size_t>(unit.line.parity)])
+                       .set("stop_bits", unit.line.stop_bits))
+      .set("models", models_json(unit))
+      .set("options", options_json(unit))
+      .set("commands", commands_json(unit))
+      .set("fields", fields_json(unit));
+}
+
+int run_list(const Invocation& invocation) {
+  const bool json = invocation.has("--json");
+  if (invocation.has("protocol")) {
+    const Unit& unit = require_unit(invocation.text("protocol"));
+    print_line(json ? unit_json(unit).line() : details(unit));
+    return 0;
+  }
+  if (!json) print_line(supported_encoders());
+  if (json) {
+    for (const Unit* unit : all_units()) print_line(unit_json(*unit).line());
+  }
+  return 0;
+}
+
+constexpr std::array<Parameter, 2> parameters{{
+    {"protocol", "", "show the models, options, commands and fields of this one"},
+    {"--json", "", "one JSON object a line, one line for each protocol"},
+}};
+
+constexpr std::array<Example, 2> examples{{
+    {"absenc list", "every supported encoder"},
+    {"absenc list tformat", "all about one protocol"},
+}};
+
+}  // namespace
+
+const Subcommand list_subcommand{
+    "list", "show the supported encoders, their options and commands", "", parameters, examples, run_list};
+
+}  // namespace absenc::tool

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/reading_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+#include "absenc/core/bits.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+// As many as it takes to tell neighbouring positions apart.
+int decimals(unsigned bits) {
+  return std::max(0, static_cast<int>(std::ceil(std::log10(std::ldexp(1.0, static_cast<int>(bits)) / 360))));
+}
+
+// The digits of the largest number of so many bits.
+int digits(unsigned bits) { return static_cast<int>(fmt::formatted_size("{}", low_mask(bits))); }
+
+std::string flags_text(const FieldInfo* field, std::uint32_t bits) {
+  return field == nullptr ? "" : fmt::format("{}", fmt::join(flag_names(*field, bits), " "));
+}
+
+std::string position_text(const Reading& reading) {
+  const unsigned bits = reading.singleturn_bits;
+  const unsigned valid = reading.singleturn_valid_bits;
+  if (!reading.ready) return fmt::format("position INVALID ({}: the encoder is starting)", reading.singleturn);
+  if (valid == 0) return fmt::format("position INVALID ({})", reading.singleturn);
+  const std::string angle = fmt::format("{:.{}f}", degrees(reading.singleturn, bits), decimals(valid));
+  if (valid < bits)
+    return fmt::format("position INVALID (only the top {} of {} bits hold: {} deg)", valid, bits, angle);
+  const int width = decimals(bits) == 0 ? 3 : decimals(bits) + 4;
+  return fmt::format("{:>{}} deg   {:>{}} counts", angle, width, reading.singleturn, digits(bits));
+}
+
+std::string turns_text(const Reading& reading) {
+  if (!reading.multiturn_valid) return fmt::format("turns INVALID ({})", reading.multiturn);
+  return fmt::format("{:>{}} turns", reading.multiturn, digits(reading.multiturn_bits));
+}
+
+}  // namespace
+
+std::string to_text(const Unit& unit, const Reading& reading) {
+  std::string text;
+  const auto add = [&text](const std::string& part) { text += text.empty() ? part : "   " + part; };
+  if (reading.singleturn_bits != 0) add(position_text(reading));
+  if (reading.multiturn_bits != 0) add(turns_text(reading));
+  const FieldInfo* field = unit.alarms != nullptr ? unit.alarms : unit.status;
+  const std::string flags = flags_text(field, unit.alarms != nullptr ? reading.alarms : reading.status);
+  if (field != nullptr)
+    add(flags.empty() ? fmt::format("no {}", field->name) : fmt::format("{}: {}", field->name, flags));
+  return text;
+}
+
+std::string alarms_in_words(const Unit& unit, const Reading& reading) {
+  std::string lines;
+  for (std::size_t i = 0; unit.alarms != nullptr && i < unit.alarms->flags.size(); ++i) {
+    const FlagInfo& flag = unit.alarms->flags[i];
+    if ((reading.alarms >> i & 1) == 0 || flag.name.empty()) continue;
+    if (!lines.empty()) lines += '\n';
+    lines += fmt::format("  {}: {}", flag.name, flag.meaning);
+    if (!flag.action.empty()) lines += fmt::format(". What to do: {}", flag.action);
+  }
+  return lines;
+}
+
+Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed) {
+  Json json = Json::object().set("time_s", seconds).set("protocol", unit.id);
+  if (reading.singleturn_bits != 0) {
+    const bool valid = reading.singleturn_valid() && reading.ready;
+    json.set("angle_deg", valid ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
+    json.set("singleturn", reading.singleturn).set("singleturn_bits", reading.singleturn_bits);
+    json.set("singleturn_valid", valid).set("singleturn_valid_bits", reading.singleturn_valid_bits);
+  }
+  if (reading.multiturn_bits != 0) {
+    json.set("multiturn", reading.multiturn).set("multiturn_bits", reading.multiturn_bits);
+    json.set("multiturn_valid", reading.multiturn_valid);
+  }
+  if (unit.status != nullptr) json.set("status", flags_to_json(*unit.status, reading.status));
+  if (unit.alarms != nullptr) json.set("alarms", flags_to_json(*unit.alarms, reading.alarms));
+  return json.set("confirmed", confirmed).set("ok", true);
+}
+
+std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
+  std::string row = fmt::format("{:.6f},", seconds);
+  if (reading.singleturn_bits != 0) {
+    const bool valid = reading.singleturn_valid() && reading.ready;
+    if (valid) row += fmt::format("{}", degrees(reading.singleturn, reading.singleturn_bits));
+    row += fmt::format(",{},{}", reading.singleturn, valid);
+  } else {
+    row += ",,";
+  }
+  if (reading.multiturn_bits != 0) {
+    row += fmt::format(",{},{}", reading.multiturn, reading.multiturn_valid);
+  } else {
+    row += ",,";
+  }
+  return row + fmt::format(",{},{}", flags_text(unit.status, reading.status), flags_text(unit.alarms, reading.alarms));
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A position reading for people, as JSON and as CSV. What is not valid never looks like a good number.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/protocol/unit.hpp"
+#include "tools/absenc/json.hpp"
+
+namespace absenc::tool {
+
+/// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"
+[[nodiscard]] std::string to_text(const Unit& unit, const Reading& reading);
+
+/// What each alarm means and what to do, a line each; "" without alarms.
+[[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
+
+[[nodiscard]] Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed);
+
+inline constexpr std::string_view csv_header =
+    "time_s,angle_deg,singleturn,singleturn_valid,multiturn,multiturn_valid,status,alarms";
+/// Flags are separated by spaces; what the reply does not carry is empty, and so is the angle when it is not valid.
+[[nodiscard]] std::string to_csv(const Unit& unit, const Reading& reading, double seconds);
+
+}  // namespace absenc::tool

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/subcommand.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+
+#include "absenc/protocol/options.hpp"
+#include "tools/absenc/error.hpp"
+
+namespace absenc::tool {
+
+std::span<const Subcommand* const> all_subcommands() {
+  static constexpr std::array all{
+      &list_subcommand,   &read_subcommand,   &run_subcommand,     &emulate_subcommand,
+      &decode_subcommand, &encode_subcommand, &vectors_subcommand, &bench_subcommand,
+  };
+  return all;
+}
+
+std::string_view Invocation::text(std::string_view name, std::string_view fallback) const {
+  const auto found = values_.find(name);
+  return found == values_.end() ? fallback : std::string_view(found->second.back());
+}
+
+std::span<const std::string> Invocation::texts(std::string_view name) const {
+  const auto found = values_.find(name);
+  if (found == values_.end()) return {};
+  return found->second;
+}
+
+std::int64_t Invocation::number(std::string_view name, std::int64_t fallback, std::int64_t minimum,
+                                std::int64_t maximum) const {
+  if (!has(name)) return fallback;
+  const Result<std::int64_t> number = parse_number(text(name));
+  if (number && *number >= minimum && *number <= maximum) return *number;
+  const std::string range =
+      maximum == INT64_MAX ? fmt::format("{} or more", minimum) : fmt::format("from {} to {}", minimum, maximum);
+  throw UsageError(fmt::format("{} is \"{}\", but must be a whole number, {}", name, text(name), range));
+}
+
+double Invocation::real(std::string_view name, double fallback, double minimum, double maximum) const {
+  if (!has(name)) return fallback;
+  const std::string written(text(name));
+  char* end = nullptr;
+  const double value = std::strtod(written.c_str(), &end);
+  const bool whole = !written.empty() && end == written.c_str() + written.size() && std::isfinite(value);
+  if (whole && value >= minimum && value <= maximum) return value;
+  throw UsageError(fmt::format("{} is \"{}\", but must be a number from {} to {}", name, written, minimum, maximum));
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// A subcommand as data: main.cpp makes the command line and the help text of it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace absenc::tool {
+
+struct Parameter {
+  std::string_view name;   // "unit": an argument; "--count": an option
+  std::string_view value;  // stands for its value in help; "": a flag
+  std::string_view meaning;
+  std::string_view fallback{};  // the default, in words; "": none
+  bool required = false;
+  bool repeatable = false;  // an argument that takes all that follow, or an option that may come often
+
+  [[nodiscard]] constexpr bool is_option() const { return name.starts_with("--"); }
+};
+
+struct Example {
+  std::string_view command;
+  std::string_view meaning;
+};
+
+/// What the user wrote, by the names of the parameters.
+class Invocation {
+ public:
+  void add(std::string_view name, std::string value) { values_[name].push_back(std::move(value)); }
+
+  [[nodiscard]] bool has(std::string_view name) const { return values_.contains(name); }
+  /// The last value, or `fallback`.
+  [[nodiscard]] std::string_view text(std::string_view name, std::string_view fallback = {}) const;
+  [[nodiscard]] std::span<const std::string> texts(std::string_view name) const;
+  /// Decimal or 0x. Throws UsageError for what is no number or outside the range.
+  [[nodiscard]] std::int64_t number(std::string_view name, std::int64_t fallback, std::int64_t minimum,
+                                    std::int64_t maximum) const;
+  [[nodiscard]] double real(std::string_view name, double fallback, double minimum, double maximum) const;
+
+ private:
+  std::map<std::string_view, std::vector<std::string>> values_;
+};
+
+struct Subcommand {
+  std::string_view name;
+  std::string_view summary;      // one line
+  std::string_view description;  // more, for the help text; lines end where they should
+  std::span<const Parameter> parameters;
+  std::span<const Example> examples;
+  int (*run)(const Invocation& invocation);  // returns the exit status
+};
+
+/// In the order in which help shows them.
+[[nodiscard]] std::span<const Subcommand* const> all_subcommands();
+
+extern const Subcommand list_subcommand;
+extern const Subcommand read_subcommand;
+extern const Subcommand run_subcommand;
+extern const Subcommand emulate_subcommand;
+extern const Subcommand decode_subcommand;
+extern const Subcommand encode_subcommand;
+extern const Subcommand vectors_subcommand;
+extern const Subcommand bench_subcommand;
+
+}  // namespace absenc::tool

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/unit_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+
+#include "absenc/protocol/all.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/nearest.hpp"
+#include "tools/absenc/wire_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+template <class Named>
+std::vector<std::string_view> names_of(std::span<const Named> all) {
+  std::vector<std::string_view> names;
+  for (const Named& one : all) {
+    if (!one.name.empty()) names.push_back(one.name);
+  }
+  return names;
+}
+
+std::string sentence(const Unit& unit, const OptionError& error, std::span<const std::string_view> extra_names) {
+  switch (error.kind) {
+    case OptionError::Kind::unknown_model:
+      return fmt::format("{} has no model \"{}\"{}", unit.id, error.text,
+                         suggestion(error.text, names_of(unit.models)));
+    case OptionError::Kind::bad_value:
+      return fmt::format("{} is \"{}\", but must be {}", error.option->name, error.text, range_of(*error.option));
+    default:
+      break;
+  }
+  std::vector<std::string_view> names = names_of(unit.options);
+  names.push_back("model");
+  names.insert(names.end(), extra_names.begin(), extra_names.end());
+  return fmt::format("{} has no option \"{}\"{}", unit.id, error.text, suggestion(error.text, names));
+}
+
+std::string printable(Bytes bytes) {
+  std::string text;
+  for (const std::uint8_t byte : bytes) text += byte >= 0x20 && byte < 0x7F ? static_cast<char>(byte) : '.';
+  return text;
+}
+
+}  // namespace
+
+const Unit& require_unit(std::string_view id) {
+  if (const Unit* unit = find_unit(id)) return *unit;
+  std::vector<std::string_view> names;
+  for (const Unit* unit : all_units()) names.push_back(unit->id);
+  throw UsageError(fmt::format("there is no protocol \"{}\"{}", id, suggestion(id, names)));
+}
+
+const Command& require_command(const Unit& unit, std::string_view name) {
+  if (const Command* command = find_command(unit, name)) return *command;
+  throw UsageError(fmt::format("{} has no command \"{}\"{}", unit.id, name, suggestion(name, names_of(unit.commands))));
+}
+
+OptionText split_setting(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || equals == 0) {
+    throw UsageError(fmt::format("\"{}\" is no setting: write NAME=VALUE", text));
+  }
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+Options require_options(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
+                        std::span<const std::string_view> extra_names) {
+  std::vector<OptionText> own;
+  for (const OptionText& setting : settings) {
+    if (setting.name != "model") {
+      own.push_back(setting);
+    } else if (!model.empty() && model != setting.value) {
+      throw UsageError(fmt::format("two models are given, {} and {}: give one", model, setting.value));
+    } else {
+      model = setting.value;
+    }
+  }
+  Options options;
+  const OptionError error = resolve_options(unit, model, own, options);
+  if (error.kind != OptionError::Kind::none) throw UsageError(sentence(unit, error, extra_names));
+  return options;
+}
+
+Options require_options(const Unit& unit, std::string_view model, std::span<const std::string> settings) {
+  std::vector<OptionText> split;
+  for (const std::string& setting : settings) split.push_back(split_setting(setting));
+  return require_options(unit, model, split);
+}
+
+std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written) {
+  if (written.size() > command.arguments.size()) {
+    const std::vector<std::string_view> names = names_of(command.arguments);
+    throw UsageError(fmt::format("{} takes {}, so \"{}\" is too much", command.name,
+                                 names.empty() ? "no arguments" : fmt::format("only {}", fmt::join(names, ", ")),
+                                 written[command.arguments.size()]));
+  }
+  std::vector<std::int64_t> values;
+  for (std::size_t i = 0; i < command.arguments.size(); ++i) {
+    const Argument& argument = command.arguments[i];
+    if (i >= written.size()) {
+      if (argument.required) {
+        throw UsageError(fmt::format("{} needs the argument {}: {}", command.name, argument.name, argument.meaning));
+      }
+      values.push_back(argument.default_value);
+      continue;
+    }
+    const Result<std::int64_t> value = parse_number(written[i]);
+    if (!value || *value < argument.minimum || *value > argument.maximum) {
+      throw UsageError(fmt::format("{} of {} is \"{}\", but must be a number from {} to {}", argument.name,
+                                   command.name, written[i], argument.minimum, argument.maximum));
+    }
+    values.push_back(*value);
+  }
+  return values;
+}
+
+std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names) {
+  std::uint32_t bits = 0;
+  for (const std::string& name : names) {
+    std::size_t bit = 0;
+    while (bit < field.flags.size() && field.flags[bit].name != name) ++bit;
+    if (name.empty() || bit == field.flags.size()) {
+      throw UsageError(fmt::format("there is no alarm \"{}\"{}", name, suggestion(name, names_of(field.flags))));
+    }
+    bits |= std::uint32_t{1} << bit;
+  }
+  return bits;
+}
+
+std::string range_of(const Option& option) {
+  if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, " or "));
+  return fmt::format("{} to {}", option.minimum, option.maximum);
+}
+
+std::string to_text(const Option& option, std::int64_t value) {
+  if (option.choices.empty()) return fmt::format("{}", value);
+  return std::string(option.choices[static_cast<std::size_t>(value)]);
+}
+
+Json to_json(const Option& option, std::int64_t value) {
+  if (option.choices.empty()) return value;
+  if (option.choices.data() == boolean_choices.data()) return value != 0;
+  return option.choices[static_cast<std::size_t>(value)];
+}
+
+std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits) {
+  std::vector<std::string_view> names;
+  for (std::size_t i = 0; i < field.flags.size(); ++i) {
+    if ((bits >> i & 1) != 0 && !field.flags[i].name.empty()) names.push_back(field.flags[i].name);
+  }
+  return names;
+}
+
+Json flags_to_json(const FieldInfo& field, std::uint64_t bits) {
+  Json names = Json::array();
+  for (const std::string_view name : flag_names(field, bits)) names.append(name);
+  return names;
+}
+
+Json to_json(const FieldValue& value) {
+  switch (value.info->kind) {
+    case FieldInfo::Kind::boolean:
+      return value.number != 0;
+    case FieldInfo::Kind::flags:
+      return flags_to_json(*value.info, static_cast<std::uint64_t>(value.number));
+    case FieldInfo::Kind::real:
+      return value.real;
+    case FieldInfo::Kind::text:
+      return printable(value.bytes);
+    case FieldInfo::Kind::bytes:
+      return fmt::format("{:02x}", fmt::join(value.bytes, ""));
+    case FieldInfo::Kind::number:
+      break;
+  }
+  return value.number;
+}
+
+std::string to_text(const FieldValue& value) {
+  switch (value.info->kind) {
+    case FieldInfo::Kind::boolean:
+      return value.number != 0 ? "yes" : "no";
+    case FieldInfo::Kind::flags: {
+      const auto names = flag_names(*value.info, static_cast<std::uint64_t>(value.number));
+      return names.empty() ? "none" : fmt::format("{}", fmt::join(names, " "));
+    }
+    case FieldInfo::Kind::real:
+      return fmt::format("{}", value.real);
+    case FieldInfo::Kind::text:
+      return printable(value.bytes);
+    case FieldInfo::Kind::bytes:
+      return to_hex(value.bytes);
+    case FieldInfo::Kind::number:
+      break;
+  }
+  return fmt::format("{}", value.number);
+}
+
+void FieldTable::put(const FieldValue& value) {
+  const FieldInfo& info = *value.info;
+  std::string shown = to_text(value);
+  if (!info.unit.empty()) shown += fmt::format(" {}", info.unit);
+  rows.push_back({std::string(info.name), shown, std::string(info.meaning)});
+  if (info.kind != FieldInfo::Kind::flags) return;
+  for (std::size_t i = 0; i < info.flags.size(); ++i) {
+    const FlagInfo& flag = info.flags[i];
+    if ((static_cast<std::uint64_t>(value.number) >> i & 1) == 0 || flag.name.empty()) continue;
+    std::string words(flag.meaning);
+    if (!flag.action.empty()) words += fmt::format(": {}", flag.action);
+    rows.push_back({fmt::format("  {}", flag.name), "", words});
+  }
+}
+
+std::string_view name_of(LinkKind link) {
+  static constexpr std::array<std::string_view, 5> names{"half_duplex", "full_duplex", "exchange", "clocked", "can"};
+  return names[static_cast<std::size_t>(link)];
+}
+
+std::string line_of(const Unit& unit) {
+  static constexpr std::array<std::string_view, 5> words{"RS-485 half duplex", "full-duplex UART", "SPI",
+                                                         "clocked bits", "CAN"};
+  const double rate = unit.line.rate;
+  const std::string_view kind = words[static_cast<std::size_t>(unit.link)];
+  if (unit.line.rate == 0) return std::string(kind);
+  if (unit.line.rate >= 1'000'000) return fmt::format("{}, {} Mbit/s", kind, rate / 1e6);
+  return fmt::format("{}, {} kbit/s", kind, rate / 1e3);
+}
+
+std::string_view name_of(Verb verb) {
+  static constexpr std::array<std::string_view, 12> names{
+      "read",        "read_part",    "info",       "temperature", "clear_alarms", "zero", "reset_multiturn",
+      "memory_read", "memory_write", "config_get", "config_set",  "run"};
+  return names[static_cast<std::size_t>(verb)];
+}
+
+}  // namespace absenc::tool

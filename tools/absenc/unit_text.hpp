@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Between what a user writes or reads and a unit's descriptor: units, options, commands and fields by their names.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/protocol/unit.hpp"
+#include "tools/absenc/json.hpp"
+
+namespace absenc::tool {
+
+/// Throws UsageError, which names the nearest.
+[[nodiscard]] const Unit& require_unit(std::string_view id);
+[[nodiscard]] const Command& require_command(const Unit& unit, std::string_view name);
+
+/// "name=value"; throws UsageError.
+[[nodiscard]] OptionText split_setting(std::string_view text);
+
+/// The options of a model with single settings; "model" may be among the settings. `extra_names` are proposed beside
+/// the unit's own when a name is unknown. Throws UsageError.
+[[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
+                                      std::span<const std::string_view> extra_names = {});
+/// From --option and --model as they were written.
+[[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const std::string> settings);
+
+/// One value for each argument of the command. Throws UsageError.
+[[nodiscard]] std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written);
+
+/// The bits of the flags with these names. Throws UsageError.
+[[nodiscard]] std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names);
+
+/// "1 to 24" or "true, false"
+[[nodiscard]] std::string range_of(const Option& option);
+[[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
+[[nodiscard]] Json to_json(const Option& option, std::int64_t value);
+
+[[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
+[[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
+[[nodiscard]] Json to_json(const FieldValue& value);
+[[nodiscard]] std::string to_text(const FieldValue& value);
+
+/// "half_duplex"
+[[nodiscard]] std::string_view name_of(LinkKind link);
+/// "RS-485 half duplex, 2.5 Mbit/s"
+[[nodiscard]] std::string line_of(const Unit& unit);
+[[nodiscard]] std::string_view name_of(Verb verb);
+
+/// Puts fields into a JSON object.
+struct JsonFields final : FieldSink {
+  void put(const FieldValue& value) override { fields.set(value.info->name, to_json(value)); }
+  Json fields = Json::object();
+};
+
+/// Puts fields into the rows of a table: name, value, unit or meaning; a row for each flag that is set.
+struct FieldTable final : FieldSink {
+  void put(const FieldValue& value) override;
+  std::vector<std::vector<std::string>> rows;
+};
+
+}  // namespace absenc::tool
