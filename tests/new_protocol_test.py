@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`./dev new-protocol` makes a unit that builds, is listed, and fails the generic battery until it is written."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
+LIBRARY = Path(os.environ["ABSENC"]).parent.parent / "libabsenc.a"
+COMPILE = ["g++", "-std=c++20", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror"]
+
+
+class NewProtocol(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.root = Path(self.folder.name)
+        for part in ("absenc", "docs/protocol-template", "tools/new-protocol.py", "tests/battery_test.cpp"):
+            (self.root / part).parent.mkdir(parents=True, exist_ok=True)
+            if (SOURCE / part).is_dir():
+                shutil.copytree(SOURCE / part, self.root / part)
+            else:
+                shutil.copy(SOURCE / part, self.root / part)
+
+    def new_protocol(self, name):
+        return subprocess.run(["python3", "-B", str(self.root / "tools/new-protocol.py"), name, "--root", str(self.root)],
+                              capture_output=True, text=True)
+
+    def test_begins_a_unit_that_builds_and_fails(self):
+        made = self.new_protocol("my_encoder")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        unit = self.root / "absenc/protocol/my_encoder"
+        self.assertNotIn("protocol_name", "".join(file.read_text() for file in unit.iterdir()))
+        sources = [self.root / "absenc/protocol/all.cpp", unit / "unit.cpp", unit / "my_encoder_test.cpp",
+                   self.root / "tests/battery_test.cpp"]
+        program = self.root / "battery"
+        subprocess.run(COMPILE + ["-I", str(self.root)] + [str(source) for source in sources] +
+                       ["-o", str(program), str(LIBRARY), "-lgtest", "-lgtest_main", "-lpthread"], check=True)
+        battery = subprocess.run([str(program)], capture_output=True, text=True)
+        self.assertEqual(battery.returncode, 1)
+        failed = [line for line in battery.stdout.splitlines() if line.startswith("[  FAILED  ]")]
+        self.assertTrue(any("my_encoder_001" in line for line in failed), failed)
+        self.assertTrue(any("HasBothRoles" in line for line in failed), failed)
+        self.assertFalse(any("tformat" in line for line in failed), failed)
+
+    def test_refuses_names_that_are_none_or_taken(self):
+        self.assertEqual(self.new_protocol("tformat").returncode, 1)
+        for name in ("Upper", "1st", "core", "a-b", ""):
+            self.assertEqual(self.new_protocol(name).returncode, 2, name)
+
+
+if __name__ == "__main__":
+    unittest.main()

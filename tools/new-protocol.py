@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Begins a protocol unit: copies docs/protocol-template to absenc/protocol/<name> and lists it in all.cpp.
+
+In the template, in contents and in file names, `protocol_name` stands for the name.
+"""
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+PLACEHOLDER = "protocol_name"
+RESERVED = {"absenc", "core", "link", "protocol", "host", "sim", "capture", "os", "command", "unit", "units"}
+
+
+def list_unit(text, name):
+    """all.cpp with one unit more: its include in order, its line at the end of `units`."""
+    lines = text.splitlines()
+    include = f'#include "absenc/protocol/{name}/unit.hpp"'
+    existing = [i for i, line in enumerate(lines) if re.match(r'#include "absenc/protocol/\w+/unit\.hpp"', line)]
+    if existing:
+        at = next((i for i in existing if lines[i] > include), existing[-1] + 1)
+    else:
+        at = max(i for i, line in enumerate(lines) if line.startswith("#include")) + 1
+    lines.insert(at, include)
+    begin = next(i for i, line in enumerate(lines) if "std::array units{" in line)
+    end = next(i for i in range(begin, len(lines)) if lines[i] == "};")
+    lines.insert(end, f"    &{name}::unit,")
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="./dev new-protocol", description="Begins a protocol unit from the template.")
+    parser.add_argument("name", help="lower case letters, digits and _: the folder and the namespace")
+    parser.add_argument("--root", type=Path, default=Path(__file__).resolve().parent.parent, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    name, root = arguments.name, arguments.root
+    template = root / "docs" / "protocol-template"
+    folder = root / "absenc" / "protocol" / name
+    all_cpp = root / "absenc" / "protocol" / "all.cpp"
+
+    if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or name in RESERVED:
+        parser.error(f'"{name}" cannot be a name: lower case letters, digits and single _, beginning with a letter')
+    if folder.exists():
+        sys.exit(f"new-protocol: absenc/protocol/{name} is already there")
+    if not template.is_dir():
+        sys.exit("new-protocol: docs/protocol-template is missing")
+
+    listed = list_unit(all_cpp.read_text(encoding="utf-8"), name)
+    folder.mkdir()
+    for source in sorted(template.iterdir()):
+        target = folder / source.name.replace(PLACEHOLDER, name)
+        target.write_text(source.read_text(encoding="utf-8").replace(PLACEHOLDER, name), encoding="utf-8")
+        print(f"absenc/protocol/{name}/{target.name}")
+    all_cpp.write_text(listed, encoding="utf-8")
+    print("absenc/protocol/all.cpp: one line more")
+    print("Next: ./dev test fails until the unit is written; CONTRIBUTING.md says in which order to write it.")
+
+
+if __name__ == "__main__":
+    main()
