@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Google Benchmark with a line for each pair NAME and NAME/reference: how many times faster the first is.
+#pragma once
+
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace absenc::bench {
+
+/// Prints the usual table, then the ratios of the medians over the repetitions.
+class RatioReporter : public benchmark::ConsoleReporter {
+ public:
+  RatioReporter() : ConsoleReporter(isatty(STDOUT_FILENO) != 0 ? OO_ColorTabular : OO_Tabular) {}
+
+  void ReportRuns(const std::vector<Run>& runs) override {
+    ConsoleReporter::ReportRuns(runs);
+    for (const Run& run : runs) {
+      if (run.run_type == Run::RT_Aggregate && run.aggregate_name == "median") {
+        medians_[run.run_name.function_name] = run.GetAdjustedCPUTime();
+      }
+    }
+  }
+  void Finalize() override {
+    for (const auto& [name, time] : medians_) {
+      const auto reference = medians_.find(name + "_reference");
+      if (reference == medians_.end()) continue;
+      GetOutputStream() << "ratio " << name << ": " << reference->second / time << " times its reference\n";
+    }
+  }
+
+ private:
+  std::map<std::string, double> medians_;
+};
+
+/// Repetitions of both are interleaved at random, so that a change of the machine's speed meets them alike.
+inline int run_with_ratios(int argc, char** argv) {
+  std::vector<std::string> arguments(argv, argv + argc);
+  arguments.insert(arguments.begin() + 1, {"--benchmark_enable_random_interleaving=true", "--benchmark_repetitions=9",
+                                           "--benchmark_display_aggregates_only=true"});
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  int count = static_cast<int>(pointers.size());
+  benchmark::Initialize(&count, pointers.data());
+  if (benchmark::ReportUnrecognizedArguments(count, pointers.data())) return 1;
+  RatioReporter reporter;
+  benchmark::RunSpecifiedBenchmarks(&reporter);
+  return 0;
+}
+
+}  // namespace absenc::bench
