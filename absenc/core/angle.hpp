@@ -11,17 +11,17 @@ namespace absenc {
 
 /// One position as an encoder reported it, with what of it may be trusted.
 struct Reading {
-  std::uint64_t singleturn = 0;       // counts, 0 .. 2^singleturn_bits - 1
-  std::uint64_t multiturn = 0;        // revolutions, 0 .. 2^multiturn_bits - 1
-  unsigned singleturn_bits = 0;       // 0: the reply carries no single-turn position
-  unsigned multiturn_bits = 0;        // 0: the reply carries no revolutions
-  unsigned singleturn_valid_bits = 0; // the top bits that hold; 0: do not use the position
+  std::uint64_t singleturn = 0;        // counts, 0 .. 2^singleturn_bits - 1
+  std::uint64_t multiturn = 0;         // revolutions, 0 .. 2^multiturn_bits - 1
+  unsigned singleturn_bits = 0;        // 0: the reply carries no single-turn position
+  unsigned multiturn_bits = 0;         // 0: the reply carries no revolutions
+  unsigned singleturn_valid_bits = 0;  // the top bits that hold; 0: do not use the position
   bool multiturn_valid = false;
-  bool ready = true;                  // false while the encoder says that it is starting
-  std::uint32_t status = 0;           // bits named by the unit's status field
-  std::uint32_t alarms = 0;           // bits named by the unit's alarms field
-  Time latched{};                     // when the encoder took the position
-  Time received{};                    // when the last byte of the reply was there
+  bool ready = true;         // false while the encoder says that it is starting
+  std::uint32_t status = 0;  // bits named by the unit's status field
+  std::uint32_t alarms = 0;  // bits named by the unit's alarms field
+  Time latched{};            // when the encoder took the position
+  Time received{};           // when the last byte of the reply was there
 
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;

@@ -61,9 +61,7 @@ inline constexpr std::array<ErrorText, 16> error_texts{{
     {"request_rejected", "the encoder refused the request", "check that the request is allowed, then send it again"},
 }};
 
-[[nodiscard]] constexpr const ErrorText& text_of(Error error) {
-  return error_texts[static_cast<std::size_t>(error)];
-}
+[[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
 /// A value or an Error other than `none`. Reading the value of a failed result is undefined, as in std::expected.
 template <class T>

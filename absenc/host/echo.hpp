@@ -48,10 +48,10 @@ class EchoFilter final : public Machine<std::uint8_t> {
   EchoMode found_ = EchoMode::automatic;  // in this conversation
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
-  ByteBuffer<capacity> held_;    // automatic: heard before it is known what is echo
-  std::size_t echo_due_ = 0;     // on: echo bytes still to come
-  std::size_t reply_due_ = 0;    // items the conversation expects
-  bool passed_ = false;          // something of the reply went to the conversation
+  ByteBuffer<capacity> held_;  // automatic: heard before it is known what is echo
+  std::size_t echo_due_ = 0;   // on: echo bytes still to come
+  std::size_t reply_due_ = 0;  // items the conversation expects
+  bool passed_ = false;        // something of the reply went to the conversation
   bool only_echo_ = false;
 };
 

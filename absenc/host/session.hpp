@@ -16,8 +16,8 @@
 namespace absenc::host {
 
 struct Counters {
-  std::uint64_t good = 0;      // conversations that ended well
-  std::uint64_t repeated = 0;  // attempts after an error
+  std::uint64_t good = 0;                                  // conversations that ended well
+  std::uint64_t repeated = 0;                              // attempts after an error
   std::array<std::uint64_t, error_texts.size()> errors{};  // of each kind, repeated ones included
 
   [[nodiscard]] constexpr std::uint64_t bad() const {

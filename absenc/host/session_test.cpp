@@ -76,9 +76,9 @@ TEST_P(Echo, IsRemovedByCount) {
 
 INSTANTIATE_TEST_SUITE_P(Modes, Echo,
                          ::testing::Values(EchoRow{EchoMode::automatic, false, true},
-                                           EchoRow{EchoMode::automatic, true, true},
-                                           EchoRow{EchoMode::on, true, true}, EchoRow{EchoMode::off, false, true},
-                                           EchoRow{EchoMode::off, true, false}, EchoRow{EchoMode::on, false, false}));
+                                           EchoRow{EchoMode::automatic, true, true}, EchoRow{EchoMode::on, true, true},
+                                           EchoRow{EchoMode::off, false, true}, EchoRow{EchoMode::off, true, false},
+                                           EchoRow{EchoMode::on, false, false}));
 
 TEST(EchoFilter, FindsOutByItselfAndRemembers) {
   for (const bool echo : {false, true}) {

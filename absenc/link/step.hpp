@@ -32,10 +32,10 @@ struct Step {
   std::size_t bits = 0;         // transfer on a clocked link: number of clocks
   Time at{};                    // transfer, pulse: not before; wait: a `timer` event is due then, if that lies ahead
   Time answer{};                // transfer, wait: `silence` when nothing has come this long after `sent`; 0: no limit
-  Time gap{};                   // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
-  Time width{};                 // pulse
-  Line line{};                  // pulse
-  LineSettings settings{};      // configure
+  Time gap{};               // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
+  Time width{};             // pulse
+  Line line{};              // pulse
+  LineSettings settings{};  // configure
 };
 
 /// What happened. `at` is the time at which it was complete: the end of the last bit.

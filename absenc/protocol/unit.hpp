@@ -116,8 +116,8 @@ struct Unit {
   std::span<const FieldInfo> fields;
   std::span<const Command> commands;
   std::span<const Vector> vectors;
-  const FieldInfo* status;  // the flags of Reading::status; null when the unit has none
-  const FieldInfo* alarms;  // the flags of Reading::alarms
+  const FieldInfo* status;     // the flags of Reading::status; null when the unit has none
+  const FieldInfo* alarms;     // the flags of Reading::alarms
   std::size_t host_storage;    // bytes that `host` needs, suitably aligned for any type
   std::size_t device_storage;  // bytes that `device` needs
 

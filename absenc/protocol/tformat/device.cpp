@@ -12,9 +12,9 @@ using ByteEvent = Event<std::uint8_t>;
 
 constexpr std::int32_t battery_error_below = 2750;  // mV, typical (5.4)
 constexpr std::int32_t battery_alarm_below = 3100;
-constexpr std::int32_t full_absolute_speed = 100'000;  // 1/1000 rpm (5.4.1)
-constexpr std::int32_t standing_still = 1'000;         // 1/1000 rpm: what a servo at rest may tremble
-constexpr std::int32_t power_off_speed = 6'000'000;    // 1/1000 rpm (5.4.2)
+constexpr std::int32_t full_absolute_speed = 100'000;   // 1/1000 rpm (5.4.1)
+constexpr std::int32_t standing_still = 1'000;          // 1/1000 rpm: what a servo at rest may tremble
+constexpr std::int32_t power_off_speed = 6'000'000;     // 1/1000 rpm (5.4.2)
 constexpr std::int32_t power_off_acceleration = 4'000;  // rad/s^2
 constexpr std::int32_t power_off_timer_acceleration = 80'000;
 constexpr Time power_off_timer = 5s;
@@ -144,7 +144,8 @@ void VirtualEncoder::answer_memory(const Request& request, Time at) {
                               : is_open(page_, request.address) && !(writing && temperature);
   if (!open) return refuse(0, at);
 
-  const std::size_t index = page_ == service_page ? threshold_at : std::size_t{page_} * page_addresses + request.address;
+  const std::size_t index =
+      page_ == service_page ? threshold_at : std::size_t{page_} * page_addresses + request.address;
   if (!writing) {
     if (selecting) {
       reply.value = page_;
@@ -266,7 +267,8 @@ Reply VirtualEncoder::everything(Time now) {
   const std::uint8_t almc = alarms_now();
   Reply reply{.id = DataId::everything, .status = status_for(almc), .alarms = almc};
   reply.encoder_id = static_cast<std::uint8_t>(format_.encoder_id);
-  reply.singleturn = static_cast<std::uint32_t>(static_cast<std::uint64_t>(position) & low_mask(format_.singleturn_bits));
+  reply.singleturn =
+      static_cast<std::uint32_t>(static_cast<std::uint64_t>(position) & low_mask(format_.singleturn_bits));
   reply.multiturn = static_cast<std::uint32_t>(static_cast<std::uint64_t>(turns) & low_mask(format_.multiturn_bits));
   if ((almc & alarms::full_absolute_status) != 0 && format_.singleturn_bits > full_absolute_bits) {
     reply.singleturn &= ~static_cast<std::uint32_t>(low_mask(format_.singleturn_bits - full_absolute_bits));

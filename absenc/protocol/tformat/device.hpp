@@ -81,17 +81,17 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   Time off_since_{};
   bool was_on_ = false;
 
-  std::int64_t turn_offset_ = 0;    // subtracted from the turns of the shaft
-  std::int64_t counter_lap_ = 0;    // which lap of the turn counter was seen last
+  std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
+  std::int64_t counter_lap_ = 0;  // which lap of the turn counter was seen last
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;         // unlatched alarms raised from outside
+  std::uint8_t forced_ = 0;  // unlatched alarms raised from outside
   bool full_absolute_ = false;
 
   std::uint8_t page_ = 0;
   Time busy_until_{};
   bool page_changing_ = false;
   bool zero_pending_ = false;
-  std::int64_t zero_request_ = 0;   // counts to become zero when the EEPROM is written
+  std::int64_t zero_request_ = 0;  // counts to become zero when the EEPROM is written
 
   DataId reset_id_{};
   unsigned reset_count_ = 0;

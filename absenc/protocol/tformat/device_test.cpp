@@ -28,9 +28,7 @@ void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
 Wire memory_write(Bench& bench, std::uint8_t address, std::uint8_t value) {
   return bench.raw(wire(Request{DataId::write_memory, address, value}));
 }
-Wire memory_read(Bench& bench, std::uint8_t address) {
-  return bench.raw(wire(Request{DataId::read_memory, address}));
-}
+Wire memory_read(Bench& bench, std::uint8_t address) { return bench.raw(wire(Request{DataId::read_memory, address})); }
 
 TEST(TformatDevice, AnswersEveryDataId) {
   Bench bench;
@@ -70,14 +68,14 @@ TEST(TformatDevice, AbnormalRequestsAreAnsweredLikeId3) {
   Bench bench;
   const Wire plain = wire(Reply{.encoder_id = 0x11});
   const Wire parity = wire(Reply{.status = status::parity_error, .encoder_id = 0x11});
-  EXPECT_EQ(bench.raw({0x9A}), parity);                                         // parity of ID 3
-  EXPECT_EQ(bench.raw({control_field(0x4)}), plain);                            // unknown id
-  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);                              // CRC
-  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                                    // cut short
-  EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);                 // busy bit in a request
-  EXPECT_EQ(bench.raw({0x00}), Wire{});                                         // sync code: no answer
-  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);                                    // ... but the next start is found
-  EXPECT_EQ(memory_write(bench, 127, 6), plain);                                // closed page
+  EXPECT_EQ(bench.raw({0x9A}), parity);                          // parity of ID 3
+  EXPECT_EQ(bench.raw({control_field(0x4)}), plain);             // unknown id
+  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);               // CRC
+  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                     // cut short
+  EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);  // busy bit in a request
+  EXPECT_EQ(bench.raw({0x00}), Wire{});                          // sync code: no answer
+  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);                     // ... but the next start is found
+  EXPECT_EQ(memory_write(bench, 127, 6), plain);                 // closed page
   EXPECT_EQ(memory_write(bench, 127, 7), wire(hex<"327F074A">));
   bench.pass(memory_time);
   EXPECT_EQ(memory_read(bench, 3), plain);  // page 7 is closed but for 4 and 5
@@ -189,8 +187,10 @@ TEST(TformatDevice, ResetsSentTooFastOrOnATurningShaftDoNothing) {
   bench.shaft.put(3, 0);
   for (unsigned i = 0; i < 20; ++i) {  // the next request right behind each reply: 31 us apart
     testing::RawHost host({0x62}, bench.line.now());
-    if (bench.host == Bench::none) bench.host = bench.line.attach(sim::Role::host, host);
-    else bench.line.replace(bench.host, host);
+    if (bench.host == Bench::none)
+      bench.host = bench.line.attach(sim::Role::host, host);
+    else
+      bench.line.replace(bench.host, host);
     while (host.reply.size() < 6) bench.line.step();
   }
   EXPECT_EQ(bench.encoder.everything(bench.line.now()).multiturn, 3u);

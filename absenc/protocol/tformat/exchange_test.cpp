@@ -30,7 +30,8 @@ bool looks_right(Bytes request, Bytes reply) {
     case 0x92:
       return reply.size() == 4 && (reply[1] & 0xCF) == 0 && reply[2] == 0x11;
     case 0x1A: {
-      if (reply.size() != 11 || (reply[1] & 0xCF) != 0 || reply[4] > 1 || reply[5] != 0x11 || reply[8] != 0) return false;
+      if (reply.size() != 11 || (reply[1] & 0xCF) != 0 || reply[4] > 1 || reply[5] != 0x11 || reply[8] != 0)
+        return false;
       const bool counting = (reply[9] & 0x04) != 0;
       const bool alarm = (reply[9] & 0xF0) != 0;
       return counting == ((reply[1] & 0x10) != 0) && alarm == ((reply[1] & 0x20) != 0);
@@ -89,8 +90,8 @@ class Campaign {
     if (right) return;
     ++undetectable_;
     EXPECT_TRUE(looks_right(conversation.exchange().sent, conversation.exchange().received))
-        << ::testing::PrintToString(std::vector<int>(conversation.exchange().received.begin(),
-                                                     conversation.exchange().received.end()));
+        << ::testing::PrintToString(
+               std::vector<int>(conversation.exchange().received.begin(), conversation.exchange().received.end()));
   }
 
   void one() {
@@ -112,7 +113,8 @@ class Campaign {
     const Reply& got = position.reply();
     bool right = got.id != DataId::encoder_id || got.encoder_id == truth.encoder_id;
     if (got.id == DataId::multiturn || got.id == DataId::everything) right = right && got.multiturn == truth.multiturn;
-    if (got.id == DataId::singleturn || got.id == DataId::everything) right = right && got.singleturn == truth.singleturn;
+    if (got.id == DataId::singleturn || got.id == DataId::everything)
+      right = right && got.singleturn == truth.singleturn;
     if (got.id == DataId::everything) right = right && got.alarms == truth.alarms;
     judge(position, right);
   }
@@ -138,8 +140,8 @@ class Campaign {
     const Reset done = converse(Reset({}, id));
     const Reply truth = encoder_.everything(line_.now());
     const bool cleared = (truth.alarms & alarms::latched) == 0;
-    judge(done, id == DataId::zero ? truth.singleturn == 0
-                                   : cleared && (id == DataId::clear_alarms || truth.multiturn == 0));
+    judge(done,
+          id == DataId::zero ? truth.singleturn == 0 : cleared && (id == DataId::clear_alarms || truth.multiturn == 0));
   }
 
   static constexpr std::size_t none = ~std::size_t{0};
@@ -169,7 +171,8 @@ void expect_every_fault(const Campaign& campaign, const sim::FaultRates& rates) 
   EXPECT_GT(campaign.accepted(), exchanges_per_seed / 4);
   for (std::size_t kind = 0; kind < rates.rates.size(); ++kind) {
     if (rates.rates[kind] == 0) continue;
-    EXPECT_GT(campaign.faulty().count(static_cast<FaultKind>(kind)), exchanges_per_seed / 200) << sim::fault_names[kind];
+    EXPECT_GT(campaign.faulty().count(static_cast<FaultKind>(kind)), exchanges_per_seed / 200)
+        << sim::fault_names[kind];
   }
 }
 

@@ -66,8 +66,8 @@ struct Format {
 };
 
 inline constexpr std::uint8_t page_select_address = 127;
-inline constexpr std::uint8_t busy_bit = 0x80;      // of ADF, in replies
-inline constexpr unsigned full_absolute_bits = 5;   // of the position hold with full_absolute_status (5.4.1)
+inline constexpr std::uint8_t busy_bit = 0x80;     // of ADF, in replies
+inline constexpr unsigned full_absolute_bits = 5;  // of the position hold with full_absolute_status (5.4.1)
 inline constexpr std::size_t request_capacity = 4;
 inline constexpr std::size_t reply_capacity = 11;
 using RequestBytes = ByteBuffer<request_capacity>;
@@ -306,12 +306,11 @@ namespace detail {
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = reply.id == DataId::everything;
   const bool has_turns = has_all || reply.id == DataId::multiturn;
-  const bool has_position = has_all || (reply.id != DataId::multiturn && reply.id != DataId::encoder_id &&
-                                        !is_memory_access(reply.id));
+  const bool has_position =
+      has_all || (reply.id != DataId::multiturn && reply.id != DataId::encoder_id && !is_memory_access(reply.id));
   const bool alarms_known = has_all || known_alarms.has_value();
   const std::uint8_t almc = has_all ? reply.alarms : known_alarms.value_or(alarms::full_absolute_status);
-  const bool counting_error =
-      (reply.status & status::counting_error) != 0 || (almc & alarms::counting_error) != 0;
+  const bool counting_error = (reply.status & status::counting_error) != 0 || (almc & alarms::counting_error) != 0;
 
   Reading reading;
   reading.status = reply.status;

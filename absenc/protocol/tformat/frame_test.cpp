@@ -11,9 +11,9 @@
 namespace absenc::tformat {
 namespace {
 
-constexpr std::array all_ids{DataId::singleturn,   DataId::multiturn, DataId::encoder_id,
-                             DataId::everything,   DataId::write_memory, DataId::clear_alarms,
-                             DataId::zero,         DataId::reset_multiturn, DataId::read_memory};
+constexpr std::array all_ids{DataId::singleturn, DataId::multiturn,       DataId::encoder_id,
+                             DataId::everything, DataId::write_memory,    DataId::clear_alarms,
+                             DataId::zero,       DataId::reset_multiturn, DataId::read_memory};
 
 TEST(TformatFrame, ControlFieldsOfTable1) {
   const std::array<std::uint8_t, 9> table{0x02, 0x8A, 0x92, 0x1A, 0x32, 0xBA, 0xC2, 0x62, 0xEA};
@@ -122,12 +122,11 @@ TEST(TformatFrame, ValidityOfEachPart) {
     unsigned singleturn_valid_bits;
     bool multiturn_valid;
   };
-  for (const Row& row : {Row{0, 17, true}, Row{alarms::over_speed, 17, false},
-                         Row{alarms::full_absolute_status, 5, true}, Row{alarms::counting_error, 0, true},
-                         Row{alarms::counter_overflow, 17, true}, Row{alarms::over_heat, 17, true},
-                         Row{alarms::multiturn_error, 17, false}, Row{alarms::battery_error, 17, false},
-                         Row{alarms::battery_alarm, 17, true},
-                         Row{alarms::battery_error | alarms::battery_alarm, 17, false}}) {
+  for (const Row& row :
+       {Row{0, 17, true}, Row{alarms::over_speed, 17, false}, Row{alarms::full_absolute_status, 5, true},
+        Row{alarms::counting_error, 0, true}, Row{alarms::counter_overflow, 17, true}, Row{alarms::over_heat, 17, true},
+        Row{alarms::multiturn_error, 17, false}, Row{alarms::battery_error, 17, false},
+        Row{alarms::battery_alarm, 17, true}, Row{alarms::battery_error | alarms::battery_alarm, 17, false}}) {
     const Reading reading = to_reading({}, {.status = status_for(row.almc), .alarms = row.almc});
     EXPECT_EQ(reading.singleturn_valid_bits, row.singleturn_valid_bits) << int{row.almc};
     EXPECT_EQ(reading.multiturn_valid, row.multiturn_valid) << int{row.almc};

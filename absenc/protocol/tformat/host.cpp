@@ -11,9 +11,9 @@ using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
 constexpr unsigned attempts_in_procedures = 3;
-constexpr Time busy_pause = 1ms;                   // between two looks at a busy encoder
-constexpr Time busy_limit = 2 * memory_time;       // the document's maximum is memory_time
-constexpr Time between_looks = 10ms;               // two positions that far apart show whether the shaft turns
+constexpr Time busy_pause = 1ms;              // between two looks at a busy encoder
+constexpr Time busy_limit = 2 * memory_time;  // the document's maximum is memory_time
+constexpr Time between_looks = 10ms;          // two positions that far apart show whether the shaft turns
 
 }  // namespace
 
@@ -200,6 +200,12 @@ void Reset::second_look(const Reply& reply) {
   if (moved > noise || -moved > noise) {
     return finish(Error::invalid_argument, "the shaft is turning: a reset needs it standing still; nothing was sent");
   }
+  // The position is too coarse then to show a movement.
+  if ((reply.alarms & alarms::full_absolute_status) != 0) {
+    return finish(Error::invalid_argument,
+                  "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand "
+                  "still since; nothing was sent");
+  }
   if (id_ == DataId::clear_alarms && (reply.alarms & alarms::battery_error) != 0) {
     return finish(Error::invalid_argument,
                   "battery_error says that the turns are lost, and clearing it alone would hide that: replace the "
@@ -224,8 +230,9 @@ void Reset::failed(Error error) {
   // When the tenth reply is lost, the reset may have been done all the same: reading tells.
   if (phase_ == Phase::requests && sent_requests_ == reset_requests) return go_on();
   if (phase_ == Phase::requests) {
-    return finish(error, "one of the ten requests was not answered well, so the encoder has most likely done nothing; "
-                         "read the position before you try again");
+    return finish(error,
+                  "one of the ten requests was not answered well, so the encoder has most likely done nothing; "
+                  "read the position before you try again");
   }
   if (phase_ == Phase::verify) {
     return finish(error, "all ten requests were sent, but whether the encoder obeyed could not be read");
@@ -268,8 +275,9 @@ ReadMemory::ReadMemory(const Format& format, std::uint8_t page, std::uint8_t add
     : Procedure(format, attempts_in_procedures), page_(page), address_(address), count_(count) {
   for (unsigned i = address; i < unsigned{address} + count; ++i) {
     if (is_open(page, i)) continue;
-    finish(Error::invalid_argument, "this area is closed: pages 0 to 5 have addresses 0 to 126, page 7 has 4 "
-                                    "(over-heat threshold) and 5 (temperature)");
+    finish(Error::invalid_argument,
+           "this area is closed: pages 0 to 5 have addresses 0 to 126, page 7 has 4 "
+           "(over-heat threshold) and 5 (temperature)");
     return;
   }
   if (count == 0) {
@@ -324,8 +332,9 @@ void ReadOverheatThreshold::report(FieldSink& sink) const {
 WriteMemory::WriteMemory(const Format& format, std::uint8_t page, std::uint8_t address, std::uint8_t value, Wear wear)
     : Procedure(format, attempts_in_procedures), page_(page), address_(address), value_(value), wear_(wear) {
   if (!is_open(page, address) || (page == service_page && address == temperature_address)) {
-    finish(Error::invalid_argument, "this address cannot be written: pages 0 to 5 have addresses 0 to 126, page 7 has "
-                                    "4 (over-heat threshold)");
+    finish(Error::invalid_argument,
+           "this address cannot be written: pages 0 to 5 have addresses 0 to 126, page 7 has "
+           "4 (over-heat threshold)");
     return;
   }
   select(Phase::select, {});

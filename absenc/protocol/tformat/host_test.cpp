@@ -80,8 +80,12 @@ TEST(TformatHost, ReadsEverythingInTheTimeOfTheWire) {
   EXPECT_TRUE(read.reading()->multiturn_valid);
   EXPECT_EQ(read.reading()->latched, 4us);
   EXPECT_EQ(read.reading()->received, 51us);
-  EXPECT_EQ(report(read), (std::map<std::string, std::int64_t>{{"data_id", 3}, {"status", 0}, {"singleturn", 0x12345},
-                                                               {"encoder_id", 17}, {"multiturn", 4660}, {"alarms", 0}}));
+  EXPECT_EQ(report(read), (std::map<std::string, std::int64_t>{{"data_id", 3},
+                                                               {"status", 0},
+                                                               {"singleturn", 0x12345},
+                                                               {"encoder_id", 17},
+                                                               {"multiturn", 4660},
+                                                               {"alarms", 0}}));
 }
 
 TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
@@ -176,7 +180,8 @@ TEST(TformatHost, OverHeatThreshold) {
   Bench bench;
   ReadOverheatThreshold at_shipping({});
   bench.run(at_shipping);
-  EXPECT_EQ(report(at_shipping), (std::map<std::string, std::int64_t>{{"overheat_enabled", 1}, {"overheat_threshold_c", 90}}));
+  EXPECT_EQ(report(at_shipping),
+            (std::map<std::string, std::int64_t>{{"overheat_enabled", 1}, {"overheat_threshold_c", 90}}));
   WriteOverheatThreshold write({}, 30);
   EXPECT_EQ(bench.run(write).error(), Error::none);
   EXPECT_EQ(report(write)["overheat_threshold_c"], 30);
@@ -277,6 +282,17 @@ TEST(TformatHost, AResetOnATurningShaftIsNotSent) {
   Reset zero({}, DataId::zero);
   EXPECT_EQ(bench.run(zero).error(), Error::invalid_argument);
   EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+}
+
+TEST(TformatHost, AResetNeedsAPositionFineEnoughToShowMovement) {
+  Bench bench;
+  bench.encoder.power_off(Time{});
+  bench.shaft.spin(100, Time{});
+  bench.encoder.power_on(Time{}, PowerOn::skip);
+  Reset zero({}, DataId::zero);
+  EXPECT_EQ(bench.run(zero).error(), Error::invalid_argument);
+  EXPECT_EQ(bench.encoder.answered(), 2u);
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
 }
 

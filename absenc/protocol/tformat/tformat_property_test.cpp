@@ -39,7 +39,8 @@ RC_GTEST_PROP(TformatProperty, ZeroIsHereWhereverTheShaftStands, (std::int32_t p
   RC_ASSERT(bench.everything().multiturn == turns);
 }
 
-RC_GTEST_PROP(TformatProperty, OneWrongBitIsAlwaysSeen, (std::uint32_t singleturn, std::uint16_t turns, std::uint8_t almc)) {
+RC_GTEST_PROP(TformatProperty, OneWrongBitIsAlwaysSeen,
+              (std::uint32_t singleturn, std::uint16_t turns, std::uint8_t almc)) {
   const Reply reply{.status = status_for(almc),
                     .singleturn = singleturn & 0x1FFFF,
                     .multiturn = turns,

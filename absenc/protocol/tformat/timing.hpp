@@ -15,7 +15,7 @@ inline constexpr Time answer_time = 3us;        // from the request's delimiter 
 inline constexpr unsigned reset_requests = 10;  // of one kind in one sequence make a reset (10)
 inline constexpr Time reset_interval = 40us;    // at least, between them (10)
 inline constexpr Time memory_time = 18ms;       // at most, for a write, a page change or the zero position (9.1, 10)
-inline constexpr Time start_up_with_battery = 1s;        // no request is accepted (5.4)
+inline constexpr Time start_up_with_battery = 1s;  // no request is accepted (5.4)
 inline constexpr Time start_up_without_battery = 1500ms;
 inline constexpr Time temperature_settles = 5s;  // after power on (7.4)
 
@@ -23,7 +23,7 @@ inline constexpr Time temperature_settles = 5s;  // after power on (7.4)
 inline constexpr Time answer_limit = 100us;
 inline constexpr Time gap_limit = 3 * line_settings.character();
 
-inline constexpr std::uint8_t user_pages = 6;      // 0 to 5 (6.1.1)
+inline constexpr std::uint8_t user_pages = 6;        // 0 to 5 (6.1.1)
 inline constexpr std::uint8_t page_addresses = 127;  // 0 to 126; 127 selects the page
 inline constexpr std::uint8_t service_page = 7;
 inline constexpr std::uint8_t overheat_address = 4;     // on the service page (7.2)

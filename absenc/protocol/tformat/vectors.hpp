@@ -22,11 +22,20 @@ inline constexpr std::array<Expected, 3> v020{{{"data_id", 0}, {"status", 0x00},
 inline constexpr std::array<Expected, 3> v021{{{"data_id", 0}, {"status", 0x00}, {"singleturn", 0}}};
 inline constexpr std::array<Expected, 3> v022{{{"data_id", 0}, {"status", 0x00}, {"singleturn", 131071}}};
 inline constexpr std::array<Expected, 3> v024{{{"data_id", 2}, {"status", 0x00}, {"encoder_id", 17}}};
-inline constexpr std::array<Expected, 6> v025{{{"data_id", 3}, {"status", 0x20}, {"singleturn", 74565}, {"encoder_id", 17}, {"multiturn", 4660}, {"alarms", 0x10}}};
-inline constexpr std::array<Expected, 6> v029{{{"data_id", 3}, {"status", 0x00}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x08}}};
-inline constexpr std::array<Expected, 6> v030{{{"data_id", 3}, {"status", 0x20}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x10}}};
-inline constexpr std::array<Expected, 6> v032{{{"data_id", 3}, {"status", 0x20}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x40}}};
-inline constexpr std::array<Expected, 6> v033{{{"data_id", 3}, {"status", 0x20}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x80}}};
+inline constexpr std::array<Expected, 6> v025{{{"data_id", 3},
+                                               {"status", 0x20},
+                                               {"singleturn", 74565},
+                                               {"encoder_id", 17},
+                                               {"multiturn", 4660},
+                                               {"alarms", 0x10}}};
+inline constexpr std::array<Expected, 6> v029{
+    {{"data_id", 3}, {"status", 0x00}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x08}}};
+inline constexpr std::array<Expected, 6> v030{
+    {{"data_id", 3}, {"status", 0x20}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x10}}};
+inline constexpr std::array<Expected, 6> v032{
+    {{"data_id", 3}, {"status", 0x20}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x40}}};
+inline constexpr std::array<Expected, 6> v033{
+    {{"data_id", 3}, {"status", 0x20}, {"singleturn", 0}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x80}}};
 inline constexpr std::array<Expected, 3> v034{{{"data_id", 7}, {"status", 0x00}, {"singleturn", 64206}}};
 inline constexpr std::array<Expected, 3> v036{{{"data_id", 12}, {"status", 0x00}, {"singleturn", 64206}}};
 inline constexpr std::array<Expected, 4> v040{{{"data_id", 13}, {"address", 1}, {"busy", 0}, {"value", 90}}};
@@ -34,11 +43,18 @@ inline constexpr std::array<Expected, 4> v042{{{"data_id", 13}, {"address", 5}, 
 inline constexpr std::array<Expected, 4> v043{{{"data_id", 13}, {"address", 4}, {"busy", 0}, {"value", 218}}};
 inline constexpr std::array<Expected, 3> v101{{{"data_id", 1}, {"status", 0x00}, {"multiturn", 4660}}};
 inline constexpr std::array<Expected, 3> v102{{{"data_id", 8}, {"status", 0x00}, {"singleturn", 64206}}};
-inline constexpr std::array<Expected, 6> v103{{{"data_id", 3}, {"status", 0x10}, {"singleturn", 1}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x04}}};
-inline constexpr std::array<Expected, 6> v106{{{"data_id", 3}, {"status", 0x20}, {"singleturn", 1}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x00}}};
+inline constexpr std::array<Expected, 6> v103{
+    {{"data_id", 3}, {"status", 0x10}, {"singleturn", 1}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x04}}};
+inline constexpr std::array<Expected, 6> v106{
+    {{"data_id", 3}, {"status", 0x20}, {"singleturn", 1}, {"encoder_id", 17}, {"multiturn", 0}, {"alarms", 0x00}}};
 inline constexpr std::array<Expected, 4> v107{{{"data_id", 13}, {"address", 1}, {"busy", 1}, {"value", 0}}};
 inline constexpr std::array<Expected, 4> v108{{{"data_id", 6}, {"address", 1}, {"busy", 0}, {"value", 90}}};
-inline constexpr std::array<Expected, 6> v112{{{"data_id", 3}, {"status", 0x00}, {"singleturn", 8388607}, {"encoder_id", 23}, {"multiturn", 65535}, {"alarms", 0x00}}};
+inline constexpr std::array<Expected, 6> v112{{{"data_id", 3},
+                                               {"status", 0x00},
+                                               {"singleturn", 8388607},
+                                               {"encoder_id", 23},
+                                               {"multiturn", 65535},
+                                               {"alarms", 0x00}}};
 inline constexpr std::array<Expected, 4> v114{{{"data_id", 6}, {"control_field", 50}, {"address", 1}, {"value", 90}}};
 }  // namespace expected
 
