@@ -43,7 +43,7 @@ struct ErrorText {
 /// Indexed by the enumerator.
 inline constexpr std::array<ErrorText, 16> error_texts{{
     {"none", "no error", ""},
-    {"invalid_argument", "an argument is outside what the protocol can carry", "check the value against its range"},
+    {"invalid_argument", "this cannot be done as it was asked", "check the value against its range"},
     {"unsupported", "this encoder or model does not have that", "`absenc list` shows what each one supports"},
     {"buffer_too_small", "the caller's buffer is too small", "pass a larger one"},
     {"timeout", "the encoder did not answer", "check supply, A/B polarity, baud rate and that the encoder has started"},

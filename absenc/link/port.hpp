@@ -13,7 +13,8 @@ struct Port {
   /// The port's own clock, which stamps every event; it never runs backwards.
   [[nodiscard]] virtual Time now() = 0;
 
-  /// Begins a transfer, pulse or configure step. `sent` follows as the next event of a transfer or pulse.
+  /// Begins a transfer, pulse or configure step. After a transfer or pulse, `sent` is the next event, unless something
+  /// was heard before its end (the echo of a half-duplex line, an encoder that talks out of turn).
   virtual void begin(const Step<Item>& step) = 0;
 
   /// Blocks until the next event that a machine waiting with this step must see. Items stay valid until the next call.
