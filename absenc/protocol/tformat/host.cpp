@@ -133,6 +133,9 @@ void Procedure::conclude() {
   }
 }
 
+// A page change must not be disturbed by asking whether it is over.
+void Procedure::ask_again() { ask(request_, received_at_ + (selects_page() ? memory_time : busy_pause)); }
+
 Exchange<std::uint8_t> Procedure::exchange() const { return {request_bytes_, reply_bytes_, sent_at_, received_at_}; }
 
 // ---- ReadPosition
@@ -295,7 +298,7 @@ void ReadMemory::answered(const Reply& reply) {
   if (give_up_ == Time{}) give_up_ = received_at() + busy_limit;
   if (reply.busy) {
     if (received_at() > give_up_) return finish(Error::busy, "the encoder stays busy longer than a write may take");
-    return ask(request(), received_at() + busy_pause);
+    return ask_again();
   }
   if (request().address == page_select_address) {
     give_up_ = received_at() + memory_time + busy_limit;
@@ -349,7 +352,7 @@ void WriteMemory::answered(const Reply& reply) {
   if (give_up_ == Time{}) give_up_ = received_at() + busy_limit;
   if (reply.busy) {  // the request was not executed, so even a write may be sent again
     if (received_at() > give_up_) return finish(Error::busy, "the encoder stays busy longer than a write may take");
-    return ask(request(), received_at() + busy_pause);
+    return ask_again();
   }
   const Time settled = received_at() + memory_time;
   give_up_ = settled + busy_limit;

@@ -32,6 +32,8 @@ class Procedure : public Conversation<std::uint8_t> {
 
   /// Sends `request`, not before `earliest`.
   void ask(const Request& request, Time earliest = {});
+  /// The same request, after the encoder said that it is busy.
+  void ask_again();
   void finish(Error error = Error::none, std::string_view detail = {});
 
   /// The reply passed every check (`busy` may be set). Calls `ask` or `finish`.
