@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <vector>
@@ -127,13 +128,37 @@ TEST(EchoFilter, OneByteTooManyIsNotTakenForAnEcho) {
 }
 
 TEST(EchoFilter, ADisturbedEchoIsNoticed) {
-  // With `echo` as a fault of the far end, garbage in front of it stands where the echo should be.
-  sim::FaultRates rates = always(sim::FaultKind::echo);
-  Bench good(EchoMode::on, rates);
-  EXPECT_EQ(good.read().error(), Error::none);
-  rates[sim::FaultKind::corrupt] = 1;
-  Bench bad(EchoMode::on, rates, 1);
-  EXPECT_NE(bad.read().error(), Error::none);
+  Bench bench(EchoMode::on);
+  std::vector<std::byte> storage(bench.unit.host_storage);
+  for (const std::uint8_t echo : std::to_array<std::uint8_t>({0x1A, 0x1B})) {
+    auto* read = bench.unit.host(bench.options, *find_command(bench.unit, Verb::read), {}, storage).bytes;
+    EchoFilter filter(EchoMode::on);
+    filter.attach(*read);
+    ASSERT_EQ(filter.next(Time{}).kind, Step<std::uint8_t>::Kind::transfer);
+    using Kind = Event<std::uint8_t>::Kind;
+    const Wire wire{echo, 0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B};
+    filter.feed({.kind = Kind::sent, .at = Time(1)});
+    filter.feed({.kind = Kind::received, .at = Time(2), .items = wire});
+    filter.feed({.kind = Kind::silence, .at = Time(3)});
+    EXPECT_EQ(read->error() == Error::none && read->reading() != nullptr, echo == 0x1A);
+  }
+}
+
+// The echo ends long before the encoder answers: that is no gap.
+TEST(EchoFilter, TheAnswerTimeRunsOnAfterTheEcho) {
+  for (const EchoMode mode : {EchoMode::on, EchoMode::automatic}) {
+    sim::FaultRates rates = always(sim::FaultKind::delay);
+    rates.delay = std::chrono::microseconds(50);
+    Bench bench(mode, rates, 1);
+    bench.port->set_echo(true);
+    EXPECT_EQ(bench.read().error(), Error::none);
+  }
+}
+
+// The reply to a page select has as many bytes as its request and equals it.
+TEST(EchoFilter, AReplyLikeItsRequestIsNotTakenForAnEchoAlone) {
+  Bench bench(EchoMode::automatic);
+  EXPECT_EQ(bench.session->run(*find_command(bench.unit, Verb::temperature))->error(), Error::none);
 }
 
 // ---- Sessions

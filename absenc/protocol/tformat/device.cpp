@@ -186,13 +186,13 @@ void VirtualEncoder::execute_reset(DataId id, Time at) {
   if (id == DataId::zero) {
     zero_pending_ = true;
     zero_request_ = counts(at) + zero();
+    zero_turns_ = turns(at);
     busy_until_ = at + memory_time;
     page_changing_ = false;
     return;
   }
   latches_ = 0;
   if (id == DataId::reset_multiturn) set_turns(0, at);
-  update(at);  // over_heat comes back at once while the encoder is hot
 }
 
 // ---- State
@@ -206,10 +206,11 @@ std::int64_t VirtualEncoder::counts(Time now) const {
   return (shaft_->at(now).position >> (32 - format_.singleturn_bits)) - zero();
 }
 
+// As if the turn counter had no end.
+std::int64_t VirtualEncoder::turns(Time now) const { return (counts(now) >> format_.singleturn_bits) - turn_offset_; }
+
 // How often the turn counter has gone round.
-std::int64_t VirtualEncoder::lap(Time now) const {
-  return ((counts(now) >> format_.singleturn_bits) - turn_offset_) >> format_.multiturn_bits;
-}
+std::int64_t VirtualEncoder::lap(Time now) const { return turns(now) >> format_.multiturn_bits; }
 
 void VirtualEncoder::set_turns(std::uint32_t turns, Time now) {
   turn_offset_ = (counts(now) >> format_.singleturn_bits) - turns;
@@ -243,12 +244,11 @@ void VirtualEncoder::update(Time now) {
   }
   if (zero_pending_ && now >= busy_until_) {
     zero_pending_ = false;
-    const std::uint32_t turns = everything(now).multiturn;
     const std::uint64_t zeroed = static_cast<std::uint64_t>(zero_request_) & low_mask(format_.singleturn_bits);
     store_little_endian(MutableBytes(memory_).subspan(zero_at, 4), zeroed);
     ++memory_version_;
     ++writes_;
-    set_turns(turns, now);
+    turn_offset_ = ((zero_request_ - zero()) >> format_.singleturn_bits) - zero_turns_;  // the turns stay
   }
   if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
@@ -263,13 +263,13 @@ void VirtualEncoder::update(Time now) {
 
 Reply VirtualEncoder::everything(Time now) {
   const std::int64_t position = counts(now);
-  const std::int64_t turns = (position >> format_.singleturn_bits) - turn_offset_;
   const std::uint8_t almc = alarms_now();
   Reply reply{.id = DataId::everything, .status = status_for(almc), .alarms = almc};
   reply.encoder_id = static_cast<std::uint8_t>(format_.encoder_id);
   reply.singleturn =
       static_cast<std::uint32_t>(static_cast<std::uint64_t>(position) & low_mask(format_.singleturn_bits));
-  reply.multiturn = static_cast<std::uint32_t>(static_cast<std::uint64_t>(turns) & low_mask(format_.multiturn_bits));
+  reply.multiturn =
+      static_cast<std::uint32_t>(static_cast<std::uint64_t>(turns(now)) & low_mask(format_.multiturn_bits));
   if ((almc & alarms::full_absolute_status) != 0 && format_.singleturn_bits > full_absolute_bits) {
     reply.singleturn &= ~static_cast<std::uint32_t>(low_mask(format_.singleturn_bits - full_absolute_bits));
   }

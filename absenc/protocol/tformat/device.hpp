@@ -64,6 +64,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void update(Time now);
   void update_power_off(Time now);
   [[nodiscard]] std::int64_t counts(Time now) const;
+  [[nodiscard]] std::int64_t turns(Time now) const;
   [[nodiscard]] std::int64_t lap(Time now) const;
   [[nodiscard]] std::uint32_t zero() const;
   [[nodiscard]] std::uint8_t alarms_now() const;
@@ -92,6 +93,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   bool page_changing_ = false;
   bool zero_pending_ = false;
   std::int64_t zero_request_ = 0;  // counts to become zero when the EEPROM is written
+  std::int64_t zero_turns_ = 0;    // to be kept then
 
   DataId reset_id_{};
   unsigned reset_count_ = 0;

@@ -60,6 +60,14 @@ TEST(TformatDevice, CountsRoundTheTurnAndBelowZero) {
   const Reply reply = bench.everything();
   EXPECT_EQ(reply.singleturn, 0x1FFFFu);
   EXPECT_EQ(reply.multiturn, 0xFFFFu);
+  EXPECT_EQ(reply.alarms, alarms::counter_overflow);  // it came from 0
+
+  testing::TestShaft below_zero;
+  below_zero.put(-1, 0);
+  VirtualEncoder encoder({}, below_zero);
+  encoder.power_on(Time{}, PowerOn::skip);
+  EXPECT_EQ(encoder.everything(Time{}).multiturn, 0xFFFFu);
+  EXPECT_EQ(encoder.everything(Time{}).alarms, 0);  // it always was there
 }
 
 // ---- Abnormal requests (8.4, 9.4)
@@ -163,6 +171,40 @@ TEST(TformatDevice, TenRequestsMakeAReset) {
   EXPECT_EQ(bench.everything().multiturn, 0u);
   EXPECT_EQ(bench.everything().singleturn, 1000u);
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
+}
+
+TEST(TformatDevice, AnyOtherRequestStartsTheCountAgain) {
+  Bench bench;
+  bench.shaft.put(7, 0);
+  reset(bench, DataId::reset_multiturn, 9);
+  bench.raw({0xEA, 0x01, 0xEC});  // an abnormal one
+  reset(bench, DataId::reset_multiturn, 9);
+  reset(bench, DataId::clear_alarms, 9);
+  reset(bench, DataId::reset_multiturn, 1);
+  EXPECT_EQ(bench.everything().multiturn, 7u);
+}
+
+TEST(TformatDevice, ZeroLeavesTheTurns) {
+  Bench bench;
+  bench.shaft.put(7, 0x1F000);
+  reset(bench, DataId::zero);
+  bench.pass(memory_time);
+  bench.shaft.put(7, 0x100);
+  EXPECT_EQ(bench.everything().multiturn, 6u);
+  reset(bench, DataId::zero);
+  bench.pass(memory_time);
+  EXPECT_EQ(bench.everything().singleturn, 0u);
+  EXPECT_EQ(bench.everything().multiturn, 6u);
+}
+
+TEST(TformatDevice, AZeroThatWasNotWrittenBeforePowerOffIsLost) {
+  Bench bench;
+  bench.shaft.put(0, 1000);
+  reset(bench, DataId::zero);
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.pass(memory_time);
+  EXPECT_EQ(bench.everything().singleturn, 1000u);
 }
 
 TEST(TformatDevice, ZeroTakes18MillisecondsAndSurvivesPowerOff) {
@@ -290,7 +332,9 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
   bench.shaft.spin(6100, bench.line.now());
   bench.pass(1s);
   bench.encoder.power_on(bench.line.now(), PowerOn::skip);
-  EXPECT_EQ(bench.everything().alarms & alarms::over_speed, alarms::over_speed);
+  const Reply reply = bench.encoder.everything(bench.line.now());
+  EXPECT_EQ(reply.alarms & alarms::over_speed, alarms::over_speed);
+  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the count is wrong
 }
 
 TEST(TformatDevice, CountingAndMultiturnErrorsEndWithThePower) {

@@ -102,9 +102,7 @@ void Procedure::feed(const ByteEvent& event) {
 void Procedure::received(const ByteEvent& event) {
   if (state_ == State::done || state_ == State::ending) return;
   received_at_ = event.at;
-  for (const std::uint8_t byte : event.items) {
-    if (!reply_bytes_.push_back(byte)) disturbed_ = true;
-  }
+  for (const std::uint8_t byte : event.items) reply_bytes_.push_back(byte);
   if (state_ == State::sending) disturbed_ = true;
   if (state_ != State::receiving || reply_bytes_.size() < expected()) return;
   const Result<Reply> reply = decode_reply(format_, request_, reply_bytes_);

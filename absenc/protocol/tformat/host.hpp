@@ -61,7 +61,7 @@ class Procedure : public Conversation<std::uint8_t> {
   bool disturbed_ = false;  // something came before the request was out, or a damaged character
   Request request_{};
   RequestBytes request_bytes_;
-  // One character more than the longest reply tells "too long"; the rest of a flood is only counted out.
+  // One character more than the longest reply tells "too long"; what no longer fits changes nothing.
   ByteBuffer<4 * reply_capacity> reply_bytes_;
   Time earliest_{};
   Time sent_at_{};

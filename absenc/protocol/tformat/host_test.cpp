@@ -277,12 +277,34 @@ TEST(TformatHost, Resets) {
 }
 
 TEST(TformatHost, AResetOnATurningShaftIsNotSent) {
-  Bench bench;
-  bench.shaft.spin(5, Time{});
-  Reset zero({}, DataId::zero);
-  EXPECT_EQ(bench.run(zero).error(), Error::invalid_argument);
-  EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
-  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  for (const std::int32_t rpm : {5, -5}) {
+    Bench bench;
+    bench.shaft.spin(rpm, Time{});
+    Reset zero({}, DataId::zero);
+    EXPECT_EQ(bench.run(zero).error(), Error::invalid_argument);
+    EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
+    EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  }
+}
+
+// Replies 0 and 1 are looks, 2 to 11 answer the requests, 12 is the verification.
+TEST(TformatHost, AResetThatDidNotHappenIsFound) {
+  struct Row {
+    DataId id;
+    Reply verification;
+  };
+  for (const Row& row : {Row{DataId::zero, {.singleturn = 128, .encoder_id = 0x11}},
+                         Row{DataId::zero, {.singleturn = 0x20000 - 128, .encoder_id = 0x11}},
+                         Row{DataId::reset_multiturn, {.multiturn = 1, .encoder_id = 0x11}},
+                         Row{DataId::clear_alarms, {.encoder_id = 0x11, .alarms = alarms::over_speed}}}) {
+    TamperedBench bench([&row](unsigned index, auto& reply) {
+      const ReplyBytes bytes = encode_reply(row.verification);
+      if (index == 12) reply.assign(bytes.view().begin(), bytes.view().end());
+    });
+    Reset reset({}, row.id);
+    EXPECT_EQ(bench.run(reset).error(), Error::cross_check_failed) << static_cast<int>(row.id);
+    EXPECT_EQ(reset.reading(), nullptr);
+  }
 }
 
 TEST(TformatHost, AResetNeedsAPositionFineEnoughToShowMovement) {
