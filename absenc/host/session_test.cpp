@@ -146,6 +146,17 @@ TEST(EchoFilter, ADisturbedEchoIsNoticed) {
 
 // The echo ends long before the encoder answers: that is no gap.
 TEST(EchoFilter, TheAnswerTimeRunsOnAfterTheEcho) {
+  Bench port_like(EchoMode::on);  // on a real port the echo comes after `sent`
+  std::vector<std::byte> storage(port_like.unit.host_storage);
+  auto* read = port_like.unit.host(port_like.options, *find_command(port_like.unit, Verb::read), {}, storage).bytes;
+  EchoFilter filter(EchoMode::on);
+  filter.attach(*read);
+  const Wire echo{0x1A};
+  const Time answer = filter.next(Time{}).answer;
+  filter.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = Time(1)});
+  filter.feed({.kind = Event<std::uint8_t>::Kind::received, .at = Time(2), .items = echo});
+  EXPECT_GE(filter.next(Time(2)).gap, answer);
+
   for (const EchoMode mode : {EchoMode::on, EchoMode::automatic}) {
     sim::FaultRates rates = always(sim::FaultKind::delay);
     rates.delay = std::chrono::microseconds(50);

@@ -179,6 +179,7 @@ TEST(TformatDevice, AnyOtherRequestStartsTheCountAgain) {
   reset(bench, DataId::reset_multiturn, 9);
   bench.raw({0xEA, 0x01, 0xEC});  // an abnormal one
   reset(bench, DataId::reset_multiturn, 9);
+  EXPECT_EQ(bench.everything().multiturn, 7u);
   reset(bench, DataId::clear_alarms, 9);
   reset(bench, DataId::reset_multiturn, 1);
   EXPECT_EQ(bench.everything().multiturn, 7u);
