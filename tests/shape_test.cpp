@@ -3,81 +3,20 @@
 // exact times. Host and device of every conversation are machines of the same kind.
 #include <gtest/gtest.h>
 
-#include <deque>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "absenc/sim/line.hpp"
+#include "tests/shape_toys.hpp"
 
 namespace absenc {
 namespace {
 
 using sim::Role;
 using std::chrono::microseconds;
-using Byte = std::uint8_t;
-
-std::string hex(unsigned value, int digits) {
-  std::string text;
-  for (int i = digits - 1; i >= 0; --i) text += "0123456789ABCDEF"[(value >> (4 * i)) & 0xF];
-  return text;
-}
-std::string text_of(Byte byte) { return hex(byte, 2); }
-std::string text_of(const CanFrame& frame) {
-  std::string text = hex(frame.id, frame.extended ? 8 : 3) + ':';
-  for (const Byte byte : frame.bytes()) text += hex(byte, 2);
-  return text;
-}
-
-// A machine whose reaction to each event is a function. It writes down everything it is told.
-template <class Item>
-class Toy final : public Machine<Item> {
- public:
-  using Kind = typename Event<Item>::Kind;
-  using React = std::function<void(Toy&, const Event<Item>&)>;
-
-  explicit Toy(React react = {}) : react_(std::move(react)) {}
-
-  void feed(const Event<Item>& event) override {
-    static constexpr const char* names[] = {"sent", "received", "silence", "timer", "selected", "triggered", "error"};
-    log += (log.empty() ? "" : ", ") + std::to_string(event.at.count()) + ' ' + names[static_cast<int>(event.kind)];
-    for (const Item& item : event.items) log += ' ' + text_of(item);
-    if (event.bits != 0) log += ' ' + std::to_string(event.bits);
-    if (event.width.count() != 0) log += ' ' + std::to_string(event.width.count());
-    if (react_) react_(*this, event);
-  }
-  Step<Item> next(Time) override {
-    if (queue_.empty()) return idle;
-    Queued queued = std::move(queue_.front());
-    queue_.pop_front();
-    out_ = std::move(queued.items);
-    queued.step.out = out_;
-    return queued.step;
-  }
-
-  void push(Step<Item> step) { queue_.push_back({step, {}}); }
-  void send(std::vector<Item> items, Time at = {}, std::size_t bits = 0, std::size_t expect = 0) {
-    queue_.push_back(
-        {{.kind = Step<Item>::Kind::transfer, .expect = expect, .bits = bits, .at = at}, std::move(items)});
-  }
-  void emit() { push({.kind = Step<Item>::Kind::emit}); }
-  void finish() { push({.kind = Step<Item>::Kind::done}); }
-
-  Step<Item> idle{};  // what it waits with
-  std::string log;
-
- private:
-  struct Queued {
-    Step<Item> step;
-    std::vector<Item> items;
-  };
-  React react_;
-  std::deque<Queued> queue_;
-  std::vector<Item> out_;
-};
-
-using ByteToy = Toy<Byte>;
-using CanToy = Toy<CanFrame>;
+using toy::Byte;
+using ByteToy = toy::Toy<Byte>;
+using CanToy = toy::Toy<CanFrame>;
 using Kind = Event<Byte>::Kind;
 
 // (a) Request and reply on half duplex: 2.5 Mbps, a character is 4 us, the answer begins 3 us after the request.
