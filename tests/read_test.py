@@ -381,6 +381,27 @@ class Run(ReadCase):
         reading = json.loads(absenc("read", address, "--json").stdout)
         self.assertEqual((reading["singleturn"], reading["multiturn"]), (0, 7))
 
+    def test_verbs_of_their_own(self):
+        address = self.encoder("--singleturn", "1000", "--multiturn", "7", "--alarm", "over_speed")
+        self.assertRegex(absenc("temperature", address).stdout, r"^temperature_c +35 degC ")
+        cleared = json.loads(absenc("clear-alarms", address, "--yes", "--json").stdout)
+        self.assertEqual((cleared["fields"]["alarms"], cleared["fields"]["multiturn"]), ([], 7))
+        self.assert_good(absenc("zero", address, "--yes"))
+        self.assert_good(absenc("reset-multiturn", address, "--yes"))
+        reading = json.loads(absenc("read", address, "--json").stdout)
+        self.assertEqual((reading["singleturn"], reading["multiturn"], reading["alarms"]), (0, 0, []))
+
+    def test_verbs_that_change_need_consent(self):
+        emulator = self.emulator("--multiturn", "7")
+        for verb in ("zero", "reset-multiturn", "clear-alarms"):
+            self.assert_wrong_usage(absenc(verb, f"tformat:{emulator.path}"), "--yes", "changes the encoder")
+        self.assertIn("0 requests answered", emulator.end()[2])
+
+    def test_clearing_alarms_does_not_hide_lost_turns(self):
+        address = self.encoder("--alarm", "battery_error")
+        self.assert_failed(absenc("clear-alarms", address, "--yes"), "turns are lost", "reset-multiturn")
+        self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["alarms"], ["battery_error"])
+
     def test_a_turning_shaft_is_not_zeroed(self):
         result = absenc("run", self.encoder("--motion", "rpm=60"), "zero", "--yes", "--json")
         self.assertEqual(result.returncode, 1)

@@ -100,7 +100,7 @@ std::string help() {
       "absenc: absolute encoders - read them, set them up, emulate them, decode what was captured\n\n"
       "Usage: absenc <verb> ...\n\nVerbs:\n";
   for (const Subcommand* subcommand : all_subcommands()) {
-    text += fmt::format("  {:<10}{}\n", subcommand->name, subcommand->summary);
+    text += fmt::format("  {:<17}{}\n", subcommand->name, subcommand->summary);
   }
   text +=
       "\nAn encoder is its protocol and where it is connected:\n"

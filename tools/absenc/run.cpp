@@ -9,7 +9,7 @@
 #include "tools/absenc/encoder.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/run.hpp"
 #include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
@@ -41,10 +41,29 @@ bool must_ask(const Command& command, const EncoderUri& uri, const Invocation& i
 }
 
 int run_run(const Invocation& invocation) {
-  os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const Command& command = require_command(*uri.unit, invocation.text("command"));
-  const std::vector<std::int64_t> arguments = require_arguments(command, invocation.texts("arguments"));
+  return run_command(invocation, uri, command, require_arguments(command, invocation.texts("arguments")));
+}
+
+constexpr std::array<Parameter, 6> parameters{{
+    {"encoder", "", "as for `absenc read`", "", true},
+    {"command", "", "a command of the protocol: see `absenc list <protocol>`", "", true},
+    {"arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true},
+    {"--yes", "", "do not ask before the encoder is changed"},
+    {"--json", "", "one JSON object"},
+    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+}};
+
+constexpr std::array<Example, 2> examples{{
+    {"absenc run tformat:/dev/ttyUSB0 temperature", "how warm the encoder is"},
+    {"absenc run tformat:/dev/ttyUSB0 memory-write 5 0x42 --yes", "write a byte of its memory without being asked"},
+}};
+
+}  // namespace
+
+int run_command(const Invocation& invocation, const EncoderUri& uri, const Command& command, Arguments arguments) {
+  os::catch_interrupts();
   if (must_ask(command, uri, invocation) && !confirmed(command, uri)) {
     print_message("nothing was changed");
     return exit_failed;
@@ -73,22 +92,6 @@ int run_run(const Invocation& invocation) {
   }
   return exit_good;
 }
-
-constexpr std::array<Parameter, 6> parameters{{
-    {"encoder", "", "as for `absenc read`", "", true},
-    {"command", "", "a command of the protocol: see `absenc list <protocol>`", "", true},
-    {"arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true},
-    {"--yes", "", "do not ask before the encoder is changed"},
-    {"--json", "", "one JSON object"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
-}};
-
-constexpr std::array<Example, 2> examples{{
-    {"absenc run tformat:/dev/ttyUSB0 temperature", "how warm the encoder is"},
-    {"absenc run tformat:/dev/ttyUSB0 memory-write 5 0x42 --yes", "write a byte of its memory without being asked"},
-}};
-
-}  // namespace
 
 const Subcommand run_subcommand{"run",
                                 "run a command of the protocol: memory, temperature, zero, reset ...",

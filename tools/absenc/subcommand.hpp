@@ -59,6 +59,10 @@ struct Subcommand {
 
 extern const Subcommand list_subcommand;
 extern const Subcommand read_subcommand;
+extern const Subcommand temperature_subcommand;
+extern const Subcommand zero_subcommand;
+extern const Subcommand reset_multiturn_subcommand;
+extern const Subcommand clear_alarms_subcommand;
 extern const Subcommand run_subcommand;
 extern const Subcommand emulate_subcommand;
 extern const Subcommand decode_subcommand;
