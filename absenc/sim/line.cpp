@@ -18,11 +18,11 @@ template <class Item>
 Line<Item>::~Line() = default;
 
 template <class Item>
-auto Line<Item>::attach(Role role, Machine<Item>& machine, OnEmit on_emit) -> Node {
+auto Line<Item>::attach(Role role, Machine<Item>& machine, const OnEmit& on_emit) -> Node {
   auto state = std::make_unique<State>();
   state->role = role;
   state->machine = &machine;
-  state->on_emit = std::move(on_emit);
+  state->on_emit = on_emit;
   state->settings = settings_;
   state->quiet_since = now_;
   nodes_.push_back(std::move(state));

@@ -36,7 +36,7 @@ class Line {
   Line& operator=(const Line&) = delete;
 
   /// `machine` must outlive the line or be replaced. It is asked for its first step at once.
-  Node attach(Role role, Machine<Item>& machine, OnEmit on_emit = {});
+  Node attach(Role role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// The node goes on with another machine, from now. What the old one was still sending is cut off.
   void replace(Node node, Machine<Item>& machine);
   /// Asks the machine for its next step, after something other than an event has changed it.
