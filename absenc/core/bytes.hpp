@@ -33,20 +33,9 @@ class Buffer {
   }
 
   constexpr void clear() { size_ = 0; }
-  /// Keeps the first `size` items; a larger `size` changes nothing.
-  constexpr void truncate(std::size_t size) {
-    if (size < size_) size_ = size;
-  }
-  /// Drops the first `count` items (all of them when there are fewer).
-  constexpr void drop_front(std::size_t count) {
-    if (count > size_) count = size_;
-    for (std::size_t i = count; i < size_; ++i) items_[i - count] = items_[i];
-    size_ -= count;
-  }
 
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
   [[nodiscard]] constexpr bool empty() const { return size_ == 0; }
-  [[nodiscard]] constexpr bool full() const { return size_ == Capacity; }
   [[nodiscard]] static constexpr std::size_t capacity() { return Capacity; }
 
   constexpr Item& operator[](std::size_t index) { return items_[index]; }

@@ -18,10 +18,8 @@ Step<Item> SimPort<Item>::Hand::next(Time) {
 
 template <class Item>
 SimPort<Item>::SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time)
-    : real_time_(std::move(real_time)),
-      line_(kind, settings),
-      device_node_(line_.attach(Role::device, device)),
-      host_node_(line_.attach(Role::host, hand_)) {
+    : real_time_(std::move(real_time)), line_(kind, settings), host_node_(line_.attach(Role::host, hand_)) {
+  line_.attach(Role::device, device);
   if (!real_time_.now != !real_time_.sleep_until) {
     throw std::invalid_argument("a simulated port needs both now and sleep_until, or neither");
   }

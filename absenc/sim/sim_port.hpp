@@ -33,8 +33,6 @@ class SimPort final : public Port<Item> {
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
 
   void set_echo(bool echo) { line_.set_echo(host_node_, echo); }
-  /// Asks the device for its next step, after something else than the line has changed it.
-  void wake_device() { line_.wake(device_node_); }
 
  private:
   // The machine at the host's end: passes steps from the port's user and collects what happens.
@@ -59,7 +57,6 @@ class SimPort final : public Port<Item> {
   Time start_{};  // of virtual time, on the caller's clock
   Line<Item> line_;
   Hand hand_;
-  typename Line<Item>::Node device_node_;
   typename Line<Item>::Node host_node_;
   std::vector<Item> items_;  // of the event handed out last
 };

@@ -17,7 +17,6 @@ inline constexpr Time reset_interval = 40us;    // at least, between them (10)
 inline constexpr Time memory_time = 18ms;       // at most, for a write, a page change or the zero position (9.1, 10)
 inline constexpr Time start_up_with_battery = 1s;  // no request is accepted (5.4)
 inline constexpr Time start_up_without_battery = 1500ms;
-inline constexpr Time temperature_settles = 5s;  // after power on (7.4)
 
 /// Limits the host waits for; the document gives only the typical answer time.
 inline constexpr Time answer_limit = 100us;
