@@ -9,7 +9,9 @@
 #include "absenc/core/crc.hpp"
 #include "absenc/core/gray.hpp"
 #include "absenc/core/result.hpp"
-#include "absenc/host/drive.hpp"
+#include "absenc/host/session.hpp"
+#include "absenc/host/unwrap.hpp"
+#include "absenc/host/velocity.hpp"
 #include "absenc/link/can.hpp"
 #include "absenc/protocol/all.hpp"
 
@@ -26,6 +28,10 @@ template class Crc<biss, CrcTable::byte>;
 template class Crc<biss, CrcTable::nibble>;
 template class Result<std::uint64_t>;
 template class Result<Reading>;
+template class host::Statistics<std::uint8_t>;
+template class host::Statistics<CanFrame>;
+template class host::Session<std::uint8_t>;
+template class host::Session<CanFrame>;
 
 // Not static: what nobody uses would not be compiled.
 bool drive_bytes(Machine<std::uint8_t>& machine, Port<std::uint8_t>& port) {
@@ -34,6 +40,12 @@ bool drive_bytes(Machine<std::uint8_t>& machine, Port<std::uint8_t>& port) {
 
 bool drive_frames(Machine<CanFrame>& machine, Port<CanFrame>& port) {
   return host::drive(machine, port, [] { return true; });
+}
+
+double speed(const Reading& reading, host::Unwrapper& unwrapper, host::Velocity& velocity) {
+  if (unwrapper.add(reading) == host::Unwrapper::Joined::started) velocity.restart();
+  velocity.add(unwrapper.position(), reading.latched);
+  return velocity.counts_per_second();
 }
 
 std::uint64_t helpers(Bytes bytes, MutableBytes out) {

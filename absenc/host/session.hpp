@@ -11,6 +11,7 @@
 #include "absenc/host/drive.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/host/first_reading.hpp"
+#include "absenc/host/statistics.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::host {
@@ -53,6 +54,7 @@ class Session {
       drive_one(*conversation, on_emit);
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
+      if (statistics_ != nullptr) statistics_->add(*conversation);
       if (error == Error::none) {
         ++counters_.good;
         return conversation;
@@ -82,6 +84,9 @@ class Session {
     }
     return conversation;
   }
+
+  /// To be fed from now on; null: none. 5 kB, which firmware may not have.
+  void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   [[nodiscard]] const Counters& counters() const { return counters_; }
@@ -119,6 +124,7 @@ class Session {
   FirstReading first_;
   bool confirmed_ = false;
   Counters counters_;
+  Statistics<Item>* statistics_ = nullptr;
 };
 
 }  // namespace absenc::host

@@ -185,6 +185,24 @@ TEST(Session, RepeatsWhatMayBeRepeated) {
 }
 
 // Request, 3 us, 11 characters: 51 us a reading are what the document allows.
+TEST(Session, TellsItsStatisticsOfEveryAttempt) {
+  Bench bad(EchoMode::off, always(sim::FaultKind::corrupt));
+  Statistics<std::uint8_t> statistics;
+  bad.session->observe(&statistics);
+  bad.read();
+  EXPECT_EQ(statistics.kept(), 3u);
+  EXPECT_EQ(statistics.bad(0).sent.size(), 1u);
+  EXPECT_EQ(statistics.bad(0).received.size(), 11u);
+  EXPECT_EQ(statistics.latencies().count(), 0u);
+
+  Bench good(EchoMode::off);
+  good.session->observe(&statistics);
+  good.read();  // twice, because it is the first
+  EXPECT_EQ(statistics.latencies().count(), 2u);
+  // The encoder's 3 us and 11 characters of 4 us.
+  EXPECT_EQ(statistics.latencies().longest(), std::chrono::microseconds(47));
+}
+
 TEST(Session, LeavesTheBusNoIdleTime) {
   Bench bench(EchoMode::off);
   constexpr int readings = 1000;

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Unwrapping and velocity over random motions, on both sides of the speed at which they hold.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+
+#include "absenc/host/unwrap.hpp"
+#include "absenc/host/velocity.hpp"
+
+namespace absenc::host {
+namespace {
+
+/// What an encoder that counts `bits` in all shows at this position.
+Reading shown(std::int64_t position, unsigned singleturn_bits, unsigned multiturn_bits, Time at) {
+  const auto counts = static_cast<std::uint64_t>(position);
+  Reading reading{.singleturn = counts & low_mask(singleturn_bits),
+                  .multiturn = counts >> singleturn_bits & low_mask(multiturn_bits),
+                  .singleturn_bits = singleturn_bits,
+                  .multiturn_bits = multiturn_bits,
+                  .singleturn_valid_bits = singleturn_bits,
+                  .multiturn_valid = multiturn_bits != 0};
+  reading.latched = at;
+  return reading;
+}
+
+struct Resolution {
+  unsigned singleturn_bits;
+  unsigned multiturn_bits;
+  [[nodiscard]] std::int64_t half() const { return std::int64_t{1} << (singleturn_bits + multiturn_bits - 1); }
+};
+
+Resolution any_resolution() {
+  const auto singleturn_bits = *rc::gen::inRange<unsigned>(1, 33);
+  return {singleturn_bits, *rc::gen::inRange<unsigned>(0, 17)};
+}
+
+RC_GTEST_PROP(UnwrapProperty, FollowsEveryMotionBelowHalfTheRangeAStep, (std::int32_t start)) {
+  const auto [singleturn_bits, multiturn_bits] = any_resolution();
+  const std::int64_t half = Resolution{singleturn_bits, multiturn_bits}.half();
+  Unwrapper unwrapper;
+  std::int64_t position = start;
+  unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time{}));
+  const std::int64_t offset = unwrapper.position() - position;
+  for (int i = 1; i <= 200; ++i) {
+    // Up to one count below the limit one way, and up to it the other way.
+    position += *rc::gen::weightedOneOf<std::int64_t>(
+        {{8, rc::gen::inRange<std::int64_t>(-half, half)}, {1, rc::gen::just(-half)}, {1, rc::gen::just(half - 1)}});
+    RC_ASSERT(unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time(i))) == Unwrapper::Joined::continued);
+    RC_ASSERT(unwrapper.position() == position + offset);
+  }
+}
+
+RC_GTEST_PROP(UnwrapProperty, CannotFollowFromHalfTheRangeOn, (std::int32_t start)) {
+  const auto [singleturn_bits, multiturn_bits] = any_resolution();
+  const std::int64_t half = Resolution{singleturn_bits, multiturn_bits}.half();
+  Unwrapper unwrapper;
+  unwrapper.add(shown(start, singleturn_bits, multiturn_bits, Time{}));
+  const std::int64_t before = unwrapper.position();
+  const auto step = *rc::gen::inRange<std::int64_t>(half, 3 * half);
+  unwrapper.add(shown(start + step, singleturn_bits, multiturn_bits, Time(1)));
+  RC_ASSERT(unwrapper.position() - before == step - 2 * half);
+}
+
+RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
+  const auto [singleturn_bits, multiturn_bits] = any_resolution();
+  const auto rpm = *rc::gen::inRange<std::uint32_t>(1, 100'000);
+  const Time gap = longest_gap(multiturn_bits, rpm);
+  const double counts = std::ldexp(1.0, static_cast<int>(singleturn_bits)) * rpm / 60e9;  // a nanosecond
+  const auto half = static_cast<double>(Resolution{singleturn_bits, multiturn_bits}.half());
+  RC_ASSERT(counts * static_cast<double>(gap.count()) <= half * (1 + 1e-9));
+  RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * (1 - 1e-9));
+}
+
+RC_GTEST_PROP(VelocityProperty, IsThatOfTheMiddleOfItsWindow, ()) {
+  // Counts a second, and a second squared; readings every 0.1 to 20 ms, with up to half of that as jitter.
+  const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);
+  const double acceleration = *rc::gen::inRange(-100'000'000, 100'000'000);
+  const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
+  const auto at_time = [=](double seconds) { return speed * seconds + acceleration * seconds * seconds / 2; };
+  Velocity velocity;
+  for (std::int64_t i = 0; i < 100; ++i) {
+    const Time at(i * period + *rc::gen::inRange<std::int64_t>(0, period / 2));
+    const double seconds = std::chrono::duration<double>(at).count();
+    velocity.add(static_cast<std::int64_t>(std::floor(at_time(seconds))), at);
+    if (!velocity.valid()) continue;
+    const double delay = std::chrono::duration<double>(velocity.delay()).count();
+    const double wanted = speed + acceleration * (seconds - delay);
+    const double one_count = 1 / (2 * delay);
+    RC_ASSERT(std::abs(velocity.counts_per_second() - wanted) <= one_count + 1e-6 * std::abs(wanted) + 1e-3);
+    RC_ASSERT(velocity.delay() <= std::max(Time(std::chrono::milliseconds(25)), Time(3 * period / 4)));
+  }
+}
+
+RC_GTEST_PROP(VelocityProperty, OfAnUnwrappedTurnHoldsToHalfATurnAStep, ()) {
+  constexpr unsigned bits = 17;
+  constexpr double revolution = 1 << bits;
+  const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
+  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // counts a second
+  const auto measured = [&](double speed) {
+    Unwrapper unwrapper;
+    Velocity velocity;
+    for (std::int64_t i = 0; i < 50; ++i) {
+      const auto position = static_cast<std::int64_t>(std::floor(speed * static_cast<double>(i * period) / 1e9));
+      unwrapper.add(shown(position, bits, 0, Time(i * period)));
+      velocity.add(unwrapper.position(), Time(i * period));
+    }
+    return velocity.counts_per_second();
+  };
+  const double share = *rc::gen::inRange(-999, 1000) / 1000.0;
+  const double count = 1e9 / static_cast<double>(period);
+  RC_ASSERT(std::abs(measured(share * limit) - share * limit) <= count);
+  // Above the limit it looks as if the shaft turned the other way.
+  const double above = *rc::gen::inRange(1001, 2000) / 1000.0;
+  RC_ASSERT(std::abs(measured(above * limit) - (above - 2) * limit) <= count);
+}
+
+}  // namespace
+}  // namespace absenc::host

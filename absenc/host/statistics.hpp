@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// How an encoder's line behaves: how many readings a second, how long they take, and what the last bad frames were.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/core/time.hpp"
+#include "absenc/protocol/conversation.hpp"
+
+namespace absenc::host {
+
+/// Distribution of latencies up to 68 s in a fixed 4 kB. A percentile is at most 1/32 too long, never too short.
+class Latencies {
+ public:
+  constexpr void add(Time latency) {
+    const std::int64_t nanoseconds = std::clamp<std::int64_t>(latency.count(), 0, most);
+    ++counts_[bucket(static_cast<std::uint64_t>(nanoseconds))];
+    ++count_;
+    longest_ = std::max(longest_, latency);
+  }
+
+  [[nodiscard]] constexpr std::uint64_t count() const { return count_; }
+  [[nodiscard]] constexpr Time longest() const { return longest_; }
+
+  /// What `share` (0 to 1) of the latencies do not exceed; 0 when there are none.
+  [[nodiscard]] constexpr Time percentile(double share) const {
+    const auto rank = static_cast<std::uint64_t>(share * static_cast<double>(count_));
+    std::uint64_t below = 0;
+    for (std::size_t i = 0; i < counts_.size(); ++i) {
+      below += counts_[i];
+      if (below > rank) return std::min(longest_, last_of(i));
+    }
+    return longest_;
+  }
+
+ private:
+  static constexpr unsigned fine_bits = 5;  // 32 buckets for each power of two
+  static constexpr unsigned most_bits = 36;
+  static constexpr std::int64_t most = (std::int64_t{1} << most_bits) - 1;
+
+  // Below 2^fine_bits each value has a bucket of its own.
+  [[nodiscard]] static constexpr std::size_t bucket(std::uint64_t value) {
+    const auto width = static_cast<unsigned>(std::bit_width(value));
+    if (width <= fine_bits) return value;
+    const unsigned shift = width - fine_bits - 1;
+    return (std::size_t{shift} << fine_bits) + (value >> shift);
+  }
+  [[nodiscard]] static constexpr Time last_of(std::size_t bucket) {
+    if (bucket < std::size_t{2} << fine_bits) return Time(static_cast<std::int64_t>(bucket));
+    const std::size_t shift = (bucket >> fine_bits) - 1;
+    const std::uint64_t top = bucket - (shift << fine_bits) + 1;
+    return Time(static_cast<std::int64_t>((top << shift) - 1));
+  }
+
+  std::array<std::uint32_t, std::size_t{most_bits - fine_bits + 1} << fine_bits> counts_{};
+  std::uint64_t count_ = 0;
+  Time longest_{};
+};
+
+/// Events a second: a mean that forgets with a time constant of one second.
+class Rate {
+ public:
+  constexpr void add(Time at) {
+    if (seen_) {
+      fade(at - last_);
+      ++events_;
+    }
+    last_ = at;
+    seen_ = true;
+  }
+
+  /// Falls when the next event is overdue. 0 before the second event.
+  [[nodiscard]] constexpr double per_second(Time now) const {
+    if (events_ == 0) return 0;
+    Rate faded = *this;
+    if (static_cast<double>((now - last_).count()) * events_ > nanoseconds_) faded.fade(now - last_);
+    return faded.events_ * 1e9 / faded.nanoseconds_;
+  }
+
+ private:
+  constexpr void fade(Time step) {
+    const auto nanoseconds = static_cast<double>(step.count());
+    const double kept = 1e9 / (1e9 + nanoseconds);
+    events_ *= kept;
+    nanoseconds_ = nanoseconds_ * kept + nanoseconds;
+  }
+
+  bool seen_ = false;
+  Time last_{};
+  double events_ = 0;
+  double nanoseconds_ = 0;  // in which they came
+};
+
+/// An exchange that failed, as it was. What is longer than the buffers is cut.
+template <class Item>
+struct BadExchange {
+  Error error = Error::none;
+  Time at{};  // when the last item was received, or sent
+  Buffer<Item, 64 / sizeof(Item)> sent{};
+  Buffer<Item, 64 / sizeof(Item)> received{};
+};
+
+/// Fed by a `Session` with every conversation, repeated ones included.
+template <class Item>
+class Statistics {
+ public:
+  static constexpr std::size_t most_kept = 8;
+
+  void add(const Conversation<Item>& conversation) {
+    const Exchange<Item> exchange = conversation.exchange();
+    if (conversation.error() == Error::none) {
+      rate_.add(exchange.received_at);
+      latencies_.add(exchange.received_at - exchange.sent_at);
+      return;
+    }
+    BadExchange<Item>& bad = bad_[bad_count_++ % most_kept];
+    bad = {.error = conversation.error(), .at = exchange.received_at};
+    const auto cut = [](std::span<const Item> items, std::size_t size) {
+      return items.first(std::min(items.size(), size));
+    };
+    bad.sent.append(cut(exchange.sent, bad.sent.capacity()));
+    bad.received.append(cut(exchange.received, bad.received.capacity()));
+  }
+
+  /// From the end of the request to the end of the reply, of what ended well.
+  [[nodiscard]] const Latencies& latencies() const { return latencies_; }
+  [[nodiscard]] const Rate& rate() const { return rate_; }
+  /// How many of the last bad exchanges are kept.
+  [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_kept); }
+  /// The last one is number 0, the one before it number 1.
+  [[nodiscard]] const BadExchange<Item>& bad(std::size_t number) const {
+    return bad_[(bad_count_ - 1 - number) % most_kept];
+  }
+
+ private:
+  Latencies latencies_;
+  Rate rate_;
+  std::array<BadExchange<Item>, most_kept> bad_{};
+  std::size_t bad_count_ = 0;
+};
+
+}  // namespace absenc::host
