@@ -47,9 +47,9 @@ class Latencies {
   // Below 2^fine_bits each value has a bucket of its own.
   [[nodiscard]] static constexpr std::size_t bucket(std::uint64_t value) {
     const auto width = static_cast<unsigned>(std::bit_width(value));
-    if (width <= fine_bits) return value;
+    if (width <= fine_bits) return static_cast<std::size_t>(value);
     const unsigned shift = width - fine_bits - 1;
-    return (std::size_t{shift} << fine_bits) + (value >> shift);
+    return (std::size_t{shift} << fine_bits) + static_cast<std::size_t>(value >> shift);
   }
   [[nodiscard]] static constexpr Time last_of(std::size_t bucket) {
     if (bucket < std::size_t{2} << fine_bits) return Time(static_cast<std::int64_t>(bucket));
