@@ -60,8 +60,7 @@ class Session {
         return conversation;
       }
       ++counters_.errors[static_cast<std::size_t>(error)];
-      // An encoder that was silent may have been switched off: what it says next has to be confirmed.
-      if (error == Error::timeout) confirmed_ = false;
+      if (error == Error::timeout) doubt();  // it may have been switched off
       if (attempt >= attempts || error == Error::invalid_argument) return conversation;
       ++counters_.repeated;
     }
@@ -88,6 +87,8 @@ class Session {
   /// To be fed from now on; null: none. 5 kB, which firmware may not have.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
+  /// The encoder may be another one now: what it says next has to be confirmed.
+  void doubt() { confirmed_ = false; }
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   [[nodiscard]] const Counters& counters() const { return counters_; }
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }

@@ -5,7 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <vector>
+#include <optional>
 
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/error.hpp"
@@ -23,12 +23,26 @@ Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty()
 template <class Item>
 class EncoderOn final : public Encoder {
  public:
-  EncoderOn(const EncoderUri& uri, Link link, Port<Item>& port)
+  explicit EncoderOn(const EncoderUri& uri)
       : Encoder(uri),
-        link_(std::move(link)),
-        port_(port),
         storage_(std::make_unique<std::byte[]>(uri.unit->host_storage)),
-        session_(*uri.unit, uri.options, port_, {storage_.get(), uri.unit->host_storage}, uri.echo) {}
+        session_(*uri.unit, uri.options, port_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
+    session_.observe(&statistics_);
+  }
+
+  void connect() override {
+    link_ = open_link(uri());
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      port_.attach(*link_->frames);
+    } else {
+      port_.attach(*link_->bytes);
+    }
+    session_.doubt();
+  }
+
+  void disconnect() override { link_.reset(); }
+  bool connected() const override { return link_.has_value(); }
+  const std::vector<std::string>& notes() const override { return link_->notes; }
 
   Outcome read() override {
     const Command* command = find_command(unit(), Verb::read);
@@ -43,6 +57,18 @@ class EncoderOn final : public Encoder {
   void report(FieldSink& sink) const override { last_->report(sink); }
   bool confirmed() const override { return session_.confirmed(); }
   const host::Counters& counters() const override { return session_.counters(); }
+  const host::Latencies& latencies() const override { return statistics_.latencies(); }
+  const host::Rate& rate() const override { return statistics_.rate(); }
+
+  std::vector<KeptExchange> bad_exchanges() const override {
+    std::vector<KeptExchange> kept;
+    for (std::size_t i = 0; i < statistics_.kept(); ++i) {
+      const host::BadExchange<Item>& bad = statistics_.bad(i);
+      kept.push_back({bad.error, bad.at, wire_text(bad.sent), wire_text(bad.received)});
+    }
+    return kept;
+  }
+
   std::uint64_t items() const override { return port_.items_sent + port_.items_received; }
   Time now() override { return port_.now(); }
 
@@ -87,10 +113,10 @@ class EncoderOn final : public Encoder {
   }
 
   [[nodiscard]] std::string exchange(const Trouble& trouble) const {
-    const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_.place);
+    const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->place);
     if (port_.received.empty()) {
       const std::string latency =
-          link_.latency > Time{} ? fmt::format(" + {} for the way", to_text(link_.latency)) : "";
+          link_->latency > Time{} ? fmt::format(" + {} for the way", to_text(link_->latency)) : "";
       return fmt::format("{}; nothing came back within {}{}", sent, to_text(port_.answer), latency);
     }
     const Time after = port_.first_received_at - port_.sent_at;
@@ -98,7 +124,7 @@ class EncoderOn final : public Encoder {
     return fmt::format("{}; received {}{}", sent, trouble.received, later);
   }
 
-  [[nodiscard]] std::string wire_text(const std::vector<Item>& items) const {
+  [[nodiscard]] std::string wire_text(std::span<const Item> items) const {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       std::string text;
       for (const CanFrame& frame : items) {
@@ -107,15 +133,16 @@ class EncoderOn final : public Encoder {
       return text;
     } else {
       constexpr std::size_t most_shown = 64;
-      const std::string text = to_hex(Bytes(items).first(std::min(items.size(), most_shown)));
+      const std::string text = to_hex(items.first(std::min(items.size(), most_shown)));
       return items.size() <= most_shown ? text : fmt::format("{} ... ({} bytes)", text, items.size());
     }
   }
 
-  Link link_;
+  std::optional<Link> link_;
   WatchedPort<Item> port_;
   std::unique_ptr<std::byte[]> storage_;
   host::Session<Item> session_;
+  host::Statistics<Item> statistics_;
   const Conversation<Item>* last_ = nullptr;
 };
 
@@ -134,14 +161,20 @@ Json Trouble::json() const {
   return json.set("sent", sent).set("received", received);
 }
 
+std::unique_ptr<Encoder> Encoder::make(const EncoderUri& uri) {
+  if (uri.unit->link == LinkKind::can) return std::make_unique<EncoderOn<CanFrame>>(uri);
+  return std::make_unique<EncoderOn<std::uint8_t>>(uri);
+}
+
 std::unique_ptr<Encoder> Encoder::open(const EncoderUri& uri) {
-  Link link = open_link(uri);
-  for (const std::string& note : link.notes) print_message(fmt::format("note: {}", note));
-  if (Port<std::uint8_t>* port = link.bytes) {
-    return std::make_unique<EncoderOn<std::uint8_t>>(uri, std::move(link), *port);
-  }
-  Port<CanFrame>* port = link.frames;
-  return std::make_unique<EncoderOn<CanFrame>>(uri, std::move(link), *port);
+  std::unique_ptr<Encoder> encoder = make(uri);
+  encoder->connect();
+  print_notes(*encoder);
+  return encoder;
+}
+
+void print_notes(const Encoder& encoder) {
+  for (const std::string& note : encoder.notes()) print_message(fmt::format("note: {}", note));
 }
 
 std::string summary(const host::Counters& counters) {

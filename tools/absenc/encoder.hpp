@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/host/session.hpp"
 #include "tools/absenc/json.hpp"
@@ -34,11 +35,30 @@ struct Trouble {
   [[nodiscard]] Json json() const;
 };
 
+/// A bad exchange that was kept.
+struct KeptExchange {
+  Error error = Error::none;
+  Time at{};
+  std::string sent{};  // as the link's wire text
+  std::string received{};
+};
+
 class Encoder {
  public:
-  /// Prints what could be better about the port. Throws os::Failure, UsageError.
+  /// Not connected yet.
+  [[nodiscard]] static std::unique_ptr<Encoder> make(const EncoderUri& uri);
+  /// Connected, its notes printed. Throws as `connect`.
   [[nodiscard]] static std::unique_ptr<Encoder> open(const EncoderUri& uri);
   virtual ~Encoder() = default;
+
+  /// Opens the way to it, again after `disconnect`; counters and statistics go on. Throws os::Failure, UsageError.
+  virtual void connect() = 0;
+  virtual void disconnect() = 0;
+  [[nodiscard]] virtual bool connected() const = 0;
+  /// What could be better about the port, a sentence each.
+  [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
+
+  // All of the following only while it is connected, but for counters and statistics.
 
   /// The position, with all the alarms the unit can tell. Throws UsageError when the unit has none.
   virtual Outcome read() = 0;
@@ -50,6 +70,10 @@ class Encoder {
   /// Whether two positions in a row agreed since the encoder was opened or silent.
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
+  [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
+  [[nodiscard]] virtual const host::Rate& rate() const = 0;
+  /// The last bad exchanges, the newest first.
+  [[nodiscard]] virtual std::vector<KeptExchange> bad_exchanges() const = 0;
   /// Bytes or frames over the line so far, both ways.
   [[nodiscard]] virtual std::uint64_t items() const = 0;
   /// The clock of the readings.
@@ -64,6 +88,9 @@ class Encoder {
  private:
   EncoderUri uri_;
 };
+
+/// Prints what could be better about the port.
+void print_notes(const Encoder& encoder);
 
 /// "1234 readings, 2 failed attempts (2 bad_checksum), 2 repeated"
 [[nodiscard]] std::string summary(const host::Counters& counters);

@@ -28,7 +28,8 @@ struct Link {
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
-  explicit WatchedPort(Port<Item>& port) : port_(&port) {}
+  /// The port to use from now on.
+  void attach(Port<Item>& port) { port_ = &port; }
 
   Time now() override { return port_->now(); }
 
@@ -66,7 +67,7 @@ class WatchedPort final : public Port<Item> {
 
  private:
   static constexpr std::size_t most_kept = 1024;
-  Port<Item>* port_;
+  Port<Item>* port_ = nullptr;
 };
 
 }  // namespace absenc::tool

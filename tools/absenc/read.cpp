@@ -5,9 +5,10 @@
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/encoder.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/live_encoder.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/pace.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 
@@ -20,30 +21,55 @@ enum class Format : std::uint8_t { human, json, csv };
 /// Shows readings and failures as they come, and keeps quiet about what was said already.
 class Display {
  public:
-  Display(Encoder& encoder, Format format) : encoder_(&encoder), format_(format), start_(encoder.now()) {
+  Display(const LiveEncoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
     if (format == Format::csv) print_line(csv_header);
   }
 
-  void show(const Outcome& outcome) {
-    if (outcome.error != Error::none) return show_trouble(outcome);
-    last_trouble_ = Error::none;
-    if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no position");
-    show_reading(*outcome.reading);
+  void show(const Sample& sample) {
+    switch (sample.kind) {
+      case Sample::Kind::reading:
+        last_trouble_ = Error::none;
+        return show_reading(sample);
+      case Sample::Kind::failed:
+        return show_trouble(sample);
+      case Sample::Kind::lost:
+        print_message(fmt::format("{}\n  Waiting for it to come back.", sample.message));
+        if (format_ == Format::json) print_line(event("lost", sample).line());
+        return;
+      case Sample::Kind::absent:
+        if (sample.message != last_absence_) print_message(sample.message);
+        last_absence_ = sample.message;
+        return;
+      case Sample::Kind::back:
+        last_absence_.clear();
+        print_message(fmt::format("it is back {}", sample.message));
+        if (format_ == Format::json) print_line(event("back", sample).line());
+        return;
+    }
   }
 
  private:
-  void show_reading(Reading reading) {
-    const Unit& unit = encoder_->unit();
-    const bool doubtful = reading.ready && reading.singleturn_valid() && !encoder_->confirmed();
-    if (doubtful) {
-      reading.singleturn_valid_bits = 0;
-      reading.multiturn_valid = false;
-      if (!told_doubt_) print_message("no two readings in a row agree as well as the fastest shaft allows");
+  [[nodiscard]] double seconds(const Sample& sample) const {
+    return std::chrono::duration<double>(sample.at - start_).count();
+  }
+
+  [[nodiscard]] Json event(std::string_view name, const Sample& sample) const {
+    return Json::object()
+        .set("time_s", seconds(sample))
+        .set("ok", false)
+        .set("event", name)
+        .set("message", sample.message);
+  }
+
+  void show_reading(const Sample& sample) {
+    const Unit& unit = live_->encoder().unit();
+    const Reading& reading = sample.reading;
+    if (sample.doubtful && !told_doubt_) {
+      print_message("no two readings in a row agree as well as the fastest shaft allows");
     }
-    told_doubt_ = doubtful;
-    const double seconds = std::chrono::duration<double>(reading.latched - start_).count();
-    if (format_ == Format::json) return print_line(to_json(unit, reading, seconds, encoder_->confirmed()).line());
-    if (format_ == Format::csv) return print_line(to_csv(unit, reading, seconds));
+    told_doubt_ = sample.doubtful;
+    if (format_ == Format::json) return print_line(to_json(unit, reading, seconds(sample), sample.confirmed).line());
+    if (format_ == Format::csv) return print_line(to_csv(unit, reading, seconds(sample)));
     print_line(to_text(unit, reading));
     if (reading.alarms != alarms_) {
       print_note(reading.alarms != 0 ? alarms_in_words(unit, reading) : "  the alarms are gone");
@@ -51,38 +77,21 @@ class Display {
     }
   }
 
-  void show_trouble(const Outcome& outcome) {
-    Trouble trouble = encoder_->trouble(outcome);
+  void show_trouble(const Sample& sample) {
+    Trouble trouble = sample.trouble;
     if (format_ == Format::json) return print_line(trouble.json().line());
     if (trouble.error == last_trouble_) trouble.advice.clear();
     last_trouble_ = trouble.error;
     print_message(trouble.text());
   }
 
-  Encoder* encoder_;
+  const LiveEncoder* live_;
   Format format_;
   Time start_;
   std::uint32_t alarms_ = 0;
   bool told_doubt_ = false;
   Error last_trouble_ = Error::none;
-};
-
-/// Times of equal distance that do not drift: one that was missed is skipped.
-class Pace {
- public:
-  explicit Pace(double rate) : period_(rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0), next_(os::now()) {}
-
-  void wait() {
-    if (period_ == Time{}) return;
-    next_ += period_;
-    const Time late = os::now() - next_;
-    if (late > Time{}) next_ += late / period_ * period_;
-    os::sleep_until(next_);
-  }
-
- private:
-  Time period_;
-  Time next_;
+  std::string last_absence_;
 };
 
 struct Tally {
@@ -91,15 +100,17 @@ struct Tally {
   bool last_good = false;
 };
 
-void read_all(Encoder& encoder, Display& display, std::uint64_t count, double rate, Tally& tally) {
-  Pace pace(rate);
+// Endless reading survives that the port goes away.
+void read_all(LiveEncoder& live, Display& display, std::uint64_t count, Pace& pace, Tally& tally) {
   for (std::uint64_t i = 0; count == 0 || i < count; ++i) {
-    if (i > 0) pace.wait();
+    if (i > 0) os::sleep_until(pace.next());
     if (os::interrupted()) throw os::Interrupted{};
-    const Outcome outcome = encoder.read();
-    tally.last_good = outcome.error == Error::none;
-    ++(tally.last_good ? tally.good : tally.bad);
-    display.show(outcome);
+    const Sample sample = live.next();
+    if (sample.kind == Sample::Kind::lost && count != 0) throw ToolFailure(sample.message);
+    tally.last_good = sample.kind == Sample::Kind::reading;
+    tally.good += tally.last_good ? 1 : 0;
+    tally.bad += sample.kind == Sample::Kind::failed ? 1 : 0;
+    display.show(sample);
   }
 }
 
@@ -107,32 +118,28 @@ int run_read(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const auto count = static_cast<std::uint64_t>(invocation.number("--count", 1, 0, INT64_MAX));
-  const double rate = invocation.real("--rate", 10, 0, 1e6);
+  Pace pace(invocation.real("--rate", 10, 0, 1e6));
   if (invocation.has("--json") && invocation.has("--csv")) throw UsageError("--json and --csv exclude each other");
   const Format format = invocation.has("--json") ? Format::json : invocation.has("--csv") ? Format::csv : Format::human;
 
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
-  Display display(*encoder, format);
+  LiveEncoder live(uri, pace.period());
+  live.connect();
+  print_notes(live.encoder());
+  Display display(live, format);
   Tally tally;
   if (count != 0) {
-    read_all(*encoder, display, count, rate, tally);
+    read_all(live, display, count, pace, tally);
     return tally.bad == 0 ? exit_good : exit_failed;
   }
   const Time start = os::now();
-  const auto summarize = [&] {
-    print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}", tally.good, tally.bad,
-                              to_text(os::now() - start), summary(encoder->counters())));
-  };
   try {
-    read_all(*encoder, display, 0, rate, tally);
+    read_all(live, display, 0, pace, tally);
   } catch (const os::Interrupted&) {
-    summarize();
-    return tally.last_good ? exit_good : exit_failed;
-  } catch (const os::Failure&) {
-    summarize();
-    throw;
   }
-  return exit_failed;
+  print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}; the port went away: {}",
+                            tally.good, tally.bad, to_text(os::now() - start), summary(live.encoder().counters()),
+                            live.losses()));
+  return tally.last_good ? exit_good : exit_failed;
 }
 
 constexpr std::array<Parameter, 6> parameters{{

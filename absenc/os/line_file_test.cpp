@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/line_file.hpp"
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "absenc/os/error.hpp"
+
+namespace absenc::os {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A directory of its own.
+struct Directory {
+  Directory() {
+    std::string name = fs::temp_directory_path() / "absenc-line-file-XXXXXX";
+    path = ::mkdtemp(name.data());
+  }
+  ~Directory() { fs::remove_all(path); }
+  Directory(const Directory&) = delete;
+  Directory& operator=(const Directory&) = delete;
+  fs::path path;
+};
+
+std::string content(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+TEST(LineFile, GrowsAtOnce) {
+  const Directory directory;
+  LineFile file(directory.path / "log");
+  file.append("one\n");
+  EXPECT_EQ(content(file.path()), "one\n");
+  file.append("two\nthree\n");
+  EXPECT_EQ(content(file.path()), "one\ntwo\nthree\n");
+  EXPECT_EQ(file.size(), 14u);
+  file.sync();
+}
+
+TEST(LineFile, IsNeverOneThatWasThere) {
+  const Directory directory;
+  std::ofstream(directory.path / "log") << "precious";
+  try {
+    LineFile file(directory.path / "log");
+    FAIL();
+  } catch (const Failure& failure) {
+    EXPECT_EQ(failure.kind(), Failure::Kind::in_use);
+  }
+  EXPECT_EQ(content(directory.path / "log"), "precious");
+  EXPECT_THROW(LineFile(directory.path / "nowhere" / "log"), Failure);
+  EXPECT_THROW(LineFile(directory.path.string()), Failure);
+}
+
+TEST(LineFile, TakesBackWhatDoesNotFit) {
+  const Directory directory;
+  LineFile file(directory.path / "log");
+  file.append("whole line\n");
+  // A limit of the process stands for the full disk: the first part of the write succeeds.
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{16, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  EXPECT_THROW(file.append("another line\n"), Failure);
+  EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(content(file.path()), "whole line\n");
+  EXPECT_EQ(file.size(), 11u);
+  file.append("again\n");
+  EXPECT_EQ(content(file.path()), "whole line\nagain\n");
+}
+
+}  // namespace
+}  // namespace absenc::os

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/live_encoder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/output.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Time time_between_tries = 250ms;
+
+std::uint32_t maximum_rpm(const EncoderUri& uri) {
+  return uri.options.model != nullptr ? uri.options.model->maximum_rpm : 0;
+}
+
+unsigned multiturn_bits(const EncoderUri& uri) { return uri.unit->resolution(uri.options).multiturn_bits; }
+
+// A pause of a few readings is joined even if the fastest shaft could have deceived us: most shafts are slower.
+Time longest_gap(const EncoderUri& uri, Time period) {
+  return std::max({host::longest_gap(multiturn_bits(uri), maximum_rpm(uri)), 3 * period, Time(50ms)});
+}
+
+double revolutions_a_minute(const Reading& reading, double counts_per_second) {
+  return std::ldexp(60 * counts_per_second, -static_cast<int>(reading.singleturn_bits));
+}
+
+}  // namespace
+
+LiveEncoder::LiveEncoder(const EncoderUri& uri, Time period)
+    : encoder_(Encoder::make(uri)), period_(period), unwrapper_(longest_gap(uri, period)) {}
+
+void LiveEncoder::connect() {
+  encoder_->connect();
+  offset_ = os::now() - encoder_->now();
+  was_there_ = true;
+}
+
+void LiveEncoder::forget_position() {
+  unwrapper_ = host::Unwrapper(longest_gap(encoder_->uri(), period_));
+  velocity_.restart();
+}
+
+Sample LiveEncoder::next() {
+  if (!encoder_->connected()) return search();
+  try {
+    const Outcome outcome = encoder_->read();
+    if (outcome.error != Error::none) {
+      return {.kind = Sample::Kind::failed, .at = os::now(), .trouble = encoder_->trouble(outcome)};
+    }
+    if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no position");
+    return take(*outcome.reading);
+  } catch (const os::Failure& failure) {
+    encoder_->disconnect();
+    velocity_.restart();
+    ++losses_;
+    lost_at_ = os::now();
+    next_try_ = lost_at_ + time_between_tries;
+    return {.kind = Sample::Kind::lost, .at = lost_at_, .message = failure.what()};
+  }
+}
+
+Sample LiveEncoder::search() {
+  os::sleep_until(next_try_);
+  const Time now = os::now();
+  next_try_ = now + time_between_tries;
+  const bool again = was_there_;
+  try {
+    connect();
+  } catch (const os::Failure& failure) {
+    return {.kind = Sample::Kind::absent, .at = now, .message = failure.what()};
+  }
+  const std::string gap = again ? fmt::format("after {}", to_text(os::now() - lost_at_)) : "for the first time";
+  return {.kind = Sample::Kind::back, .at = os::now(), .message = gap};
+}
+
+Sample LiveEncoder::take(Reading reading) {
+  reading.latched += offset_;
+  reading.received += offset_;
+  Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = encoder_->confirmed()};
+  sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
+  if (sample.doubtful) {
+    reading.singleturn_valid_bits = 0;
+    reading.multiturn_valid = false;
+  }
+  sample.reading = reading;
+  const host::Unwrapper::Joined joined = unwrapper_.add(reading);
+  if (joined == host::Unwrapper::Joined::ignored) return sample;
+  if (joined == host::Unwrapper::Joined::started) velocity_.restart();
+  velocity_.add(unwrapper_.position(), reading.latched);
+  sample.position_valid = true;
+  sample.position = unwrapper_.position();
+  sample.speed_valid = velocity_.valid();
+  sample.speed_rpm = revolutions_a_minute(reading, velocity_.counts_per_second());
+  sample.speed_delay = velocity_.delay();
+  return sample;
+}
+
+std::string LiveEncoder::rate_note() const {
+  const EncoderUri& uri = encoder_->uri();
+  if (period_ == Time{} || host::longest_gap(multiturn_bits(uri), maximum_rpm(uri)) >= period_) return {};
+  const double half_range = std::ldexp(0.5, static_cast<int>(multiturn_bits(uri)));  // revolutions
+  const double seconds = std::chrono::duration<double>(period_).count();
+  return fmt::format(
+      "at this rate the turns are followed up to {:.0f} rpm, but the shaft may reach {} rpm: {:.0f} readings a second "
+      "would be enough",
+      60 * half_range / seconds, maximum_rpm(uri), std::floor(maximum_rpm(uri) / (60 * half_range)) + 1);
+}
+
+}  // namespace absenc::tool
