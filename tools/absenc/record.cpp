@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/process.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/live_encoder.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/pace.hpp"
+#include "tools/absenc/recording.hpp"
+#include "tools/absenc/subcommand.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+/// A line on the terminal that is written over once a second; nothing where there is no terminal.
+class Progress {
+ public:
+  void show(const Recording& recording, const LiveEncoder& live) {
+    const Time now = os::now();
+    if (!os::is_terminal(2) || now < next_) return;
+    next_ = now + std::chrono::seconds(1);
+    const std::string rate = live.encoder().connected()
+                                 ? fmt::format("{:.1f} a second", live.encoder().rate().per_second(now))
+                                 : "the port is away";
+    print_prompt(fmt::format("\r{}: {} readings, {}, {} failures, {} bytes \033[K", to_text(now - recording.start()),
+                             recording.readings(), rate, recording.failures(), recording.bytes()));
+    shown_ = true;
+  }
+  void end() {
+    if (shown_) print_note("");
+    shown_ = false;
+  }
+
+ private:
+  Time next_{};
+  bool shown_ = false;
+};
+
+struct Limits {
+  std::uint64_t count;  // 0: none
+  Time end;
+};
+
+// What comes between the readings is told; the file has it too.
+void tell(const Sample& sample, Progress& progress) {
+  if (sample.kind != Sample::Kind::lost && sample.kind != Sample::Kind::back) return;
+  progress.end();
+  print_message(sample.kind == Sample::Kind::lost ? fmt::format("{}\n  Waiting for it to come back.", sample.message)
+                                                  : fmt::format("it is back {}", sample.message));
+}
+
+// Returns whether the last reading was good.
+bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limits& limits, Progress& progress) {
+  bool good = false;
+  try {
+    while ((limits.count == 0 || recording.readings() < limits.count) && os::now() < limits.end) {
+      if (os::interrupted()) break;
+      const Sample sample = live.next();
+      good = sample.kind == Sample::Kind::reading;
+      recording.take(sample);
+      tell(sample, progress);
+      progress.show(recording, live);
+      os::sleep_until(std::min(pace.next(), limits.end));
+    }
+  } catch (const os::Interrupted&) {
+  }
+  return good;
+}
+
+RecordingSettings settings_of(const Invocation& invocation) {
+  RecordingSettings settings;
+  settings.path = invocation.text("--output");
+  settings.encoder = invocation.text("encoder");
+  settings.rate = invocation.real("--rate", 100, 0, 1e6);
+  settings.every = static_cast<std::uint64_t>(invocation.number("--every", 1, 1, INT64_MAX));
+  if (invocation.has("--part-size")) {
+    settings.part_size = static_cast<std::uint64_t>(1e6 * invocation.real("--part-size", 0, 0.001, 1e9));
+  }
+  if (invocation.has("--part-time")) {
+    settings.part_time = Time(static_cast<std::int64_t>(1e9 * invocation.real("--part-time", 0, 0.01, 1e9)));
+  }
+  return settings;
+}
+
+int run_record(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const RecordingSettings settings = settings_of(invocation);
+  const double seconds = invocation.real("--for", 0, 0.001, 1e9);
+  const auto count = static_cast<std::uint64_t>(invocation.number("--count", 0, 0, INT64_MAX));
+
+  Pace pace(settings.rate);
+  LiveEncoder live(uri, pace.period());
+  live.connect();
+  print_notes(live.encoder());
+  if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
+  Recording recording(settings, uri);
+  const Limits limits{count, seconds > 0 ? recording.start() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never};
+  Progress progress;
+  const auto summarize = [&] {
+    progress.end();
+    print_message(fmt::format("{} readings and {} failures in {} are in {}; exchanges: {}", recording.readings(),
+                              recording.failures(), to_text(os::now() - recording.start()), recording.names(),
+                              summary(live.encoder().counters())));
+  };
+  bool good = false;
+  try {
+    good = record_all(live, recording, pace, limits, progress);
+    recording.finish();
+  } catch (const os::Failure& failure) {
+    progress.end();
+    print_message(fmt::format("{}: the recording has ended; what is written so far is whole", failure.what()));
+    good = false;
+  }
+  summarize();
+  return good ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 9> parameters{{
+    {"encoder", "", "as for `absenc read`", "", true},
+    {"--output", "FILE", "where to; the name ends in .csv, or in .jsonl for JSON lines; it must not exist yet", "",
+     true},
+    {"--rate", "HZ", "readings a second; 0: as many as the line allows", "100"},
+    {"--every", "N", "of N readings write one, and each with other alarms than the one before", "1"},
+    {"--count", "N", "end after so many readings in the file", "until Ctrl-C"},
+    {"--for", "SECONDS", "end after this time", "until Ctrl-C"},
+    {"--part-size", "MEGABYTES", "begin another file when one is this large: NAME-0001.csv, NAME-0002.csv ..."},
+    {"--part-time", "SECONDS", "begin another file after this time"},
+    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+}};
+
+constexpr std::array<Example, 2> examples{{
+    {"absenc record tformat:/dev/ttyUSB0 --output log.csv", "100 readings a second, until Ctrl-C"},
+    {"absenc record tformat:/dev/ttyUSB0 --output log.jsonl --rate 1000 --every 10 --part-time 3600",
+     "a file an hour, with each tenth of 1000 readings a second"},
+}};
+
+}  // namespace
+
+const Subcommand record_subcommand{
+    "record",
+    "write readings to files, for hours",
+    "Each file begins with the encoder, its model and options, the start time and the units. Lines are handed to\n"
+    "the system as they come: nothing is lost when the command is killed, and a full disk leaves whole lines. When\n"
+    "the port goes away, that is a line, the command waits for it to come back, and that is another line.\n"
+    "In CSV, lines before the column names begin with #.",
+    parameters,
+    examples,
+    run_record};
+
+}  // namespace absenc::tool

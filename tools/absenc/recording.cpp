@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/recording.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <chrono>
+#include <filesystem>
+#include <vector>
+
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Column {
+  std::string_view name;
+  std::string_view unit;
+};
+
+// Those of `read --csv` and more.
+constexpr std::array<Column, 12> columns{{
+    {"time_s", "seconds after `started`"},
+    {"angle_deg", "degrees within the turn, empty when not valid"},
+    {"singleturn", "counts"},
+    {"singleturn_valid", ""},
+    {"multiturn", "revolutions as the encoder counts them"},
+    {"multiturn_valid", ""},
+    {"status", "names, separated by spaces"},
+    {"alarms", "names, separated by spaces"},
+    {"position", "counts, continued past the end of the encoder's own counter"},
+    {"speed_rpm", "mean over twice speed_delay_s"},
+    {"speed_delay_s", "how long before time_s the shaft had that speed"},
+    {"event", "empty for a reading; lost or back: the port; otherwise the error that came in its place"},
+}};
+
+std::string date_and_time() {
+  const auto now = std::chrono::time_point_cast<std::chrono::milliseconds>(std::chrono::system_clock::now());
+  const auto milliseconds = now.time_since_epoch().count() % 1000;
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(std::chrono::system_clock::to_time_t(now)),
+                     milliseconds);
+}
+
+std::string_view event_of(const Sample& sample) {
+  switch (sample.kind) {
+    case Sample::Kind::lost:
+      return "lost";
+    case Sample::Kind::back:
+      return "back";
+    case Sample::Kind::failed:
+      return text_of(sample.trouble.error).name;
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+Recording::Recording(const RecordingSettings& settings, const EncoderUri& uri)
+    : settings_(settings), unit_(uri.unit), options_(uri.options), start_(os::now()), started_(date_and_time()) {
+  const std::string ending = fs::path(settings.path).extension();
+  if (ending != ".csv" && ending != ".jsonl" && ending != ".ndjson") {
+    throw UsageError(
+        fmt::format("\"{}\" does not say how to write it: the name must end in .csv, or in .jsonl for JSON "
+                    "lines",
+                    settings.path));
+  }
+  format_ = ending == ".csv" ? Format::csv : Format::json_lines;
+  if (settings_.part_size || settings_.part_time) refuse_parts_of_another_recording();
+  open_part();
+}
+
+std::string Recording::part_path(unsigned part) const {
+  if (!settings_.part_size && !settings_.part_time) return settings_.path;
+  const fs::path path(settings_.path);
+  const std::string name = fmt::format("{}-{:04}{}", path.stem().string(), part, path.extension().string());
+  return path.parent_path() / name;
+}
+
+// Later parts of an older recording would stand in the way in the middle of this one.
+void Recording::refuse_parts_of_another_recording() const {
+  const fs::path path(settings_.path);
+  const std::string begin = path.stem().string() + "-";
+  const std::string ending = path.extension();
+  std::error_code error;  // a folder that cannot be read will be told when the file is made
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", error)) {
+    const std::string name = entry.path().filename();
+    if (!name.starts_with(begin) || !name.ends_with(ending) || name.size() < begin.size() + ending.size() + 4) continue;
+    const std::string number = name.substr(begin.size(), name.size() - begin.size() - ending.size());
+    if (!std::all_of(number.begin(), number.end(), [](unsigned char c) { return std::isdigit(c) != 0; })) continue;
+    throw UsageError(
+        fmt::format("there is already a part of another recording, {}: choose another name", entry.path().string()));
+  }
+}
+
+void Recording::open_part() {
+  if (file_) {
+    file_->sync();
+    finished_bytes_ += file_->size();
+  }
+  ++part_;
+  part_start_ = os::now();
+  file_.emplace(part_path(part_));
+  file_->append(header());
+}
+
+std::string Recording::header() const {
+  std::vector<std::string> options;
+  for (std::size_t i = 0; i < unit_->options.size(); ++i) {
+    options.push_back(fmt::format("{}={}", unit_->options[i].name, to_text(unit_->options[i], options_[i])));
+  }
+  const std::string_view model = options_.model != nullptr ? options_.model->name : "none";
+  if (format_ == Format::json_lines) {
+    Json json = Json::object().set("absenc_record", 1).set("encoder", settings_.encoder).set("protocol", unit_->id);
+    json.set("model", model).set("options", fmt::format("{}", fmt::join(options, " ")));
+    json.set("started", started_).set("rate_hz", settings_.rate).set("every", settings_.every).set("part", part_);
+    Json units = Json::object();
+    for (const Column& column : columns) {
+      if (!column.unit.empty()) units.set(column.name, column.unit);
+    }
+    return json.set("units", units).line() + '\n';
+  }
+  std::string text = fmt::format(
+      "# absenc record 1\n# encoder: {}\n# protocol: {}\n# model: {}\n# options: {}\n# started: {}\n# rate_hz: {}\n"
+      "# every: {}\n# part: {}\n",
+      settings_.encoder, unit_->id, model, fmt::join(options, " "), started_, settings_.rate, settings_.every, part_);
+  std::string names;
+  for (const Column& column : columns) {
+    if (!column.unit.empty()) text += fmt::format("# {}: {}\n", column.name, column.unit);
+    names += fmt::format("{}{}", names.empty() ? "" : ",", column.name);
+  }
+  return text + names + '\n';
+}
+
+std::string Recording::line_of(const Sample& sample) const {
+  const double seconds = std::chrono::duration<double>(sample.at - start_).count();
+  const double delay = std::chrono::duration<double>(sample.speed_delay).count();
+  const bool is_reading = sample.kind == Sample::Kind::reading;
+  if (format_ == Format::csv) {
+    if (!is_reading) return fmt::format("{:.6f},,,,,,,,,,,{}\n", seconds, event_of(sample));
+    const std::string position = sample.position_valid ? fmt::format("{}", sample.position) : "";
+    const std::string speed = sample.speed_valid ? fmt::format("{:.6g},{:.6f}", sample.speed_rpm, delay) : ",";
+    return fmt::format("{},{},{},\n", to_csv(*unit_, sample.reading, seconds), position, speed);
+  }
+  if (is_reading) {
+    Json json = to_json(*unit_, sample.reading, seconds, sample.confirmed);
+    json.set("position", sample.position_valid ? Json(sample.position) : Json());
+    json.set("speed_rpm", sample.speed_valid ? Json(sample.speed_rpm) : Json());
+    json.set("speed_delay_s", sample.speed_valid ? Json(delay) : Json());
+    return json.line() + '\n';
+  }
+  Json json = Json::object().set("time_s", seconds).set("ok", false).set("event", event_of(sample));
+  if (sample.kind != Sample::Kind::failed) return json.set("message", sample.message).line() + '\n';
+  json.set("message", sample.trouble.message).set("sent", sample.trouble.sent).set("received", sample.trouble.received);
+  return json.line() + '\n';
+}
+
+// Of the readings every so manieth, but none with other alarms is left out; of what went wrong everything but waiting.
+bool Recording::wanted(const Sample& sample) {
+  if (sample.kind == Sample::Kind::absent) return false;
+  if (sample.kind != Sample::Kind::reading) return true;
+  const bool other_alarms = sample.reading.alarms != alarms_;
+  alarms_ = sample.reading.alarms;
+  return seen_++ % settings_.every == 0 || other_alarms;
+}
+
+void Recording::take(const Sample& sample) {
+  if (!wanted(sample)) return;
+  const bool full = settings_.part_size && file_->size() >= *settings_.part_size;
+  const bool over = settings_.part_time && os::now() - part_start_ >= *settings_.part_time;
+  if (full || over) open_part();
+  file_->append(line_of(sample));
+  ++(sample.kind == Sample::Kind::reading ? readings_ : failures_);
+}
+
+std::string Recording::names() const {
+  return part_ == 1 ? part_path(1) : fmt::format("{} to {}", part_path(1), part_path(part_));
+}
+
+}  // namespace absenc::tool
