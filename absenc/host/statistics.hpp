@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an encoder's line behaves: how many readings a second, how long they take, and what the last bad frames were.
+// How an encoder's line behaves: how long readings take, how many a second, and what the last bad frames were.
 #pragma once
 
 #include <algorithm>
@@ -115,7 +115,6 @@ class Statistics {
   void add(const Conversation<Item>& conversation) {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {
-      rate_.add(exchange.received_at);
       latencies_.add(exchange.received_at - exchange.sent_at);
       return;
     }
@@ -130,7 +129,6 @@ class Statistics {
 
   /// From the end of the request to the end of the reply, of what ended well.
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }
-  [[nodiscard]] const Rate& rate() const { return rate_; }
   /// How many of the last bad exchanges are kept.
   [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_kept); }
   /// The last one is number 0, the one before it number 1.
@@ -140,7 +138,6 @@ class Statistics {
 
  private:
   Latencies latencies_;
-  Rate rate_;
   std::array<BadExchange<Item>, most_kept> bad_{};
   std::size_t bad_count_ = 0;
 };

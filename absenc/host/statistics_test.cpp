@@ -120,8 +120,6 @@ TEST(Statistics, CountsWhatEndedWell) {
   }
   EXPECT_EQ(statistics.latencies().count(), 4u);
   EXPECT_EQ(statistics.latencies().longest(), 90us);
-  EXPECT_GT(statistics.rate().per_second(4s), 0.5);
-  EXPECT_LT(statistics.rate().per_second(4s), 1);
   EXPECT_EQ(statistics.kept(), 1u);
 }
 

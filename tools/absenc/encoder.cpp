@@ -58,7 +58,6 @@ class EncoderOn final : public Encoder {
   bool confirmed() const override { return session_.confirmed(); }
   const host::Counters& counters() const override { return session_.counters(); }
   const host::Latencies& latencies() const override { return statistics_.latencies(); }
-  const host::Rate& rate() const override { return statistics_.rate(); }
 
   std::vector<KeptExchange> bad_exchanges() const override {
     std::vector<KeptExchange> kept;

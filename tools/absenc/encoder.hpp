@@ -38,7 +38,7 @@ struct Trouble {
 /// A bad exchange that was kept.
 struct KeptExchange {
   Error error = Error::none;
-  Time at{};
+  Time at{};           // on the clock of the readings
   std::string sent{};  // as the link's wire text
   std::string received{};
 };
@@ -71,7 +71,6 @@ class Encoder {
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
-  [[nodiscard]] virtual const host::Rate& rate() const = 0;
   /// The last bad exchanges, the newest first.
   [[nodiscard]] virtual std::vector<KeptExchange> bad_exchanges() const = 0;
   /// Bytes or frames over the line so far, both ways.

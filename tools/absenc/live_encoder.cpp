@@ -79,13 +79,23 @@ Sample LiveEncoder::search() {
   } catch (const os::Failure& failure) {
     return {.kind = Sample::Kind::absent, .at = now, .message = failure.what()};
   }
-  const std::string gap = again ? fmt::format("after {}", to_text(os::now() - lost_at_)) : "for the first time";
-  return {.kind = Sample::Kind::back, .at = os::now(), .message = gap};
+  const std::string sentence =
+      again ? fmt::format("the port is back after {}", to_text(os::now() - lost_at_)) : "the port is open";
+  return {.kind = Sample::Kind::back, .at = os::now(), .message = sentence};
+}
+
+double LiveEncoder::rate() const { return rate_.per_second(os::now()); }
+
+std::vector<KeptExchange> LiveEncoder::bad_exchanges() const {
+  std::vector<KeptExchange> exchanges = encoder_->bad_exchanges();
+  for (KeptExchange& exchange : exchanges) exchange.at += offset_;
+  return exchanges;
 }
 
 Sample LiveEncoder::take(Reading reading) {
   reading.latched += offset_;
   reading.received += offset_;
+  rate_.add(reading.received);
   Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = encoder_->confirmed()};
   sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
   if (sample.doubtful) {

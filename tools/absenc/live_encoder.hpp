@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absenc/host/unwrap.hpp"
 #include "absenc/host/velocity.hpp"
@@ -56,6 +57,10 @@ class LiveEncoder {
   [[nodiscard]] const Encoder& encoder() const { return *encoder_; }
   /// How often the port went away.
   [[nodiscard]] std::uint64_t losses() const { return losses_; }
+  /// Good readings a second.
+  [[nodiscard]] double rate() const;
+  /// As Encoder::bad_exchanges, with times of os::now.
+  [[nodiscard]] std::vector<KeptExchange> bad_exchanges() const;
   /// A sentence when the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;
 
@@ -67,6 +72,7 @@ class LiveEncoder {
   Time period_;
   host::Unwrapper unwrapper_;
   host::Velocity velocity_;
+  host::Rate rate_;
   Time offset_{};  // from the port's clock to ours
   Time lost_at_{};
   Time next_try_{};

@@ -42,7 +42,7 @@ class Display {
         return;
       case Sample::Kind::back:
         last_absence_.clear();
-        print_message(fmt::format("it is back {}", sample.message));
+        print_message(sample.message);
         if (format_ == Format::json) print_line(event("back", sample).line());
         return;
     }

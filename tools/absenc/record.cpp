@@ -24,9 +24,8 @@ class Progress {
     const Time now = os::now();
     if (!os::is_terminal(2) || now < next_) return;
     next_ = now + std::chrono::seconds(1);
-    const std::string rate = live.encoder().connected()
-                                 ? fmt::format("{:.1f} a second", live.encoder().rate().per_second(now))
-                                 : "the port is away";
+    const std::string rate =
+        live.encoder().connected() ? fmt::format("{:.1f} a second", live.rate()) : "the port is away";
     print_prompt(fmt::format("\r{}: {} readings, {}, {} failures, {} bytes \033[K", to_text(now - recording.start()),
                              recording.readings(), rate, recording.failures(), recording.bytes()));
     shown_ = true;
@@ -51,7 +50,7 @@ void tell(const Sample& sample, Progress& progress) {
   if (sample.kind != Sample::Kind::lost && sample.kind != Sample::Kind::back) return;
   progress.end();
   print_message(sample.kind == Sample::Kind::lost ? fmt::format("{}\n  Waiting for it to come back.", sample.message)
-                                                  : fmt::format("it is back {}", sample.message));
+                                                  : sample.message);
 }
 
 // Returns whether the last reading was good.

@@ -17,6 +17,7 @@ std::span<const Subcommand* const> all_subcommands() {
   static constexpr std::array all{
       &list_subcommand,
       &read_subcommand,
+      &monitor_subcommand,
       &record_subcommand,
       &temperature_subcommand,
       &zero_subcommand,

@@ -59,6 +59,7 @@ struct Subcommand {
 
 extern const Subcommand list_subcommand;
 extern const Subcommand read_subcommand;
+extern const Subcommand monitor_subcommand;
 extern const Subcommand record_subcommand;
 extern const Subcommand temperature_subcommand;
 extern const Subcommand zero_subcommand;

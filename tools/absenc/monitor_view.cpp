@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/monitor_view.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+Style style_of(Snapshot::State state) {
+  switch (state) {
+    case Snapshot::State::live:
+      return Style::good;
+    case Snapshot::State::opening:
+    case Snapshot::State::paused:
+      return Style::warning;
+    default:
+      return Style::bad;
+  }
+}
+
+bool is_live(const Snapshot& snapshot) { return snapshot.state == Snapshot::State::live; }
+
+bool has_angle(const Snapshot& snapshot) {
+  const Reading& reading = snapshot.last.reading;
+  return is_live(snapshot) && reading.ready && reading.singleturn_valid();
+}
+
+std::string angle_text(const Snapshot& snapshot) {
+  if (!is_live(snapshot)) return "-";
+  if (!has_angle(snapshot)) return "INVALID";
+  const Reading& reading = snapshot.last.reading;
+  return fmt::format("{:.3f}", degrees(reading.singleturn, reading.singleturn_bits));
+}
+
+std::string turns_text(const Snapshot& snapshot) {
+  const Reading& reading = snapshot.last.reading;
+  if (!is_live(snapshot) || reading.multiturn_bits == 0) return "-";
+  return reading.multiturn_valid ? fmt::format("{}", reading.multiturn) : "INVALID";
+}
+
+std::string speed_text(const Snapshot& snapshot) {
+  if (!is_live(snapshot) || !snapshot.last.speed_valid) return "-";
+  const double rpm = std::abs(snapshot.last.speed_rpm) < 0.05 ? 0 : snapshot.last.speed_rpm;  // no "-0.0"
+  return fmt::format("{:.1f}", rpm);
+}
+
+std::string alarm_names(const Shown& shown) {
+  const Unit& unit = *shown.watch->uri().unit;
+  const Reading& reading = shown.snapshot.last.reading;
+  std::string text;
+  const auto add = [&](const FieldInfo* field, std::uint32_t bits) {
+    if (field == nullptr) return;
+    for (const std::string_view name : flag_names(*field, bits))
+      text += fmt::format("{}{}", text.empty() ? "" : " ", name);
+  };
+  add(unit.alarms, reading.alarms);
+  if (unit.alarms == nullptr) add(unit.status, reading.status);
+  return text;
+}
+
+std::uint64_t failures(const Snapshot& snapshot) { return snapshot.counters.bad(); }
+
+// ---- The list
+
+int name_width(const Screen& screen) { return std::clamp(screen.columns() - 60, 8, 40); }
+
+void draw_list_line(Screen& screen, int row, const Shown& shown, bool selected) {
+  const Snapshot& snapshot = shown.snapshot;
+  const int width = name_width(screen);
+  screen.put(row, 0, selected ? ">" : " ", Style::bold);
+  screen.put(row, 2, shown.watch->name().substr(0, static_cast<std::size_t>(width)),
+             selected ? Style::bold : Style::plain);
+  screen.put(row, width + 3, name_of(snapshot.state), style_of(snapshot.state));
+  const std::string values =
+      fmt::format("{:>9} {:>8} {:>9} {:>8} {:>7}", angle_text(snapshot), turns_text(snapshot), speed_text(snapshot),
+                  fmt::format("{:.1f}", snapshot.rate), failures(snapshot));
+  screen.put(row, width + 11, values);
+  if (is_live(snapshot) && !alarm_names(shown).empty()) screen.put(row, width + 57, "!", Style::bad);
+}
+
+// The rows of the list around the selected encoder; returns the row behind it.
+int draw_list(Screen& screen, int row, const View& view) {
+  const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(screen.rows() - 14));
+  const std::size_t count = std::min(view.encoders.size(), most);
+  const std::size_t first = std::min(view.selected - std::min(view.selected, count / 2), view.encoders.size() - count);
+  screen.put(row++, 2,
+             fmt::format("{:<{}} {:<7} {:>9} {:>8} {:>9} {:>8} {:>7}", "encoder", name_width(screen), "state",
+                         "degrees", "turns", "rpm", "a second", "failed"),
+             Style::faint);
+  for (std::size_t i = first; i < first + count; ++i)
+    draw_list_line(screen, row++, view.encoders[i], i == view.selected);
+  if (count < view.encoders.size()) {
+    screen.put(row++, 2, fmt::format("{} to {} of {}", first + 1, first + count, view.encoders.size()), Style::faint);
+  }
+  return row;
+}
+
+// ---- One encoder
+
+void draw_bar(Screen& screen, int row, const Snapshot& snapshot) {
+  const int width = std::min(screen.columns() - 12, 73);
+  std::string bar(static_cast<std::size_t>(width), '-');
+  for (const double quarter : {0.25, 0.5, 0.75}) bar[static_cast<std::size_t>(quarter * (width - 1))] = '+';
+  const Reading& reading = snapshot.last.reading;
+  if (has_angle(snapshot)) {
+    const double share = degrees(reading.singleturn, reading.singleturn_bits) / 360;
+    bar[static_cast<std::size_t>(share * width)] = 'O';
+  }
+  screen.put(row, 2, fmt::format("0 |{}| 360", bar), has_angle(snapshot) ? Style::plain : Style::faint);
+}
+
+void draw_position(Screen& screen, int row, const Shown& shown) {
+  const Snapshot& snapshot = shown.snapshot;
+  if (is_live(snapshot)) {
+    std::string text = to_text(*shown.watch->uri().unit, snapshot.last.reading);
+    const bool good = has_angle(snapshot);
+    return screen.put(row, 2, text, good ? Style::bold : Style::bad);
+  }
+  std::string text = fmt::format("{}: no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
+  if (snapshot.has_reading) {
+    text += fmt::format("; the last was: {}", to_text(*shown.watch->uri().unit, snapshot.last.reading));
+  }
+  screen.put(row, 2, text, style_of(snapshot.state));
+}
+
+std::string speed_line(const Snapshot& snapshot) {
+  if (!is_live(snapshot) || !snapshot.last.position_valid) return "speed -";
+  std::string text = fmt::format("position {} counts", snapshot.last.position);
+  if (!snapshot.last.speed_valid) return text;
+  return fmt::format("speed {} rpm, {} ago; {}", speed_text(snapshot), to_text(snapshot.last.speed_delay), text);
+}
+
+std::string statistics_line(const Snapshot& snapshot) {
+  return fmt::format("{:.1f} a second; latency 50 % {}, 99 % {}, longest {}", snapshot.rate, to_text(snapshot.median),
+                     to_text(snapshot.percentile_99), to_text(snapshot.longest));
+}
+
+// Words in as many rows as they need but not beyond `end`; returns the row behind them.
+int draw_words(Screen& screen, int row, int end, std::string_view text, Style style) {
+  constexpr int indent = 2;
+  const auto width = static_cast<std::size_t>(screen.columns() - indent);
+  while (!text.empty() && row < end) {
+    std::size_t size = std::min(text.size(), width);
+    if (size < text.size()) {
+      const std::size_t space = text.rfind(' ', size);
+      if (space != std::string_view::npos && space > 0) size = space;
+    }
+    screen.put(row++, indent, text.substr(0, size), style);
+    text.remove_prefix(std::min(text.find_first_not_of(' ', size), text.size()));
+  }
+  return row;
+}
+
+int draw_alarms(Screen& screen, int row, int end, const Shown& shown) {
+  const Unit& unit = *shown.watch->uri().unit;
+  const std::string words = is_live(shown.snapshot) ? alarms_in_words(unit, shown.snapshot.last.reading) : "";
+  std::string_view rest = words;
+  while (!rest.empty()) {
+    const std::size_t size = std::min(rest.find('\n'), rest.size());
+    std::string_view line = rest.substr(0, size);
+    line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+    row = draw_words(screen, row, end, line, Style::bad);
+    rest.remove_prefix(std::min(size + 1, rest.size()));
+  }
+  return row;
+}
+
+void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
+  const auto room = static_cast<std::size_t>(std::max(0, end - row));
+  const std::size_t count = std::min(room, snapshot.trace.size());
+  for (std::size_t i = snapshot.trace.size() - count; i < snapshot.trace.size(); ++i) {
+    screen.put(row++, 2, snapshot.trace[i], Style::faint);
+  }
+}
+
+// The last bad exchanges: what was sent and what came, repeated attempts included.
+void draw_errors(Screen& screen, int row, int end, const Shown& shown) {
+  if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
+  for (const KeptExchange& bad : shown.snapshot.bad) {
+    const double seconds = std::chrono::duration<double>(bad.at - shown.watch->start()).count();
+    const std::string text = fmt::format("{:9.3f}  {}: {} -> {}", seconds, text_of(bad.error).name, bad.sent,
+                                         bad.received.empty() ? "nothing" : bad.received);
+    row = draw_words(screen, row, end, text, Style::plain);
+  }
+}
+
+void draw_encoder(Screen& screen, int row, int end, const Shown& shown, bool errors) {
+  const Snapshot& snapshot = shown.snapshot;
+  draw_position(screen, row++, shown);
+  draw_bar(screen, row++, snapshot);
+  screen.put(row++, 2, speed_line(snapshot));
+  screen.put(row++, 2, statistics_line(snapshot));
+  const bool flawless = failures(snapshot) == 0 && snapshot.losses == 0;
+  row = draw_words(screen, row, end,
+                   fmt::format("{}; the port went away: {}", summary(snapshot.counters), snapshot.losses),
+                   flawless ? Style::plain : Style::warning);
+  if (!is_live(snapshot) && snapshot.state != Snapshot::State::paused) {
+    row = draw_words(screen, row, end, snapshot.message, Style::bad);
+  }
+  row = draw_alarms(screen, row, end, shown);
+  if (!snapshot.notice.empty()) row = draw_words(screen, row, end, snapshot.notice, Style::bold);
+  if (errors) return draw_errors(screen, row + 1, end, shown);
+  draw_trace(screen, row + 1, end, snapshot);
+}
+
+void draw_help(Screen& screen, int row, int end) {
+  constexpr std::array<std::string_view, 7> keys{
+      "q, Ctrl-C     quit",
+      "space, p      pause: nothing is read; again: go on",
+      "z             make this position the zero of this encoder: asks first",
+      "tab, n, down  the next encoder",
+      "up            the one before",
+      "e             the last bad exchanges, byte by byte; again: the trace",
+      "h, ?          this help; again: away with it",
+  };
+  for (const std::string_view key : keys) screen.put(row++, 4, key);
+  draw_words(screen, row + 1, end,
+             "\"failed\" counts every attempt, repeated ones too. The speed is the mean over a short window, and as "
+             "old as it says. What is not live is never shown as a present value.",
+             Style::plain);
+}
+
+}  // namespace
+
+void draw(Screen& screen, const View& view) {
+  screen.clear();
+  if (screen.rows() < least_rows || screen.columns() < least_columns) {
+    screen.put(0, 0, "the terminal is too small:", Style::bad);
+    screen.put(1, 0, fmt::format("{} x {}, needs {} x {}", screen.columns(), screen.rows(), least_columns, least_rows));
+    screen.put(2, 0, "q: quit");
+    return screen.show();
+  }
+  const Shown& selected = view.encoders[view.selected];
+  screen.fill(0, fmt::format(" absenc monitor   {}{}", selected.watch->name(), view.paused ? "   PAUSED" : ""),
+              Style::title);
+  const int last = screen.rows() - 1;
+  const int row = draw_list(screen, 1, view) + 1;
+  if (view.below == View::Below::help) {
+    draw_help(screen, row, last);
+  } else {
+    draw_encoder(screen, row, last, selected, view.below == View::Below::errors);
+  }
+  const std::string_view keys = " q quit   space pause   z zero   tab next   e errors   h help";
+  screen.fill(last, view.question.empty() ? keys : std::string_view(view.question), Style::title);
+  screen.show();
+}
+
+std::string to_line(const Shown& shown) {
+  const Snapshot& snapshot = shown.snapshot;
+  std::string text = fmt::format("{}: ", shown.watch->name());
+  if (is_live(snapshot)) {
+    text += fmt::format("{}   {} rpm", to_text(*shown.watch->uri().unit, snapshot.last.reading), speed_text(snapshot));
+  } else {
+    text += fmt::format("{}, no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
+  }
+  return text + fmt::format("   {:.1f} a second   {} failed", snapshot.rate, failures(snapshot));
+}
+
+Json to_json(const Shown& shown) {
+  const Snapshot& snapshot = shown.snapshot;
+  const Unit& unit = *shown.watch->uri().unit;
+  Json json = Json::object().set("encoder", shown.watch->name()).set("state", name_of(snapshot.state));
+  json.set("age_s", std::chrono::duration<double>(snapshot.age).count());
+  const double seconds = std::chrono::duration<double>(snapshot.last.at - shown.watch->start()).count();
+  json.set("reading",
+           is_live(snapshot) ? to_json(unit, snapshot.last.reading, seconds, snapshot.last.confirmed) : Json());
+  const bool has_speed = is_live(snapshot) && snapshot.last.speed_valid;
+  json.set("position", is_live(snapshot) && snapshot.last.position_valid ? Json(snapshot.last.position) : Json());
+  json.set("speed_rpm", has_speed ? Json(snapshot.last.speed_rpm) : Json());
+  const auto microseconds = [](Time time) { return static_cast<double>(time.count()) / 1e3; };
+  json.set("rate_hz", snapshot.rate).set("readings", snapshot.readings);
+  json.set("latency_us", Json::object()
+                             .set("p50", microseconds(snapshot.median))
+                             .set("p99", microseconds(snapshot.percentile_99))
+                             .set("max", microseconds(snapshot.longest)));
+  json.set("errors", errors_to_json(snapshot.counters)).set("losses", snapshot.losses);
+  return is_live(snapshot) ? json : json.set("message", snapshot.message);
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/watch.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/pace.hpp"
+#include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t most_lines = 200;
+constexpr Time between_summaries = 100ms;
+constexpr Time between_lines = 200ms;  // of good readings; whatever is wrong gets a line at once
+
+// os::now is the steady clock.
+std::chrono::steady_clock::time_point to_time_point(Time time) {
+  return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
+}
+
+}  // namespace
+
+std::string_view name_of(Snapshot::State state) {
+  static constexpr std::array<std::string_view, 7> names{"opening", "live",   "silent", "failing",
+                                                         "lost",    "paused", "ended"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+Watch::Watch(std::string name, const EncoderUri& uri, double rate, Time offset)
+    : name_(std::move(name)),
+      uri_(uri),
+      rate_(rate),
+      offset_(offset),
+      start_(os::now()),
+      known_at_(start_),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+void Watch::stop() {
+  thread_.request_stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+Snapshot Watch::snapshot(bool details) const {
+  const std::lock_guard lock(mutex_);
+  Snapshot snapshot = known_;
+  snapshot.age = os::now() - known_at_;
+  const Time period = rate_ > 0 ? Time(static_cast<std::int64_t>(1e9 / rate_)) : Time{};
+  const bool old = snapshot.age > std::max<Time>(3 * period, 500ms);
+  if (snapshot.state == Snapshot::State::live && old) snapshot.state = Snapshot::State::silent;
+  if (paused_ && snapshot.state != Snapshot::State::ended) snapshot.state = Snapshot::State::paused;
+  if (details) {
+    snapshot.trace.assign(lines_.begin(), lines_.end());
+  } else {
+    snapshot.bad.clear();
+  }
+  return snapshot;
+}
+
+void Watch::pause(bool paused) {
+  const std::lock_guard lock(mutex_);
+  paused_ = paused;
+  changed_.notify_all();
+}
+
+void Watch::run(const Command& command) {
+  const std::lock_guard lock(mutex_);
+  command_ = command;
+  known_.notice = fmt::format("{} is running", command.name);
+  changed_.notify_all();
+}
+
+void Watch::work(const std::stop_token& stop) {
+  try {
+    Pace pace(rate_, offset_);
+    LiveEncoder live(uri_, pace.period());
+    Time next = start_ + offset_;
+    for (;;) {
+      std::optional<Command> command;
+      {
+        std::unique_lock lock(mutex_);
+        changed_.wait_until(lock, stop, to_time_point(next), [&] { return command_.has_value(); });
+        if (paused_) changed_.wait(lock, stop, [&] { return !paused_ || command_.has_value(); });
+        command = std::exchange(command_, std::nullopt);
+      }
+      if (stop.stop_requested()) return;
+      if (command) {
+        run_command(live, *command);
+      } else {
+        publish(live, live.next());
+        next = pace.next();
+      }
+    }
+  } catch (const os::Interrupted&) {  // everybody ends: os::interrupted() tells the others
+  } catch (const std::exception& error) {
+    end(error.what());
+  }
+}
+
+void Watch::end(const std::string& why) {
+  add_line(os::now(), why);
+  const std::lock_guard lock(mutex_);
+  known_.state = Snapshot::State::ended;
+  known_.message = why;
+}
+
+void Watch::publish(const LiveEncoder& live, const Sample& sample) {
+  trace(live, sample);
+  const Time now = os::now();
+  const std::lock_guard lock(mutex_);
+  switch (sample.kind) {
+    case Sample::Kind::reading:
+      known_.state = Snapshot::State::live;
+      known_.has_reading = true;
+      known_.last = sample;
+      known_at_ = sample.at;
+      ++known_.readings;
+      break;
+    case Sample::Kind::failed:
+      known_.state = Snapshot::State::failing;
+      known_.message = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);
+      if (!sample.trouble.advice.empty()) known_.message += fmt::format(". Try: {}", sample.trouble.advice);
+      break;
+    case Sample::Kind::lost:
+      known_.state = Snapshot::State::lost;
+      [[fallthrough]];
+    case Sample::Kind::absent:
+      known_.message = sample.message;
+      break;
+    case Sample::Kind::back:
+      break;
+  }
+  if (now < next_summary_ && sample.kind == Sample::Kind::reading) return;
+  next_summary_ = now + between_summaries;
+  const Encoder& encoder = live.encoder();
+  known_.losses = live.losses();
+  known_.rate = live.rate();
+  known_.median = encoder.latencies().percentile(0.5);
+  known_.percentile_99 = encoder.latencies().percentile(0.99);
+  known_.longest = encoder.latencies().longest();
+  if (encoder.counters().bad() != known_.counters.bad()) known_.bad = live.bad_exchanges();
+  known_.counters = encoder.counters();
+}
+
+void Watch::trace(const LiveEncoder& live, const Sample& sample) {
+  const Unit& unit = live.encoder().unit();
+  switch (sample.kind) {
+    case Sample::Kind::reading: {
+      const bool other_alarms = sample.reading.alarms != alarms_;
+      if (!other_alarms && sample.at < next_line_) return;
+      alarms_ = sample.reading.alarms;
+      next_line_ = sample.at + between_lines;
+      return add_line(sample.at, to_text(unit, sample.reading));
+    }
+    case Sample::Kind::failed: {
+      std::string text = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);
+      if (!sample.trouble.exchange.empty()) text += fmt::format(" ({})", sample.trouble.exchange);
+      return add_line(sample.at, text);
+    }
+    case Sample::Kind::lost:
+    case Sample::Kind::back:
+      return add_line(sample.at, sample.message);
+    case Sample::Kind::absent:
+      return;
+  }
+}
+
+void Watch::add_line(Time at, const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  lines_.push_back(fmt::format("{:9.3f}  {}", std::chrono::duration<double>(at - start_).count(), text));
+  if (lines_.size() > most_lines) lines_.pop_front();
+}
+
+void Watch::run_command(LiveEncoder& live, const Command& command) {
+  std::string notice;
+  if (!live.encoder().connected()) {
+    notice = fmt::format("{} was not done: the port is away", command.name);
+  } else {
+    try {
+      const Outcome outcome = live.encoder().run(command, {});
+      live.forget_position();
+      notice = outcome.error == Error::none
+                   ? fmt::format("{}: done, and verified by reading back", command.name)
+                   : fmt::format("{} failed: {}", command.name, live.encoder().trouble(outcome).message);
+    } catch (const os::Failure& failure) {  // the next reading will find the port lost
+      notice = fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
+    }
+  }
+  add_line(os::now(), notice);
+  const std::lock_guard lock(mutex_);
+  known_.notice = notice;
+}
+
+}  // namespace absenc::tool
