@@ -7,8 +7,8 @@ import unittest
 
 from command_support import ABSENC, Case, absenc, json_lines
 
-VERBS = ["list", "read", "temperature", "zero", "reset-multiturn", "clear-alarms", "run", "emulate", "decode", "encode",
-         "vectors", "bench"]
+VERBS = ["list", "read", "info", "alarms", "temperature", "zero", "reset-multiturn", "clear-alarms", "run", "emulate",
+         "decode", "encode", "vectors", "bench"]
 GOOD_REPLY = "1A 00 45 23 01 11 34 12 00 00 4A"
 
 

@@ -34,12 +34,14 @@ class Readme(unittest.TestCase):
         commands = [line[2:] for block in blocks("console") for line in block.splitlines() if line.startswith("$ ")]
         self.assertGreater(len(commands), 6)
         with tempfile.TemporaryDirectory() as folder:
+            config = Path(folder, "absenc.toml")
+            config.write_text("".join(blocks("toml")))
             for command in commands:
                 words = shlex.split(command.replace("/tmp/", folder + "/"))
                 self.assertEqual(words.pop(0), "absenc", command)
                 if words[0] == "emulate":
                     words += ["--for", "0.2"]
-                done = absenc(*words)
+                done = absenc(*words, env={**os.environ, "ABSENC_CONFIG": str(config)})
                 self.assertEqual(done.returncode, 0, f"{command}\n{done.stderr}")
                 self.assertTrue(done.stdout, command)
 

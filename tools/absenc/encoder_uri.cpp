@@ -10,7 +10,7 @@
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/nearest.hpp"
+#include "tools/absenc/named_encoder.hpp"
 #include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
@@ -67,9 +67,8 @@ bool allowed(const LinkParameter& parameter, Place place) {
 void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   for (const OptionText& setting : settings) {
-    const auto parameter = std::find_if(link_parameters.begin(), link_parameters.end(),
-                                        [&](const LinkParameter& one) { return one.name == setting.name; });
-    if (parameter == link_parameters.end()) {
+    const LinkParameter* parameter = find_link_parameter(setting.name);
+    if (parameter == nullptr) {
       options.push_back(setting);
     } else if (!allowed(*parameter, uri.place)) {
       throw UsageError(fmt::format("{} cannot be set here, it is for: {}", setting.name, parameter->places));
@@ -131,17 +130,71 @@ void parse_where(EncoderUri& uri, std::string_view address) {
   uri.path = where;
 }
 
-}  // namespace
-
-EncoderUri parse_encoder(std::string_view text, std::span<const std::string> more) {
+EncoderUri parse_address(std::string_view address) {
   EncoderUri uri;
-  const std::size_t question = std::min(text.find('?'), text.size());
-  parse_where(uri, text.substr(0, question));
+  parse_where(uri, address);
   uri.line = uri.unit->line;
   const bool half_duplex = uri.unit->link == LinkKind::half_duplex;
   if (half_duplex) uri.echo = host::EchoMode::automatic;
   if (!half_duplex) uri.rs485 = os::Rs485::off;
+  return uri;
+}
 
+// Without ':' and '/', and no protocol.
+bool is_name(std::string_view address) {
+  return !address.empty() && address.find_first_of(":/") == std::string_view::npos && address != "sim" &&
+         find_unit(address) == nullptr;
+}
+
+bool fits(const EncoderUri& uri, std::string_view setting) {
+  if (const LinkParameter* parameter = find_link_parameter(setting)) return allowed(*parameter, uri.place);
+  return std::any_of(uri.unit->options.begin(), uri.unit->options.end(),
+                     [&](const Option& option) { return option.name == setting; });
+}
+
+// So that what is wrong can be said of the last of them. A virtual encoder wants all of its options first.
+void try_settings(EncoderUri uri, std::span<const OptionText> settings) {
+  take_settings(uri, settings);
+  const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;
+  if (uri.place == Place::sim && options_are_set) VirtualDevice(*uri.unit, uri.options, uri.device);
+}
+
+EncoderUri parse_named(std::string_view name, std::span<const OptionText> written) {
+  const Config config =
+      require_config(fmt::format("\"{}\" is no PROTOCOL:PORT, so it would have to be a name of absenc.toml", name));
+  NamedEncoder named = require_encoder(config, name);
+  EncoderUri uri = at(named.place, [&] { return parse_address(named.address); });
+
+  std::vector<ConfigSetting> settings = std::move(named.settings);
+  std::copy_if(named.defaults.begin(), named.defaults.end(), std::back_inserter(settings),
+               [&](const ConfigSetting& setting) { return fits(uri, setting.name); });
+  // What a virtual encoder can be set to depends on its options: they come first.
+  std::stable_partition(settings.begin(), settings.end(),
+                        [](const ConfigSetting& setting) { return find_link_parameter(setting.name) == nullptr; });
+  std::vector<OptionText> all;
+  for (const ConfigSetting& setting : settings) {
+    for (const std::string& value : setting.values) all.push_back({setting.name, value});
+    if (!setting.values.empty()) at(setting.place, [&] { try_settings(uri, all); });
+  }
+  std::erase_if(all, [&](const OptionText& setting) {
+    return std::any_of(written.begin(), written.end(), [&](const auto& over) { return over.name == setting.name; });
+  });
+  all.insert(all.end(), written.begin(), written.end());
+  take_settings(uri, all);
+  return uri;
+}
+
+}  // namespace
+
+const LinkParameter* find_link_parameter(std::string_view name) {
+  const auto found = std::find_if(link_parameters.begin(), link_parameters.end(),
+                                  [&](const LinkParameter& one) { return one.name == name; });
+  return found == link_parameters.end() ? nullptr : &*found;
+}
+
+EncoderUri parse_encoder(std::string_view text, std::span<const std::string> more) {
+  const std::size_t question = std::min(text.find('?'), text.size());
+  const std::string_view address = text.substr(0, question);
   std::vector<OptionText> settings;
   std::string_view rest = text.substr(std::min(question + 1, text.size()));
   while (!rest.empty()) {
@@ -150,8 +203,16 @@ EncoderUri parse_encoder(std::string_view text, std::span<const std::string> mor
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
   for (const std::string& setting : more) settings.push_back(split_setting(setting));
+  if (is_name(address)) return parse_named(address, settings);
+  EncoderUri uri = parse_address(address);
   take_settings(uri, settings);
   return uri;
+}
+
+std::string address_of(const EncoderUri& uri) {
+  if (uri.place == Place::sim) return fmt::format("sim:{}", uri.unit->id);
+  if (uri.place == Place::tcp) return fmt::format("{}:tcp:{}:{}", uri.unit->id, uri.host, uri.port);
+  return fmt::format("{}:{}", uri.unit->id, uri.path);
 }
 
 }  // namespace absenc::tool

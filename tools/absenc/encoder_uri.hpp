@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder as the user writes it: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001, sim:tformat.
+// An encoder as the user writes it: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001, sim:tformat, or
+// a name of absenc.toml.
 #pragma once
 
 #include <array>
@@ -25,6 +26,7 @@ struct LinkParameter {
   std::string_view meaning;
   std::string_view places;  // for people
   bool serial, tcp, sim;    // where it may be given
+  bool repeatable = false;
 };
 
 inline constexpr std::array<LinkParameter, 10> link_parameters{{
@@ -36,11 +38,14 @@ inline constexpr std::array<LinkParameter, 10> link_parameters{{
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim", false, false, true},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim", false, false, true},
     {"multiturn", "TURNS", "turns at the start", "sim", false, false, true},
-    {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", false, false, true},
+    {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", false, false, true, true},
     {"fault", "KIND=RATE", "a fault to inject, with its probability; may be given more than once", "sim", false, false,
-     true},
+     true, true},
     {"seed", "N", "another series of faults", "sim", false, false, true},
 }};
+
+/// Null when there is none with this name.
+[[nodiscard]] const LinkParameter* find_link_parameter(std::string_view name);
 
 struct EncoderUri {
   const Unit* unit = nullptr;
@@ -57,8 +62,11 @@ struct EncoderUri {
   DeviceSettings device;
 };
 
-/// `settings` ("name=value") count as if they stood behind the text. Throws UsageError, which names what is wrong and
-/// the nearest name that would be right.
+/// `settings` ("name=value") count as if they stood behind the text; both override what absenc.toml says of a name.
+/// Throws UsageError, which names what is wrong and the nearest name that would be right.
 [[nodiscard]] EncoderUri parse_encoder(std::string_view text, std::span<const std::string> settings = {});
+
+/// Without its settings: "tformat:/dev/ttyUSB0"
+[[nodiscard]] std::string address_of(const EncoderUri& uri);
 
 }  // namespace absenc::tool

@@ -107,6 +107,7 @@ std::string help() {
       "  tformat:/dev/ttyUSB0            a serial port\n"
       "  tformat:tcp:192.168.1.20:4001   a serial server on the network\n"
       "  sim:tformat                     a virtual encoder inside the command: no hardware needed\n"
+      "  elbow                           a name from absenc.toml: see `absenc list --help`\n"
       "with options behind it, as in \"tformat:/dev/ttyUSB0?model=23-bit&echo=on\".\n";
   text += fmt::format("\nExamples:\n{}", example_lines(general_examples));
   return text +

@@ -6,6 +6,8 @@
 
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/encoder_uri.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/named_encoder.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
@@ -203,8 +205,36 @@ Json unit_json(const Unit& unit) {
       .set("fields", fields_json(unit));
 }
 
+Json name_json(std::string_view name, const EncoderUri& uri) {
+  return Json::object()
+      .set("name", name)
+      .set("encoder", address_of(uri))
+      .set("protocol", uri.unit->id)
+      .set("model", uri.options.model == nullptr ? Json() : Json(uri.options.model->name))
+      .set("options", options_to_json(*uri.unit, uri.options));
+}
+
+// Nothing is shown when one of them is wrong.
+int list_names(bool json) {
+  const Config config = require_config("the names are those of absenc.toml");
+  Rows rows{{"NAME", "ENCODER", "MODEL"}};
+  std::string lines;
+  for (const ConfigSection& encoder : config.encoders) {
+    const EncoderUri uri = parse_encoder(encoder.name);
+    rows.push_back({encoder.name, address_of(uri), std::string(uri.options.model ? uri.options.model->name : "")});
+    lines += name_json(encoder.name, uri).line() + '\n';
+  }
+  if (!json) print_line(table(rows) + fmt::format("\nThey are written in {}.", config.path));
+  if (json && !lines.empty()) print_line(lines);
+  return exit_good;
+}
+
 int run_list(const Invocation& invocation) {
   const bool json = invocation.has("--json");
+  if (invocation.has("--names")) {
+    if (invocation.has("protocol")) throw UsageError("--names lists encoders of any protocol: give no protocol");
+    return list_names(json);
+  }
   if (invocation.has("protocol")) {
     const Unit& unit = require_unit(invocation.text("protocol"));
     print_line(json ? unit_json(unit).line() : details(unit));
@@ -217,19 +247,37 @@ int run_list(const Invocation& invocation) {
   return 0;
 }
 
-constexpr std::array<Parameter, 2> parameters{{
+constexpr std::array<Parameter, 3> parameters{{
     {"protocol", "", "show the models, options, commands and fields of this one"},
-    {"--json", "", "one JSON object a line, one line for each protocol"},
+    {"--names", "", "show the encoders that absenc.toml gives names to, and check their settings"},
+    {"--json", "", "one JSON object a line, one line for each protocol or name"},
 }};
 
-constexpr std::array<Example, 2> examples{{
+constexpr std::array<Example, 3> examples{{
     {"absenc list", "every supported encoder"},
     {"absenc list tformat", "all about one protocol"},
+    {"absenc list --names", "your own encoders, by the names you gave them"},
 }};
 
 }  // namespace
 
 const Subcommand list_subcommand{
-    "list", "show the supported encoders, their options and commands", "", parameters, examples, run_list};
+    "list",
+    "show the supported encoders, their options and commands, or your own by name",
+    "absenc.toml gives names to encoders, for `absenc read elbow` and every other verb:\n"
+    "  [defaults]             # for every encoder, where they fit\n"
+    "  echo = \"auto\"\n"
+    "  [bus.arm]              # a line that several encoders share\n"
+    "  port = \"/dev/ttyUSB0\"  # or \"tcp:192.168.1.20:4001\", or \"sim\"\n"
+    "  latency = 5\n"
+    "  [encoder.elbow]        # all that can stand behind ? in an encoder; lists for what may be repeated\n"
+    "  protocol = \"tformat\"\n"
+    "  bus = \"arm\"            # or port = ...\n"
+    "  model = \"23-bit\"\n"
+    "It is the file that ABSENC_CONFIG names, or else ./absenc.toml, or else ~/.config/absenc/absenc.toml.\n"
+    "What stands behind the name (\"elbow?latency=20\") and --option override it.",
+    parameters,
+    examples,
+    run_list};
 
 }  // namespace absenc::tool

@@ -56,11 +56,11 @@ std::string to_text(const Unit& unit, const Reading& reading) {
   return text;
 }
 
-std::string alarms_in_words(const Unit& unit, const Reading& reading) {
+std::string flags_in_words(const FieldInfo* field, std::uint32_t bits) {
   std::string lines;
-  for (std::size_t i = 0; unit.alarms != nullptr && i < unit.alarms->flags.size(); ++i) {
-    const FlagInfo& flag = unit.alarms->flags[i];
-    if ((reading.alarms >> i & 1) == 0 || flag.name.empty()) continue;
+  for (std::size_t i = 0; field != nullptr && i < field->flags.size(); ++i) {
+    const FlagInfo& flag = field->flags[i];
+    if ((bits >> i & 1) == 0 || flag.name.empty()) continue;
     if (!lines.empty()) lines += '\n';
     lines += fmt::format("  {}: {}", flag.name, flag.meaning);
     if (!flag.action.empty()) lines += fmt::format(". What to do: {}", flag.action);
@@ -68,8 +68,11 @@ std::string alarms_in_words(const Unit& unit, const Reading& reading) {
   return lines;
 }
 
-Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed) {
-  Json json = Json::object().set("time_s", seconds).set("protocol", unit.id);
+std::string alarms_in_words(const Unit& unit, const Reading& reading) {
+  return flags_in_words(unit.alarms, reading.alarms);
+}
+
+void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed) {
   if (reading.singleturn_bits != 0) {
     const bool valid = reading.singleturn_valid() && reading.ready;
     json.set("angle_deg", valid ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
@@ -82,7 +85,20 @@ Json to_json(const Unit& unit, const Reading& reading, double seconds, bool conf
   }
   if (unit.status != nullptr) json.set("status", flags_to_json(*unit.status, reading.status));
   if (unit.alarms != nullptr) json.set("alarms", flags_to_json(*unit.alarms, reading.alarms));
-  return json.set("confirmed", confirmed).set("ok", true);
+  json.set("confirmed", confirmed).set("ok", true);
+}
+
+Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed) {
+  Json json = Json::object().set("time_s", seconds).set("protocol", unit.id);
+  set_reading(json, unit, reading, confirmed);
+  return json;
+}
+
+Reading checked(Reading reading, bool confirmed) {
+  if (confirmed || !reading.ready || !reading.singleturn_valid()) return reading;
+  reading.singleturn_valid_bits = 0;
+  reading.multiturn_valid = false;
+  return reading;
 }
 
 std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {

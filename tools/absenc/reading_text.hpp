@@ -2,6 +2,7 @@
 // A position reading for people, as JSON and as CSV. What is not valid never looks like a good number.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -14,10 +15,16 @@ namespace absenc::tool {
 /// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"
 [[nodiscard]] std::string to_text(const Unit& unit, const Reading& reading);
 
-/// What each alarm means and what to do, a line each; "" without alarms.
+/// What each flag that is set means and what to do, a line each; "" when there is none, or no such field.
+[[nodiscard]] std::string flags_in_words(const FieldInfo* field, std::uint32_t bits);
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
+/// Sets everything but the time.
+void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed);
 [[nodiscard]] Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed);
+
+/// A position that no second one confirmed is not valid.
+[[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 inline constexpr std::string_view csv_header =
     "time_s,angle_deg,singleturn,singleturn_valid,multiturn,multiturn_valid,status,alarms";

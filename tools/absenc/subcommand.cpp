@@ -19,6 +19,8 @@ std::span<const Subcommand* const> all_subcommands() {
       &read_subcommand,
       &monitor_subcommand,
       &record_subcommand,
+      &info_subcommand,
+      &alarms_subcommand,
       &temperature_subcommand,
       &zero_subcommand,
       &reset_multiturn_subcommand,

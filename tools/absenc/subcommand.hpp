@@ -61,6 +61,8 @@ extern const Subcommand list_subcommand;
 extern const Subcommand read_subcommand;
 extern const Subcommand monitor_subcommand;
 extern const Subcommand record_subcommand;
+extern const Subcommand info_subcommand;
+extern const Subcommand alarms_subcommand;
 extern const Subcommand temperature_subcommand;
 extern const Subcommand zero_subcommand;
 extern const Subcommand reset_multiturn_subcommand;

@@ -148,6 +148,14 @@ Json to_json(const Option& option, std::int64_t value) {
   return option.choices[static_cast<std::size_t>(value)];
 }
 
+Json options_to_json(const Unit& unit, const Options& options) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    json.set(unit.options[i].name, to_json(unit.options[i], options[i]));
+  }
+  return json;
+}
+
 std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits) {
   std::vector<std::string_view> names;
   for (std::size_t i = 0; i < field.flags.size(); ++i) {
@@ -220,13 +228,15 @@ std::string_view name_of(LinkKind link) {
   return names[static_cast<std::size_t>(link)];
 }
 
-std::string line_of(const Unit& unit) {
+std::string line_of(const Unit& unit) { return line_of(unit.link, unit.line); }
+
+std::string line_of(LinkKind link, const LineSettings& line) {
   static constexpr std::array<std::string_view, 5> words{"RS-485 half duplex", "full-duplex UART", "SPI",
                                                          "clocked bits", "CAN"};
-  const double rate = unit.line.rate;
-  const std::string_view kind = words[static_cast<std::size_t>(unit.link)];
-  if (unit.line.rate == 0) return std::string(kind);
-  if (unit.line.rate >= 1'000'000) return fmt::format("{}, {} Mbit/s", kind, rate / 1e6);
+  const double rate = line.rate;
+  const std::string_view kind = words[static_cast<std::size_t>(link)];
+  if (line.rate == 0) return std::string(kind);
+  if (line.rate >= 1'000'000) return fmt::format("{}, {} Mbit/s", kind, rate / 1e6);
   return fmt::format("{}, {} kbit/s", kind, rate / 1e3);
 }
 

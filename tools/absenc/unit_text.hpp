@@ -38,6 +38,9 @@ namespace absenc::tool {
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
 [[nodiscard]] Json to_json(const Option& option, std::int64_t value);
 
+/// {"singleturn_bits":17,...}
+[[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
+
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] Json to_json(const FieldValue& value);
@@ -47,6 +50,7 @@ namespace absenc::tool {
 [[nodiscard]] std::string_view name_of(LinkKind link);
 /// "RS-485 half duplex, 2.5 Mbit/s"
 [[nodiscard]] std::string line_of(const Unit& unit);
+[[nodiscard]] std::string line_of(LinkKind link, const LineSettings& line);
 [[nodiscard]] std::string_view name_of(Verb verb);
 
 /// Puts fields into a JSON object.

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""absenc.toml: encoders by name, where the file is looked for, what overrides what, and what is wrong with a file."""
+import json
+import os
+import unittest
+
+from command_support import Case, Emulator, absenc, json_lines
+
+ELBOW = '[encoder.elbow]\nprotocol = "tformat"\n'
+SIM = ELBOW + 'port = "sim"\n'
+
+
+class ConfigCase(Case):
+    """Commands run in an empty directory of a user without any configuration."""
+
+    def setUp(self):
+        super().setUp()
+        self.home = self.file("home")
+        self.work = self.file("work")
+        for directory in (self.home, self.work):
+            os.mkdir(directory)
+
+    def absenc(self, *arguments, **environment):
+        kept = {name: value for name, value in os.environ.items()
+                if name not in ("ABSENC_CONFIG", "XDG_CONFIG_HOME")}
+        return absenc(*arguments, cwd=self.work, env={**kept, "HOME": self.home, **environment})
+
+    def write(self, path, text):
+        os.makedirs(os.path.dirname(self.file(path)), exist_ok=True)
+        return self.file(path, text)
+
+    def config(self, text):
+        return self.write("work/absenc.toml", text)
+
+    def json(self, *arguments):
+        result = self.absenc(*arguments, "--json")
+        self.assert_good(result)
+        return json.loads(result.stdout)
+
+
+class Names(ConfigCase):
+    def test_every_verb(self):
+        with Emulator(self.directory, "--singleturn", "1000", "--multiturn", "7") as emulator:
+            self.config(f'{ELBOW}port = "{emulator.path}"\nlatency = 300\n')
+            reading = self.json("read", "elbow")
+            self.assertEqual((reading["singleturn"], reading["multiturn"]), (1000, 7))
+            self.assertEqual(self.json("temperature", "elbow")["fields"], {"temperature_c": 35})
+            self.assertEqual(self.json("run", "elbow", "memory-read", "5")["fields"]["address"], 5)
+            self.assertEqual(self.json("alarms", "elbow")["alarms"], [])
+            self.assertEqual(self.json("info", "elbow")["encoder"], f"tformat:{emulator.path}")
+            self.assert_good(self.absenc("bench", "elbow", "--seconds", "0.1"))
+            self.assert_good(self.absenc("zero", "elbow", "--yes"))
+            self.assertEqual(self.json("read", "elbow")["singleturn"], 0)
+
+    def test_encoders_of_one_bus(self):
+        with Emulator(self.directory, "--model", "23-bit", "--tcp", "0") as emulator:
+            port = emulator.line().strip().rsplit(":", 1)[1]
+            self.config(f'[bus.arm]\nport = "tcp:127.0.0.1:{port}"\nlatency = 300\n'
+                        f'{ELBOW}bus = "arm"\nmodel = "23-bit"\n'
+                        '[encoder.wrist]\nprotocol = "tformat"\nbus = "arm"\nlatency = 400\n')
+            self.assertEqual(self.json("read", "elbow")["singleturn_bits"], 23)
+            wrist = self.absenc("read", "wrist")
+            self.assert_failed(wrist, "set model=23-bit", "127.0.0.1")
+
+    def test_settings_of_a_virtual_encoder(self):
+        self.config(SIM + 'singleturn = 8000000\nmultiturn = 3\nmodel = "23-bit"\nstrict = false\n'
+                    'alarm = ["over_heat", "battery_alarm"]\n')
+        reading = self.json("read", "elbow")
+        self.assertEqual((reading["singleturn"], reading["multiturn"]), (8000000, 3))
+        self.assertEqual(reading["alarms"], ["over_heat", "battery_alarm"])
+
+    def test_a_protocol_with_a_port_needs_no_file(self):
+        self.config("this is no TOML")
+        self.assert_good(self.absenc("read", "sim:tformat"))
+        self.assert_wrong_usage(self.absenc("read", "tformat"), "where the encoder is")
+        self.assert_wrong_usage(self.absenc("read", "/dev/ttyUSB0"), "which protocol")
+
+
+class Overriding(ConfigCase):
+    def test_the_nearer_wins(self):
+        self.config('[defaults]\nsingleturn = 1\nmultiturn = 1\nseed = 1\nalarm = "over_heat"\n'
+                    f'[bus.b]\nport = "sim"\nmultiturn = 2\n{ELBOW}bus = "b"\nalarm = "battery_alarm"\n')
+        reading = self.json("read", "elbow")
+        self.assertEqual((reading["singleturn"], reading["multiturn"]), (1, 2))
+        self.assertEqual(reading["alarms"], ["battery_alarm"])
+
+    def test_behind_the_name_and_beside_it(self):
+        self.config(SIM + 'singleturn = 1\nmultiturn = 1\nmodel = "23-bit"\nalarm = "over_heat"\n')
+        reading = self.json("read", "elbow?singleturn=5&model=TS5700N8500", "--option", "multiturn=6",
+                            "--option", "alarm=battery_alarm")
+        self.assertEqual((reading["singleturn"], reading["multiturn"], reading["singleturn_bits"]), (5, 6, 17))
+        self.assertEqual(reading["alarms"], ["battery_alarm"])
+
+    def test_an_empty_list_overrides(self):
+        self.config('[defaults]\nalarm = "over_heat"\n' + SIM + "alarm = []\n")
+        self.assertEqual(self.json("read", "elbow")["alarms"], [])
+
+    def test_defaults_only_where_they_fit(self):
+        self.config('[defaults]\nlatency = 5\nbaud = 9600\necho = "auto"\nmultiturn = 4\nstrict = false\n' + SIM)
+        self.assertEqual(self.json("read", "elbow")["multiturn"], 4)
+        self.assertEqual(self.json("info", "elbow")["options"]["strict"], False)
+        # A bus or an encoder is told what it is told.
+        self.config(SIM + "latency = 5\n")
+        self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:4:1: latency cannot be set here", "tcp")
+
+    def test_wrong_settings_behind_the_name(self):
+        self.config(SIM)
+        self.assert_wrong_usage(self.absenc("read", "elbow?sigleturn=5"), "did you mean singleturn?")
+        self.assert_wrong_usage(self.absenc("read", "elbow", "--option", "latency=5"), "cannot be set here")
+
+
+class WhereTheFileIs(ConfigCase):
+    def multiturn(self, **environment):
+        result = self.absenc("read", "elbow", "--json", **environment)
+        self.assert_good(result)
+        return json.loads(result.stdout)["multiturn"]
+
+    def test_order(self):
+        self.write("home/.config/absenc/absenc.toml", SIM + "multiturn = 1\n")
+        self.assertEqual(self.multiturn(), 1)
+        self.write("xdg/absenc/absenc.toml", SIM + "multiturn = 2\n")
+        self.assertEqual(self.multiturn(XDG_CONFIG_HOME=self.file("xdg")), 2)
+        self.config(SIM + "multiturn = 3\n")
+        self.assertEqual(self.multiturn(), 3)
+        mine = self.file("mine.toml", SIM + "multiturn = 4\n")
+        self.assertEqual(self.multiturn(ABSENC_CONFIG=mine), 4)
+
+    def test_no_file(self):
+        for arguments in (["read", "elbow"], ["list", "--names"]):
+            self.assert_wrong_usage(self.absenc(*arguments), "looked for absenc.toml and ",
+                                    f"{self.home}/.config/absenc/absenc.toml",
+                                    '[encoder.elbow]\n  protocol = "tformat"')
+
+    def test_the_example_of_that_message_is_a_file(self):
+        message = self.absenc("read", "elbow").stderr
+        self.config("\n".join(line for line in message.splitlines() if line.startswith("  ")))
+        self.assertIn("elbow  tformat:/dev/ttyUSB0", self.absenc("list", "--names").stdout)
+
+    def test_a_file_that_is_not_there(self):
+        self.config(SIM)
+        path = self.file("nothing.toml")
+        self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG=path), path, "ABSENC_CONFIG")
+        self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG=self.directory), "cannot be read: Is a dir")
+
+
+class WrongFiles(ConfigCase):
+    def test_the_place_comes_first(self):
+        for text, words in [("[encoder.elbow\n", ["1:15: this is no TOML"]),
+                            (SIM + 'modle = "23-bit"\n', ["4:1:", "did you mean model?"]),
+                            (SIM + "latency = 2.5\n", ["4:1:", "a number with a fraction"]),
+                            (SIM + 'model = "24-bit"\n', ["4:1:", "did you mean 23-bit?"]),
+                            (SIM + 'echo = "maybe"\n', ["4:1:", "auto, on or off"]),
+                            (SIM + "singleturn_bits = 99\n", ["4:1:", "1 to 24"]),
+                            (SIM + "singleturn = 131072\n", ["4:1:", "0 to 131071"]),
+                            (SIM + 'seed = 2\nalarm = ["over_heat", "over_haet"]\n',
+                             ["5:1:", "did you mean over_heat?"]),
+                            (SIM + 'fault = "corrupt=2"\n', ["4:1:", "from 0 to 1"]),
+                            (SIM + 'motion = "rmp=2"\n', ["4:1:", "rpm=R"]),
+                            (ELBOW + 'port = "tcp:host"\n', ["3:1:", "tcp:HOST:PORT"]),
+                            (ELBOW + 'port = ""\n', ["3:1:", "where the encoder is"]),
+                            ('[defaults]\necho = "maybe"\n' + SIM, ["2:1:", "auto, on or off"]),
+                            (ELBOW + 'bus = "b"\n[bus.b]\nport = "sim"\nbaud = 9600\n', ["6:1:", "it is for: serial"])]:
+            with self.subTest(text):
+                self.config(text)
+                place, *rest = words
+                self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc: absenc.toml:" + place, *rest)
+
+    def test_a_slip_anywhere_is_told_a_value_only_where_it_is_used(self):
+        self.config(SIM + '[encoder.wrist]\nprotocol = "tformat"\nport = "sim"\nmodle = "23-bit"\n')
+        self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:7:1:")
+        self.config(SIM + '[encoder.wrist]\nprotocol = "tformat"\nport = "sim"\nmotion = "file=nothing.csv"\n')
+        self.assert_good(self.absenc("read", "elbow"))
+        for arguments in (["read", "wrist"], ["list", "--names"], ["list", "--names", "--json"]):
+            self.assert_wrong_usage(self.absenc(*arguments), "absenc.toml:7:1:", "nothing.csv")
+
+    def test_names_that_do_not_exist(self):
+        self.config(SIM)
+        self.assert_wrong_usage(self.absenc("read", "elbwo"), '"elbwo" in absenc.toml', "did you mean elbow?")
+        self.assert_wrong_usage(self.absenc("read", "shoulder?latency=5"), "known are: elbow")
+
+
+class List(ConfigCase):
+    def test_names(self):
+        self.config(ELBOW + 'port = "/dev/ttyUSB0"\nmodel = "23-bit"\nlatency = 5\n'
+                    '[encoder.arm]\nprotocol = "tformat"\nport = "tcp:host:4001"\nsingleturn_bits = 20\n')
+        result = self.absenc("list", "--names")
+        self.assert_good(result)
+        self.assertEqual([line.split() for line in result.stdout.splitlines()[:3]],
+                         [["NAME", "ENCODER", "MODEL"], ["elbow", "tformat:/dev/ttyUSB0", "23-bit"],
+                          ["arm", "tformat:tcp:host:4001"]])
+        self.assertIn("absenc.toml", result.stdout)
+        elbow, arm = json_lines(self.absenc("list", "--names", "--json").stdout)
+        self.assertEqual(elbow, {"name": "elbow", "encoder": "tformat:/dev/ttyUSB0", "protocol": "tformat",
+                                 "model": "23-bit",
+                                 "options": {"singleturn_bits": 23, "multiturn_bits": 16, "encoder_id": 23,
+                                             "strict": True}})
+        self.assertEqual((arm["name"], arm["model"]), ("arm", None))
+
+    def test_no_protocol_beside_names(self):
+        self.config(SIM)
+        self.assert_wrong_usage(self.absenc("list", "tformat", "--names"), "--names")
+
+
+if __name__ == "__main__":
+    unittest.main()

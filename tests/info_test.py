@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc info` and `absenc alarms` over the real serial path."""
+import json
+import unittest
+
+from command_support import Case, Emulator, absenc, json_lines
+
+
+class EncoderCase(Case):
+    def encoder(self, *arguments, more=""):
+        """The address of an emulator, with patience for a machine that is busy with other tests."""
+        emulator = Emulator(self.directory, *arguments)
+        self.addCleanup(emulator.end)
+        return f"tformat:{emulator.path}?latency=300{more}"
+
+
+def questions():
+    """What an encoder can be asked without arguments, in the order in which info asks."""
+    commands = json_lines(absenc("list", "tformat", "--json").stdout)[0]["commands"]
+    free = [command for command in commands if not any(one["required"] for one in command["arguments"])]
+    return [command["name"] for verb in ("info", "temperature", "config_get", "read")
+            for command in free if command["verb"] == verb]
+
+
+class Info(EncoderCase):
+    def test_words(self):
+        result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
+        self.assert_good(result)
+        self.assertEqual(result.stderr, "")
+        self.assertNotIn("FAILED", result.stdout)
+        for row in [rf"^encoder +tformat:{self.directory}/encoder$", r"^protocol +Tamagawa T-format",
+                    r"^model +TS5700N8500: ", r"^line +RS-485 half duplex, 2\.5 Mbit/s$",
+                    r"^resolution +17 bits in a turn, 16 bits of turns$",
+                    r"^options +singleturn_bits=17$", r"^ +strict=true$", r"^  encoder_id +17 ",
+                    r"^  temperature_c +35 degC ", r"^  overheat_threshold_c +90 degC ",
+                    r"^ *204\.799 deg +74565 counts +4660 turns +no alarms$"]:
+            self.assertRegex(result.stdout, "(?m)" + row)
+        places = [result.stdout.index(f"\n{name} ") for name in questions()]
+        self.assertEqual(places, sorted(places))
+
+    def test_json(self):
+        address = self.encoder("--model", "23-bit", "--singleturn", "5", "--alarm", "over_heat",
+                               more="&model=23-bit&baud=1000000")
+        result = absenc("info", address, "--json")
+        self.assert_good(result)
+        info = json.loads(result.stdout)
+        answers = info.pop("answers")
+        self.assertEqual(info, {
+            "encoder": address.split("?")[0], "protocol": "tformat", "model": "23-bit", "link": "half_duplex",
+            "rate": 1000000, "resolution": {"singleturn_bits": 23, "multiturn_bits": 16},
+            "options": {"singleturn_bits": 23, "multiturn_bits": 16, "encoder_id": 23, "strict": True}, "ok": True})
+        self.assertEqual(list(answers), questions())
+        self.assertEqual(answers["temperature"], {"ok": True, "fields": {"temperature_c": 35}})
+        self.assertEqual(answers["encoder-id"]["fields"]["encoder_id"], 23)
+        self.assertEqual((answers["position"]["singleturn"], answers["position"]["alarms"]), (5, ["over_heat"]))
+
+    def test_alarms_are_explained(self):
+        result = absenc("info", self.encoder("--alarm", "battery_error"))
+        self.assert_good(result)
+        self.assertIn("turns INVALID (0)   alarms: battery_error\n  battery_error: the battery was below",
+                      result.stdout)
+
+    def test_no_model(self):
+        result = absenc("info", "sim:tformat?singleturn_bits=20", "--json")
+        info = json.loads(result.stdout)
+        self.assertEqual((info["model"], info["resolution"]["singleturn_bits"]), (None, 20))
+        self.assertIn("none with these options", absenc("info", "sim:tformat?singleturn_bits=20").stdout)
+
+    def test_silence(self):
+        address = self.encoder("--fault", "silence=1", more="&latency=1")
+        result = absenc("info", address)
+        self.assert_failed(result, "timeout: the encoder did not answer", "Try: ")
+        self.assertEqual(result.stderr.count("timeout"), 1)
+        self.assertEqual(result.stdout.count("FAILED  timeout: "), len(questions()))
+        self.assertRegex(result.stdout, r"(?m)^model +TS5700N8500")
+        info = absenc("info", address, "--json")
+        self.assertEqual((info.returncode, info.stderr), (1, ""))
+        answers = json.loads(info.stdout)["answers"]
+        self.assertEqual(list(answers), questions())
+        self.assertEqual({answer["error"] for answer in answers.values()}, {"timeout"})
+
+    def test_what_fails_does_not_stop_the_rest(self):
+        # The encoder id is not the one that was assumed; memory does not carry it.
+        result = absenc("info", self.encoder(more="&encoder_id=23"))
+        self.assert_failed(result, "unexpected_reply", "set model=TS5700N8500")
+        self.assertRegex(result.stdout, r"(?m)^encoder-id +FAILED +unexpected_reply: ")
+        self.assertRegex(result.stdout, r"(?m)^  temperature_c +35 degC ")
+        self.assertRegex(result.stdout, r"(?m)^position +FAILED +unexpected_reply: ")
+
+    def test_readings_that_do_not_agree(self):
+        address = "sim:tformat?motion=file=" + self.file("motion.csv", "0,0\n0.0001,0\n100,600000000\n")
+        result = absenc("info", address)
+        self.assertRegex(result.stdout, r"position INVALID \(\d+\) .*\n  no two readings in a row agree")
+        answer = json.loads(absenc("info", address, "--json").stdout)["answers"]["position"]
+        self.assertEqual((answer["singleturn_valid"], answer["angle_deg"], answer["confirmed"]), (False, None, False))
+
+
+class Alarms(EncoderCase):
+    def test_none(self):
+        address = self.encoder()
+        result = absenc("alarms", address)
+        self.assert_good(result)
+        self.assertEqual((result.stdout, result.stderr), ("no alarms\n", ""))
+        self.assertEqual(json.loads(absenc("alarms", address, "--json").stdout),
+                         {"ok": True, "protocol": "tformat", "alarms": [], "status": []})
+
+    def test_words(self):
+        result = absenc("alarms", self.encoder("--alarm", "over_heat", "--alarm", "battery_alarm"))
+        self.assert_good(result)
+        self.assertEqual(
+            result.stdout,
+            "alarms:\n"
+            "  over_heat: the encoder is or was hotter than its threshold. What to do: let it cool, then clear-alarms\n"
+            "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on\n"
+            "status:\n"
+            "  alarm: over-heat, multi-turn error, battery error or battery alarm. "
+            "What to do: read the alarms (data ID 3)\n")
+
+    def test_every_alarm(self):
+        unit = json_lines(absenc("list", "tformat", "--json").stdout)[0]
+        known = next(field["flags"] for field in unit["fields"] if field["name"] == "alarms")
+        self.assertGreater(len(known), 7)
+        for flag in known:
+            with self.subTest(flag["name"]):
+                result = absenc("alarms", f"sim:tformat?alarm={flag['name']}", "--json")
+                self.assert_good(result)
+                self.assertEqual(json.loads(result.stdout)["alarms"], [flag])
+
+    def test_silence(self):
+        address = self.encoder("--fault", "silence=1", more="&latency=1")
+        result = absenc("alarms", address)
+        self.assert_failed(result, "timeout: the encoder did not answer", "sent 1A to ", "Try: ")
+        self.assertEqual(result.stdout, "")
+        result = absenc("alarms", address, "--json")
+        self.assertEqual((result.returncode, json.loads(result.stdout)["error"]), (1, "timeout"))
+
+
+if __name__ == "__main__":
+    unittest.main()

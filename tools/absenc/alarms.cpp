@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+// A field of flags of the unit, with what the encoder set in it.
+struct Flags {
+  const FieldInfo* field;
+  std::uint32_t bits;
+};
+
+// Alarms first.
+std::vector<Flags> flags_of(const Unit& unit, const Reading& reading) {
+  std::vector<Flags> flags;
+  if (unit.alarms != nullptr) flags.push_back({unit.alarms, reading.alarms});
+  if (unit.status != nullptr) flags.push_back({unit.status, reading.status});
+  return flags;
+}
+
+Json in_words(const Flags& flags) {
+  Json json = Json::array();
+  for (std::size_t i = 0; i < flags.field->flags.size(); ++i) {
+    const FlagInfo& flag = flags.field->flags[i];
+    if ((flags.bits >> i & 1) == 0 || flag.name.empty()) continue;
+    json.append(Json::object().set("name", flag.name).set("meaning", flag.meaning).set("action", flag.action));
+  }
+  return json;
+}
+
+void show(const Unit& unit, const Reading& reading) {
+  bool is_first = true;
+  for (const Flags& flags : flags_of(unit, reading)) {
+    const std::string words = flags_in_words(flags.field, flags.bits);
+    if (!words.empty()) print_line(fmt::format("{}:\n{}", flags.field->name, words));
+    if (words.empty() && is_first) print_line(fmt::format("no {}", flags.field->name));
+    is_first = false;
+  }
+}
+
+void show_json(const Unit& unit, const Reading& reading) {
+  Json json = Json::object().set("ok", true).set("protocol", unit.id);
+  for (const Flags& flags : flags_of(unit, reading)) json.set(flags.field->name, in_words(flags));
+  print_line(json.line());
+}
+
+int run_alarms(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  if (uri.unit->alarms == nullptr && uri.unit->status == nullptr) {
+    throw UsageError(fmt::format("the encoders of {} have no alarms", uri.unit->id));
+  }
+  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const Outcome outcome = encoder->read();
+  const bool json = invocation.has("--json");
+  if (outcome.error != Error::none) {
+    const Trouble trouble = encoder->trouble(outcome);
+    if (json) {
+      print_line(trouble.json().line());
+    } else {
+      print_message(trouble.text());
+    }
+    return exit_failed;
+  }
+  if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no alarms");
+  if (json) {
+    show_json(*uri.unit, *outcome.reading);
+  } else {
+    show(*uri.unit, *outcome.reading);
+  }
+  return exit_good;
+}
+
+constexpr std::array<Parameter, 3> parameters{{
+    {"encoder", "", "as for `absenc read`", "", true},
+    {"--json", "", "one JSON object: of each alarm its name, meaning and action"},
+    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+}};
+
+constexpr std::array<Example, 2> examples{{
+    {"absenc alarms tformat:/dev/ttyUSB0", "what is wrong with the encoder, and what to do"},
+    {"absenc alarms \"sim:tformat?alarm=over_heat&alarm=battery_alarm\"", "try it without hardware"},
+}};
+
+}  // namespace
+
+const Subcommand alarms_subcommand{
+    "alarms",
+    "say in words which alarms the encoder has and what to do",
+    "Alarms and status flags of one reading. `absenc list <protocol>` shows all that there are.\n"
+    "Exit status 0 when the encoder could be read, with alarms or without; scripts look at --json.",
+    parameters,
+    examples,
+    run_alarms};
+
+}  // namespace absenc::tool

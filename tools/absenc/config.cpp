@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+// The only file that includes toml++: it is slow to compile.
+#include "tools/absenc/config.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/nearest.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+// What is a name in the file, or a path: a number there is a slip.
+constexpr std::array<std::string_view, 4> text_only{"protocol", "model", "bus", "port"};
+
+constexpr const char* variable = "ABSENC_CONFIG";
+
+std::string_view type_of(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "a list";
+    case toml::node_type::string:
+      return "text";
+    case toml::node_type::integer:
+      return "a whole number";
+    case toml::node_type::floating_point:
+      return "a number with a fraction";
+    case toml::node_type::boolean:
+      return "true or false";
+    default:
+      return "a date or time";
+  }
+}
+
+// A table is sorted by name; what is wrong first shall be found first.
+std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const toml::table& table) {
+  std::vector<std::pair<const toml::key*, const toml::node*>> entries;
+  for (const auto& [key, node] : table) entries.emplace_back(&key, &node);
+  std::sort(entries.begin(), entries.end(), [](const auto& left, const auto& right) {
+    return left.first->source().begin < right.first->source().begin;
+  });
+  return entries;
+}
+
+/// One file being read.
+class Reader {
+ public:
+  explicit Reader(const std::string& path) : path_(path) {}
+
+  [[nodiscard]] std::string place(const toml::source_position& position) const {
+    return fmt::format("{}:{}:{}", path_, position.line, position.column);
+  }
+
+  [[nodiscard]] Config config(const toml::table& file) const {
+    static constexpr std::array<std::string_view, 3> known{"defaults", "bus", "encoder"};
+    Config config{.path = path_, .defaults = {}, .buses = {}, .encoders = {}};
+    for (const auto& [key, node] : in_file_order(file)) {
+      if (key->str() == known[0]) {
+        config.defaults = section(*key, *node, "[defaults]");
+      } else if (key->str() == known[1]) {
+        config.buses = sections(*key, *node);
+      } else if (key->str() == known[2]) {
+        config.encoders = sections(*key, *node);
+      } else {
+        refuse(*key, fmt::format("there is no section \"{}\"{}", key->str(), suggestion(key->str(), known)));
+      }
+    }
+    return config;
+  }
+
+ private:
+  [[noreturn]] void refuse(const toml::key& key, const std::string& sentence) const {
+    throw UsageError(fmt::format("{}: {}", place(key.source().begin), sentence));
+  }
+
+  [[nodiscard]] const toml::table& require_table(const toml::key& key, const toml::node& node,
+                                                 std::string_view heading) const {
+    if (const toml::table* table = node.as_table()) return *table;
+    refuse(key, fmt::format("{} is {}, but must be a section: write {}", key.str(), type_of(node), heading));
+  }
+
+  [[nodiscard]] std::vector<ConfigSection> sections(const toml::key& kind, const toml::node& node) const {
+    std::vector<ConfigSection> sections;
+    const toml::table& table = require_table(kind, node, fmt::format("[{}.NAME]", kind.str()));
+    for (const auto& [key, child] : in_file_order(table)) {
+      sections.push_back(section(*key, *child, fmt::format("[{}.{}]", kind.str(), key->str())));
+    }
+    return sections;
+  }
+
+  [[nodiscard]] ConfigSection section(const toml::key& key, const toml::node& node, std::string_view heading) const {
+    ConfigSection section{std::string(key.str()), {}, place(key.source().begin)};
+    for (const auto& [name, value] : in_file_order(require_table(key, node, heading))) {
+      section.settings.push_back(setting(*name, *value));
+    }
+    return section;
+  }
+
+  [[nodiscard]] ConfigSetting setting(const toml::key& key, const toml::node& node) const {
+    ConfigSetting setting{std::string(key.str()), {}, place(key.source().begin), node.is_array()};
+    if (const toml::array* list = node.as_array()) {
+      for (const toml::node& element : *list) setting.values.push_back(value(key, element));
+    } else {
+      setting.values.push_back(value(key, node));
+    }
+    return setting;
+  }
+
+  [[nodiscard]] std::string value(const toml::key& key, const toml::node& node) const {
+    const bool must_be_text = std::find(text_only.begin(), text_only.end(), key.str()) != text_only.end();
+    if (const auto* text = node.as_string()) return text->get();
+    if (must_be_text) refuse(key, fmt::format("{} is {}, but must be text in quotes", key.str(), type_of(node)));
+    if (const auto* number = node.as_integer()) return fmt::format("{}", number->get());
+    if (const auto* truth = node.as_boolean()) return truth->get() ? "true" : "false";
+    refuse(key, fmt::format("{} is {}, but must be text in quotes, a whole number, true or false", key.str(),
+                            type_of(node)));
+  }
+
+  std::string path_;
+};
+
+std::string read_file(const std::string& path) {
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
+  if (!file.is_open() || file.bad()) {
+    throw UsageError(fmt::format("{} cannot be read: {}", path, std::strerror(errno)));
+  }
+  return text.str();
+}
+
+// "": not set.
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace
+
+const ConfigSetting* ConfigSection::find(std::string_view setting) const {
+  const auto found =
+      std::find_if(settings.begin(), settings.end(), [&](const ConfigSetting& one) { return one.name == setting; });
+  return found == settings.end() ? nullptr : &*found;
+}
+
+Config parse_config(std::string_view text, const std::string& path) {
+  const Reader reader(path);
+  try {
+    return reader.config(toml::parse(text, path));
+  } catch (const toml::parse_error& error) {
+    throw UsageError(fmt::format("{}: this is no TOML: {}", reader.place(error.source().begin), error.description()));
+  }
+}
+
+std::vector<std::string> config_paths() {
+  if (const std::string path = environment(variable); !path.empty()) return {path};
+  std::vector<std::string> paths{"absenc.toml"};
+  // The XDG Base Directory Specification: what is not absolute is to be ignored.
+  std::string folder = environment("XDG_CONFIG_HOME");
+  if (!folder.starts_with('/')) {
+    const std::string home = environment("HOME");
+    folder = home.empty() ? "" : home + "/.config";
+  }
+  if (!folder.empty()) paths.push_back(folder + "/absenc/absenc.toml");
+  return paths;
+}
+
+std::optional<Config> load_config() {
+  const bool must_exist = !environment(variable).empty();
+  for (const std::string& path : config_paths()) {
+    std::error_code ignored;
+    if (std::filesystem::exists(path, ignored)) return parse_config(read_file(path), path);
+    if (must_exist) throw UsageError(fmt::format("{}, which {} names, is not there", path, variable));
+  }
+  return std::nullopt;
+}
+
+}  // namespace absenc::tool

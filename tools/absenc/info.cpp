@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+// What needs no argument and exists with these options.
+bool can_be_asked(const EncoderUri& uri, const Command& command) {
+  const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
+                                          [](const Argument& argument) { return argument.required; });
+  if (needs_argument) return false;
+  const std::vector<std::int64_t> arguments = require_arguments(command, {});
+  const auto storage = std::make_unique<std::byte[]>(uri.unit->host_storage);
+  const Any<Conversation> made =
+      uri.unit->host(uri.options, command, arguments, {storage.get(), uri.unit->host_storage});
+  return made.bytes != nullptr || made.frames != nullptr;
+}
+
+// In this order; the position comes behind them.
+std::vector<const Command*> questions(const EncoderUri& uri) {
+  std::vector<const Command*> commands;
+  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
+    for (const Command& command : uri.unit->commands) {
+      if (command.verb == verb && can_be_asked(uri, command)) commands.push_back(&command);
+    }
+  }
+  return commands;
+}
+
+std::string resolution_text(const Resolution& resolution) {
+  std::vector<std::string> parts;
+  if (resolution.singleturn_bits != 0) parts.push_back(fmt::format("{} bits in a turn", resolution.singleturn_bits));
+  if (resolution.multiturn_bits != 0) parts.push_back(fmt::format("{} bits of turns", resolution.multiturn_bits));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+Rows identity_rows(const EncoderUri& uri) {
+  const Unit& unit = *uri.unit;
+  const Model* model = uri.options.model;
+  Rows rows{{"encoder", address_of(uri)}, {"protocol", std::string(unit.name)}};
+  rows.push_back(
+      {"model", model == nullptr ? "none with these options" : fmt::format("{}: {}", model->name, model->meaning)});
+  rows.push_back({"line", line_of(unit.link, uri.line)});
+  rows.push_back({"resolution", resolution_text(unit.resolution(uri.options))});
+  std::string_view heading = "options";
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const Option& option = unit.options[i];
+    rows.push_back({std::string(heading), fmt::format("{}={}", option.name, to_text(option, uri.options[i]))});
+    heading = "";
+  }
+  return rows;
+}
+
+Json identity_json(const EncoderUri& uri) {
+  const Unit& unit = *uri.unit;
+  const Resolution resolution = unit.resolution(uri.options);
+  return Json::object()
+      .set("encoder", address_of(uri))
+      .set("protocol", unit.id)
+      .set("model", uri.options.model == nullptr ? Json() : Json(uri.options.model->name))
+      .set("link", name_of(unit.link))
+      .set("rate", uri.line.rate)
+      .set("resolution", Json::object()
+                             .set("singleturn_bits", resolution.singleturn_bits)
+                             .set("multiturn_bits", resolution.multiturn_bits))
+      .set("options", options_to_json(unit, uri.options));
+}
+
+/// Asks the encoder and keeps what it says, for people and for programs.
+class Survey {
+ public:
+  explicit Survey(const EncoderUri& uri) : encoder_(Encoder::open(uri)) {}
+
+  void ask(const Command& command) {
+    const Outcome outcome = encoder_->run(command, require_arguments(command, {}));
+    if (outcome.error != Error::none) return fail(command, outcome);
+    JsonFields fields;
+    encoder_->report(fields);
+    answers.set(command.name, Json::object().set("ok", true).set("fields", fields.fields));
+    FieldTable table;
+    encoder_->report(table);
+    add_heading(command);
+    for (std::vector<std::string>& row : table.rows) {
+      row.front().insert(0, "  ");
+      rows.push_back(std::move(row));
+    }
+  }
+
+  void read() {
+    const Unit& unit = encoder_->unit();
+    const Outcome outcome = encoder_->read();
+    const Command& command = *find_command(unit, Verb::read);
+    if (outcome.error != Error::none) return fail(command, outcome);
+    if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no position");
+    const Reading reading = checked(*outcome.reading, encoder_->confirmed());
+    Json json = Json::object();
+    set_reading(json, unit, reading, encoder_->confirmed());
+    answers.set(command.name, json);
+    add_heading(command);
+    position = "  " + to_text(unit, reading);
+    if (const std::string alarms = alarms_in_words(unit, reading); !alarms.empty()) position += '\n' + alarms;
+    if (reading.singleturn_valid() != outcome.reading->singleturn_valid()) {
+      position += "\n  no two readings in a row agree as well as the fastest shaft allows";
+    }
+  }
+
+  Json answers = Json::object();
+  Rows rows;
+  std::string position;           // below the rows; "" when it could not be read
+  std::vector<Trouble> troubles;  // one of each kind
+
+ private:
+  void add_heading(const Command& command) {
+    rows.push_back({std::string(command.name), "", std::string(command.meaning)});
+  }
+
+  void fail(const Command& command, const Outcome& outcome) {
+    const Trouble trouble = encoder_->trouble(outcome);
+    answers.set(command.name, trouble.json());
+    rows.push_back(
+        {std::string(command.name), "FAILED", fmt::format("{}: {}", text_of(trouble.error).name, trouble.message)});
+    const bool is_known = std::any_of(troubles.begin(), troubles.end(),
+                                      [&](const Trouble& other) { return other.error == trouble.error; });
+    if (!is_known) troubles.push_back(trouble);
+  }
+
+  std::unique_ptr<Encoder> encoder_;
+};
+
+int run_info(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const bool json = invocation.has("--json");
+  if (!json) print_line(table(identity_rows(uri)) + '\n');
+  Survey survey(uri);
+  for (const Command* command : questions(uri)) survey.ask(*command);
+  if (find_command(*uri.unit, Verb::read) != nullptr) survey.read();
+  const bool good = survey.troubles.empty();
+  if (json) {
+    print_line(identity_json(uri).set("answers", survey.answers).set("ok", good).line());
+  } else {
+    print_line(table(survey.rows) + survey.position);
+    for (const Trouble& trouble : survey.troubles) print_message(trouble.text());
+  }
+  return good ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 3> parameters{{
+    {"encoder", "", "as for `absenc read`", "", true},
+    {"--json", "", "one JSON object"},
+    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+}};
+
+constexpr std::array<Example, 2> examples{{
+    {"absenc info tformat:/dev/ttyUSB0", "who is there"},
+    {"absenc info sim:tformat --json", "the same of a virtual encoder, for programs"},
+}};
+
+}  // namespace
+
+const Subcommand info_subcommand{
+    "info",
+    "show who is there: the protocol, the model, and all that the encoder says of itself",
+    "First what absenc was told or assumes, then what the encoder answers: its identity, temperature,\n"
+    "settings, position and alarms. What fails is shown in its place and the rest goes on.\n"
+    "Exit status 1 when anything failed.",
+    parameters,
+    examples,
+    run_info};
+
+}  // namespace absenc::tool

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a name of absenc.toml stands for, and the check that all of the file makes sense.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tools/absenc/config.hpp"
+#include "tools/absenc/error.hpp"
+
+namespace absenc::tool {
+
+struct NamedEncoder {
+  std::string address;                  // "tformat:/dev/ttyUSB0"
+  std::string place;                    // where the file says where it is connected
+  std::vector<ConfigSetting> settings;  // its own, and those of its bus that it does not override
+  std::vector<ConfigSetting> defaults;  // that it may be given, where they fit
+};
+
+/// Throws UsageError, which names the place in the file: settings that do not exist, protocols and buses that do not
+/// exist, whether they are used or not. Values are left to whoever uses them.
+void check(const Config& config);
+
+/// From a file that was checked. Throws UsageError, which names the nearest.
+[[nodiscard]] NamedEncoder require_encoder(const Config& config, std::string_view name);
+
+/// absenc.toml, checked; throws UsageError also when there is none: then `purpose` says who needs it.
+[[nodiscard]] Config require_config(std::string_view purpose);
+
+/// Does the work; a UsageError gets the place put before it.
+template <class Work>
+auto at(const std::string& place, const Work& work) {
+  try {
+    return work();
+  } catch (const UsageError& error) {
+    throw UsageError(place + ": " + error.what());
+  }
+}
+
+}  // namespace absenc::tool
