@@ -4,31 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 namespace absenc::tool {
 
 namespace {
-
-constexpr std::array<Example, 4> general_examples{{
-    {"absenc list", "which encoders are supported"},
-    {"absenc emulate tformat --pty /tmp/encoder", "a virtual encoder for any program to open"},
-    {"absenc read tformat:/tmp/encoder --count 0", "its position, until Ctrl-C"},
-    {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"", "what a captured frame says"},
-}};
-
-std::string title(const Parameter& parameter) {
-  if (!parameter.is_option()) return fmt::format("<{}>{}", parameter.name, parameter.repeatable ? "..." : "");
-  if (parameter.value.empty()) return std::string(parameter.name);
-  return fmt::format("{} {}", parameter.name, parameter.value);
-}
-
-std::string words(const Parameter& parameter) {
-  std::string text(parameter.meaning);
-  if (parameter.is_option() && parameter.repeatable) text += "; may be given more than once";
-  if (!parameter.fallback.empty()) text += fmt::format(" (default: {})", parameter.fallback);
-  return text;
-}
 
 constexpr std::size_t text_width = 100;
 
@@ -74,6 +53,19 @@ std::string example_lines(std::span<const Example> examples) {
 
 }  // namespace
 
+std::string title(const Parameter& parameter) {
+  if (!parameter.is_option()) return fmt::format("<{}>{}", parameter.name, parameter.repeatable ? "..." : "");
+  if (parameter.value.empty()) return std::string(parameter.name);
+  return fmt::format("{} {}", parameter.name, parameter.value);
+}
+
+std::string words(const Parameter& parameter) {
+  std::string text(parameter.meaning);
+  if (parameter.is_option() && parameter.repeatable) text += "; may be given more than once";
+  if (!parameter.fallback.empty()) text += fmt::format(" (default: {})", parameter.fallback);
+  return text;
+}
+
 std::string usage(const Subcommand& subcommand) {
   std::string text = fmt::format("absenc {}", subcommand.name);
   for (const Parameter& parameter : subcommand.parameters) {
@@ -96,23 +88,18 @@ std::string help(const Subcommand& subcommand) {
 }
 
 std::string help() {
-  std::string text =
-      "absenc: absolute encoders - read them, set them up, emulate them, decode what was captured\n\n"
-      "Usage: absenc <verb> ...\n\nVerbs:\n";
+  std::string text = fmt::format("absenc: {}\n\nUsage: absenc <verb> ...\n\nVerbs:\n", about);
   for (const Subcommand* subcommand : all_subcommands()) {
     text += fmt::format("  {:<17}{}\n", subcommand->name, subcommand->summary);
   }
-  text +=
-      "\nAn encoder is its protocol and where it is connected:\n"
-      "  tformat:/dev/ttyUSB0            a serial port\n"
-      "  tformat:tcp:192.168.1.20:4001   a serial server on the network\n"
-      "  sim:tformat                     a virtual encoder inside the command: no hardware needed\n"
-      "  elbow                           a name from absenc.toml: see `absenc list --help`\n"
-      "with options behind it, as in \"tformat:/dev/ttyUSB0?model=23-bit&echo=on\".\n";
+  text += "\nAn encoder is its protocol and where it is connected:\n";
+  for (const Example& encoder : encoder_examples) {
+    text += fmt::format("  {:<32}{}\n", encoder.command, encoder.meaning);
+  }
+  text += "with options behind it, as in \"tformat:/dev/ttyUSB0?model=23-bit&echo=on\".\n";
   text += fmt::format("\nExamples:\n{}", example_lines(general_examples));
-  return text +
-         "\n`absenc <verb> --help` explains a verb, `absenc --version` prints the version.\n"
-         "Exit status: 0 good, 1 the encoder or the line failed, 2 wrong usage.\n";
+  text += "\n`absenc <verb> --help` explains a verb, `absenc --version` prints the version.\n";
+  return text + fmt::format("Exit status: 0 {}, 1 {}, 2 {}.\n", exit_statuses[0], exit_statuses[1], exit_statuses[2]);
 }
 
 }  // namespace absenc::tool

@@ -1,12 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-// Help text, made from the same data as the command line.
+// Help text, made from the same data as the command line. The man page takes its parts from here.
 #pragma once
 
+#include <array>
 #include <string>
+#include <string_view>
 
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
+
+inline constexpr std::string_view about =
+    "absolute encoders - read them, set them up, emulate them, decode what was captured";
+
+inline constexpr std::array<Example, 4> encoder_examples{{
+    {"tformat:/dev/ttyUSB0", "a serial port"},
+    {"tformat:tcp:192.168.1.20:4001", "a serial server on the network"},
+    {"sim:tformat", "a virtual encoder inside the command: no hardware needed"},
+    {"elbow", "a name from absenc.toml: see `absenc list --help`"},
+}};
+
+inline constexpr std::array<Example, 4> general_examples{{
+    {"absenc list", "which encoders are supported"},
+    {"absenc emulate tformat --pty /tmp/encoder", "a virtual encoder for any program to open"},
+    {"absenc read tformat:/tmp/encoder --count 0", "its position, until Ctrl-C"},
+    {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"", "what a captured frame says"},
+}};
+
+/// By the number of the exit status.
+inline constexpr std::array<std::string_view, 3> exit_statuses{"good", "the encoder or the line failed", "wrong usage"};
 
 /// Of the whole command.
 [[nodiscard]] std::string help();
@@ -14,5 +36,10 @@ namespace absenc::tool {
 
 /// "absenc read <encoder> [options]"
 [[nodiscard]] std::string usage(const Subcommand& subcommand);
+
+/// "<encoder>", "--count N"
+[[nodiscard]] std::string title(const Parameter& parameter);
+/// Its meaning, how often it may be given and its default.
+[[nodiscard]] std::string words(const Parameter& parameter);
 
 }  // namespace absenc::tool
