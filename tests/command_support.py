@@ -133,5 +133,30 @@ class Case(unittest.TestCase):
             self.assertIn(word, text)
 
 
+class EncoderCase(Case):
+    """A test with emulators, and commands that run beside it."""
+
+    def emulator(self, *arguments):
+        emulator = Emulator(self.directory, *arguments)
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def encoder(self, *arguments, latency=300, more=""):
+        """The address of an emulator, with patience for a machine that is busy with other tests."""
+        return f"tformat:{self.emulator(*arguments).path}?latency={latency}{more}"
+
+    def start(self, *arguments, **settings):
+        settings.setdefault("stdin", subprocess.DEVNULL)
+        process = subprocess.Popen([ABSENC, *arguments], bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   **settings)
+        self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
+        return process
+
+    def first_line(self, process):
+        line = read_line(process.stdout, time.monotonic() + PATIENCE)
+        self.assertIsNotNone(line)
+        return line
+
+
 def json_lines(text):
     return [json.loads(line) for line in text.splitlines()]

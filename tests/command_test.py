@@ -7,7 +7,7 @@ import unittest
 
 from command_support import ABSENC, Case, absenc, json_lines
 
-VERBS = ["list", "read", "info", "alarms", "temperature", "zero", "reset-multiturn", "clear-alarms", "run", "emulate",
+VERBS = ["list", "read", "monitor", "record", "info", "alarms", "temperature", "zero", "reset-multiturn", "clear-alarms", "run", "emulate",
          "decode", "encode", "vectors", "bench"]
 GOOD_REPLY = "1A 00 45 23 01 11 34 12 00 00 4A"
 

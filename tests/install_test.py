@@ -174,7 +174,8 @@ class ManPage(Case):
 
     def test_has_the_usual_sections(self):
         sections = [line for line in self.shown().stdout.splitlines() if re.match(r"[A-Z]", line)][1:]
-        self.assertEqual(sections, ["NAME", "SYNOPSIS", "DESCRIPTION", "ENCODERS", "VERBS", "EXAMPLES", "EXIT STATUS"])
+        self.assertEqual(sections, ["NAME", "SYNOPSIS", "DESCRIPTION", "ENCODERS", "VERBS", "EXAMPLES", "FILES",
+                                    "ENVIRONMENT", "EXIT STATUS"])
 
 
 class Completion(Case):

@@ -12,36 +12,13 @@ import subprocess
 import time
 import unittest
 
-from command_support import ABSENC, PATIENCE, Case, Emulator, FakeEncoder, absenc, end, json_lines, read_line
+from command_support import ABSENC, PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, end, json_lines, read_line
 
 GOOD_REPLY = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
 NOBODY = 65534
 
 
-class ReadCase(Case):
-    def emulator(self, *arguments):
-        emulator = Emulator(self.directory, *arguments)
-        self.addCleanup(emulator.end)
-        return emulator
-
-    def encoder(self, *arguments, latency=300, more=""):
-        """The address of an emulator, with patience for a machine that is busy with other tests."""
-        return f"tformat:{self.emulator(*arguments).path}?latency={latency}{more}"
-
-    def start(self, *arguments, **settings):
-        settings.setdefault("stdin", subprocess.DEVNULL)
-        process = subprocess.Popen([ABSENC, *arguments], bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                   **settings)
-        self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
-        return process
-
-    def first_line(self, process):
-        line = read_line(process.stdout, time.monotonic() + PATIENCE)
-        self.assertIsNotNone(line)
-        return line
-
-
-class Readings(ReadCase):
+class Readings(EncoderCase):
     def test_words(self):
         result = absenc("read", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
         self.assert_good(result)
@@ -130,7 +107,7 @@ class Readings(ReadCase):
         self.assert_good(result)
 
 
-class Simulated(ReadCase):
+class Simulated(EncoderCase):
     def test_without_hardware(self):
         result = absenc("read", "sim:tformat?singleturn=5&multiturn=7", "--json")
         self.assert_good(result)
@@ -149,7 +126,7 @@ class Simulated(ReadCase):
         self.assertEqual(json.loads(result.stdout)["alarms"], ["over_heat", "battery_alarm"])
 
 
-class Trouble(ReadCase):
+class Trouble(EncoderCase):
     """Each message says what happened, what went over the line, and what to try."""
 
     def test_silence(self):
@@ -246,7 +223,7 @@ class Trouble(ReadCase):
         self.assertIn("went away", err.decode())
 
 
-class OrdinaryUser(ReadCase):
+class OrdinaryUser(EncoderCase):
     """Root may open everything: then these are run as nobody, with a copy of the command that nobody may run."""
 
     def setUp(self):
@@ -297,7 +274,7 @@ class OrdinaryUser(ReadCase):
         self.assert_failed(result, path, "cannot be written")
 
 
-class Ends(ReadCase):
+class Ends(EncoderCase):
     def test_interrupted_stream(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(number), Emulator(self.directory) as emulator:
@@ -359,7 +336,7 @@ class Ends(ReadCase):
         self.assertIn("absenc: 2 requests answered", emulator.end()[2])
 
 
-class Run(ReadCase):
+class Run(EncoderCase):
     def test_fields(self):
         address = self.encoder()
         self.assertRegex(absenc("run", address, "temperature").stdout, r"^temperature_c +35 degC ")
@@ -450,7 +427,7 @@ class Run(ReadCase):
         self.assert_failed(result, "invalid_argument", "this area is closed")
 
 
-class Bench(ReadCase):
+class Bench(EncoderCase):
     def test_json(self):
         result = absenc("bench", self.encoder(), "--seconds", "0.2", "--json")
         self.assert_good(result)

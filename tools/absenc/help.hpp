@@ -27,6 +27,17 @@ inline constexpr std::array<Example, 4> general_examples{{
     {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"", "what a captured frame says"},
 }};
 
+inline constexpr std::array<Example, 2> files{{
+    {"./absenc.toml", "names for encoders; `absenc list --help` shows how to write it"},
+    {"~/.config/absenc/absenc.toml", "the same, where there is none in the working directory"},
+}};
+
+inline constexpr std::array<Example, 3> environment{{
+    {"ABSENC_CONFIG", "the only absenc.toml to look at"},
+    {"XDG_CONFIG_HOME", "instead of ~/.config"},
+    {"NO_COLOR", "if not empty, `absenc monitor` does without colours"},
+}};
+
 /// By the number of the exit status.
 inline constexpr std::array<std::string_view, 3> exit_statuses{"good", "the encoder or the line failed", "wrong usage"};
 

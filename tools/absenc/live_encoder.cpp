@@ -10,6 +10,7 @@
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/reading_text.hpp"
 
 namespace absenc::tool {
 
@@ -98,11 +99,7 @@ Sample LiveEncoder::take(Reading reading) {
   rate_.add(reading.received);
   Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = encoder_->confirmed()};
   sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
-  if (sample.doubtful) {
-    reading.singleturn_valid_bits = 0;
-    reading.multiturn_valid = false;
-  }
-  sample.reading = reading;
+  sample.reading = reading = checked(reading, sample.confirmed);
   const host::Unwrapper::Joined joined = unwrapper_.add(reading);
   if (joined == host::Unwrapper::Joined::ignored) return sample;
   if (joined == host::Unwrapper::Joined::started) velocity_.restart();

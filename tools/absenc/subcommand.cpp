@@ -15,21 +15,11 @@ namespace absenc::tool {
 
 std::span<const Subcommand* const> all_subcommands() {
   static constexpr std::array all{
-      &list_subcommand,
-      &read_subcommand,
-      &monitor_subcommand,
-      &record_subcommand,
-      &info_subcommand,
-      &alarms_subcommand,
-      &temperature_subcommand,
-      &zero_subcommand,
-      &reset_multiturn_subcommand,
-      &clear_alarms_subcommand,
-      &run_subcommand,
-      &emulate_subcommand,
-      &decode_subcommand,
-      &encode_subcommand,
-      &vectors_subcommand,
+      &list_subcommand,         &read_subcommand,   &monitor_subcommand,
+      &record_subcommand,       &info_subcommand,   &alarms_subcommand,
+      &temperature_subcommand,  &zero_subcommand,   &reset_multiturn_subcommand,
+      &clear_alarms_subcommand, &run_subcommand,    &emulate_subcommand,
+      &decode_subcommand,       &encode_subcommand, &vectors_subcommand,
       &bench_subcommand,
   };
   return all;

@@ -108,6 +108,10 @@ std::string man_page(std::string_view version, std::span<const Subcommand* const
   text += ".SH VERBS\n";
   for (const Subcommand* subcommand : subcommands) text += verb(*subcommand);
   text += ".SH EXAMPLES\n" + examples(general_examples);
+  text += ".SH FILES\n";
+  for (const Example& file : files) text += tagged(file.command, file.meaning);
+  text += ".SH ENVIRONMENT\n";
+  for (const Example& variable : environment) text += tagged(variable.command, variable.meaning);
   text += ".SH EXIT STATUS\n";
   for (std::size_t i = 0; i < exit_statuses.size(); ++i) text += tagged(fmt::format("{}", i), exit_statuses[i]);
   return text;

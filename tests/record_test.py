@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc record`: what is in its files, whatever happens to the encoder, the disk or the command."""
+import csv
+import datetime
+import glob
+import json
+import os
+import pty
+import random
+import signal
+import subprocess
+import time
+import unittest
+
+from command_support import ABSENC, PATIENCE, Emulator, EncoderCase, absenc, end
+
+COLUMNS = ["time_s", "angle_deg", "singleturn", "singleturn_valid", "multiturn", "multiturn_valid", "status", "alarms",
+           "position", "speed_rpm", "speed_delay_s", "event"]
+
+
+def wait_until(condition, what):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > deadline:
+            raise AssertionError(f"in vain waited for: {what}")
+        time.sleep(0.005)
+
+
+def read_csv(path):
+    """The header and the rows of a recording; every line must be whole."""
+    with open(path, encoding="utf-8", newline="") as file:
+        text = file.read()
+    if not text.endswith("\n"):
+        raise AssertionError(f"the last line is cut: {text[-80:]!r}")
+    lines = text.splitlines()
+    header = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# ") and ": " in line)
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    for row in rows:
+        if None in row or None in row.values():
+            raise AssertionError(f"not all columns: {row}")
+    return header, rows
+
+
+def read_json_lines(path):
+    with open(path, encoding="utf-8") as file:
+        first, *rest = [json.loads(line) for line in file.read().splitlines()]
+    return first, rest
+
+
+def times(rows):
+    return [float(row["time_s"]) for row in rows]
+
+
+class RecordCase(EncoderCase):
+    def output(self, name="log.csv"):
+        return os.path.join(self.directory, name)
+
+    def assert_rising(self, values):
+        for before, after in zip(values, values[1:]):
+            self.assertLess(before, after)
+
+
+class Files(RecordCase):
+    def test_csv(self):
+        address = self.encoder("--singleturn", "74565", "--multiturn", "4660", "--alarm", "battery_alarm")
+        before = datetime.datetime.now(datetime.timezone.utc)
+        result = absenc("record", address, "--output", self.output(), "--count", "20", "--rate", "200")
+        self.assert_good(result)
+        self.assertIn("20 readings and 0 failures", result.stderr)
+        self.assertEqual(result.stdout, "")
+        header, rows = read_csv(self.output())
+        self.assertEqual(list(rows[0]), COLUMNS)
+        self.assertEqual((header["encoder"], header["protocol"], header["model"], header["rate_hz"], header["part"]),
+                         (address, "tformat", "TS5700N8500", "200", "1"))
+        self.assertIn("singleturn_bits=17", header["options"])
+        self.assertEqual(header["singleturn"], "counts")
+        started = datetime.datetime.fromisoformat(header["started"].replace("Z", "+00:00"))
+        self.assertLess(abs((started - before).total_seconds()), PATIENCE)
+        self.assertEqual(len(rows), 20)
+        self.assert_rising(times(rows))
+        for row in rows:
+            self.assertEqual((row["singleturn"], row["singleturn_valid"], row["multiturn"], row["multiturn_valid"],
+                              row["alarms"], row["position"], row["event"]),
+                             ("74565", "true", "4660", "true", "battery_alarm", str(4660 * 2**17 + 74565), ""))
+            self.assertAlmostEqual(float(row["angle_deg"]), 360 * 74565 / 2**17)
+        self.assertEqual(rows[0]["speed_rpm"], "")
+        self.assertEqual(float(rows[-1]["speed_rpm"]), 0)
+
+    def test_json_lines(self):
+        self.assert_good(absenc("record", self.encoder("--singleturn", "5"), "--output", self.output("log.jsonl"),
+                                "--count", "3", "--rate", "0"))
+        header, rows = read_json_lines(self.output("log.jsonl"))
+        self.assertEqual((header["absenc_record"], header["protocol"], header["model"]), (1, "tformat", "TS5700N8500"))
+        self.assertIn("speed_rpm", header["units"])
+        self.assertEqual([row["singleturn"] for row in rows], [5, 5, 5])
+        self.assertEqual(rows[0]["position"], 5)
+        self.assertEqual(rows[0]["speed_rpm"], None)
+        self.assertEqual(rows[2]["speed_rpm"], 0)
+
+    def test_speed_and_position_past_the_wrap(self):
+        result = absenc("record", "sim:tformat?motion=rpm=-90", "--output", self.output(), "--for", "1.2")
+        self.assert_good(result)
+        _, rows = read_csv(self.output())
+        self.assertLess(float(rows[-1]["position"]), -1.5 * 2**17)
+        self.assertIn("65535", [row["multiturn"] for row in rows])
+        for row in rows[5:]:
+            self.assertAlmostEqual(float(row["speed_rpm"]), -90, delta=1)
+            # The position is that of the time it is said to be: 1.5 revolutions a second.
+            self.assertAlmostEqual(float(row["position"]) - float(rows[0]["position"]),
+                                   -1.5 * 2**17 * (float(row["time_s"]) - float(rows[0]["time_s"])), delta=20)
+
+    def test_decimation(self):
+        self.assert_good(absenc("record", "sim:tformat?motion=rpm=60", "--output", self.output(), "--rate", "1000",
+                                "--every", "10", "--count", "20"))
+        _, rows = read_csv(self.output())
+        self.assertEqual(len(rows), 20)
+        self.assertGreaterEqual(times(rows)[-1] - times(rows)[0], 0.189)
+
+    def test_rate(self):
+        self.assert_good(absenc("record", "sim:tformat", "--output", self.output(), "--rate", "50", "--for", "1"))
+        _, rows = read_csv(self.output())
+        self.assertLessEqual(len(rows), 51)
+
+    def test_parts_by_size(self):
+        result = absenc("record", "sim:tformat?motion=rpm=60", "--output", self.output(), "--rate", "0", "--count", "300",
+                        "--part-size", "0.004")
+        self.assert_good(result)
+        parts = sorted(glob.glob(os.path.join(self.directory, "log-*.csv")))
+        self.assertGreater(len(parts), 3)
+        self.assertEqual(os.path.basename(parts[0]), "log-0001.csv")
+        self.assertIn(f"{parts[0]} to {parts[-1]}", result.stderr)
+        together = []
+        for number, part in enumerate(parts, 1):
+            header, rows = read_csv(part)
+            self.assertEqual(header["part"], str(number))
+            self.assertTrue(rows)
+            self.assertLess(os.path.getsize(part), 4200)
+            together += rows
+        self.assertEqual(len(together), 300)
+        self.assert_rising(times(together))
+
+    def test_parts_by_time(self):
+        self.assert_good(absenc("record", "sim:tformat", "--output", self.output("a.jsonl"), "--for", "0.5", "--part-time",
+                                "0.1"))
+        parts = sorted(glob.glob(os.path.join(self.directory, "a-*.jsonl")))
+        self.assertGreaterEqual(len(parts), 4)
+        together = []
+        for part in parts:
+            _, rows = read_json_lines(part)
+            self.assertLessEqual(rows[-1]["time_s"] - rows[0]["time_s"], 0.12)
+            together += rows
+        self.assert_rising(times(together))
+
+
+class Trouble(RecordCase):
+    def test_no_file_is_overwritten(self):
+        with open(self.output(), "w", encoding="utf-8") as file:
+            file.write("precious")
+        self.assert_failed(absenc("record", "sim:tformat", "--output", self.output(), "--count", "1"), "already a file")
+        with open(self.output(), encoding="utf-8") as file:
+            self.assertEqual(file.read(), "precious")
+        os.rename(self.output(), self.output("log-0007.csv"))
+        self.assert_wrong_usage(absenc("record", "sim:tformat", "--output", self.output(), "--count", "1", "--part-size",
+                                       "1"), "log-0007.csv", "another name")
+
+    def test_wrong_usage(self):
+        self.assert_wrong_usage(absenc("record", "sim:tformat"), "--output is missing")
+        self.assert_wrong_usage(absenc("record", "sim:tformat", "--output", self.output("log.txt")), ".csv", ".jsonl")
+        self.assert_wrong_usage(absenc("record", "sim:tformat", "--output", self.output(), "--every", "0"), "--every")
+        self.assert_failed(absenc("record", "sim:tformat", "--output", os.path.join(self.directory, "no", "log.csv")),
+                           "cannot be made", "No such file or directory")
+        self.assert_failed(absenc("record", "tformat:/dev/nothing", "--output", self.output()), "no port /dev/nothing")
+        self.assertFalse(os.path.exists(self.output()))
+
+    def test_failures_are_lines(self):
+        absenc("record", "sim:tformat?fault=corrupt=0.7&singleturn=77", "--output", self.output(), "--rate", "0", "--for",
+               "0.5")
+        _, rows = read_csv(self.output())
+        events = {row["event"] for row in rows}
+        self.assertIn("", events)
+        self.assertIn("bad_checksum", events)
+        for row in rows:
+            self.assertEqual(row["singleturn"], "77" if row["event"] == "" else "")
+
+    def test_unplugged_and_back(self):
+        process = None
+        with Emulator(self.directory, "--singleturn", "1000") as first:
+            process = self.start("record", f"tformat:{first.path}?latency=300", "--output", self.output(), "--rate", "200")
+            wait_until(lambda: os.path.exists(self.output()) and len(read_csv(self.output())[1]) > 20, "readings")
+            first.end(signal.SIGKILL)
+        wait_until(lambda: read_csv(self.output())[1][-1]["event"] == "lost", "the loss in the file")
+        with Emulator(self.directory, "--singleturn", "2000", "--alarm", "battery_alarm"):
+            wait_until(lambda: len(read_csv(self.output())[1][-1]["singleturn"]) > 0, "readings again")
+            status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        self.assertIn("went away", messages)
+        self.assertIn("the port is back after", messages)
+        _, rows = read_csv(self.output())
+        self.assert_rising(times(rows))
+        events = [row["event"] for row in rows]
+        lost, back = events.index("lost"), events.index("back")
+        self.assertEqual([event for event in events if event in ("lost", "back")], ["lost", "back"])
+        self.assertEqual(back, lost + 1)
+        for number, row in enumerate(rows):
+            if row["event"] == "":
+                self.assertEqual(row["singleturn"], "1000" if number < lost else "2000")
+                self.assertEqual(row["alarms"], "" if number < lost else "battery_alarm")
+
+    def test_full_disk(self):
+        """A file system of 1 MB: mounted, as root or in a namespace of our own."""
+        script = ('mount -t tmpfs -o size=1m absenc-test "$1" && "$0" record sim:tformat --rate 0 --output "$1/log.csv" 2>"$2"; '
+                  'echo $? >"$3"; cp "$1/log.csv" "$4"; df --output=avail "$1"; umount "$1"')
+        folder, messages, status, copy = (self.output(name) for name in ("disk", "messages", "status", "copy.csv"))
+        os.mkdir(folder)
+        shell = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--user", "--map-root-user", "--mount"]
+        if subprocess.run([*shell, "mount", "-t", "tmpfs", "-o", "size=1m", "absenc-test", folder], check=False,
+                          capture_output=True).returncode != 0:
+            self.skipTest("this machine does not let us mount a small file system")
+        subprocess.run([*shell, "sh", "-c", script, ABSENC, folder, messages, status, copy], check=True,
+                       capture_output=True, timeout=PATIENCE)
+        with open(status, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "1\n")
+        with open(messages, encoding="utf-8") as file:
+            text = file.read()
+        self.assert_sentence(text, "No space left on device", "what is written so far is whole")
+        _, rows = read_csv(copy)
+        self.assertIn(f"{len(rows)} readings", text)
+        self.assertGreater(os.path.getsize(copy), 2**20 - 3 * 4096)
+
+    def test_killed(self):
+        """Nothing but SIGKILL, a hundred times: every line is whole and the last second is there."""
+        random.seed(1)
+        for number in range(100):
+            path = self.output(f"{number}.csv")
+            process = self.start("record", "sim:tformat?motion=rpm=60", "--output", path, "--rate", "2000")
+            wait_until(lambda p=path: os.path.exists(p), "the file")
+            time.sleep(random.uniform(0.001, 0.05))
+            killed = time.time()
+            end(process, signal.SIGKILL)
+            header, rows = read_csv(path)
+            if not rows:
+                self.assertLess(killed - os.path.getctime(path), 1)
+                continue
+            started = datetime.datetime.fromisoformat(header["started"].replace("Z", "+00:00")).timestamp()
+            self.assertLess(killed - (started + times(rows)[-1]), 1)
+            self.assert_rising(times(rows))
+
+    def test_the_clock_of_the_day_is_set_back(self):
+        library = glob.glob("/usr/lib/*/faketime/libfaketime.so.1")
+        self.assertTrue(library, "the package faketime is missing")
+        shift = self.file("shift", "+0")
+        environment = {**os.environ, "LD_PRELOAD": library[0], "FAKETIME_TIMESTAMP_FILE": shift,
+                       "FAKETIME_NO_CACHE": "1", "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
+        process = self.start("record", "sim:tformat", "--output", self.output(), "--part-time", "0.2", env=environment)
+        part = self.output("log-0001.csv")
+        wait_until(lambda: os.path.exists(part) and len(read_csv(part)[1]) > 5, "readings")
+        self.file("shift", "-3600")
+        wait_until(lambda: os.path.exists(self.output("log-0003.csv")), "two parts more")
+        status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        together = []
+        for path in sorted(glob.glob(self.output("log-*.csv"))):
+            together += read_csv(path)[1]
+        self.assert_rising(times(together))
+        self.assertLess(times(together)[-1], PATIENCE)
+
+    def test_ends_by_a_signal(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(number):
+                path = self.output(f"{number}.csv")
+                process = self.start("record", "sim:tformat", "--output", path)
+                wait_until(lambda p=path: os.path.exists(p) and len(read_csv(p)[1]) > 2, "readings")
+                status, _, messages = end(process, number)
+                self.assertEqual(status, 0)
+                self.assertIn(f"{len(read_csv(path)[1])} readings", messages)
+
+    def test_progress_is_for_terminals(self):
+        terminal, ours = pty.openpty()
+        process = subprocess.run([ABSENC, "record", "sim:tformat", "--output", self.output(), "--for", "0.3"], stdin=ours,
+                                 stdout=subprocess.DEVNULL, stderr=ours, check=False, timeout=PATIENCE)
+        os.close(ours)
+        shown = os.read(terminal, 4096).decode()
+        os.close(terminal)
+        self.assertEqual(process.returncode, 0)
+        self.assertRegex(shown, r"\r\d.*: \d+ readings, .* 0 failures, \d+ bytes")
+        quiet = absenc("record", "sim:tformat", "--output", self.output("b.csv"), "--for", "0.3")
+        self.assertEqual(len(quiet.stderr.splitlines()), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
