@@ -86,8 +86,7 @@ class Controls {
   void ask_for_zero() {
     const Command* command = find_command(*selected().uri().unit, Verb::zero);
     if (command == nullptr) return;
-    view_.question =
-        fmt::format(" {}: {}? It changes the encoder. y: yes, any other key: no", selected().name(), command->meaning);
+    view_.question = fmt::format(" {}? y: yes, any other key: no   ({})", command->meaning, selected().name());
   }
 
   Watches* watches_;

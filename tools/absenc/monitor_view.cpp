@@ -109,7 +109,7 @@ int draw_list(Screen& screen, int row, const View& view) {
 void draw_bar(Screen& screen, int row, const Snapshot& snapshot) {
   const int width = std::min(screen.columns() - 12, 73);
   std::string bar(static_cast<std::size_t>(width), '-');
-  for (const double quarter : {0.25, 0.5, 0.75}) bar[static_cast<std::size_t>(quarter * (width - 1))] = '+';
+  for (const double quarter : {0.25, 0.5, 0.75}) bar[static_cast<std::size_t>(quarter * width)] = '+';
   const Reading& reading = snapshot.last.reading;
   if (has_angle(snapshot)) {
     const double share = degrees(reading.singleturn, reading.singleturn_bits) / 360;

@@ -26,7 +26,7 @@ struct View {
 };
 
 inline constexpr int least_rows = 16;
-inline constexpr int least_columns = 60;
+inline constexpr int least_columns = 64;
 
 /// Draws all of it; on a smaller screen than the least, only that it is too small.
 void draw(Screen& screen, const View& view);
