@@ -226,6 +226,51 @@ TEST_P(HostBattery, GarbageAround) {
   }
 }
 
+// ---- What a unit says of its memory and its settings.
+
+bool takes(const Command& command, std::string_view name, std::uint32_t least, std::uint32_t most) {
+  for (const Argument& argument : command.arguments) {
+    if (argument.name == name) return argument.minimum <= least && argument.maximum >= most;
+  }
+  return false;
+}
+
+TEST(Units, MemoryIsReachedByTheirCommands) {
+  for (const Unit* unit : all_units()) {
+    std::uint64_t after = 0;  // of the area before
+    for (const MemoryArea& area : unit->memory) {
+      const std::uint32_t last = area.first + area.count - 1;
+      const std::uint64_t begin = std::uint64_t{area.page} << 32 | area.first;
+      EXPECT_GE(begin, after) << unit->id << ": areas are in order and do not overlap";
+      after = begin + area.count;
+      EXPECT_GT(area.count, 0u);
+      EXPECT_TRUE(area.writable || area.write_life == 0);
+      for (const Verb verb : {Verb::memory_read, Verb::memory_write}) {
+        const Command* command = find_command(*unit, verb);
+        if (verb == Verb::memory_write && !area.writable) continue;
+        ASSERT_NE(command, nullptr) << unit->id;
+        EXPECT_TRUE(takes(*command, "address", area.first, last)) << unit->id;
+        EXPECT_TRUE(area.page == 0 || takes(*command, "page", area.page, area.page)) << unit->id;
+        EXPECT_TRUE(verb == Verb::memory_read || takes(*command, "value", 0, 255)) << unit->id;
+      }
+    }
+  }
+}
+
+TEST(Units, EverySetterReadsBack) {
+  for (const Unit* unit : all_units()) {
+    for (const Command& command : unit->commands) {
+      if (command.verb != Verb::config_set) {
+        EXPECT_TRUE(command.reads_back.empty()) << unit->id << " " << command.name;
+        continue;
+      }
+      const Command* getter = find_command(*unit, command.reads_back);
+      ASSERT_NE(getter, nullptr) << unit->id << " " << command.name;
+      EXPECT_EQ(getter->verb, Verb::config_get);
+    }
+  }
+}
+
 std::string test_name(const ::testing::TestParamInfo<Case>& info) {
   std::string name(info.param.vector->id);
   for (char& c : name) c = c == '-' ? '_' : c;

@@ -7,8 +7,9 @@ import unittest
 
 from command_support import ABSENC, Case, absenc, json_lines
 
-VERBS = ["list", "read", "monitor", "record", "info", "alarms", "temperature", "zero", "reset-multiturn", "clear-alarms", "run", "emulate",
-         "decode", "encode", "vectors", "bench"]
+VERBS = ["list", "read", "monitor", "record", "info", "alarms", "temperature", "zero", "reset-multiturn", "clear-alarms",
+         "memory read", "memory write", "memory dump", "memory load", "memory verify", "config get", "config set", "run",
+         "emulate", "decode", "encode", "vectors", "bench"]
 GOOD_REPLY = "1A 00 45 23 01 11 34 12 00 00 4A"
 
 
@@ -186,6 +187,8 @@ class ListAndVectors(Case):
         self.assertFalse(commands["position"]["changes_encoder"])
         self.assertEqual([argument["name"] for argument in commands["memory-write"]["arguments"]],
                          ["address", "value", "page"])
+        self.assertEqual(sum(area["count"] for area in unit["memory"] if area["in_dump"]), 6 * 127)
+        self.assertEqual(unit["memory"][-1]["writable"], False)
         self.assertEqual(json_lines(absenc("list", "tformat", "--json").stdout), [unit])
 
     def test_vectors_agree_with_the_reference(self):
@@ -213,12 +216,21 @@ class Usage(Case):
         for verb in VERBS:
             self.assertIn(f"\n  {verb}", result.stdout)
             with self.subTest(verb):
-                verb_help = absenc(verb, "--help")
+                verb_help = absenc(*verb.split(), "--help")
                 self.assert_good(verb_help)
                 for word in [f"Usage: absenc {verb}", "Options:", "Examples:"]:
                     self.assertIn(word, verb_help.stdout)
                 self.assertGreaterEqual(verb_help.stdout.count(f"  absenc {verb}"), 2)
                 self.assertTrue(all(len(line) <= 120 for line in verb_help.stdout.splitlines()), verb_help.stdout)
+
+    def test_help_of_verbs_of_two_words(self):
+        result = absenc("memory", "--help")
+        self.assert_good(result)
+        for word in ["Usage: absenc memory <verb>", "\n  memory read ", "\n  memory verify "]:
+            self.assertIn(word, result.stdout)
+        self.assertNotIn("config", result.stdout)
+        self.assertIn("Try: absenc memory --help", absenc("memory", "raed").stderr)
+        self.assertIn("Try: absenc memory read --help", absenc("memory", "read").stderr)
 
     def test_version(self):
         result = absenc("--version")
@@ -240,6 +252,13 @@ class Usage(Case):
                                  (["read", "sim:tformat", "--json=no"], ["--json takes no value"]),
                                  (["read", "sim:tformat", "--json", "--csv"], ["exclude each other"]),
                                  (["list", "tfromat"], ["did you mean tformat?"]),
+                                 (["memroy"], ["did you mean memory?"]),
+                                 (["memory"], ["what shall be done", "read, write, dump, load, verify"]),
+                                 (["memory", "raed"], ["of memory", "did you mean read?"]),
+                                 (["memory", "decode"], ["of memory"]),
+                                 (["memory", "--jsn"], ["no option --jsn"]),
+                                 (["memory", "read", "--jsn"], ["memory read has no option", "did you mean --json?"]),
+                                 (["config", "gte", "sim:tformat"], ["did you mean get?"]),
                                  (["run", "sim:tformat", "temprature"], ["did you mean temperature?"]),
                                  (["emulate", "tformat", "--fault", "corupt=1"], ["corrupt"]),
                                  (["emulate", "tformat", "--fault", "corrupt=2"], ["from 0 to 1"]),

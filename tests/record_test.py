@@ -282,7 +282,7 @@ class Trouble(RecordCase):
         shown = os.read(terminal, 4096).decode()
         os.close(terminal)
         self.assertEqual(process.returncode, 0)
-        self.assertRegex(shown, r"\r\d.*: \d+ readings, .* 0 failures, \d+ bytes")
+        self.assertRegex(shown, r"\r\x1b\[K\d.*: \d+ readings, .* 0 failures, \d+ bytes")
         quiet = absenc("record", "sim:tformat", "--output", self.output("b.csv"), "--for", "0.3")
         self.assertEqual(len(quiet.stderr.splitlines()), 1)
 

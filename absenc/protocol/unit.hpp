@@ -50,7 +50,25 @@ struct Command {
   std::string_view meaning;
   std::span<const Argument> arguments{};
   bool changes_encoder = false;
-  bool repeatable = true;  // whether the same request may be sent again after an error
+  bool repeatable = true;         // whether the same request may be sent again after an error
+  std::string_view reads_back{};  // config_set: the name of the config_get command that reads this setting
+};
+
+/// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments named
+/// `address`, `page` (only where there are pages), `count` (bytes to read; without it one at a time) and `value` (the
+/// byte to write). memory_read reports `data`, or `value` for a single byte.
+struct MemoryArea {
+  std::uint32_t page;  // 0 where there are no pages
+  std::uint32_t first;
+  std::uint32_t count;
+  std::string_view meaning;
+  bool writable = true;
+  bool in_dump = true;           // whether it belongs to a copy of the memory
+  std::uint32_t write_life = 0;  // how often a byte may be written; 0: not known
+
+  [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
+    return on_page == page && address >= first && address - first < count;
+  }
 };
 
 /// A frame in the form its link carries.
@@ -115,6 +133,7 @@ struct Unit {
   std::span<const Model> models;
   std::span<const FieldInfo> fields;
   std::span<const Command> commands;
+  std::span<const MemoryArea> memory;  // what the commands memory_read and memory_write reach, in order
   std::span<const Vector> vectors;
   const FieldInfo* status;     // the flags of Reading::status; null when the unit has none
   const FieldInfo* alarms;     // the flags of Reading::alarms

@@ -42,6 +42,7 @@ constinit const Unit unit{
     .models = models,
     .fields = fields,
     .commands = commands,
+    .memory = {},
     .vectors = vectors,
     .status = nullptr,
     .alarms = nullptr,

@@ -7,6 +7,7 @@
 #include "tools/absenc/encoder.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
@@ -83,9 +84,9 @@ int run_alarms(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 3> parameters{{
-    {"encoder", "", "as for `absenc read`", "", true},
+    parameter::encoder,
     {"--json", "", "one JSON object: of each alarm its name, meaning and action"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+    parameter::option,
 }};
 
 constexpr std::array<Example, 2> examples{{

@@ -8,10 +8,10 @@
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/encoder.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/run.hpp"
 #include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
@@ -130,15 +130,7 @@ int run_bench(const Invocation& invocation) {
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
   const bool json = invocation.has("--json");
   const Outcome first = encoder->read();
-  if (first.error != Error::none) {
-    const Trouble trouble = encoder->trouble(first);
-    if (json) {
-      print_line(trouble.json().line());
-    } else {
-      print_message(trouble.text());
-    }
-    return exit_failed;
-  }
+  if (first.error != Error::none) throw CommandFailure(encoder->trouble(first));
   const Measurement measurement = measure(*encoder, seconds);
   if (measurement.latencies.empty()) {
     throw ToolFailure(fmt::format("there was no good reading; exchanges: {}", summary(encoder->counters())));
@@ -148,10 +140,10 @@ int run_bench(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 4> parameters{{
-    {"encoder", "", "as for `absenc read`", "", true},
+    parameter::encoder,
     {"--seconds", "S", "how long", "5"},
-    {"--json", "", "one JSON object"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+    parameter::json,
+    parameter::option,
 }};
 
 constexpr std::array<Example, 2> examples{{

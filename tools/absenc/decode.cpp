@@ -6,6 +6,7 @@
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
@@ -60,14 +61,14 @@ int run_decode(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 6> parameters{{
-    {"protocol", "", "see `absenc list`", "", true},
+    parameter::protocol,
     {"--hex", "FRAME",
      "the reply: hexadecimal bytes with or without spaces, commas and 0x; a CAN frame as ID:DATA; "
      "a clocked word as a string of 0 and 1"},
     {"--request", "FRAME", "the request it answers; without --hex the request itself is decoded"},
-    {"--model", "NAME", "which model of the protocol", "the first that agrees with the options"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true},
-    {"--json", "", "one JSON object"},
+    parameter::model,
+    parameter::protocol_option,
+    parameter::json,
 }};
 
 constexpr std::array<Example, 2> examples{{

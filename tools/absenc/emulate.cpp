@@ -13,6 +13,7 @@
 #include "tools/absenc/memory_file.hpp"
 #include "tools/absenc/memory_keeper.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/virtual_device.hpp"
@@ -113,11 +114,11 @@ int run_emulate(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 14> parameters{{
-    {"protocol", "", "see `absenc list`", "", true},
+    parameter::protocol,
     {"--pty", "PATH", "where to put the link to the pseudo-terminal", "only the pseudo-terminal itself"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
-    {"--model", "NAME", "which model of the protocol", "the first that agrees with the options"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true},
+    parameter::model,
+    parameter::protocol_option,
     {"--singleturn", "COUNTS", "position within the turn at the start", "0"},
     {"--multiturn", "TURNS", "turns at the start", "0"},
     {"--motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV (lines of seconds,degrees)", "still"},

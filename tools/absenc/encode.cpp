@@ -5,6 +5,7 @@
 
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
@@ -36,12 +37,12 @@ int run_encode(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 6> parameters{{
-    {"protocol", "", "see `absenc list`", "", true},
-    {"command", "", "a command of the protocol: see `absenc list <protocol>`", "", true},
-    {"arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true},
-    {"--model", "NAME", "which model of the protocol", "the first that agrees with the options"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true},
-    {"--json", "", "one JSON object"},
+    parameter::protocol,
+    parameter::command,
+    parameter::arguments,
+    parameter::model,
+    parameter::protocol_option,
+    parameter::json,
 }};
 
 constexpr std::array<Example, 2> examples{{

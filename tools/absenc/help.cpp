@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace absenc::tool {
 
@@ -51,6 +52,10 @@ std::string example_lines(std::span<const Example> examples) {
   return text;
 }
 
+std::string verb_line(const Subcommand& subcommand) {
+  return fmt::format("  {:<17}{}\n", subcommand.name, subcommand.summary);
+}
+
 }  // namespace
 
 std::string title(const Parameter& parameter) {
@@ -87,10 +92,20 @@ std::string help(const Subcommand& subcommand) {
   return text + fmt::format("\nExamples:\n{}", example_lines(subcommand.examples));
 }
 
+std::string help(std::string_view group) {
+  std::string text = fmt::format("Usage: absenc {} <verb> ...\n\nVerbs:\n", group);
+  for (const Subcommand* subcommand : all_subcommands()) {
+    if (first_word(*subcommand) == group) text += verb_line(*subcommand);
+  }
+  return text + fmt::format("\n`absenc {} <verb> --help` explains a verb.\n", group);
+}
+
 std::string help() {
   std::string text = fmt::format("absenc: {}\n\nUsage: absenc <verb> ...\n\nVerbs:\n", about);
+  std::string_view group;
   for (const Subcommand* subcommand : all_subcommands()) {
-    text += fmt::format("  {:<17}{}\n", subcommand->name, subcommand->summary);
+    if (group != std::exchange(group, first_word(*subcommand))) text += '\n';
+    text += verb_line(*subcommand);
   }
   text += "\nAn encoder is its protocol and where it is connected:\n";
   for (const Example& encoder : encoder_examples) {

@@ -44,6 +44,8 @@ inline constexpr std::array<std::string_view, 3> exit_statuses{"good", "the enco
 /// Of the whole command.
 [[nodiscard]] std::string help();
 [[nodiscard]] std::string help(const Subcommand& subcommand);
+/// Of the verbs that begin with this word.
+[[nodiscard]] std::string help(std::string_view first_word_of_two);
 
 /// "absenc read <encoder> [options]"
 [[nodiscard]] std::string usage(const Subcommand& subcommand);

@@ -9,6 +9,7 @@
 #include "tools/absenc/encoder.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
@@ -161,9 +162,9 @@ int run_info(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 3> parameters{{
-    {"encoder", "", "as for `absenc read`", "", true},
-    {"--json", "", "one JSON object"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+    parameter::encoder,
+    parameter::json,
+    parameter::option,
 }};
 
 constexpr std::array<Example, 2> examples{{

@@ -86,6 +86,18 @@ Rows command_rows(const Unit& unit) {
   return rows;
 }
 
+Rows memory_rows(const Unit& unit) {
+  Rows rows;
+  for (const MemoryArea& area : unit.memory) {
+    const std::uint32_t last = area.first + area.count - 1;
+    const std::string to = last == area.first ? "" : fmt::format(" to 0x{:02X}", last);
+    std::string writes = area.writable ? "" : "read only";
+    if (area.write_life != 0) writes = fmt::format("{} writes in a byte's life", area.write_life);
+    rows.push_back({fmt::format("page {}: 0x{:02X}{}", area.page, area.first, to), std::string(area.meaning), writes});
+  }
+  return rows;
+}
+
 Rows field_rows(const Unit& unit) {
   Rows rows;
   for (const FieldInfo& field : unit.fields) {
@@ -111,6 +123,7 @@ std::string details(const Unit& unit) {
   text += section("Options (--option NAME=VALUE, or ?NAME=VALUE behind an encoder)", option_rows(unit));
   text += section("Settings of the port (?NAME=VALUE behind an encoder)", port_rows());
   text += section(fmt::format("Commands (absenc run {}:PORT <command>)", unit.id), command_rows(unit));
+  text += section(fmt::format("Memory (absenc memory read {}:PORT <address> --page P)", unit.id), memory_rows(unit));
   text += section("Fields", field_rows(unit));
   return text;
 }
@@ -171,6 +184,21 @@ Json commands_json(const Unit& unit) {
   return commands;
 }
 
+Json memory_json(const Unit& unit) {
+  Json areas = Json::array();
+  for (const MemoryArea& area : unit.memory) {
+    areas.append(Json::object()
+                     .set("page", area.page)
+                     .set("first", area.first)
+                     .set("count", area.count)
+                     .set("meaning", area.meaning)
+                     .set("writable", area.writable)
+                     .set("in_dump", area.in_dump)
+                     .set("write_life", area.write_life));
+  }
+  return areas;
+}
+
 Json fields_json(const Unit& unit) {
   static constexpr std::array<std::string_view, 6> kinds{"number", "boolean", "flags", "real", "text", "bytes"};
   Json fields = Json::array();
@@ -202,6 +230,7 @@ Json unit_json(const Unit& unit) {
       .set("models", models_json(unit))
       .set("options", options_json(unit))
       .set("commands", commands_json(unit))
+      .set("memory", memory_json(unit))
       .set("fields", fields_json(unit));
 }
 

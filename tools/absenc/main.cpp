@@ -4,8 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <map>
 #include <memory>
-#include <optional>
+#include <string>
+#include <vector>
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
@@ -14,6 +16,7 @@
 #include "tools/absenc/help.hpp"
 #include "tools/absenc/nearest.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/run.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
@@ -24,8 +27,9 @@ namespace {
 /// so that a wrong name is reported before what is missing because of it.
 class Parser {
  public:
-  Parser(CLI::App& app, const Subcommand& subcommand)
-      : subcommand_(&subcommand), app_(app.add_subcommand(std::string(subcommand.name))) {
+  /// `parent` is the command itself or the first word of a verb of two.
+  Parser(CLI::App& parent, const Subcommand& subcommand)
+      : subcommand_(&subcommand), app_(parent.add_subcommand(std::string(last_word(subcommand)))) {
     app_->allow_extras();
     for (const Parameter& parameter : subcommand.parameters) add(parameter);
   }
@@ -90,60 +94,105 @@ class Parser {
   std::vector<std::pair<const Parameter*, CLI::Option*>> options_;
 };
 
-// Without a verb.
-int answer(const CLI::App& app) {
-  std::vector<std::string_view> names;
-  for (const Subcommand* subcommand : all_subcommands()) names.push_back(subcommand->name);
-  const std::vector<std::string> words = app.remaining();
-  if (words.empty()) {
-    throw UsageError(fmt::format("what shall be done? Usage: absenc <verb> ..., where the verb is one of {}",
-                                 fmt::join(names, ", ")));
+// Where words end before they make a verb; `group` is the first of two, or "".
+[[noreturn]] void refuse(const CLI::App& app, std::string_view group, std::span<const std::string_view> options) {
+  const std::vector<std::string_view> words = words_after(group);
+  const std::vector<std::string> remaining = app.remaining();
+  if (remaining.empty()) {
+    throw UsageError(fmt::format("what shall be done{}? Usage: absenc {}{}<verb> ..., where the verb is one of {}",
+                                 group.empty() ? "" : fmt::format(" with the {}", group), group,
+                                 group.empty() ? "" : " ", fmt::join(words, ", ")));
   }
-  const std::string& word = words.front();
+  const std::string& word = remaining.front();
+  const std::string of_group = group.empty() ? "" : fmt::format(" of {}", group);
   if (word.starts_with('-')) {
-    const std::vector<std::string_view> options{"--help", "--version"};
-    throw UsageError(fmt::format("there is no option {}{}", word, suggestion(word, options)));
+    throw UsageError(fmt::format("there is no option {}{}{}", word, of_group, suggestion(word, options)));
   }
-  throw UsageError(fmt::format("there is no verb \"{}\"{}", word, suggestion(word, names)));
+  throw UsageError(fmt::format("there is no verb \"{}\"{}{}", word, of_group, suggestion(word, words)));
 }
 
-int run(int argument_count, char** arguments, const Subcommand*& chosen) {
-  CLI::App app;
-  app.require_subcommand(0, 1);
-  app.allow_extras();
-  app.set_help_flag("-h,--help");
-  app.add_flag("--version");
-  std::vector<std::unique_ptr<Parser>> parsers;
-  for (const Subcommand* subcommand : all_subcommands()) parsers.push_back(std::make_unique<Parser>(app, *subcommand));
-  const auto find_chosen = [&] {
-    for (const auto& parser : parsers) {
-      if (parser->parsed()) chosen = &parser->subcommand();
+/// All subcommands in CLI11.
+class CommandLine {
+ public:
+  CommandLine() {
+    app_.set_help_flag("-h,--help");
+    app_.add_flag("--version");
+    accept_one(app_);
+    for (const Subcommand* subcommand : all_subcommands()) {
+      const std::string_view group = first_word(*subcommand);
+      parsers_.push_back(std::make_unique<Parser>(group.empty() ? app_ : group_of(group), *subcommand));
     }
-  };
-  try {
-    app.parse(argument_count, arguments);
-    find_chosen();
-  } catch (const CLI::CallForHelp&) {
-    find_chosen();
-    print_line(chosen != nullptr ? help(*chosen) : help());
-    return exit_good;
-  } catch (const CLI::ArgumentMismatch& error) {
-    find_chosen();
-    const std::string text = error.what();  // "--hex: 1 required  missing"
-    throw UsageError(text.substr(0, text.find(':')) + " needs a value");
-  } catch (const CLI::ParseError& error) {
-    find_chosen();
-    throw UsageError(error.what());
   }
-  if (app.count("--version") > 0) {
-    print_line("absenc " ABSENC_VERSION);
-    return exit_good;
+
+  /// `understood` is the verb as far as it was found, also when this throws.
+  int run(int argument_count, char** arguments, std::string& understood) {
+    try {
+      app_.parse(argument_count, arguments);
+      find(understood);
+    } catch (const CLI::CallForHelp&) {
+      find(understood);
+      print_line(chosen_ != nullptr ? help(chosen_->subcommand()) : understood.empty() ? help() : help(understood));
+      return exit_good;
+    } catch (const CLI::ArgumentMismatch& error) {
+      find(understood);
+      const std::string text = error.what();  // "--hex: 1 required  missing"
+      throw UsageError(text.substr(0, text.find(':')) + " needs a value");
+    } catch (const CLI::ParseError& error) {
+      find(understood);
+      throw UsageError(error.what());
+    }
+    if (app_.count("--version") > 0) {
+      print_line("absenc " ABSENC_VERSION);
+      return exit_good;
+    }
+    if (chosen_ != nullptr) return run_chosen();
+    const std::vector<std::string_view> options{"--help", "--version"};
+    if (understood.empty()) refuse(app_, {}, options);
+    refuse(*groups_.at(understood), understood, std::span(options).first(1));
   }
-  for (const auto& parser : parsers) {
-    if (parser->parsed()) return chosen->run(parser->invocation());
+
+ private:
+  static void accept_one(CLI::App& app) {
+    app.require_subcommand(0, 1);
+    app.allow_extras();
   }
-  return answer(app);
-}
+
+  CLI::App& group_of(std::string_view name) {
+    CLI::App*& group = groups_[std::string(name)];
+    if (group == nullptr) {
+      group = app_.add_subcommand(std::string(name));
+      accept_one(*group);
+    }
+    return *group;
+  }
+
+  void find(std::string& understood) {
+    for (const auto& [name, group] : groups_) {
+      if (group->parsed()) understood = name;
+    }
+    for (const auto& parser : parsers_) {
+      if (!parser->parsed()) continue;
+      chosen_ = parser.get();
+      understood = parser->subcommand().name;
+    }
+  }
+
+  int run_chosen() {
+    const Invocation invocation = chosen_->invocation();
+    try {
+      return chosen_->subcommand().run(invocation);
+    } catch (const CommandFailure& failure) {
+      if (!invocation.has("--json")) throw;
+      print_line(failure.trouble.json().line());
+      return exit_failed;
+    }
+  }
+
+  CLI::App app_;
+  std::map<std::string, CLI::App*> groups_;  // by the first of two words
+  std::vector<std::unique_ptr<Parser>> parsers_;
+  const Parser* chosen_ = nullptr;
+};
 
 }  // namespace
 
@@ -151,14 +200,13 @@ int run(int argument_count, char** arguments, const Subcommand*& chosen) {
 
 int main(int argument_count, char** arguments) {
   using namespace absenc::tool;
-  const Subcommand* chosen = nullptr;
+  std::string understood;
   try {
     absenc::os::protect_standard_streams();
-    return run(argument_count, arguments, chosen);
+    return CommandLine().run(argument_count, arguments, understood);
   } catch (const UsageError& error) {
     print_message(error.what());
-    print_note(
-        fmt::format("Try: absenc {}{}--help", chosen != nullptr ? chosen->name : "", chosen != nullptr ? " " : ""));
+    print_note(fmt::format("Try: absenc {}{}--help", understood, understood.empty() ? "" : " "));
     return exit_usage;
   } catch (const OutputClosed&) {
     return exit_good;

@@ -12,6 +12,7 @@
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/monitor_view.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
@@ -199,12 +200,12 @@ int run_monitor(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 6> parameters{{
-    {"encoder", "", "as for `absenc read`", "", true, true},
+    {"encoder", "", "as for `absenc read`; several may be given", "", true, true},
     {"--rate", "HZ", "readings a second of each; 0: as many as the line allows", "50"},
     {"--interval", "SECONDS", "without a screen: how often to print a line for each", "1"},
     {"--for", "SECONDS", "end by itself", "until q or Ctrl-C"},
     {"--json", "", "no screen: one JSON object a line"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+    parameter::option,
 }};
 
 constexpr std::array<Example, 2> examples{{

@@ -9,6 +9,7 @@
 #include "tools/absenc/live_encoder.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/pace.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 
@@ -143,13 +144,12 @@ int run_read(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 6> parameters{{
-    {"encoder", "", "PROTOCOL:PORT, PROTOCOL:tcp:HOST:PORT or sim:PROTOCOL, with ?NAME=VALUE&NAME=VALUE behind it", "",
-     true},
+    parameter::encoder,
     {"--count", "N", "how many readings; 0: until Ctrl-C", "1"},
     {"--rate", "HZ", "readings a second; 0: as many as the line allows", "10"},
     {"--json", "", "one JSON object a line, failures too"},
     {"--csv", "", "comma-separated values with a header"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+    parameter::option,
 }};
 
 constexpr std::array<Example, 3> examples{{

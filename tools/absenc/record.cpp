@@ -4,12 +4,13 @@
 #include <array>
 
 #include "absenc/os/error.hpp"
-#include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/live_encoder.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/pace.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/progress.hpp"
 #include "tools/absenc/recording.hpp"
 #include "tools/absenc/subcommand.hpp"
 
@@ -17,27 +18,24 @@ namespace absenc::tool {
 
 namespace {
 
-/// A line on the terminal that is written over once a second; nothing where there is no terminal.
-class Progress {
+/// Says once a second how far it is.
+class Report {
  public:
   void show(const Recording& recording, const LiveEncoder& live) {
     const Time now = os::now();
-    if (!os::is_terminal(2) || now < next_) return;
+    if (!progress_.visible() || now < next_) return;
     next_ = now + std::chrono::seconds(1);
-    const std::string rate =
-        live.encoder().connected() ? fmt::format("{:.1f} a second", live.rate()) : "the port is away";
-    print_prompt(fmt::format("\r{}: {} readings, {}, {} failures, {} bytes \033[K", to_text(now - recording.start()),
-                             recording.readings(), rate, recording.failures(), recording.bytes()));
-    shown_ = true;
+    const bool connected = live.encoder().connected();
+    progress_.show(fmt::format("{}: {} readings, {}, {} failures, {} bytes", to_text(now - recording.start()),
+                               recording.readings(),
+                               connected ? fmt::format("{:.1f} a second", live.rate()) : "the port is away",
+                               recording.failures(), recording.bytes()));
   }
-  void end() {
-    if (shown_) print_note("");
-    shown_ = false;
-  }
+  void clear() { progress_.clear(); }
 
  private:
+  Progress progress_;
   Time next_{};
-  bool shown_ = false;
 };
 
 struct Limits {
@@ -46,15 +44,15 @@ struct Limits {
 };
 
 // What comes between the readings is told; the file has it too.
-void tell(const Sample& sample, Progress& progress) {
+void tell(const Sample& sample, Report& report) {
   if (sample.kind != Sample::Kind::lost && sample.kind != Sample::Kind::back) return;
-  progress.end();
+  report.clear();
   print_message(sample.kind == Sample::Kind::lost ? fmt::format("{}\n  Waiting for it to come back.", sample.message)
                                                   : sample.message);
 }
 
 // Returns whether the last reading was good.
-bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limits& limits, Progress& progress) {
+bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limits& limits, Report& report) {
   bool good = false;
   try {
     while ((limits.count == 0 || recording.readings() < limits.count) && os::now() < limits.end) {
@@ -62,8 +60,8 @@ bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limit
       const Sample sample = live.next();
       good = sample.kind == Sample::Kind::reading;
       recording.take(sample);
-      tell(sample, progress);
-      progress.show(recording, live);
+      tell(sample, report);
+      report.show(recording, live);
       os::sleep_until(std::min(pace.next(), limits.end));
     }
   } catch (const os::Interrupted&) {
@@ -100,19 +98,19 @@ int run_record(const Invocation& invocation) {
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
   Recording recording(settings, uri);
   const Limits limits{count, seconds > 0 ? recording.start() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never};
-  Progress progress;
+  Report report;
   const auto summarize = [&] {
-    progress.end();
+    report.clear();
     print_message(fmt::format("{} readings and {} failures in {} are in {}; exchanges: {}", recording.readings(),
                               recording.failures(), to_text(os::now() - recording.start()), recording.names(),
                               summary(live.encoder().counters())));
   };
   bool good = false;
   try {
-    good = record_all(live, recording, pace, limits, progress);
+    good = record_all(live, recording, pace, limits, report);
     recording.finish();
   } catch (const os::Failure& failure) {
-    progress.end();
+    report.clear();
     print_message(fmt::format("{}: the recording has ended; what is written so far is whole", failure.what()));
     good = false;
   }
@@ -121,7 +119,7 @@ int run_record(const Invocation& invocation) {
 }
 
 constexpr std::array<Parameter, 9> parameters{{
-    {"encoder", "", "as for `absenc read`", "", true},
+    parameter::encoder,
     {"--output", "FILE", "where to; the name ends in .csv, or in .jsonl for JSON lines; it must not exist yet", "",
      true},
     {"--rate", "HZ", "readings a second; 0: as many as the line allows", "100"},
@@ -130,7 +128,7 @@ constexpr std::array<Parameter, 9> parameters{{
     {"--for", "SECONDS", "end after this time", "until Ctrl-C"},
     {"--part-size", "MEGABYTES", "begin another file when one is this large: NAME-0001.csv, NAME-0002.csv ..."},
     {"--part-time", "SECONDS", "begin another file after this time"},
-    {"--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true},
+    parameter::option,
 }};
 
 constexpr std::array<Example, 2> examples{{

@@ -15,14 +15,36 @@ namespace absenc::tool {
 
 std::span<const Subcommand* const> all_subcommands() {
   static constexpr std::array all{
-      &list_subcommand,         &read_subcommand,   &monitor_subcommand,
-      &record_subcommand,       &info_subcommand,   &alarms_subcommand,
-      &temperature_subcommand,  &zero_subcommand,   &reset_multiturn_subcommand,
-      &clear_alarms_subcommand, &run_subcommand,    &emulate_subcommand,
-      &decode_subcommand,       &encode_subcommand, &vectors_subcommand,
-      &bench_subcommand,
+      &list_subcommand,         &read_subcommand,        &monitor_subcommand,
+      &record_subcommand,       &info_subcommand,        &alarms_subcommand,
+      &temperature_subcommand,  &zero_subcommand,        &reset_multiturn_subcommand,
+      &clear_alarms_subcommand, &memory_read_subcommand, &memory_write_subcommand,
+      &memory_dump_subcommand,  &memory_load_subcommand, &memory_verify_subcommand,
+      &config_get_subcommand,   &config_set_subcommand,  &run_subcommand,
+      &emulate_subcommand,      &decode_subcommand,      &encode_subcommand,
+      &vectors_subcommand,      &bench_subcommand,
   };
   return all;
+}
+
+std::string_view first_word(const Subcommand& subcommand) {
+  const std::size_t space = subcommand.name.find(' ');
+  return space == std::string_view::npos ? std::string_view() : subcommand.name.substr(0, space);
+}
+
+std::string_view last_word(const Subcommand& subcommand) {
+  return subcommand.name.substr(subcommand.name.find(' ') + 1);  // npos + 1 is 0
+}
+
+std::vector<std::string_view> words_after(std::string_view first) {
+  std::vector<std::string_view> words;
+  for (const Subcommand* subcommand : all_subcommands()) {
+    const std::string_view group = first_word(*subcommand);
+    const std::string_view word = first.empty() && !group.empty() ? group : last_word(*subcommand);
+    const bool belongs = first.empty() || group == first;
+    if (belongs && (words.empty() || words.back() != word)) words.push_back(word);
+  }
+  return words;
 }
 
 std::string_view Invocation::text(std::string_view name, std::string_view fallback) const {

@@ -46,7 +46,7 @@ class Invocation {
 };
 
 struct Subcommand {
-  std::string_view name;
+  std::string_view name;         // one word, or two as in "memory read"
   std::string_view summary;      // one line
   std::string_view description;  // more, for the help text; lines end where they should
   std::span<const Parameter> parameters;
@@ -54,8 +54,15 @@ struct Subcommand {
   int (*run)(const Invocation& invocation);  // returns the exit status
 };
 
-/// In the order in which help shows them.
+/// In the order in which help shows them; those that share their first word stand together.
 [[nodiscard]] std::span<const Subcommand* const> all_subcommands();
+
+/// "memory" of "memory read"; "" of one word.
+[[nodiscard]] std::string_view first_word(const Subcommand& subcommand);
+/// "read" of "memory read" and of "read"
+[[nodiscard]] std::string_view last_word(const Subcommand& subcommand);
+/// The words that may come after `first`, or, when that is "", those that a verb may begin with.
+[[nodiscard]] std::vector<std::string_view> words_after(std::string_view first);
 
 extern const Subcommand list_subcommand;
 extern const Subcommand read_subcommand;
@@ -67,6 +74,13 @@ extern const Subcommand temperature_subcommand;
 extern const Subcommand zero_subcommand;
 extern const Subcommand reset_multiturn_subcommand;
 extern const Subcommand clear_alarms_subcommand;
+extern const Subcommand memory_read_subcommand;
+extern const Subcommand memory_write_subcommand;
+extern const Subcommand memory_dump_subcommand;
+extern const Subcommand memory_load_subcommand;
+extern const Subcommand memory_verify_subcommand;
+extern const Subcommand config_get_subcommand;
+extern const Subcommand config_set_subcommand;
 extern const Subcommand run_subcommand;
 extern const Subcommand emulate_subcommand;
 extern const Subcommand decode_subcommand;

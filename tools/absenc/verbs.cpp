@@ -5,6 +5,7 @@
 #include <array>
 
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/run.hpp"
 
 namespace absenc::tool {
@@ -22,13 +23,8 @@ int run_verb(const Invocation& invocation) {
   return run_command(invocation, uri, *command, {});
 }
 
-constexpr Parameter encoder{"encoder", "", "as for `absenc read`", "", true};
-constexpr Parameter json{"--json", "", "one JSON object"};
-constexpr Parameter option{
-    "--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true};
-constexpr std::array<Parameter, 3> reading{{encoder, json, option}};
-constexpr std::array<Parameter, 4> changing{
-    {encoder, {"--yes", "", "do not ask before the encoder is changed"}, json, option}};
+constexpr std::array<Parameter, 3> reading{{parameter::encoder, parameter::json, parameter::option}};
+constexpr std::array<Parameter, 4> changing{{parameter::encoder, parameter::yes, parameter::json, parameter::option}};
 
 constexpr std::string_view asks =
     "Asks first; without a terminal it needs --yes. The shaft must stand still. What became of it is read back.";

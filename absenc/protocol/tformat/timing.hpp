@@ -25,6 +25,7 @@ inline constexpr Time gap_limit = 3 * line_settings.character();
 inline constexpr std::uint8_t user_pages = 6;        // 0 to 5 (6.1.1)
 inline constexpr std::uint8_t page_addresses = 127;  // 0 to 126; 127 selects the page
 inline constexpr std::uint8_t service_page = 7;
+inline constexpr std::uint32_t write_life = 100'000;    // of a byte (6.1.1)
 inline constexpr std::uint8_t overheat_address = 4;     // on the service page (7.2)
 inline constexpr std::uint8_t temperature_address = 5;  // on the service page (7.3)
 inline constexpr std::uint8_t overheat_at_shipping = 0xDA;

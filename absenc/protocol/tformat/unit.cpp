@@ -69,8 +69,34 @@ constexpr std::array<Command, 12> commands{{
     {"temperature", Verb::temperature, id_of(DataId::read_memory), "temperature of the board"},
     {"overheat-threshold", Verb::config_get, id_of(DataId::read_memory), "temperature above which over_heat is raised"},
     {"set-overheat-threshold", Verb::config_set, id_of(DataId::write_memory), "set that temperature",
-     threshold_arguments, true, false},
+     threshold_arguments, true, false, "overheat-threshold"},
 }};
+
+constexpr MemoryArea user_page(std::uint32_t number) {
+  return {number, 0, page_addresses, "the user's EEPROM", true, true, write_life};
+}
+constexpr std::array<MemoryArea, user_pages + 2> memory{{
+    user_page(0),
+    user_page(1),
+    user_page(2),
+    user_page(3),
+    user_page(4),
+    user_page(5),
+    {service_page, overheat_address, 1, "over-heat threshold", true, false, write_life},
+    {service_page, temperature_address, 1, "temperature", false, false},
+}};
+
+constexpr bool memory_is_what_is_open() {
+  for (unsigned on_page = 0; on_page <= service_page; ++on_page) {
+    for (unsigned at = 0; at <= page_select_address; ++at) {
+      const bool has =
+          std::any_of(memory.begin(), memory.end(), [&](const MemoryArea& area) { return area.has(on_page, at); });
+      if (has != is_open(on_page, at)) return false;
+    }
+  }
+  return true;
+}
+static_assert(memory_is_what_is_open());
 
 Error decode_frame(const Options& values, Frame request, Frame reply, FieldSink& sink) {
   return decode(to_format(values), request.bytes, reply.bytes, sink);
@@ -175,6 +201,7 @@ constinit const Unit unit{
     .models = models,
     .fields = fields,
     .commands = commands,
+    .memory = memory,
     .vectors = vectors,
     .status = &fields[field_status],
     .alarms = &fields[field_alarms],

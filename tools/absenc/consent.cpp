@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/consent.hpp"
+
+#include <fmt/format.h>
+
+#include <iostream>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/output.hpp"
+
+namespace absenc::tool {
+
+bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_view what, std::string_view meaning) {
+  // The virtual encoder of sim: is gone afterwards anyway.
+  if (uri.place == Place::sim || invocation.has("--yes")) return false;
+  if (can_ask()) return true;
+  throw UsageError(
+      fmt::format("{} changes the encoder ({}) and nobody is there to be asked: give --yes to do it", what, meaning));
+}
+
+bool confirmed(const EncoderUri& uri, std::string_view meaning) {
+  const std::string where = uri.place == Place::serial ? uri.path : fmt::format("{}:{}", uri.host, uri.port);
+  print_prompt(fmt::format("This changes the encoder at {}: {}. Go on? [y/N] ", where, meaning));
+  pollfd input{0, POLLIN, 0};
+  try {
+    os::wait_for({&input, 1}, never);
+  } catch (const os::Interrupted&) {
+    print_note("");
+    throw;
+  }
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == "y" || answer == "yes";
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// What changes an encoder asks first; scripts say --yes.
+#pragma once
+
+#include <string_view>
+
+#include "tools/absenc/encoder_uri.hpp"
+#include "tools/absenc/subcommand.hpp"
+
+namespace absenc::tool {
+
+/// Whether the user is to be asked before `what`, which means `meaning`. Throws UsageError when nobody is there.
+[[nodiscard]] bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_view what,
+                            std::string_view meaning);
+
+/// Asks; only y and yes go on. Throws os::Interrupted.
+[[nodiscard]] bool confirmed(const EncoderUri& uri, std::string_view meaning);
+
+}  // namespace absenc::tool

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// A copy of an encoder's memory in a file, for people to read and edit: docs/dump-format.md describes it.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "tools/absenc/memory_image.hpp"
+
+namespace absenc::tool {
+
+struct Dump {
+  MemoryImage image;
+  bool checked = false;  // it has a checksum, which is right, or says that it was edited
+};
+
+[[nodiscard]] std::string to_dump(const Unit& unit, const Options& options, const MemoryImage& image);
+
+/// `name` is for messages. Throws ToolFailure for a text that is damaged, was made from another kind of encoder, or
+/// has what cannot be read or, if that is the purpose, written.
+[[nodiscard]] Dump parse_dump(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
+                              bool for_writing);
+
+}  // namespace absenc::tool

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/encoder_memory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <initializer_list>
+
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/progress.hpp"
+#include "tools/absenc/run.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+struct Value {
+  std::string_view argument;
+  std::int64_t value;
+};
+
+const Argument* find_argument(const Command& command, std::string_view name) {
+  for (const Argument& argument : command.arguments) {
+    if (argument.name == name) return &argument;
+  }
+  return nullptr;
+}
+
+// In the order of the command, which need not have all of them.
+std::vector<std::int64_t> arguments(const Command& command, std::initializer_list<Value> values) {
+  std::vector<std::int64_t> all;
+  for (const Argument& argument : command.arguments) {
+    const auto value =
+        std::find_if(values.begin(), values.end(), [&](const Value& one) { return one.argument == argument.name; });
+    all.push_back(value != values.end() ? value->value : argument.default_value);
+  }
+  return all;
+}
+
+/// What memory_read reports.
+struct ReadBytes final : FieldSink {
+  void put(const FieldValue& field) override {
+    if (field.info->name == "data") data.assign(field.bytes.begin(), field.bytes.end());
+    if (field.info->name == "value" && data.empty()) data = {static_cast<std::uint8_t>(field.number)};
+  }
+  std::vector<std::uint8_t> data;
+};
+
+// So many bytes of a run can be read at once.
+std::size_t most_at_once(const Unit& unit, const Command& command, MemoryAddress at) {
+  const Argument* count = find_argument(command, "count");
+  const auto most = count != nullptr ? static_cast<std::size_t>(count->maximum) : 1;
+  for (const MemoryArea& area : unit.memory) {
+    if (area.has(at.page, at.address)) return std::min<std::size_t>(most, area.first + area.count - at.address);
+  }
+  return 1;
+}
+
+}  // namespace
+
+void EncoderMemory::check_model() {
+  if (find_command(encoder_->unit(), Verb::read) == nullptr) return;
+  const Outcome outcome = encoder_->read();
+  if (outcome.error != Error::none) throw CommandFailure(encoder_->trouble(outcome));
+}
+
+MemoryImage EncoderMemory::read(const MemoryImage& image) {
+  const Unit& unit = encoder_->unit();
+  const Command& command = *find_command(unit, Verb::memory_read);
+  Progress progress;
+  MemoryImage found;
+  for (const MemoryRun& run : runs(image)) {
+    for (std::size_t done = 0; done < run.bytes.size();) {
+      const MemoryAddress at{run.first.page, static_cast<std::uint32_t>(run.first.address + done)};
+      const std::size_t count = std::min(run.bytes.size() - done, most_at_once(unit, command, at));
+      const std::vector<std::uint8_t> bytes = read_run(at, count);
+      for (std::uint32_t i = 0; i < count; ++i) found[{at.page, at.address + i}] = bytes[i];
+      done += count;
+      progress.show(fmt::format("reading {} of {} bytes", found.size(), image.size()));
+    }
+  }
+  return found;
+}
+
+std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t count) {
+  const Command& command = *find_command(encoder_->unit(), Verb::memory_read);
+  ReadBytes bytes;
+  run_into(
+      *encoder_, command,
+      arguments(command, {{"page", at.page}, {"address", at.address}, {"count", static_cast<std::int64_t>(count)}}),
+      bytes);
+  if (bytes.data.size() == count) return bytes.data;
+  throw ToolFailure(fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(encoder_->unit(), at),
+                                bytes.data.size()));
+}
+
+void EncoderMemory::write(MemoryAddress at, std::uint8_t value) {
+  const Command& command = *find_command(encoder_->unit(), Verb::memory_write);
+  ReadBytes ignored;
+  run_into(*encoder_, command, arguments(command, {{"page", at.page}, {"address", at.address}, {"value", value}}),
+           ignored);
+}
+
+}  // namespace absenc::tool

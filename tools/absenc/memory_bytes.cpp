@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// `memory read` and `memory write`: single bytes.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_memory.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/memory_change.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/wire_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+constexpr std::int64_t most_bytes = 65536;
+
+MemoryAddress first_address(const Invocation& invocation) {
+  return {static_cast<std::uint32_t>(invocation.number("--page", 0, 0, UINT16_MAX)),
+          static_cast<std::uint32_t>(invocation.number("address", 0, 0, INT32_MAX))};
+}
+
+// "0x10  00 5A ...  .Z..."
+std::string hex_dump(const MemoryImage& image) {
+  std::vector<std::vector<std::string>> rows;
+  for (const MemoryRun& run : runs(image, 16)) {
+    std::string characters;
+    for (const std::uint8_t byte : run.bytes) {
+      characters += byte > 0x20 && byte < 0x7F ? static_cast<char>(byte) : '.';
+    }
+    rows.push_back({fmt::format("0x{:02X}", run.first.address), to_hex(run.bytes), characters});
+  }
+  return table(rows);
+}
+
+int run_read(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  require_memory(*uri.unit, false);
+  const MemoryAddress first = first_address(invocation);
+  const std::int64_t count = invocation.number("--count", 1, 1, most_bytes);
+  MemoryImage image;
+  for (std::uint32_t i = 0; i < count; ++i) image[{first.page, first.address + i}] = 0;
+  require_open(*uri.unit, image, false);
+
+  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  image = EncoderMemory(*encoder).read(image);
+  if (!invocation.has("--json")) {
+    print_line(hex_dump(image));
+    return exit_good;
+  }
+  const std::vector<std::uint8_t> bytes = runs(image).front().bytes;
+  print_line(Json::object()
+                 .set("ok", true)
+                 .set("page", first.page)
+                 .set("address", first.address)
+                 .set("data", fmt::format("{:02x}", fmt::join(bytes, "")))
+                 .line());
+  return exit_good;
+}
+
+int run_write(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  require_memory(*uri.unit, true);
+  MemoryAddress at = first_address(invocation);
+  MemoryImage wanted;
+  for (const std::string& written : invocation.texts("values")) {
+    const Result<std::int64_t> value = parse_number(written);
+    if (!value || *value < 0 || *value > 255) {
+      throw UsageError(fmt::format("the value \"{}\" is no byte: a number from 0 to 255, or 0x00 to 0xFF", written));
+    }
+    wanted[at] = static_cast<std::uint8_t>(*value);
+    ++at.address;
+  }
+  require_open(*uri.unit, wanted, true);
+  return change_memory(invocation, uri, wanted);
+}
+
+constexpr Parameter address{"address", "", "of the first byte: decimal, or hexadecimal with 0x", "", true};
+constexpr Parameter page{"--page", "P", "of the memory, where it has pages", "0"};
+
+constexpr std::array<Parameter, 6> read_parameters{{
+    parameter::encoder,
+    address,
+    page,
+    {"--count", "N", "how many bytes", "1"},
+    parameter::json,
+    parameter::option,
+}};
+constexpr std::array<Example, 2> read_examples{{
+    {"absenc memory read tformat:/dev/ttyUSB0 0x10 --count 16 --page 2", "16 bytes of page 2"},
+    {"absenc memory read sim:tformat 0", "try it without hardware"},
+}};
+
+constexpr std::array<Parameter, 8> write_parameters{{
+    parameter::encoder,
+    address,
+    {"values", "", "bytes: decimal, or hexadecimal with 0x", "", true, true},
+    page,
+    {"--dry-run", "", "only show what differs"},
+    parameter::yes,
+    parameter::json,
+    parameter::option,
+}};
+constexpr std::array<Example, 2> write_examples{{
+    {"absenc memory write tformat:/dev/ttyUSB0 0x10 0x42 0x43 --page 2", "two bytes of page 2"},
+    {"absenc memory write sim:tformat 0 0x5A", "try it without hardware"},
+}};
+
+}  // namespace
+
+const Subcommand memory_read_subcommand{
+    "memory read", "read bytes of the encoder's memory", "", read_parameters, read_examples, run_read};
+const Subcommand memory_write_subcommand{
+    "memory write",
+    "write bytes of the encoder's memory",
+    "Asks first; without a terminal it needs --yes. Only bytes that differ are written: memory wears. Each is\n"
+    "read back.",
+    write_parameters,
+    write_examples,
+    run_write};
+
+}  // namespace absenc::tool

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Brings bytes of an encoder's memory to what they should be: shows, asks, writes what differs, reads back.
+#pragma once
+
+#include "tools/absenc/encoder_uri.hpp"
+#include "tools/absenc/json.hpp"
+#include "tools/absenc/memory_image.hpp"
+#include "tools/absenc/subcommand.hpp"
+
+namespace absenc::tool {
+
+/// Heeds --yes, --json and --dry-run; returns the exit status. When it ends too early it says which bytes were written
+/// and which were not. `wanted` must be open. Throws UsageError when nobody can be asked.
+int change_memory(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted);
+
+/// WHERE, FILE, ENCODER: a row for up to 8 bytes that follow each other.
+[[nodiscard]] std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,
+                                           const MemoryImage& found);
+[[nodiscard]] Json differences_json(const MemoryImage& differing, const MemoryImage& found);
+
+}  // namespace absenc::tool

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// `memory dump`, `load` and `verify`: between an encoder's memory and a file.
+#include <fmt/format.h>
+
+#include <array>
+#include <cstring>
+#include <filesystem>
+
+#include "absenc/os/process.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/dump_file.hpp"
+#include "tools/absenc/encoder_memory.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/memory_change.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/text_file.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Before the encoder is read for nothing.
+void require_replaceable(const std::string& path) {
+  const auto refuse = [&](std::string_view why) {
+    throw ToolFailure(fmt::format("{} cannot be written: {}", path, why));
+  };
+  std::error_code ignored;
+  const fs::path folder = fs::path(path).parent_path();
+  if (!fs::exists(path, ignored)) {
+    if (!fs::is_directory(folder, ignored)) refuse(fmt::format("there is no directory {}", folder.string()));
+    return;
+  }
+  if (!fs::is_regular_file(path, ignored)) refuse("it is no regular file");
+  if (const int error = os::replaceable(path); error != 0) refuse(std::strerror(error));
+}
+
+int run_dump(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  require_memory(*uri.unit, false);
+  const bool to_file = invocation.has("--output");
+  const std::string path = to_file ? link_target(std::string(invocation.text("--output"))) : "";
+  if (to_file) require_replaceable(path);
+
+  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  EncoderMemory memory(*encoder);
+  memory.check_model();
+  const MemoryImage image = memory.read(dump_addresses(*uri.unit));
+  const std::string text = to_dump(*uri.unit, uri.options, image);
+  if (!to_file) {
+    print_line(text);
+    return exit_good;
+  }
+  os::replace_file(path, text, os::Durable::yes);
+  print_line(fmt::format("{} bytes are in {}", image.size(), path));
+  return exit_good;
+}
+
+MemoryImage read_dump(const Invocation& invocation, const EncoderUri& uri, bool for_writing) {
+  const std::string path(invocation.text("file"));
+  const std::string text = read_text_file("the dump", path);
+  const Dump dump = parse_dump(path, text, *uri.unit, uri.options, for_writing);
+  if (!dump.checked) print_message(fmt::format("note: {} has no checksum: damage would not be noticed", path));
+  return dump.image;
+}
+
+int run_load(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  require_memory(*uri.unit, true);
+  return change_memory(invocation, uri, read_dump(invocation, uri, true));
+}
+
+int run_verify(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  require_memory(*uri.unit, false);
+  const MemoryImage wanted = read_dump(invocation, uri, false);
+  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  EncoderMemory memory(*encoder);
+  memory.check_model();
+  const MemoryImage found = memory.read(wanted);
+  const MemoryImage wrong = differing(wanted, found);
+  if (invocation.has("--json")) {
+    print_line(Json::object()
+                   .set("ok", true)
+                   .set("same", wrong.empty())
+                   .set("compared", wanted.size())
+                   .set("differences", differences_json(wrong, found))
+                   .line());
+  } else {
+    if (!wrong.empty()) print_line(difference_table(*uri.unit, "FILE", wrong, found));
+    print_line(wrong.empty() ? fmt::format("all {} bytes are the same", wanted.size())
+                             : fmt::format("{} of {} bytes differ", wrong.size(), wanted.size()));
+  }
+  return wrong.empty() ? exit_good : exit_failed;
+}
+
+constexpr Parameter file{"file", "", "made by `absenc memory dump`, edited or not", "", true};
+
+constexpr std::array<Parameter, 3> dump_parameters{{
+    parameter::encoder,
+    {"--output", "FILE", "where to write it; a file that is there is replaced", "standard output"},
+    parameter::option,
+}};
+constexpr std::array<Example, 2> dump_examples{{
+    {"absenc memory dump tformat:/dev/ttyUSB0 --output motor7.dump", "keep what is in an encoder"},
+    {"absenc memory dump sim:tformat", "try it without hardware"},
+}};
+
+constexpr std::array<Parameter, 6> load_parameters{{
+    parameter::encoder,
+    file,
+    {"--dry-run", "", "only show what differs"},
+    parameter::yes,
+    parameter::json,
+    parameter::option,
+}};
+constexpr std::array<Example, 2> load_examples{{
+    {"absenc memory load tformat:/dev/ttyUSB0 motor7.dump", "make an encoder that replaces another the same"},
+    {"absenc memory load tformat:/dev/ttyUSB0 motor7.dump --dry-run", "what would be written"},
+}};
+
+constexpr std::array<Parameter, 4> verify_parameters{{parameter::encoder, file, parameter::json, parameter::option}};
+constexpr std::array<Example, 2> verify_examples{{
+    {"absenc memory verify tformat:/dev/ttyUSB0 motor7.dump", "is it what was written?"},
+    {"absenc memory verify tformat:/dev/ttyUSB0 motor7.dump --json", "the same for programs"},
+}};
+
+}  // namespace
+
+const Subcommand memory_dump_subcommand{
+    "memory dump",
+    "copy the memory into a file that can be edited",
+    "Lines of page, address and bytes in hexadecimal. After editing, delete the line with the checksum: a file\n"
+    "whose checksum is wrong is refused, one without is taken. What is not in the file is left alone.",
+    dump_parameters,
+    dump_examples,
+    run_dump};
+const Subcommand memory_load_subcommand{
+    "memory load",
+    "write the bytes of such a file that differ",
+    "The whole file is checked first; then the differences are shown, and it asks. Without a terminal it needs\n"
+    "--yes. Each byte is read back. After an interruption the same command goes on where it stopped.",
+    load_parameters,
+    load_examples,
+    run_load};
+const Subcommand memory_verify_subcommand{"memory verify",
+                                          "compare the memory with such a file",
+                                          "Exit status 1 when they differ.",
+                                          verify_parameters,
+                                          verify_examples,
+                                          run_verify};
+
+}  // namespace absenc::tool

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/memory_image.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "tools/absenc/error.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+const MemoryArea* find_area(const Unit& unit, MemoryAddress at) {
+  const auto found = std::find_if(unit.memory.begin(), unit.memory.end(),
+                                  [&](const MemoryArea& area) { return area.has(at.page, at.address); });
+  return found == unit.memory.end() ? nullptr : &*found;
+}
+
+bool has_pages(const Unit& unit) {
+  return std::any_of(unit.memory.begin(), unit.memory.end(), [](const MemoryArea& area) { return area.page != 0; });
+}
+
+void add(MemoryImage& image, const MemoryArea& area) {
+  for (std::uint32_t i = 0; i < area.count; ++i) image[{area.page, area.first + i}] = 0;
+}
+
+}  // namespace
+
+std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest) {
+  std::vector<MemoryRun> all;
+  MemoryAddress next;
+  for (const auto& [at, value] : image) {
+    if (all.empty() || at != next || all.back().bytes.size() == longest) all.push_back({at, {}});
+    all.back().bytes.push_back(value);
+    next = {at.page, at.address + 1};
+  }
+  return all;
+}
+
+MemoryImage dump_addresses(const Unit& unit) {
+  MemoryImage image;
+  for (const MemoryArea& area : unit.memory) {
+    if (area.in_dump) add(image, area);
+  }
+  return image;
+}
+
+MemoryImage differing(const MemoryImage& wanted, const MemoryImage& found) {
+  MemoryImage image;
+  for (const auto& [at, value] : wanted) {
+    const auto there = found.find(at);
+    if (there == found.end() || there->second != value) image[at] = value;
+  }
+  return image;
+}
+
+std::string to_text(const Unit& unit, MemoryAddress at) {
+  const std::string address = fmt::format("address 0x{:02X}", at.address);
+  return has_pages(unit) ? fmt::format("page {} {}", at.page, address) : address;
+}
+
+std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
+  std::map<std::uint32_t, std::vector<std::string>> ranges;  // of each page
+  for (const MemoryRun& run : runs(image)) {
+    std::string text = fmt::format("0x{:02X}", run.first.address);
+    if (run.bytes.size() > 1) text += fmt::format(" to 0x{:02X}", run.first.address + run.bytes.size() - 1);
+    ranges[run.first.page].push_back(text);
+  }
+  std::vector<std::string> pages;
+  for (auto page = ranges.begin(); page != ranges.end();) {
+    auto last = page;  // of the pages with the same addresses
+    auto after = std::next(page);
+    while (after != ranges.end() && after->first == last->first + 1 && after->second == page->second) last = after++;
+    std::string text = fmt::format("{}", fmt::join(page->second, ", "));
+    if (has_pages(unit)) {
+      const std::string to = last == page ? "" : fmt::format(" to {}", last->first);
+      text.insert(0, fmt::format("page {}{}: ", page->first, to));
+    }
+    pages.push_back(text);
+    page = after;
+  }
+  return fmt::format("{}", fmt::join(pages, "; "));
+}
+
+std::string closed(const Unit& unit, MemoryAddress at, bool for_writing) {
+  const MemoryArea* area = find_area(unit, at);
+  if (area != nullptr && (area->writable || !for_writing)) return {};
+  if (area != nullptr) return fmt::format("{} ({}) can only be read", to_text(unit, at), area->meaning);
+  MemoryImage all;
+  for (const MemoryArea& one : unit.memory) add(all, one);
+  return fmt::format("{} has no {}; it has {}", unit.id, to_text(unit, at), addresses_in_words(unit, all));
+}
+
+void require_memory(const Unit& unit, bool for_writing) {
+  const Verb verb = for_writing ? Verb::memory_write : Verb::memory_read;
+  if (!unit.memory.empty() && find_command(unit, verb) != nullptr) return;
+  throw UsageError(fmt::format("the memory of a {} encoder cannot be {}", unit.id, for_writing ? "written" : "read"));
+}
+
+void require_open(const Unit& unit, const MemoryImage& image, bool for_writing) {
+  for (const auto& [at, value] : image) {
+    if (const std::string why = closed(unit, at, for_writing); !why.empty()) throw UsageError(why);
+  }
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bytes of an encoder's memory by their addresses, in words and in runs.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::tool {
+
+struct MemoryAddress {
+  std::uint32_t page = 0;
+  std::uint32_t address = 0;
+  friend constexpr auto operator<=>(const MemoryAddress&, const MemoryAddress&) = default;
+};
+
+using MemoryImage = std::map<MemoryAddress, std::uint8_t>;
+
+/// Consecutive addresses of one page.
+struct MemoryRun {
+  MemoryAddress first;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// In order; a run ends after `longest` bytes.
+[[nodiscard]] std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest = SIZE_MAX);
+
+/// What a copy of the unit's memory has; the values are 0.
+[[nodiscard]] MemoryImage dump_addresses(const Unit& unit);
+
+/// The bytes of `wanted` that `found` has not, with the values of `wanted`.
+[[nodiscard]] MemoryImage differing(const MemoryImage& wanted, const MemoryImage& found);
+
+/// "page 2 address 0x05", or "address 0x05" where there are no pages
+[[nodiscard]] std::string to_text(const Unit& unit, MemoryAddress at);
+
+/// "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06"
+[[nodiscard]] std::string addresses_in_words(const Unit& unit, const MemoryImage& image);
+
+/// Why this address cannot be read (or written), or "".
+[[nodiscard]] std::string closed(const Unit& unit, MemoryAddress at, bool for_writing);
+
+/// Throws UsageError.
+void require_memory(const Unit& unit, bool for_writing);
+void require_open(const Unit& unit, const MemoryImage& image, bool for_writing);
+
+}  // namespace absenc::tool

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parameters that many subcommands share, so that they read the same everywhere.
+#pragma once
+
+#include "tools/absenc/subcommand.hpp"
+
+namespace absenc::tool::parameter {
+
+inline constexpr Parameter encoder{"encoder", "",
+                                   "PROTOCOL:PORT, PROTOCOL:tcp:HOST:PORT, sim:PROTOCOL or a name from absenc.toml, "
+                                   "with ?NAME=VALUE&NAME=VALUE behind it",
+                                   "", true};
+inline constexpr Parameter option{
+    "--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true};
+inline constexpr Parameter yes{"--yes", "", "do not ask before the encoder is changed"};
+inline constexpr Parameter json{"--json", "", "one JSON object"};
+
+// Without an encoder:
+inline constexpr Parameter protocol{"protocol", "", "see `absenc list`", "", true};
+inline constexpr Parameter model{"--model", "NAME", "which model of the protocol",
+                                 "the first that agrees with the options"};
+inline constexpr Parameter protocol_option{"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true};
+
+// Commands of a protocol:
+inline constexpr Parameter command{"command", "", "a command of the protocol: see `absenc list <protocol>`", "", true};
+inline constexpr Parameter arguments{
+    "arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true};
+
+}  // namespace absenc::tool::parameter
