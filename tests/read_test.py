@@ -215,12 +215,37 @@ class Trouble(EncoderCase):
 
     def test_unplugged(self):
         emulator = self.emulator()
-        process = self.start("read", f"tformat:{emulator.path}", "--count", "0", "--rate", "0")
+        process = self.start("read", f"tformat:{emulator.path}", "--count", "1000000", "--rate", "0")
         self.first_line(process)
         emulator.end()
         _, err = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 1)
         self.assertIn("went away", err.decode())
+
+    def test_endless_reading_waits_for_an_unplugged_encoder(self):
+        with Emulator(self.directory, "--singleturn", "1000") as emulator:
+            process = self.start("read", f"tformat:{emulator.path}?latency=300", "--count", "0", "--rate", "100", "--json")
+            self.first_line(process)
+            emulator.end(signal.SIGKILL)
+            lines = [self.next_line(process)]
+            while "event" not in lines[-1]:
+                lines.append(self.next_line(process))
+        with Emulator(self.directory, "--singleturn", "2000"):
+            while len(lines) < 3 or "singleturn" not in lines[-1]:
+                lines.append(self.next_line(process))
+            status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0)
+        self.assertEqual([line["event"] for line in lines if "event" in line], ["lost", "back"])
+        lost = next(number for number, line in enumerate(lines) if "event" in line)
+        self.assertEqual({line["singleturn"] for line in lines[:lost]} - {1000}, set())
+        self.assertEqual(lines[-1]["singleturn"], 2000)
+        self.assertEqual(sorted(line["time_s"] for line in lines), [line["time_s"] for line in lines])
+        self.assertIn("Waiting for it to come back", messages)
+        self.assertRegex(messages, r"the port is back after [\d.]+ m?s")
+        self.assertIn("the port went away: 1", messages)
+
+    def next_line(self, process):
+        return json.loads(self.first_line(process))
 
 
 class OrdinaryUser(EncoderCase):
