@@ -19,8 +19,9 @@ class Terminal:
 
     def __init__(self, case, *arguments, columns=80, rows=24, environment=""):
         self.case = case
-        self.socket = os.path.join(case.directory, "tmux")
-        self.status = case.file("status")
+        number = len(os.listdir(case.directory))  # a case may have several
+        self.socket = os.path.join(case.directory, f"tmux-{number}")
+        self.status = os.path.join(case.directory, f"status-{number}")
         command = f"env {environment} {shlex.join([ABSENC, 'monitor', *arguments])}; echo $? >{self.status}; read wait"
         self.tmux("-f", "/dev/null", "new-session", "-d", "-x", str(columns), "-y", str(rows), command)
         case.addCleanup(self.tmux, "kill-server")

@@ -322,6 +322,16 @@ class Ends(EncoderCase):
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual((status, err), (1, "absenc: interrupted\n"))
 
+    def test_interrupted_change(self):
+        emulator = self.emulator("--fault", "silence=1")
+        process = self.start("zero", f"tformat:{emulator.path}?latency=60000", "--yes")
+        deadline = time.monotonic() + PATIENCE
+        while not self.handles_interrupts(process.pid) and time.monotonic() < deadline:
+            pass
+        status, _, err = end(process, signal.SIGINT)
+        self.assertEqual(status, 1)
+        self.assert_sentence(err, "interrupted in the middle of zero", "not known")
+
     def test_interrupted_wait_for_an_answer(self):
         emulator = self.emulator("--fault", "silence=1")
         process = self.start("read", f"tformat:{emulator.path}?latency=60000")

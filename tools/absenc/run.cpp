@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/consent.hpp"
 #include "tools/absenc/error.hpp"
@@ -46,15 +47,19 @@ int run_command(const Invocation& invocation, const EncoderUri& uri, const Comma
   }
 
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
-  if (invocation.has("--json")) {
-    JsonFields fields;
-    run_into(*encoder, command, arguments, fields);
-    print_line(Json::object().set("ok", true).set("fields", fields.fields).line());
-  } else {
-    FieldTable rows;
-    run_into(*encoder, command, arguments, rows);
-    print_line(table(rows.rows));
+  JsonFields fields;
+  FieldTable rows;
+  const bool json = invocation.has("--json");
+  try {
+    run_into(*encoder, command, arguments, json ? static_cast<FieldSink&>(fields) : rows);
+  } catch (const os::Interrupted&) {
+    if (!command.changes_encoder) throw;
+    throw ToolFailure(
+        fmt::format("interrupted in the middle of {}: whether it was done is not known, read the encoder "
+                    "before you try again",
+                    command.name));
   }
+  print_line(json ? Json::object().set("ok", true).set("fields", fields.fields).line() : table(rows.rows));
   return exit_good;
 }
 
