@@ -9,6 +9,7 @@
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/run.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 
@@ -64,18 +65,9 @@ int run_alarms(const Invocation& invocation) {
   }
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
   const Outcome outcome = encoder->read();
-  const bool json = invocation.has("--json");
-  if (outcome.error != Error::none) {
-    const Trouble trouble = encoder->trouble(outcome);
-    if (json) {
-      print_line(trouble.json().line());
-    } else {
-      print_message(trouble.text());
-    }
-    return exit_failed;
-  }
+  if (outcome.error != Error::none) throw CommandFailure(encoder->trouble(outcome));
   if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no alarms");
-  if (json) {
+  if (invocation.has("--json")) {
     show_json(*uri.unit, *outcome.reading);
   } else {
     show(*uri.unit, *outcome.reading);

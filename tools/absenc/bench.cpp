@@ -135,7 +135,7 @@ int run_bench(const Invocation& invocation) {
   if (measurement.latencies.empty()) {
     throw ToolFailure(fmt::format("there was no good reading; exchanges: {}", summary(encoder->counters())));
   }
-  print_line(json ? to_json(*encoder, measurement).line() : to_text(*encoder, measurement));
+  print_line(invocation.has("--json") ? to_json(*encoder, measurement).line() : to_text(*encoder, measurement));
   return measurement.failed == 0 ? exit_good : exit_failed;
 }
 

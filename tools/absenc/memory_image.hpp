@@ -2,7 +2,6 @@
 // Bytes of an encoder's memory by their addresses, in words and in runs.
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -15,7 +14,10 @@ namespace absenc::tool {
 struct MemoryAddress {
   std::uint32_t page = 0;
   std::uint32_t address = 0;
-  friend constexpr auto operator<=>(const MemoryAddress&, const MemoryAddress&) = default;
+  friend constexpr bool operator==(const MemoryAddress&, const MemoryAddress&) = default;
+  friend constexpr bool operator<(const MemoryAddress& one, const MemoryAddress& other) {
+    return one.page != other.page ? one.page < other.page : one.address < other.address;
+  }
 };
 
 using MemoryImage = std::map<MemoryAddress, std::uint8_t>;
