@@ -128,7 +128,6 @@ int run_bench(const Invocation& invocation) {
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const double seconds = invocation.real("--seconds", 5, 0.01, 86400);
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
-  const bool json = invocation.has("--json");
   const Outcome first = encoder->read();
   if (first.error != Error::none) throw CommandFailure(encoder->trouble(first));
   const Measurement measurement = measure(*encoder, seconds);
