@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absenc/protocol/all.hpp"
@@ -33,9 +34,16 @@ std::vector<Case> cases_where(Wanted&& wanted) {
   return cases;
 }
 
+/// Real numbers as float: what differs by rounding is the same.
+using Value = std::pair<std::int64_t, float>;
+
+Value comparable(std::int64_t number, double real) { return {number, static_cast<float>(real)}; }
+
 struct Collector final : FieldSink {
-  void put(const FieldValue& value) override { fields[std::string(value.info->name)] = value.number; }
-  std::map<std::string, std::int64_t> fields;
+  void put(const FieldValue& value) override {
+    fields[std::string(value.info->name)] = comparable(value.number, value.real);
+  }
+  std::map<std::string, Value> fields;
 };
 
 Options options_of(const Case& test) {
@@ -51,10 +59,21 @@ Options options_of(const Case& test) {
   return options;
 }
 
-std::map<std::string, std::int64_t> expected_fields(const Vector& vector) {
-  std::map<std::string, std::int64_t> fields;
-  for (const Expected& expected : vector.fields) fields[std::string(expected.field)] = expected.number;
+std::map<std::string, Value> expected_fields(const Vector& vector) {
+  std::map<std::string, Value> fields;
+  for (const Expected& expected : vector.fields) {
+    fields[std::string(expected.field)] = comparable(expected.number, expected.real);
+  }
   return fields;
+}
+
+// A text of 0 and 1, MSB first.
+Wire pack(Bytes text) {
+  Wire bytes((text.size() + 7) / 8);
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '1') bytes[i / 8] = static_cast<std::uint8_t>(bytes[i / 8] | 0x80u >> i % 8);
+  }
+  return bytes;
 }
 
 class Battery : public ::testing::TestWithParam<Case> {
@@ -63,8 +82,13 @@ class Battery : public ::testing::TestWithParam<Case> {
   const Vector& vector = *GetParam().vector;
   Options options = options_of(GetParam());
 
+  // What a vector's reply is made of: bits as characters on clocked links, bytes elsewhere.
+  const bool clocked = unit.link == LinkKind::clocked;
+
   Error decode(Bytes reply, Collector& collector) const {
-    return unit.decode(options, {.bytes = vector.request}, {.bytes = reply}, collector);
+    const Wire packed = clocked ? pack(reply) : Wire(reply.begin(), reply.end());
+    const Frame frame{.bytes = packed, .bits = clocked ? reply.size() : 0};
+    return unit.decode(options, {.bytes = vector.request}, frame, collector);
   }
 };
 
@@ -87,17 +111,25 @@ TEST_P(GoodReply, EveryTruncation) {
 }
 
 TEST_P(GoodReply, EveryBitFlip) {
-  for (std::size_t bit = 0; bit < vector.reply.size() * 8; ++bit) {
+  const std::size_t bits_each = clocked ? 1 : 8;
+  const Wire packed = clocked ? pack(vector.reply) : Wire(vector.reply.begin(), vector.reply.end());
+  const Frame good{.bytes = packed, .bits = clocked ? vector.reply.size() : 0};
+  for (std::size_t bit = 0; bit < vector.reply.size() * bits_each; ++bit) {
     Wire reply(vector.reply.begin(), vector.reply.end());
-    reply[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
-    if (unit.covered != nullptr && !unit.covered(options, {.bytes = vector.request}, bit)) continue;
+    if (unit.covered != nullptr && !unit.covered(options, {.bytes = vector.request}, good, bit)) continue;
+    reply[bit / bits_each] ^= static_cast<std::uint8_t>(1u << bit % bits_each);
     Collector collector;
     EXPECT_NE(decode(reply, collector), Error::none) << bit;
     EXPECT_TRUE(collector.fields.empty());
   }
 }
 
-TEST_P(GoodReply, DelimitFindsTheEnd) {
+class DelimitedReply : public Battery {};
+
+// On clocked links the pause of the clock is the end.
+bool is_delimited(const Case& test) { return test.unit->link != LinkKind::clocked && is_good_reply(test); }
+
+TEST_P(DelimitedReply, DelimitFindsTheEnd) {
   Wire stream(vector.reply.begin(), vector.reply.end());
   stream.push_back(0);
   const Delimit whole = unit.delimit(options, Direction::reply, stream);
@@ -176,7 +208,7 @@ class HostBattery : public Battery {
 
   struct Outcome {
     Error error;
-    std::map<std::string, std::int64_t> fields;
+    std::map<std::string, Value> fields;
   };
   Outcome converse(const std::vector<Wire>& pieces) {
     std::vector<std::byte> storage(unit.host_storage);
@@ -277,11 +309,15 @@ std::string test_name(const ::testing::TestParamInfo<Case>& info) {
   return name;
 }
 
-bool is_read_by_a_command(const Case& test) { return !test.vector->reply.empty() && command_of(test) != nullptr; }
+// On clocked links nothing is asked, and a reply has as many bits as were clocked.
+bool is_read_by_a_command(const Case& test) {
+  return test.unit->link != LinkKind::clocked && !test.vector->reply.empty() && command_of(test) != nullptr;
+}
 
 INSTANTIATE_TEST_SUITE_P(Vectors, Battery, ::testing::ValuesIn(cases_where([](const Case&) { return true; })),
                          test_name);
 INSTANTIATE_TEST_SUITE_P(Vectors, GoodReply, ::testing::ValuesIn(cases_where(is_good_reply)), test_name);
+INSTANTIATE_TEST_SUITE_P(Vectors, DelimitedReply, ::testing::ValuesIn(cases_where(is_delimited)), test_name);
 INSTANTIATE_TEST_SUITE_P(Vectors, HostBattery, ::testing::ValuesIn(cases_where(is_read_by_a_command)), test_name);
 
 }  // namespace

@@ -14,18 +14,19 @@
 #include "absenc/host/velocity.hpp"
 #include "absenc/link/can.hpp"
 #include "absenc/protocol/all.hpp"
+#include "absenc/protocol/word.hpp"
 
 namespace absenc {
 
 inline constexpr CrcParameters modbus{16, 0x8005, 0xFFFF, true, true, 0x0000};
-inline constexpr CrcParameters biss{6, 0x03, 0x00, false, false, 0x3F};
+inline constexpr CrcParameters biss_crc{6, 0x03, 0x00, false, false, 0x3F};
 
 template class Buffer<std::uint8_t, 64>;
 template class Buffer<CanFrame, 4>;
 template class Crc<modbus, CrcTable::byte>;
 template class Crc<modbus, CrcTable::nibble>;
-template class Crc<biss, CrcTable::byte>;
-template class Crc<biss, CrcTable::nibble>;
+template class Crc<biss_crc, CrcTable::byte>;
+template class Crc<biss_crc, CrcTable::nibble>;
 template class Result<std::uint64_t>;
 template class Result<Reading>;
 template class host::Statistics<std::uint8_t>;
@@ -53,6 +54,13 @@ std::uint64_t helpers(Bytes bytes, MutableBytes out) {
   store_little_endian(out, load_big_endian(bytes));
   return gray_decode(gray_encode(reflect(bytes.size(), 64))) + (odd_parity(bytes.size()) ? 1u : 0u) +
          static_cast<std::uint64_t>(wrapped_difference(1, 2, 17)) + static_cast<std::uint64_t>(degrees(1, 17));
+}
+
+// A word that is only known at run time.
+Result<Word> word_of_text(std::string_view text, BitView bits) {
+  WordFormat format;
+  if (!parse_word_format(text, format).reason.empty()) return Error::invalid_argument;
+  return decode_word(format, bits);
 }
 
 // A machine with its own state and every pointer to a unit: virtual tables and the list of units.

@@ -215,7 +215,7 @@ struct Clocked : testing::Test {
 TEST_F(Clocked, WordIsPackedMsbFirstAndLeftAligned) {
   clock(13);
   EXPECT_EQ(host.log, "53000 sent, 53000 received 91 A0");
-  EXPECT_EQ(device.log, "1000 selected, 53000 sent 13");
+  EXPECT_EQ(device.log, "1000 selected 4000, 53000 sent 13");
   EXPECT_EQ(notes, "");
 }
 

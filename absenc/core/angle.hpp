@@ -17,6 +17,7 @@ struct Reading {
   unsigned multiturn_bits = 0;         // 0: the reply carries no revolutions
   unsigned singleturn_valid_bits = 0;  // the top bits that hold; 0: do not use the position
   bool multiturn_valid = false;
+  double unit_um = 0;        // linear encoders: micrometres a count of `singleturn`; 0: a rotation
   bool ready = true;         // false while the encoder says that it is starting
   std::uint32_t status = 0;  // bits named by the unit's status field
   std::uint32_t alarms = 0;  // bits named by the unit's alarms field
@@ -28,9 +29,10 @@ struct Reading {
   }
 };
 
-/// Degrees, 0 to below 360. A revolution has 2^bits counts, not 2^bits - 1.
+/// Degrees, 0 to below 360. A revolution has 2^bits counts, not 2^bits - 1. 1 to 64 bits.
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
-  return 360.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << bits);
+  if (bits > 48) return degrees(counts >> (bits - 48), 48);  // more would be rounded up to 360
+  return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }
 
 /// The shortest way from `from` to `to` on a circle of 2^bits counts: -2^(bits-1) .. 2^(bits-1) - 1. 1 to 63 bits.

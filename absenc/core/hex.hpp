@@ -65,4 +65,12 @@ consteval auto hex_bytes() {
 template <HexLiteral literal>
 inline constexpr auto hex = detail::hex_bytes<literal>();
 
+/// Static bytes: the characters of a text, as vectors of ASCII protocols and of clocked links are written.
+template <HexLiteral literal>
+inline constexpr auto ascii = [] {
+  std::array<std::uint8_t, literal.view().size()> bytes{};
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(literal.view()[i]);
+  return bytes;
+}();
+
 }  // namespace absenc

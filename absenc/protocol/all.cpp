@@ -4,6 +4,9 @@
 
 #include <array>
 
+#include "absenc/protocol/biss/unit.hpp"
+#include "absenc/protocol/e201/unit.hpp"
+#include "absenc/protocol/ssi/unit.hpp"
 #include "absenc/protocol/tformat/unit.hpp"
 
 namespace absenc {
@@ -11,6 +14,9 @@ namespace absenc {
 namespace {
 constexpr std::array units{
     &tformat::unit,
+    &biss::unit,
+    &ssi::unit,
+    &e201::unit,
 };
 }  // namespace
 

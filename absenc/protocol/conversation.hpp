@@ -34,6 +34,9 @@ struct Conversation : Machine<Item> {
   /// Every named value of the result. Nothing is put when there was an error.
   virtual void report(FieldSink& sink) const = 0;
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
+  /// Asks to end early, from the next step on: a conversation that changes the encoder for its own use leaves it as it
+  /// was, and ends by itself. The others ignore it: they may be left at any step.
+  virtual void abort() {}
 
  protected:
   ~Conversation() = default;

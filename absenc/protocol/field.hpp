@@ -20,6 +20,7 @@ struct FlagInfo {
 struct FieldInfo {
   enum class Kind : std::uint8_t {
     number,
+    counts,  // a number of up to 64 bits without sign: the bits of `number`
     boolean,
     flags,  // bit n is flags[n]
     real,
@@ -35,7 +36,7 @@ struct FieldInfo {
 
 struct FieldValue {
   const FieldInfo* info;
-  std::int64_t number = 0;  // number, boolean, flags
+  std::int64_t number = 0;  // number, counts, boolean, flags
   double real = 0;
   Bytes bytes{};  // text, bytes; valid during the call of `put`
 };

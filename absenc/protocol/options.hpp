@@ -14,7 +14,8 @@ namespace absenc {
 
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
-/// A number in a range, or one of `choices` (then the value is the index into it).
+/// A number in a range, or one of `choices` (then the value is the index into it). With `decimals`, the user writes up
+/// to so many digits behind a point, and all values are in the unit of the last one.
 struct Option {
   std::string_view name;
   std::string_view meaning;
@@ -23,6 +24,7 @@ struct Option {
   std::int64_t maximum = 0;
   std::span<const std::string_view> choices{};
   bool probeable = false;  // whether captured frames can tell which value is right
+  unsigned decimals = 0;
 };
 
 struct OptionValue {
@@ -69,5 +71,9 @@ struct Unit;
 
 /// A whole number, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.
 [[nodiscard]] Result<std::int64_t> parse_number(std::string_view text);
+
+/// A decimal number of 0 or more with at most `decimals` digits behind a point, in units of the last one: "0.05" with
+/// three decimals is 50. Error: invalid_argument.
+[[nodiscard]] Result<std::int64_t> parse_decimal(std::string_view text, unsigned decimals);
 
 }  // namespace absenc

@@ -84,9 +84,11 @@ struct Frame {
 struct Expected {
   std::string_view field;
   std::int64_t number = 0;
+  double real = 0;
 };
 
-/// A frame with what it must decode to. `options` is "name=value name=value".
+/// A frame with what it must decode to. `options` is "name=value name=value". Clocked links: request and reply are
+/// texts of 0 and 1.
 struct Vector {
   std::string_view id;
   std::string_view meaning;
@@ -151,8 +153,9 @@ struct Unit {
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
   /// What the options make of a position.
   Resolution (*resolution)(const Options& options);
-  /// Whether a flip of this bit of a good reply must be noticed; null: every bit.
-  bool (*covered)(const Options& options, Frame request, std::size_t bit) = nullptr;
+  /// Whether a flip of this bit of this good reply must be noticed; null: every bit. Bits count from the least
+  /// significant of the first byte on; on clocked links in the order of the wire.
+  bool (*covered)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
 };
 
 /// The first command with this verb, or null.

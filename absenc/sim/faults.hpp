@@ -47,9 +47,9 @@ struct FaultRate {
 
 /// Stands between the line and a device machine, which must outlive it. The same seed gives the same faults.
 ///
-/// For character links. A reply that a fault made longer or later is not the device's own timing: until it is sent, the
-/// device does not hear what comes (a real one would not either), so that it does not take it for a host that breaks
-/// the rules.
+/// For character links; on clocked ones the bits that the device drives are damaged. A reply that a fault made longer
+/// or later is not the device's own timing: until it is sent, the device does not hear what comes (a real one would not
+/// either), so that it does not take it for a host that breaks the rules.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   FaultyDevice(Machine<std::uint8_t>& device, const FaultRates& rates, std::uint64_t seed);

@@ -142,7 +142,8 @@ void Line<Item>::begin_exchange(Node node) {
     if (nodes_[other]->role == Role::host) continue;
     nodes_[other]->doing = Step<Item>::Kind::wait;
     nodes_[other]->out.clear();
-    feed(other, {.kind = Event<Item>::Kind::selected, .at = now_});
+    const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
+    feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .width = period});
   }
   schedule(Happening::Kind::exchanged, now_ + host.settings.bits(host.bits), node);
 }

@@ -13,6 +13,7 @@ struct Json::Value {
 Json::Json() : value_(new Value{}) {}
 Json::Json(bool value) : value_(new Value{value}) {}
 Json::Json(std::int64_t value) : value_(new Value{value}) {}
+Json::Json(std::uint64_t value) : value_(new Value{value}) {}
 Json::Json(double value) : value_(new Value{value}) {}
 Json::Json(std::string_view text) : value_(new Value{std::string(text)}) {}
 Json Json::object() {

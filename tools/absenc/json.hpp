@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 namespace absenc::tool {
 
@@ -16,8 +17,9 @@ class Json {
   Json();
   Json(bool value);
   Json(std::int64_t value);
+  Json(std::uint64_t value);
   template <std::integral Integer>
-  Json(Integer value) : Json(static_cast<std::int64_t>(value)) {}
+  Json(Integer value) : Json(std::conditional_t<std::is_signed_v<Integer>, std::int64_t, std::uint64_t>(value)) {}
   Json(double value);
   Json(std::string_view text);
   Json(const char* text) : Json(std::string_view(text)) {}

@@ -151,7 +151,7 @@ Json options_json(const Unit& unit) {
     Json json = Json::object().set("name", option.name).set("meaning", option.meaning);
     json.set("default", to_json(option, option.default_value));
     if (option.choices.empty()) {
-      json.set("minimum", option.minimum).set("maximum", option.maximum);
+      json.set("minimum", to_json(option, option.minimum)).set("maximum", to_json(option, option.maximum));
     } else {
       Json choices = Json::array();
       for (std::size_t i = 0; i < option.choices.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <array>
+#include <cmath>
 
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/error.hpp"
@@ -134,15 +135,16 @@ std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string>
 
 std::string range_of(const Option& option) {
   if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, " or "));
-  return fmt::format("{} to {}", option.minimum, option.maximum);
+  return fmt::format("{} to {}", to_text(option, option.minimum), to_text(option, option.maximum));
 }
 
 std::string to_text(const Option& option, std::int64_t value) {
-  if (option.choices.empty()) return fmt::format("{}", value);
+  if (option.choices.empty()) return option.decimals == 0 ? fmt::format("{}", value) : to_json(option, value).line();
   return std::string(option.choices[static_cast<std::size_t>(value)]);
 }
 
 Json to_json(const Option& option, std::int64_t value) {
+  if (option.decimals != 0) return static_cast<double>(value) / std::pow(10, option.decimals);
   if (option.choices.empty()) return value;
   if (option.choices.data() == boolean_choices.data()) return value != 0;
   return option.choices[static_cast<std::size_t>(value)];
@@ -172,6 +174,8 @@ Json flags_to_json(const FieldInfo& field, std::uint64_t bits) {
 
 Json to_json(const FieldValue& value) {
   switch (value.info->kind) {
+    case FieldInfo::Kind::counts:
+      return static_cast<std::uint64_t>(value.number);
     case FieldInfo::Kind::boolean:
       return value.number != 0;
     case FieldInfo::Kind::flags:
@@ -190,6 +194,8 @@ Json to_json(const FieldValue& value) {
 
 std::string to_text(const FieldValue& value) {
   switch (value.info->kind) {
+    case FieldInfo::Kind::counts:
+      return fmt::format("{}", static_cast<std::uint64_t>(value.number));
     case FieldInfo::Kind::boolean:
       return value.number != 0 ? "yes" : "no";
     case FieldInfo::Kind::flags: {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/error.hpp"
@@ -39,7 +40,10 @@ struct Comparison final : FieldSink {
   void put(const FieldValue& value) override {
     decoded.set(value.info->name, to_json(value));
     for (const Expected& expected : vector.fields) {
-      if (expected.field == value.info->name && expected.number == value.number) ++matches;
+      if (expected.field == value.info->name && expected.number == value.number &&
+          std::abs(expected.real - value.real) < 1e-9) {
+        ++matches;
+      }
     }
   }
   const Vector& vector;
@@ -58,7 +62,8 @@ Json expected_fields(const Unit& unit, const Vector& vector) {
   Json fields = Json::object();
   for (const Expected& expected : vector.fields) {
     const FieldInfo* info = find_field(unit, expected.field);
-    fields.set(expected.field, info != nullptr ? to_json(FieldValue{info, expected.number}) : Json(expected.number));
+    fields.set(expected.field,
+               info != nullptr ? to_json(FieldValue{info, expected.number, expected.real}) : Json(expected.number));
   }
   return fields;
 }

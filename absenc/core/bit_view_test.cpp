@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/core/bit_view.hpp"
+
+#include <gtest/gtest.h>
+
+namespace absenc {
+namespace {
+
+constexpr std::array<std::uint8_t, 10> bytes{0x80, 0xFF, 0x12, 0x34, 0x56, 0x78, 0x9A, 0xBC, 0xDE, 0xF0};
+
+TEST(BitView, LoadsAnyRunAtAnyPlace) {
+  const BitView bits{bytes, 80};
+  for (std::size_t first = 0; first < 80; ++first) {
+    for (unsigned count = 0; count <= 64 && first + count <= 80; ++count) {
+      std::uint64_t value = 0;
+      for (std::size_t i = first; i < first + count; ++i) value = value << 1 | (bits[i] ? 1 : 0);
+      EXPECT_EQ(bits.load(first, count), value) << first << ' ' << count;
+    }
+  }
+  EXPECT_EQ(bits.load(0, 64), 0x80FF123456789ABCu);
+}
+
+TEST(BitView, FindsTheEndOfARun) {
+  const BitView bits{bytes, 18};  // 1 0000000 11111111 00
+  EXPECT_EQ(bits.end_of_run(0), 1u);
+  EXPECT_EQ(bits.end_of_run(1), 8u);
+  EXPECT_EQ(bits.end_of_run(3), 8u);
+  EXPECT_EQ(bits.end_of_run(8), 16u);
+  EXPECT_EQ(bits.end_of_run(16), 18u);  // not 19: the bits behind the end do not count
+}
+
+TEST(BitBuffer, KeepsWhatWasAppended) {
+  BitBuffer<70> buffer;
+  EXPECT_TRUE(buffer.append(0b101, 3));
+  EXPECT_TRUE(buffer.append(0x1234'5678'9ABC'DEF0, 64));
+  EXPECT_FALSE(buffer.append(0, 4));
+  EXPECT_TRUE(buffer.append(7, 3));
+  EXPECT_EQ(buffer.size(), 70u);
+  EXPECT_EQ(buffer.view().load(0, 3), 0b101u);
+  EXPECT_EQ(buffer.view().load(3, 64), 0x1234'5678'9ABC'DEF0u);
+  EXPECT_EQ(buffer.bytes().size(), 9u);
+  EXPECT_EQ(buffer.bytes()[8], 0b00011100);
+  buffer.clear();
+  EXPECT_EQ(buffer.size(), 0u);
+  EXPECT_TRUE(buffer.append(0, 8));
+  EXPECT_EQ(buffer.bytes()[0], 0);
+}
+
+TEST(BitView, CrcOfAnyNumberOfBitsIsThatOfTheDefinition) {
+  constexpr CrcParameters six{6, 0x03, 0, false, false, 0x3F};
+  constexpr CrcParameters sixteen{16, 0x90D9, 0, false, false, 0xFFFF};
+  const BitView bits{bytes, 80};
+  for (std::size_t first = 0; first < 16; ++first) {
+    for (std::size_t count = 0; first + count <= 80; ++count) {
+      std::uint32_t small = 0;
+      std::uint32_t large = 0;
+      for (std::size_t i = first; i < first + count; ++i) {
+        small = small << 1 ^ (((small >> 5 & 1) != 0) != bits[i] ? 0x43u : 0);
+        large = large << 1 ^ (((large >> 15 & 1) != 0) != bits[i] ? 0x190D9u : 0);
+        small &= 0x3F;
+        large &= 0xFFFF;
+      }
+      EXPECT_EQ(crc_of<six>(bits, first, count), small ^ 0x3F) << first << ' ' << count;
+      EXPECT_EQ((crc_of<sixteen, CrcTable::nibble>(bits, first, count)), large ^ 0xFFFF) << first << ' ' << count;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace absenc

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests: a virtual BiSS encoder and a host on one clocked line in virtual time.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "absenc/protocol/biss/device.hpp"
+#include "absenc/protocol/biss/host.hpp"
+#include "absenc/sim/line.hpp"
+
+namespace absenc::biss::testing {
+
+/// A shaft that is put somewhere and stays there.
+struct TestShaft final : Shaft {
+  [[nodiscard]] ShaftState at(Time) const override { return state; }
+  ShaftState state{};
+};
+
+/// Clocks any number of bits, once.
+class RawHost final : public Machine<std::uint8_t> {
+ public:
+  RawHost(std::size_t bits, Time at, std::uint32_t rate) : bits_(bits), at_(at), rate_(rate) {}
+
+  void feed(const Event<std::uint8_t>& event) override {
+    if (event.kind != Event<std::uint8_t>::Kind::received) return;
+    for (std::size_t i = 0; i < bits_; ++i) text += BitView{event.items, bits_}[i] ? '1' : '0';
+  }
+  Step<std::uint8_t> next(Time) override {
+    using Kind = Step<std::uint8_t>::Kind;
+    switch (step_++) {
+      case 0:
+        return {.kind = Kind::configure, .settings = {.rate = rate_}};
+      case 1:
+        return {.kind = Kind::transfer, .bits = bits_, .at = at_};
+      default:
+        return text.empty() ? Step<std::uint8_t>{.at = never} : Step<std::uint8_t>{.kind = Kind::done};
+    }
+  }
+
+  std::string text;
+
+ private:
+  std::size_t bits_;
+  Time at_;
+  std::uint32_t rate_;
+  int step_ = 0;
+};
+
+/// `Device` and whatever machine talks to it.
+template <class Device>
+struct ClockedBench {
+  template <class Format, class... More>
+  explicit ClockedBench(const LineSettings& settings, const Format& format, const More&... more)
+      : encoder(format, shaft, more...), line(LinkKind::clocked, settings) {
+    encoder.power_on(Time{}, absenc::Device<std::uint8_t>::PowerOn::skip);
+    line.attach(sim::Role::device, encoder);
+  }
+
+  template <class Host>
+  Host& run(Host& host) {
+    if (node == none) {
+      node = line.attach(sim::Role::host, host);
+    } else {
+      line.replace(node, host);
+    }
+    finished = line.run(node, line.now() + std::chrono::seconds(10));
+    return host;
+  }
+  /// `bits` clocks after a pause.
+  std::string clock(std::size_t bits, Time pause = std::chrono::milliseconds(1), std::uint32_t rate = 200'000) {
+    RawHost host(bits, line.now() + pause, rate);
+    return run(host).text;
+  }
+
+  static constexpr std::size_t none = ~std::size_t{0};
+  TestShaft shaft;
+  Device encoder;
+  sim::Line<std::uint8_t> line;
+  std::size_t node = none;
+  bool finished = true;
+};
+
+using Bench = ClockedBench<VirtualEncoder>;
+
+/// Name and value of every field; real numbers rounded.
+inline std::map<std::string, std::int64_t> report(const Conversation<std::uint8_t>& conversation) {
+  struct Collector final : FieldSink {
+    void put(const FieldValue& value) override {
+      fields[std::string(value.info->name)] =
+          value.info->kind == FieldInfo::Kind::real ? static_cast<std::int64_t>(value.real) : value.number;
+    }
+    std::map<std::string, std::int64_t> fields;
+  } collector;
+  conversation.report(collector);
+  return collector.fields;
+}
+
+}  // namespace absenc::biss::testing

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The virtual encoder and its line, sampled by hand.
+#include "absenc/protocol/biss/device.hpp"
+
+#include <gtest/gtest.h>
+
+#include "absenc/protocol/biss/bench_test.hpp"
+
+namespace absenc::biss {
+namespace {
+
+using testing::Bench;
+
+const Format bits_19{};
+
+TEST(BissDevice, PutsExample4OnTheLine) {
+  Bench bench(line_settings, bits_19, Behaviour{.latency = 13us});
+  bench.shaft.state.position = std::int64_t{275087} << 13;
+  EXPECT_EQ(bench.clock(44, 1ms, 1'000'000), "11000000000000010100001100101000111111110011");
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  EXPECT_EQ(bench.encoder.answered(), 1u);
+}
+
+TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
+  const auto rule = [](Bench& bench) {
+    return bench.encoder.violations().empty() ? "" : bench.encoder.violations().back().rule;
+  };
+  Bench few(line_settings, bits_19);
+  few.clock(40, 1ms, 1'000'000);
+  EXPECT_EQ(rule(few), "fewer clocks than the frame has bits");
+
+  Bench soon(line_settings, bits_19);
+  soon.clock(64, 1ms, 1'000'000);
+  EXPECT_EQ(soon.clock(16, 19us, 1'000'000), "0000000000000000");
+  EXPECT_EQ(rule(soon), "clocked before the BiSS timeout has passed");
+  EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
+  EXPECT_EQ(soon.encoder.violation_count(), 2u);  // and that frame was too short
+
+  Bench fast(line_settings, bits_19);
+  fast.clock(200, 1ms, 12'500'000);
+  EXPECT_EQ(rule(fast), "MA faster than 10 MHz");
+
+  Bench slow(line_settings, bits_19);
+  EXPECT_EQ(slow.clock(64, 1ms, 20'000), std::string(64, '1'));
+  EXPECT_EQ(slow.encoder.violations()[0].rule, "MA slower than the BiSS timeout allows");
+}
+
+/// Good frames of 100 at a clock.
+unsigned good_frames(Time line_delay, Time period) {
+  testing::TestShaft shaft;
+  shaft.state.position = 0x1234'5678'9ABC;
+  Encoder encoder(bits_19, shaft, {.latency = 2us, .line_delay = line_delay});
+  encoder.set_power(true);
+  unsigned good = 0;
+  for (int i = 0; i < 100; ++i) {
+    Samples samples;
+    encoder.sample(Time{}, period, samples);
+    const Result<Reply> reply = decode(bits_19, samples.view());
+    const bool framed = samples.view().load(0, 3) == 0b110;
+    if (framed && reply && reply->word == encoder.word(Time{})) ++good;
+  }
+  return good;
+}
+
+TEST(BissDevice, LineDelayCorruptsAtHighClocks) {
+  EXPECT_EQ(good_frames(300ns, 1us), 100u);
+  EXPECT_EQ(good_frames(300ns, 400ns), 100u);
+  EXPECT_LT(good_frames(300ns, 310ns), 20u);  // an edge falls on the sample: now the old bit, now the new one
+  EXPECT_LT(good_frames(300ns, 290ns), 20u);
+  EXPECT_EQ(good_frames(300ns, 227ns), 0u);  // a whole bit late: SLO goes low one sample late
+}
+
+TEST(BissDevice, AWholeBitLateIsOneMoreIdleSample) {
+  testing::TestShaft shaft;
+  Encoder encoder(bits_19, shaft, {.latency = 2us, .line_delay = 1500ns});
+  encoder.set_power(true);
+  Samples samples;
+  encoder.sample(Time{}, 1us, samples);
+  EXPECT_EQ(samples.view().load(0, 7), 0b1110010u);
+}
+
+TEST(BissDevice, NeverReadyIsNeverAStartBit) {
+  testing::TestShaft shaft;
+  Encoder encoder(bits_19, shaft, {.latency = 1ms});
+  encoder.set_power(true);
+  Samples samples;
+  encoder.sample(Time{}, 1us, samples);
+  EXPECT_EQ(samples.size(), sample_capacity);
+  EXPECT_EQ(decode(bits_19, samples.view()).error(), Error::bad_framing);
+}
+
+}  // namespace
+}  // namespace absenc::biss

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// Host side of the E201-9S: each class is one conversation in ASCII, a machine without port, clock or heap.
+// README.md describes the procedures; link/step.hpp how to run a machine.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/e201/frame.hpp"
+#include "absenc/protocol/e201/timing.hpp"
+
+namespace absenc::e201 {
+
+/// What the E201-9S document says to do about this error; empty where it says nothing.
+[[nodiscard]] std::string_view advice(Error error);
+
+/// One request and its reply at a time; a subclass decides what comes next.
+class Procedure : public Conversation<std::uint8_t> {
+ public:
+  void feed(const Event<std::uint8_t>& event) final;
+  Step<std::uint8_t> next(Time now) final;
+  [[nodiscard]] Error error() const final { return error_; }
+  [[nodiscard]] std::string_view detail() const final { return detail_; }
+  [[nodiscard]] Exchange<std::uint8_t> exchange() const final;
+
+ protected:
+  enum class Answer : std::uint8_t {
+    samples,  // 16 characters and CR
+    line,     // up to CR
+    unknown,  // no document says whether there is one: whatever comes until it is silent
+  };
+
+  ~Procedure() = default;
+
+  /// Sends `request`, not before `earliest`.
+  void ask(const RequestText& request, Answer answer, Time earliest = {});
+  void finish(Error error = Error::none, std::string_view detail = {});
+  /// Hands out an intermediate result before what was asked last is sent.
+  void emit() { emitting_ = true; }
+
+  /// A reply of the right shape came, with its CR; with Answer::unknown anything, also nothing. Calls `ask` or
+  /// `finish`.
+  virtual void answered(Bytes reply) = 0;
+  /// No such reply came. Calls `ask` or `finish`; by default the procedure ends with this error.
+  virtual void failed(Error error) { finish(error, advice(error)); }
+
+  [[nodiscard]] Time sent_at() const { return sent_at_; }
+  [[nodiscard]] Time received_at() const { return received_at_; }
+
+ private:
+  enum class State : std::uint8_t { ready, sending, receiving, settling, done };
+
+  void received(const Event<std::uint8_t>& event);
+  void conclude();
+
+  State state_ = State::done;
+  Answer answer_{};
+  bool emitting_ = false;
+  bool disturbed_ = false;  // something came before the request was out
+  RequestText request_;
+  ReplyText reply_;  // what no longer fits changes nothing
+  Time earliest_{};
+  Time sent_at_{};
+  Time received_at_{};
+  Error error_ = Error::none;
+  std::string_view detail_{};
+};
+
+/// `4`. When nothing usable comes, the firmware is asked: before 1.16 it is `unsupported`.
+class ReadPosition final : public Procedure {
+ public:
+  explicit ReadPosition(const Format& format);
+
+  [[nodiscard]] const Reading* reading() const override;
+  void report(FieldSink& sink) const override;
+  [[nodiscard]] const Position& position() const { return position_; }
+
+ private:
+  void answered(Bytes reply) override;
+  void failed(Error error) override;
+
+  Format format_;
+  Error failure_ = Error::none;  // of `4`, while the firmware is asked
+  bool good_ = false;
+  Position position_{};
+  Reading reading_{};
+};
+
+/// One command that is answered by a line: v s e m b ? >.
+class Query final : public Procedure {
+ public:
+  explicit Query(std::uint8_t letter);
+  void report(FieldSink& sink) const override;
+
+ private:
+  void answered(Bytes reply) override;
+
+  std::uint8_t letter_;
+  ReplyText line_;
+};
+
+/// Version, serial number, supply and clock. Only the version must be answered.
+class Info final : public Procedure {
+ public:
+  Info();
+  void report(FieldSink& sink) const override;
+
+ private:
+  void answered(Bytes reply) override;
+  void failed(Error error) override;
+  void go_on();
+
+  std::array<ReplyText, 4> lines_{};
+  std::size_t index_ = 0;
+};
+
+/// A command without a reply to rely on, and the query that shows what became of it: Mn and m, Bnn and b.
+class Set final : public Procedure {
+ public:
+  /// `letter`: command::set_clock (value 1 to 8) or command::set_width (1 to 64). Error: cross_check_failed.
+  Set(std::uint8_t letter, unsigned value);
+  void report(FieldSink& sink) const override;
+
+ private:
+  void answered(Bytes reply) override;
+
+  std::uint8_t letter_;
+  unsigned value_;
+  bool verifying_ = false;
+};
+
+/// `n` or `f`, then `e` after the supply had its time. Error: cross_check_failed (where the voltage can be read).
+class SwitchSupply final : public Procedure {
+ public:
+  explicit SwitchSupply(bool on);
+  void report(FieldSink& sink) const override;
+
+ private:
+  void answered(Bytes reply) override;
+
+  bool on_;
+  bool verifying_ = false;
+  ReplyText line_;
+};
+
+/// `z`: what ? and > give counts from here. The encoder must stand still (invalid_argument); read back
+/// (cross_check_failed).
+class Zero final : public Procedure {
+ public:
+  explicit Zero(const Format& format);
+  void report(FieldSink& sink) const override;
+
+ private:
+  enum class Phase : std::uint8_t { first_look, second_look, zero, verify };
+  void answered(Bytes reply) override;
+  [[nodiscard]] bool is_near(std::int64_t counts) const { return counts <= noise_ && counts >= -noise_; }
+
+  Phase phase_ = Phase::first_look;
+  std::int64_t noise_;
+  std::int64_t counts_ = 0;
+};
+
+/// A command whose effect cannot be read back: a (clear zero), 0 (stream off).
+class Tell final : public Procedure {
+ public:
+  explicit Tell(std::uint8_t letter);
+  void report(FieldSink& sink) const override;
+
+ private:
+  void answered(Bytes) override { finish(); }
+
+  RequestText request_;
+};
+
+/// Reads `frames` frames at each clock, emits after each clock what was found so far, and sets the clock back, also
+/// after an error and after `abort`. It recommends the middle of the longest run of clocks at which all were good.
+class ClockSweep final : public Procedure {
+ public:
+  ClockSweep(const Format& format, unsigned frames);
+  void report(FieldSink& sink) const override;
+  void abort() override { aborted_ = true; }
+
+  /// 1 to 8; 0: no clock gave good frames only.
+  [[nodiscard]] unsigned recommended() const;
+
+ private:
+  enum class Phase : std::uint8_t { version, previous, set, check, frames, restore, verify };
+  void answered(Bytes reply) override;
+  void failed(Error error) override;
+  void next_clock();
+  void count(Error error);
+  void restore(Error error, std::string_view detail);
+
+  Format format_;
+  unsigned frames_;
+  bool aborted_ = false;
+  Phase phase_ = Phase::version;
+  unsigned previous_ = 0;  // clock before the sweep; 0: not known yet
+  unsigned clock_ = 0;
+  unsigned read_ = 0;      // frames at this clock
+  unsigned measured_ = 0;  // clocks that are done
+  std::array<unsigned, clocks_khz.size()> valid_{};
+  Error last_error_ = Error::none;  // of a frame
+  Error outcome_ = Error::none;     // what the sweep ends with when the clock is restored
+  std::string_view outcome_detail_{};
+};
+
+}  // namespace absenc::e201

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// SSI words, MSB first: encode, decode and the few checks that the line allows. README.md draws the frame.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "absenc/core/bit_view.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/link/line.hpp"
+#include "absenc/protocol/word.hpp"
+
+namespace absenc::ssi {
+
+/// What the encoder sends when it is clocked on.
+enum class AfterWord : std::uint8_t { repeat, zero, one };
+
+struct Format {
+  WordFormat word = "position:12"_word;
+  AfterWord after_word = AfterWord::repeat;
+  unsigned extra_clocks = 0;  // behind the word, to be compared; as many as the word has bits read it twice
+  Scale scale{};
+};
+
+inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;
+
+/// Clocks of one reading.
+[[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
+
+/// The bit at `index` (from 0) of a word that begins at `first` and is clocked on.
+[[nodiscard]] constexpr bool bit_behind(const Format& format, BitView word, std::size_t index, std::size_t first = 0) {
+  const std::size_t bits = format.word.bits();
+  if (index < bits || format.after_word == AfterWord::repeat) return word[first + index % bits];
+  return format.after_word == AfterWord::one;
+}
+
+namespace detail {
+
+[[nodiscard]] constexpr Error check_length(const Format& format, BitView bits) {
+  const std::size_t word = format.word.bits();
+  const bool twice = format.extra_clocks == 0 && bits.size == 2 * word;
+  if (bits.size == clocks(format) || twice) return Error::none;
+  // More clocks than the word has bits: read as one number, it is larger than any position.
+  for (std::size_t i = 0; i + word < bits.size; ++i) {
+    if (bits[i]) return Error::out_of_range;
+  }
+  return Error::wrong_length;
+}
+
+}  // namespace detail
+
+/// The word in `bits` from `first` on, of which all that follow must be what the encoder sends behind it. Errors:
+/// line_stuck (all bits are alike, and behind the word they should not be), bad_checksum (parity), cross_check_failed
+/// (what follows the word is not what it should be).
+[[nodiscard]] constexpr Result<Word> decode_clocked_on(const Format& format, BitView bits, std::size_t first = 0) {
+  const Result<Word> word = decode_word(format.word, bits, first);
+  bool matches = true;
+  for (std::size_t i = format.word.bits(); first + i < bits.size; ++i) {
+    matches = matches && bits[first + i] == bit_behind(format, bits, i, first);
+  }
+  if (!matches && bits.end_of_run(first) == bits.size) return Error::line_stuck;
+  if (!word) return word.error();
+  if (!matches) return Error::cross_check_failed;
+  return word;
+}
+
+/// A reading of `clocks(format)` bits, or of the word twice where no extra clocks are asked for. Errors: wrong_length;
+/// out_of_range (too many clocks, and what was read is no position); those of decode_clocked_on.
+[[nodiscard]] constexpr Result<Word> decode(const Format& format, BitView bits) {
+  const Error error = detail::check_length(format, bits);
+  if (error != Error::none) return error;
+  return decode_clocked_on(format, bits);
+}
+
+/// Appends the word and what follows it, `count` bits in all. False when `out` is too small.
+template <std::size_t Capacity>
+constexpr bool encode(const Format& format, const Word& word, std::size_t count, BitBuffer<Capacity>& out) {
+  BitBuffer<WordFormat::maximum_bits> coded;
+  if (!encode_word(format.word, word, coded) || out.capacity() - out.size() < count) return false;
+  for (std::size_t i = 0; i < count; ++i) out.append(bit_behind(format, coded.view(), i) ? 1 : 0, 1);
+  return true;
+}
+
+enum class ErrorBit : std::uint8_t { none, active_high, active_low };
+
+/// The usual words: counts, Gray-coded or not, an error bit and a parity bit over all bits before it, where wanted.
+[[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
+  WordFormat word = word_format(bits);
+  if (gray) word.set_gray();
+  if (error != ErrorBit::none) word.add({"error", Meaning::error, 1, error == ErrorBit::active_low});
+  if (parity != Parity::none) word.add({"parity", Meaning::parity, 1, parity == Parity::odd});
+  return word;
+}
+
+}  // namespace absenc::ssi

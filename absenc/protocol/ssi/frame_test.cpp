@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/ssi/frame.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string_view>
+
+#include "absenc/core/hex.hpp"
+#include "absenc/protocol/vector_check.hpp"
+
+namespace absenc::ssi {
+namespace {
+
+BitBuffer<256> bits(std::string_view text) {
+  return bits_of_text({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+Result<Word> decode(const Format& format, std::string_view text) { return ssi::decode(format, bits(text).view()); }
+
+TEST(SsiFrame, ExampleOfTheManual) {
+  const Result<Word> word = decode({}, "000111101111");
+  ASSERT_TRUE(word);
+  EXPECT_EQ(word->position, 495u);
+  EXPECT_NEAR(degrees(495, 12), 43.5058, 0.0001);
+}
+
+// 3.5: 8 clocks of 12 bits, converted with the formula for 12, are at most 22.4121 degrees: never shown.
+TEST(SsiFrame, TooFewClocksGiveNoPosition) {
+  EXPECT_NEAR(degrees(255, 12), 22.4121, 0.0001);
+  for (std::size_t size = 0; size < 12; ++size) {
+    EXPECT_EQ(decode({}, std::string(size, '1')).error(), Error::wrong_length) << size;
+  }
+}
+
+// 3.5: 14 clocks of 12 bits, read as one number, are thousands of degrees.
+TEST(SsiFrame, TooManyClocksGiveNoPosition) {
+  for (std::uint64_t position = 0; position < 4096; ++position) {
+    BitBuffer<64> read;
+    ASSERT_TRUE(encode({}, {.position = position}, 14, read));
+    const std::uint64_t number = read.view().load(0, 14);
+    EXPECT_EQ(ssi::decode({}, read.view()).error(), number > 4095 ? Error::out_of_range : Error::wrong_length);
+  }
+}
+
+TEST(SsiFrame, TheWordTwiceFindsAnyWrongBit) {
+  const Format format{.extra_clocks = 12};
+  EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);  // also where nobody asked for it
+  std::string text = "000111101111000111101111";
+  for (char& c : text) {
+    c ^= 1;
+    EXPECT_EQ(decode(format, text).error(), Error::cross_check_failed);
+    c ^= 1;
+  }
+  EXPECT_EQ(decode(format, text.substr(0, 12)).error(), Error::wrong_length);
+}
+
+// A reader with one bit too few or too many sees it in what follows.
+TEST(SsiFrame, ExtraClocksFindAWrongNumberOfBits) {
+  unsigned missed = 0;
+  for (std::uint64_t position = 0; position < 4096; ++position) {
+    for (const unsigned wrong : {11u, 13u}) {
+      const WordFormat word = word_format({.position = wrong});
+      BitBuffer<64> read;
+      ASSERT_TRUE(encode({.word = word_format({.position = 12})}, {.position = position}, 2 * wrong, read));
+      if (ssi::decode({.word = word, .extra_clocks = wrong}, read.view())) ++missed;
+    }
+  }
+  EXPECT_EQ(missed, 4u);  // all bits alike: 0 and 4095
+}
+
+TEST(SsiFrame, AfterTheWord) {
+  const Format zero{.after_word = AfterWord::zero, .extra_clocks = 2};
+  const Format one{.after_word = AfterWord::one, .extra_clocks = 2};
+  EXPECT_TRUE(decode(zero, "00011110111100"));
+  EXPECT_EQ(decode(zero, "00011110111110").error(), Error::cross_check_failed);
+  EXPECT_TRUE(decode(one, "00011110111111"));
+  EXPECT_EQ(decode(one, "00011110111101").error(), Error::cross_check_failed);
+  EXPECT_EQ(decode(zero, "11111111111111").error(), Error::line_stuck);
+  EXPECT_EQ(decode(one, "00000000000000").error(), Error::line_stuck);
+  EXPECT_TRUE(decode(zero, "00000000000000"));  // position 0
+}
+
+TEST(SsiFrame, AWordOfTheUser) {
+  constexpr WordFormat word = "multiturn:12 position:13 gray error:1! parity:1"_word;
+  const Format format{.word = word, .extra_clocks = 27};
+  const Word sent{.position = 0x1ABC, .multiturn = 0x7FF, .error = true};
+  BitBuffer<64> read;
+  ASSERT_TRUE(encode(format, sent, 54, read));
+  const Result<Word> got = ssi::decode(format, read.view());
+  ASSERT_TRUE(got);
+  EXPECT_EQ(*got, sent);
+}
+
+}  // namespace
+}  // namespace absenc::ssi

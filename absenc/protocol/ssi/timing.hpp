@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// Times of SSI, as the RAA38S6 manual (3.5) gives them; other encoders differ.
+#pragma once
+
+#include "absenc/core/time.hpp"
+#include "absenc/link/line.hpp"
+
+namespace absenc::ssi {
+
+using namespace std::chrono_literals;
+
+inline constexpr LineSettings line_settings{.rate = 200'000};
+inline constexpr Time shortest_period = 4us;  // 250 kHz
+inline constexpr Time longest_period = 10us;  // 100 kHz
+inline constexpr Time pause = 500us;          // Tm: more than that between two words, or the old one goes on
+inline constexpr Time host_pause = 510us;
+
+}  // namespace absenc::ssi

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/ssi/unit.hpp"
+
+#include <array>
+#include <new>
+
+#include "absenc/protocol/ssi/device.hpp"
+#include "absenc/protocol/ssi/fields.hpp"
+#include "absenc/protocol/ssi/host.hpp"
+#include "absenc/protocol/ssi/vectors.hpp"
+#include "absenc/protocol/word_options.hpp"
+
+namespace absenc::ssi {
+
+namespace {
+
+constexpr std::array<std::string_view, 3> error_bit_choices{"none", "active_high", "active_low"};
+constexpr std::array<std::string_view, 3> parity_choices{"none", "odd", "even"};
+
+constexpr std::array<Option, 8> options{{
+    {.name = "bits",
+     .meaning = "bits of the position within the turn",
+     .default_value = 12,
+     .minimum = 1,
+     .maximum = 64},
+    multiturn_bits_option,
+    multiturn_first_option,
+    {.name = "gray",
+     .meaning = "turns and position are one Gray-coded number",
+     .default_value = 0,
+     .choices = boolean_choices},
+    {.name = "error_bit", .meaning = "a bit behind the position", .default_value = 0, .choices = error_bit_choices},
+    {.name = "parity",
+     .meaning = "the last bit, over all before it",
+     .default_value = 0,
+     .choices = parity_choices,
+     .probeable = true},
+    after_word_option,
+    {.name = "extra_clocks",
+     .meaning = "clocks behind the word, compared with after_word; as many as the word has bits read it twice",
+     .default_value = 0,
+     .minimum = 0,
+     .maximum = WordFormat::maximum_bits},
+}};
+
+constexpr std::array<OptionValue, 3> raa38s6_12{{{option_bits, 12}, {option_multiturn_bits, 0}, {option_gray, 0}}};
+constexpr std::array<Model, 1> models{{{"RAA38S6-12", "RAA38S6 with 12 bits, binary", 0, raa38s6_12}}};
+
+constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position and turns"}}};
+
+bool is_usable(const Format& format) { return absenc::is_usable(format.word) && clocks(format) <= frame_capacity; }
+
+Error decode_frame(const Options& values, Frame, Frame reply, FieldSink& sink) {
+  const Format format = to_format(values);
+  if (!is_usable(format)) return Error::invalid_argument;
+  return decode(format, to_bits(reply), sink);
+}
+
+// The host sends nothing but clocks.
+Result<std::size_t> encode_request(const Options&, const Command&, Arguments, MutableBytes) { return std::size_t{0}; }
+
+// The pause of the clock ends a word.
+Delimit delimit(const Options&, Direction, Bytes bytes) { return {Delimit::Kind::complete, bytes.size()}; }
+
+Any<Conversation> host(const Options& values, const Command&, Arguments, std::span<std::byte> storage) {
+  const Format format = to_format(values);
+  if (!is_usable(format) || storage.size() < sizeof(ReadPosition)) return {};
+  return {.bytes = new (storage.data()) ReadPosition(format)};
+}
+
+Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
+  const Format format = to_format(values);
+  if (!is_usable(format) || storage.size() < sizeof(VirtualEncoder)) return {};
+  return {.bytes = new (storage.data()) VirtualEncoder(format, shaft)};
+}
+
+Resolution resolution(const Options& values) { return resolution_of(to_format(values).word); }
+
+// SSI has no checksum.
+bool covered(const Options&, Frame, Frame, std::size_t) { return false; }
+
+}  // namespace
+
+Format to_format(const Options& values) {
+  const PositionBits bits{.position = static_cast<unsigned>(values[option_bits]),
+                          .multiturn = static_cast<unsigned>(values[option_multiturn_bits]),
+                          .multiturn_first = values[option_multiturn_first] != 0};
+  return {.word = word_with(bits, values[option_gray] != 0, static_cast<ErrorBit>(values[option_error_bit]),
+                            static_cast<Parity>(values[option_parity])),
+          .after_word = static_cast<AfterWord>(values[option_after_word]),
+          .extra_clocks = static_cast<unsigned>(values[option_extra_clocks])};
+}
+
+constinit const Unit unit{
+    .id = "ssi",
+    .name = "SSI",
+    .document = "RAA38S6 manual, 3.5 SSI",
+    .link = LinkKind::clocked,
+    .line = line_settings,
+    .options = options,
+    .models = models,
+    .fields = word_fields,
+    .commands = commands,
+    .vectors = vectors,
+    .status = nullptr,
+    .alarms = &word_fields[word_field_alarms],
+    .host_storage = sizeof(ReadPosition),
+    .device_storage = sizeof(VirtualEncoder),
+    .decode = decode_frame,
+    .encode = encode_request,
+    .delimit = delimit,
+    .host = host,
+    .device = device,
+    .resolution = resolution,
+    .covered = covered,
+};
+
+}  // namespace absenc::ssi

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compares what a frame decodes to with what its vector expects, at compile time too.
+#pragma once
+
+#include <span>
+
+#include "absenc/core/bit_view.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc {
+
+/// Every field that is put must be expected, in any order; real numbers to 1e-9.
+struct VectorCheck final : FieldSink {
+  constexpr explicit VectorCheck(std::span<const Expected> wanted) : expected(wanted) {}
+  constexpr void put(const FieldValue& value) override {
+    for (const Expected& one : expected) {
+      const double difference = one.real - value.real;
+      const bool near = difference < 1e-9 && difference > -1e-9;
+      if (one.field == value.info->name && one.number == value.number && near) ++matches;
+    }
+    ++count;
+  }
+  [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
+
+  std::span<const Expected> expected;
+  std::size_t matches = 0;
+  std::size_t count = 0;
+};
+
+/// The frame behind the text of a vector on a clocked link; at most 256 bits, everything but 1 is 0.
+[[nodiscard]] constexpr BitBuffer<256> bits_of_text(Bytes text) {
+  BitBuffer<256> bits;
+  for (const std::uint8_t c : text) bits.append(c == '1' ? 1 : 0, 1);
+  return bits;
+}
+
+}  // namespace absenc

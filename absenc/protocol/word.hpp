@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+// The position word of clocked encoders, decoded and encoded by its WordFormat, and what it means as a reading.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/bit_view.hpp"
+#include "absenc/core/gray.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/core/shaft.hpp"
+#include "absenc/protocol/field.hpp"
+#include "absenc/protocol/word_format.hpp"
+
+namespace absenc {
+
+/// Fields that the word does not carry are 0.
+struct Word {
+  std::uint64_t position = 0;
+  std::uint64_t multiturn = 0;
+  bool error = false;
+  bool warning = false;
+  std::array<std::uint64_t, WordFormat::maximum_fields> values{};  // those of Meaning::value, by the field's index
+
+  friend constexpr bool operator==(const Word&, const Word&) = default;
+};
+
+/// Bits of Reading::alarms.
+inline constexpr std::uint32_t word_error = 1;
+inline constexpr std::uint32_t word_warning = 2;
+
+inline constexpr std::array<FlagInfo, 2> word_flags{{
+    {"error", "the encoder says that its position is wrong", "see the encoder's manual: its status tells the cause"},
+    {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply"},
+}};
+
+enum WordFieldIndex : std::size_t {
+  word_field_multiturn,
+  word_field_singleturn,
+  word_field_angle,
+  word_field_position,
+  word_field_position_um,
+  word_field_position_mm,
+  word_field_error,
+  word_field_warning,
+  word_field_alarms,
+};
+
+inline constexpr std::array<FieldInfo, 9> word_fields{{
+    {"multiturn", FieldInfo::Kind::counts, "revolutions", "turns"},
+    {"singleturn", FieldInfo::Kind::counts, "counts", "position within the turn"},
+    {"angle_deg", FieldInfo::Kind::real, "deg", "position within the turn"},
+    {"position", FieldInfo::Kind::counts, "counts", "position of a linear encoder"},
+    {"position_um", FieldInfo::Kind::real, "um", "position of a linear encoder"},
+    {"position_mm", FieldInfo::Kind::real, "mm", "position of a linear encoder"},
+    {"error", FieldInfo::Kind::boolean, "", "the encoder says that its position is wrong"},
+    {"warning", FieldInfo::Kind::boolean, "", "the encoder works near its limits"},
+    {"alarms", FieldInfo::Kind::flags, "", "error and warning", word_flags},
+}};
+
+/// What the position counts.
+struct Scale {
+  bool linear = false;
+  double unit_um = 0;  // linear: micrometres a count; 0: not known
+};
+
+namespace detail {
+
+// Position and turns as one number, in the order of the wire.
+constexpr std::uint64_t joined(const WordFormat& format, const Word& word) {
+  std::uint64_t number = 0;
+  for (const WordField& field : format.fields()) {
+    if (field.meaning == Meaning::position) number = (field.bits < 64 ? number << field.bits : 0) | word.position;
+    if (field.meaning == Meaning::multiturn) number = (field.bits < 64 ? number << field.bits : 0) | word.multiturn;
+  }
+  return number;
+}
+
+constexpr void split(const WordFormat& format, std::uint64_t number, Word& word) {
+  for (std::size_t i = format.fields().size(); i-- > 0;) {
+    const WordField& field = format.fields()[i];
+    if (field.meaning != Meaning::position && field.meaning != Meaning::multiturn) continue;
+    (field.meaning == Meaning::position ? word.position : word.multiturn) = number & low_mask(field.bits);
+    number = field.bits < 64 ? number >> field.bits : 0;
+  }
+}
+
+constexpr bool parity_of(BitView bits, std::size_t first, std::size_t end) {
+  bool odd = false;
+  for (; first + 64 <= end; first += 64) odd ^= odd_parity(bits.load(first, 64));
+  return odd ^ odd_parity(bits.load(first, static_cast<unsigned>(end - first)));
+}
+
+}  // namespace detail
+
+/// The word that begins at bit `first`. Errors: wrong_length (fewer bits are there), bad_checksum (parity).
+[[nodiscard]] constexpr Result<Word> decode_word(const WordFormat& format, BitView bits, std::size_t first = 0) {
+  if (bits.size < first || bits.size - first < format.bits()) return Error::wrong_length;
+  Word word;
+  std::size_t at = first;
+  for (std::size_t i = 0; i < format.fields().size(); ++i) {
+    const WordField& field = format.fields()[i];
+    std::uint64_t value = bits.load(at, field.bits);
+    if (field.active_low) value ^= low_mask(field.bits);
+    switch (field.meaning) {
+      case Meaning::position:
+        word.position = value;
+        break;
+      case Meaning::multiturn:
+        word.multiturn = value;
+        break;
+      case Meaning::error:
+        word.error = value != 0;
+        break;
+      case Meaning::warning:
+        word.warning = value != 0;
+        break;
+      case Meaning::parity:
+        if ((value != 0) != detail::parity_of(bits, first, at)) return Error::bad_checksum;
+        break;
+      case Meaning::value:
+        word.values[i] = value;
+        break;
+      case Meaning::skip:
+        break;
+    }
+    at += field.bits;
+  }
+  if (format.gray()) detail::split(format, gray_decode(detail::joined(format, word)), word);
+  return word;
+}
+
+/// Appends the word; what does not fit into a field is cut off. False when `out` is too small.
+template <std::size_t Capacity>
+constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer<Capacity>& out) {
+  if (out.capacity() - out.size() < format.bits()) return false;
+  Word coded = word;
+  coded.position &= low_mask(format.bits_of(Meaning::position));
+  coded.multiturn &= low_mask(format.bits_of(Meaning::multiturn));
+  if (format.gray()) detail::split(format, gray_encode(detail::joined(format, coded)), coded);
+  const std::size_t first = out.size();
+  for (std::size_t i = 0; i < format.fields().size(); ++i) {
+    const WordField& field = format.fields()[i];
+    std::uint64_t value = 0;
+    if (field.meaning == Meaning::position) value = coded.position;
+    if (field.meaning == Meaning::multiturn) value = coded.multiturn;
+    if (field.meaning == Meaning::error) value = word.error ? 1 : 0;
+    if (field.meaning == Meaning::warning) value = word.warning ? 1 : 0;
+    if (field.meaning == Meaning::parity) value = detail::parity_of(out.view(), first, out.size()) ? 1 : 0;
+    if (field.meaning == Meaning::value) value = word.values[i];
+    if (field.active_low && field.meaning != Meaning::skip) value ^= low_mask(field.bits);
+    out.append(value, field.bits);
+  }
+  return true;
+}
+
+/// Every field of the word, in the order of the wire.
+constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
+  const auto put = [&sink](WordFieldIndex index, std::int64_t number, double real = 0) {
+    sink.put({&word_fields[index], number, real});
+  };
+  for (std::size_t i = 0; i < format.fields().size(); ++i) {
+    const WordField& field = format.fields()[i];
+    const auto position = static_cast<std::int64_t>(word.position);
+    if (field.meaning == Meaning::position && scale.linear) {
+      const double um = static_cast<double>(word.position) * scale.unit_um;
+      put(word_field_position, position);
+      if (scale.unit_um > 0) put(word_field_position_um, 0, um);
+      if (scale.unit_um > 0) put(word_field_position_mm, 0, um / 1000);
+    } else if (field.meaning == Meaning::position) {
+      put(word_field_singleturn, position);
+      put(word_field_angle, 0, degrees(word.position, field.bits));
+    } else if (field.meaning == Meaning::multiturn) {
+      put(word_field_multiturn, static_cast<std::int64_t>(word.multiturn));
+    } else if (field.meaning == Meaning::error) {
+      put(word_field_error, word.error ? 1 : 0);
+    } else if (field.meaning == Meaning::warning) {
+      put(word_field_warning, word.warning ? 1 : 0);
+    } else if (field.meaning == Meaning::value) {
+      const FieldInfo info{field.name, FieldInfo::Kind::counts, "", "a field of the word format"};
+      sink.put({&info, static_cast<std::int64_t>(word.values[i])});
+    }
+  }
+}
+
+/// An error bit makes position and turns invalid.
+[[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
+  Reading reading;
+  reading.singleturn = word.position;
+  reading.multiturn = word.multiturn;
+  reading.singleturn_bits = format.bits_of(Meaning::position);
+  reading.multiturn_bits = format.bits_of(Meaning::multiturn);
+  reading.singleturn_valid_bits = word.error ? 0 : reading.singleturn_bits;
+  reading.multiturn_valid = !word.error && reading.multiturn_bits != 0;
+  reading.unit_um = scale.linear ? scale.unit_um : 0;
+  reading.alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0);
+  return reading;
+}
+
+/// What a virtual encoder shows of a shaft. A linear one goes along its whole scale in one revolution.
+[[nodiscard]] constexpr Word word_of(const WordFormat& format, const ShaftState& state, std::uint32_t alarms) {
+  const unsigned bits = format.bits_of(Meaning::position);
+  const auto fraction = static_cast<std::uint64_t>(state.position);
+  Word word;
+  word.position = (bits <= 32 ? (fraction & 0xFFFF'FFFF) >> (32 - bits) : fraction << (bits - 32)) & low_mask(bits);
+  word.multiturn = static_cast<std::uint64_t>(state.position >> 32) & low_mask(format.bits_of(Meaning::multiturn));
+  word.error = (alarms & word_error) != 0;
+  word.warning = (alarms & word_warning) != 0;
+  return word;
+}
+
+/// The usual words: turns before or behind the position, then nError and nWarning, if wanted.
+struct PositionBits {
+  unsigned position;
+  unsigned multiturn = 0;
+  bool multiturn_first = true;
+};
+
+[[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
+  WordFormat format;
+  const WordField turns{"multiturn", Meaning::multiturn, bits.multiturn};
+  if (bits.multiturn_first) format.add(turns);  // a field of 0 bits is refused
+  format.add({"position", Meaning::position, bits.position});
+  if (!bits.multiturn_first) format.add(turns);
+  return format;
+}
+
+}  // namespace absenc

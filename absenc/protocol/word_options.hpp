@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the units of position words have in common in their descriptors: options, models, frames of bits.
+#pragma once
+
+#include <array>
+
+#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/word.hpp"
+
+namespace absenc {
+
+/// These five stand in a row among a unit's options.
+inline constexpr Option singleturn_bits_option{.name = "singleturn_bits",
+                                               .meaning = "bits of the position within the turn; 0: linear encoder",
+                                               .default_value = 19,
+                                               .minimum = 0,
+                                               .maximum = 64,
+                                               .probeable = true};
+inline constexpr Option multiturn_bits_option{.name = "multiturn_bits",
+                                              .meaning = "bits of the turns; 0: no turns",
+                                              .default_value = 0,
+                                              .minimum = 0,
+                                              .maximum = 63,
+                                              .probeable = true};
+inline constexpr Option multiturn_first_option{.name = "multiturn_first",
+                                               .meaning = "whether the turns come before the position",
+                                               .default_value = 1,
+                                               .choices = boolean_choices};
+inline constexpr Option position_bits_option{.name = "position_bits",
+                                             .meaning = "linear encoders: bits of the position; 0: rotary encoder",
+                                             .default_value = 0,
+                                             .minimum = 0,
+                                             .maximum = 64,
+                                             .probeable = true};
+inline constexpr Option unit_um_option{.name = "unit_um",
+                                       .meaning = "linear encoders: micrometres a count",
+                                       .default_value = 0,
+                                       .minimum = 0,
+                                       .maximum = 1'000'000'000'000,
+                                       .decimals = 6};
+
+inline constexpr std::array<std::string_view, 3> after_word_choices{"repeat", "zero", "one"};
+/// In the order of ssi::AfterWord.
+inline constexpr Option after_word_option{.name = "after_word",
+                                          .meaning = "what an SSI encoder sends when it is clocked on",
+                                          .default_value = 0,
+                                          .choices = after_word_choices};
+
+/// `first`: the index of singleturn_bits.
+[[nodiscard]] constexpr PositionBits position_bits(const Options& values, std::size_t first) {
+  const auto bits = [&values, first](std::size_t i) { return static_cast<unsigned>(values[first + i]); };
+  if (bits(3) != 0) return {.position = bits(3)};
+  return {.position = bits(0), .multiturn = bits(1), .multiturn_first = bits(2) != 0};
+}
+
+[[nodiscard]] constexpr Scale scale_of(std::int64_t position_bits, std::int64_t unit_um) {
+  return {.linear = position_bits != 0, .unit_um = static_cast<double>(unit_um) / 1e6};
+}
+
+/// Whether there is a position, and position and turns have at most 64 bits together.
+[[nodiscard]] constexpr bool is_usable(const WordFormat& word) {
+  const unsigned position = word.bits_of(Meaning::position);
+  return position > 0 && position + word.bits_of(Meaning::multiturn) <= 64;
+}
+/// Whether readings can be told from angles: a linear encoder needs its unit.
+[[nodiscard]] constexpr bool is_usable(const Scale& scale) { return !scale.linear || scale.unit_um > 0; }
+
+[[nodiscard]] constexpr Resolution resolution_of(const WordFormat& word) {
+  return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn)};
+}
+
+/// The bits of a clocked frame; all of its bytes when it does not say how many count.
+[[nodiscard]] constexpr BitView to_bits(const Frame& frame) {
+  return {frame.bytes, frame.bits != 0 ? frame.bits : frame.bytes.size() * 8};
+}
+
+template <std::size_t a, std::size_t b>
+[[nodiscard]] constexpr std::array<FieldInfo, a + b> joined_fields(const std::array<FieldInfo, a>& first,
+                                                                   const std::array<FieldInfo, b>& second) {
+  std::array<FieldInfo, a + b> fields{};
+  for (std::size_t i = 0; i < a; ++i) fields[i] = first[i];
+  for (std::size_t i = 0; i < b; ++i) fields[a + i] = second[i];
+  return fields;
+}
+
+namespace detail {
+template <std::size_t singleturn, std::size_t multiturn, std::size_t position, std::size_t unit>
+struct PositionModels {
+  static constexpr std::array<OptionValue, 3> rotary_19{{{singleturn, 19}, {multiturn, 0}, {position, 0}}};
+  static constexpr std::array<OptionValue, 3> rotary_19_16{{{singleturn, 19}, {multiturn, 16}, {position, 0}}};
+  static constexpr std::array<OptionValue, 4> linear_26{
+      {{singleturn, 0}, {multiturn, 0}, {position, 26}, {unit, 1'000'000}}};
+  static constexpr std::array<OptionValue, 4> linear_32{
+      {{singleturn, 0}, {multiturn, 0}, {position, 32}, {unit, 50'000}}};
+};
+}  // namespace detail
+
+/// The encoders of the four examples in RLS "E201-9S Decoding the BiSS information". No speed is given for them.
+template <std::size_t singleturn, std::size_t multiturn, std::size_t position, std::size_t unit>
+inline constexpr std::array<Model, 4> position_models{{
+    {"rotary-19", "single-turn, 19 bits (example 4)", 0,
+     detail::PositionModels<singleturn, multiturn, position, unit>::rotary_19},
+    {"rotary-19-16", "19 bits, 65536 turns (example 3)", 0,
+     detail::PositionModels<singleturn, multiturn, position, unit>::rotary_19_16},
+    {"linear-26-1um", "linear, 26 bits of 1 um (example 2)", 0,
+     detail::PositionModels<singleturn, multiturn, position, unit>::linear_26},
+    {"linear-32-0.05um", "linear, 32 bits of 0.05 um (example 1)", 0,
+     detail::PositionModels<singleturn, multiturn, position, unit>::linear_32},
+}};
+
+}  // namespace absenc
