@@ -135,7 +135,7 @@ struct Unit {
   std::span<const Model> models;
   std::span<const FieldInfo> fields;
   std::span<const Command> commands;
-  std::span<const MemoryArea> memory;  // what the commands memory_read and memory_write reach, in order
+  std::span<const MemoryArea> memory{};  // what the commands memory_read and memory_write reach, in order
   std::span<const Vector> vectors;
   const FieldInfo* status;     // the flags of Reading::status; null when the unit has none
   const FieldInfo* alarms;     // the flags of Reading::alarms

@@ -42,7 +42,6 @@ constinit const Unit unit{
     .models = models,
     .fields = fields,
     .commands = commands,
-    .memory = {},
     .vectors = vectors,
     .status = nullptr,
     .alarms = nullptr,
