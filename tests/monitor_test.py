@@ -82,7 +82,7 @@ class Screen(MonitorCase):
             "",
             "  180.000 deg    65536 counts      12 turns   alarms: over_heat",
             r"  0 \|-{17}\+-{16}O-{16}\+-{16}\| 360",
-            r"  speed 0\.0 rpm, \d+ ms ago; position 1638400 counts",
+            r"  speed 0\.0 rpm, [\d.]+ ms ago; position 1638400 counts",
             r"  \d+\.\d a second; latency 50 % [\d.]+ .s, 99 % [\d.]+ .s, longest [\d.]+ .s",
             r"  \d+ good; the port went away: 0",
             "  over_heat: the encoder is or was hotter than its threshold. What to do: let it",
