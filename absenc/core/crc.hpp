@@ -59,6 +59,8 @@ class Crc {
   using Word = std::conditional_t<(parameters.width <= 8), std::uint8_t, std::uint16_t>;
 
   constexpr Crc() = default;
+  /// Starts from another value than `parameters.init`, with the same table.
+  constexpr explicit Crc(std::uint16_t init) : remainder_(initial(init)) {}
 
   constexpr void update(std::uint8_t byte) {
     if constexpr (table_kind == CrcTable::byte) {
@@ -139,10 +141,11 @@ class Crc {
     }
   }
 
-  static constexpr Word initial = parameters.refin
-                                      ? static_cast<Word>(reflect(parameters.init, parameters.width))
-                                      : static_cast<Word>((parameters.init & low_mask(parameters.width)) << spare_bits);
-  Word remainder_ = initial;
+  static constexpr Word initial(std::uint16_t init) {
+    return parameters.refin ? static_cast<Word>(reflect(init, parameters.width))
+                            : static_cast<Word>((init & low_mask(parameters.width)) << spare_bits);
+  }
+  Word remainder_ = initial(parameters.init);
 };
 
 }  // namespace absenc

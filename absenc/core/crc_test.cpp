@@ -123,5 +123,19 @@ TEST(Crc, GoesOnWhereItStopped) {
   }
 }
 
+TEST(Crc, AnotherInitialValueSharesTheTable) {
+  for (const std::uint16_t init : std::to_array<std::uint16_t>({0, 1, 0x1234, 0xFFFF})) {
+    const auto expect_definition = [init](auto crc, CrcParameters parameters) {
+      parameters.init = init;
+      crc.update(noise);
+      EXPECT_EQ(crc.value(), crc_bitwise(parameters, noise)) << init;
+    };
+    constexpr CrcParameters reflected{16, 0x5935, 0, true, true, 0};
+    constexpr CrcParameters plain{14, 0x1935, 0, false, false, 0};
+    expect_definition(Crc<reflected>(init), reflected);
+    expect_definition(Crc<plain, CrcTable::nibble>(init), plain);
+  }
+}
+
 }  // namespace
 }  // namespace absenc

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+// The virtual QS35 against its document, asked by hand-made bytes.
+#include "absenc/protocol/esl/device.hpp"
+
+#include <gtest/gtest.h>
+
+#include "absenc/core/hex.hpp"
+#include "absenc/protocol/esl/bench_test.hpp"
+
+namespace absenc::esl {
+namespace {
+
+using testing::Bench;
+using PowerOn = Device<std::uint8_t>::PowerOn;
+using Wire = std::vector<std::uint8_t>;
+
+Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
+Wire wire(const Reply& reply) { return wire(encode_reply({}, reply).view()); }
+
+Request memory_read(std::uint8_t address) { return {DataId::read_memory, 0, address}; }
+Request memory_write(std::uint8_t address, std::uint8_t value) { return {DataId::write_memory, 0, address, value}; }
+Wire memory_reply(const Request& request, bool busy, std::uint8_t value) {
+  return wire(Reply{.id = request.id, .memory_address = request.memory_address, .busy = busy, .value = value});
+}
+
+void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
+  for (unsigned i = 0; i < times; ++i) {
+    EXPECT_EQ(bench.raw(Request{id}).size(), reply_length(id));
+    bench.pass(reset_interval);
+  }
+}
+
+TEST(EslDevice, AnswersEveryIdWithItsLength) {
+  Bench bench;
+  for (const std::uint8_t id : std::to_array<std::uint8_t>({0x1, 0x2, 0x4, 0x5, 0x6, 0x8, 0x9, 0xA, 0xB, 0xC, 0xD})) {
+    EXPECT_EQ(bench.raw(Request{static_cast<DataId>(id)}).size(), reply_length(static_cast<DataId>(id)));
+  }
+  EXPECT_EQ(bench.raw(memory_read(0x20)), memory_reply(memory_read(0x20), false, 0));
+  EXPECT_EQ(bench.raw(memory_write(0x20, 7)), memory_reply(memory_write(0x20, 7), false, 7));
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+}
+
+TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
+  Bench bench;
+  testing::RawHost host(wire(hex<"0875">), 5us);
+  bench.run(host);
+  EXPECT_EQ(host.sent_at, 7us);
+  EXPECT_EQ(host.first_byte_at, 7us + 2us + 1us);
+  EXPECT_EQ(host.reply.size(), 18u);
+}
+
+// Only IDs 1, 2, 8 and B count, unless the profile says that every request does.
+TEST(EslDevice, SequenceCounters) {
+  Bench bench;
+  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
+  bench.read(DataId::temperature);
+  bench.read(DataId::alarms);
+  const Reply second = bench.read(DataId::singleturn);
+  EXPECT_EQ(second.one.sequence, 2);
+  EXPECT_EQ(second.two.sequence, 2);
+  Bench each({.sequence_step = SequenceStep::request});
+  each.read(DataId::temperature);
+  EXPECT_EQ(each.read(DataId::position).one.sequence, 2);
+  for (unsigned i = 2; i < 256; ++i) bench.read(DataId::position);
+  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // 8 bits and 7 bits
+  EXPECT_EQ(bench.read(DataId::position).two.sequence, 2);
+}
+
+TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
+  Bench bench;
+  EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());             // CRC
+  EXPECT_TRUE(bench.raw(Request{DataId::position, 3}).empty());  // another address
+  EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());               // no such id
+  EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());               // cut short
+  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);           // and it is ready for the next
+  EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
+  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // page 8 ends at 2F
+  EXPECT_EQ(bench.encoder.answered(), 1u);
+}
+
+TEST(EslDevice, AWrongParityBitIsReportedOrNot) {
+  const Wire wrong = [] {
+    Wire bytes{0x88};
+    bytes.push_back(checksum8(CrcBitOrder::lsb, bytes));
+    return bytes;
+  }();
+  Bench bench;
+  EXPECT_TRUE(bench.raw(wrong).empty());  // address 0: no other scope makes this bit
+  Bench scope({.address = 1});
+  Profile other{.parity_scope = ParityScope::all, .address = 1};
+  const RequestBytes request = encode_request(other, {DataId::position, 1});
+  const Wire reply = scope.raw(wire(request));
+  ASSERT_EQ(reply.size(), 18u);
+  EXPECT_EQ(reply[0], request[0]);
+  EXPECT_EQ(reply[1] & status::parity_error, status::parity_error);
+  Bench silent({.address = 1, .bad_request = BadRequest::silent});
+  EXPECT_TRUE(silent.raw(wire(request)).empty());
+}
+
+TEST(EslDevice, ReadyOnlyAfterStartUp) {
+  Bench bench;
+  bench.encoder.power_off(Time{});
+  EXPECT_TRUE(bench.raw(Request{}).empty());
+  const Time on = bench.line.now();
+  bench.encoder.power_on(on, PowerOn::real);
+  EXPECT_EQ(bench.read().one.status & status::ready, 0);
+  EXPECT_EQ(bench.read().two.status & status::ready, 0);
+  bench.line.run_until(on + Environment{}.start_up);
+  EXPECT_EQ(bench.read().one.status, status::ready);
+  EXPECT_EQ(bench.read().two.status, status::ready | status::channel_2);
+}
+
+// ---- Memory
+
+TEST(EslDevice, RegistersAtOnceTheEepromInTwoSteps) {
+  Bench bench;  // page 8 after power on
+  bench.raw(memory_write(0x05, 0x11));
+  EXPECT_EQ(bench.raw(memory_read(0x05)), memory_reply(memory_read(0x05), false, 0x11));
+  bench.raw(memory_write(page_select_address, 0));
+  bench.pass(page_time);
+  EXPECT_EQ(bench.raw(memory_write(5, 0x77)), memory_reply(memory_write(5, 0x77), false, 0x77));
+  const Time written = bench.line.now();
+  EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
+  EXPECT_EQ(bench.raw(memory_write(6, 1)), memory_reply(memory_write(6, 1), true, 0));
+  bench.line.run_until(written + eeprom_write_time);
+  EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
+  bench.pass(eeprom_read_time);
+  EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), false, 0x77));
+  EXPECT_EQ(*bench.encoder.stored(0, 6), 0);  // was not executed
+  EXPECT_EQ(bench.encoder.writes(), 1u);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  bench.raw(memory_read(7));
+  EXPECT_EQ(bench.raw(memory_read(7)), memory_reply(memory_read(7), true, 0));
+  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, "memory read again less than 200 us after the request before");
+}
+
+TEST(EslDevice, APageChangeTakes18Milliseconds) {
+  Bench bench;
+  bench.raw(memory_write(page_select_address, 4));
+  EXPECT_EQ(bench.raw(memory_read(0)), memory_reply(memory_read(0), true, 0));
+  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, "memory access before the page is ready");
+  bench.pass(page_time);
+  EXPECT_EQ(bench.raw(memory_read(page_select_address)), memory_reply(memory_read(page_select_address), false, 4));
+}
+
+TEST(EslDevice, MemorySurvivesPowerOffAndRegistersDoNot) {
+  Bench bench;
+  bench.raw(memory_write(0x05, 0x11));
+  *bench.encoder.stored(14, 0x1F) = 0x22;
+  *bench.encoder.stored(6, 0x0B) = 0x33;
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.raw(memory_read(0x05))[2], 0);
+  EXPECT_EQ(*bench.encoder.stored(14, 0x1F), 0x22);
+  EXPECT_EQ(*bench.encoder.stored(6, 0x0B), 0x33);
+  EXPECT_EQ(bench.encoder.stored(8, 0), nullptr);
+  EXPECT_EQ(bench.encoder.stored(14, 0x20), nullptr);
+}
+
+// Every byte of the EEPROM and MTP pages is a byte of its own.
+TEST(EslDevice, NoTwoAddressesShareAByte) {
+  Bench bench;
+  std::map<std::uint8_t*, int> seen;
+  for (unsigned page = 0; page < 256; ++page) {
+    for (unsigned address = 0; address < 128; ++address) {
+      std::uint8_t* byte = bench.encoder.stored(static_cast<std::uint8_t>(page), static_cast<std::uint8_t>(address));
+      if (byte == nullptr) continue;
+      EXPECT_EQ(++seen[byte], 1) << page << " " << address;
+    }
+  }
+  EXPECT_EQ(seen.size(), 6u * 127 + 12 + 32);
+}
+
+// ---- Alarms (Table 8)
+
+TEST(EslDevice, WhatClearsWhichAlarm) {
+  struct Row {
+    std::uint8_t alarm;
+    bool by_c;
+    bool by_d_and_c;
+    bool by_power;
+  };
+  for (const Row& row :
+       {Row{alarms::xc_error, true, true, false}, Row{alarms::multiturn_error, false, true, false},
+        Row{alarms::led_or_lissajous_error, false, false, true}, Row{alarms::overspeed, false, false, true},
+        Row{alarms::memory_error, false, false, true}, Row{alarms::singleturn_error, false, false, true},
+        Row{alarms::under_voltage, false, false, false}, Row{alarms::over_voltage, false, false, false}}) {
+    Bench bench;
+    bench.encoder.raise_alarms(row.alarm);
+    EXPECT_EQ(bench.read().one.alarms, row.alarm);
+    EXPECT_EQ(bench.read().two.alarms, row.alarm);
+    reset(bench, DataId::clear_alarms, 7);
+    EXPECT_EQ(bench.read().one.alarms, row.alarm);
+    reset(bench, DataId::clear_alarms);
+    EXPECT_EQ(bench.read().one.alarms == 0, row.by_c) << int{row.alarm};
+    reset(bench, DataId::reset_multiturn);
+    bench.pass(10ms);
+    reset(bench, DataId::clear_alarms);
+    EXPECT_EQ(bench.read().one.alarms == 0, row.by_d_and_c) << int{row.alarm};
+    if (row.by_c || row.by_d_and_c) continue;
+    bench.encoder.power_off(bench.line.now());
+    bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+    EXPECT_EQ(bench.read().one.alarms == 0, row.by_power) << int{row.alarm};
+    bench.encoder.lower_alarms(row.alarm);
+    EXPECT_EQ(bench.read().one.alarms, 0);
+  }
+}
+
+TEST(EslDevice, SupplySpeedAndTemperature) {
+  Bench bench;
+  bench.encoder.set_environment({.supply_millivolts = 2899});
+  EXPECT_EQ(bench.read().one.alarms, alarms::under_voltage);
+  bench.encoder.set_environment({.supply_millivolts = 3701});
+  EXPECT_EQ(bench.read().one.alarms, alarms::over_voltage);
+  EXPECT_EQ(bench.read().one.status, status::ready | status::safety_error);
+  bench.encoder.set_environment({.temperature = 120});
+  EXPECT_EQ(bench.read().one.status, status::ready | status::temperature_warning);
+  bench.encoder.set_environment({});
+  bench.shaft.spin(10'000, bench.line.now());
+  EXPECT_EQ(bench.read(DataId::alarms).one.alarms, 0);
+  bench.shaft.spin(-10'001, bench.line.now());
+  bench.read(DataId::alarms);
+  bench.shaft.spin(0, bench.line.now());
+  EXPECT_EQ(bench.read(DataId::alarms).one.alarms, alarms::overspeed);
+  EXPECT_EQ(bench.read(DataId::alarms).one.status, status::ready | status::non_safety_error);
+}
+
+// ---- Resets
+
+TEST(EslDevice, AnotherRequestOrTooMuchHasteStartsTheCountAgain) {
+  Bench bench;
+  bench.shaft.put(3, 1'000'000);
+  reset(bench, DataId::zero, 7);
+  bench.raw(Request{DataId::temperature});
+  reset(bench, DataId::zero, 1);
+  EXPECT_EQ(bench.read().singleturn, 1'000'000u);
+  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // 23 us apart
+  EXPECT_EQ(bench.read().singleturn, 1'000'000u);
+  EXPECT_GT(bench.encoder.violation_count(), 0u);
+  reset(bench, DataId::zero);
+  EXPECT_EQ(bench.read().singleturn, 0u);
+  EXPECT_EQ(bench.read().redundant, 0u);
+  EXPECT_EQ(bench.read().multiturn, 3u);
+}
+
+TEST(EslDevice, AResetOnATurningShaftIsAViolation) {
+  Bench bench;
+  bench.shaft.spin(5, Time{});
+  reset(bench, DataId::reset_multiturn);
+  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  EXPECT_EQ(bench.encoder.violations()[0].rule, "reset while the shaft turns");
+}
+
+TEST(EslDevice, FaultsStayInTheirChannel) {
+  Bench bench;
+  bench.shaft.put(0, 0x800000);
+  bench.encoder.set_fault(Channel::two, {.singleturn = 0, .alarms = alarms::singleturn_error});
+  const Wire bytes = bench.raw(Request{DataId::alarms});
+  EXPECT_EQ(bytes[2], 0);
+  EXPECT_EQ(bytes[6], alarms::singleturn_error);
+  EXPECT_EQ(bytes[1] & status::safety_error, 0);
+  EXPECT_EQ(bytes[5] & status::safety_error, status::safety_error);
+  const Reply reply = bench.encoder.reply_to(DataId::position, bench.line.now());
+  EXPECT_EQ(reply.singleturn, 0x800000u);
+  EXPECT_EQ(reply.redundant, 0u);
+}
+
+}  // namespace
+}  // namespace absenc::esl

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// Positions that passed every check a reader of IDs 1 and 2 can make. This is not a certified safety function:
+// README.md lists what the checks cannot see.
+#pragma once
+
+#include <optional>
+
+#include "absenc/protocol/esl/reply.hpp"
+#include "absenc/protocol/esl/timing.hpp"
+
+namespace absenc::esl {
+
+class SafetyMonitor;
+
+/// Only a SafetyMonitor makes one. The turns are not part of it: they exist in channel 1 alone.
+class SafePosition {
+ public:
+  /// Counts, 0 to 2^24 - 1. Its top 9 bits are confirmed by channel 2, within the profile's tolerance.
+  [[nodiscard]] constexpr std::uint32_t singleturn() const { return singleturn_; }
+  [[nodiscard]] constexpr std::uint8_t encoder_address() const { return encoder_address_; }
+  /// When the encoder took the position.
+  [[nodiscard]] constexpr Time latched() const { return latched_; }
+
+ private:
+  friend class SafetyMonitor;
+  constexpr SafePosition(const Reply& reply, Time latched)
+      : singleturn_(reply.singleturn), encoder_address_(reply.encoder_address), latched_(latched) {}
+
+  std::uint32_t singleturn_;
+  std::uint8_t encoder_address_;
+  Time latched_;
+};
+
+struct SafetyVerdict {
+  std::optional<SafePosition> position{};  // set when `failed` is Check::passed
+  Check failed = Check::passed;
+};
+
+/// The position is finished 4.3 us after the end of CF, which one CRC byte may follow.
+[[nodiscard]] constexpr Time latch_time(const Profile& profile, Time sent_at) {
+  return sent_at - (profile.request_crc ? line_settings.character() : Time{}) + position_time;
+}
+
+/// Judges the replies of one encoder, one after the other, from the bytes as they came.
+///
+/// The sequence counter proves something only against an earlier reply. After the start, and after anything that went
+/// wrong, the first good reply therefore makes no safe position, and the one after it must answer the other of the two
+/// IDs (`next_id`): a line that hands out each reply one cycle late shows by the wrong echo.
+class SafetyMonitor {
+ public:
+  constexpr explicit SafetyMonitor(const Profile& profile) : profile_(profile) {}
+
+  /// Which ID to ask; `wanted` once the monitor trusts the line.
+  [[nodiscard]] constexpr DataId next_id(DataId wanted = DataId::position) const {
+    if (trust_ == Trust::full) return wanted;
+    return last_id_ == DataId::position ? DataId::singleturn : DataId::position;
+  }
+
+  /// `sent_at`, the end of the request, dates the position.
+  constexpr SafetyVerdict judge(const Request& request, Bytes bytes, Time sent_at) {
+    Reply reply;
+    Check check = check_reply(profile_, request, bytes, reply);
+    if (check == Check::passed) check = check_content(reply);
+    last_id_ = request.id;
+    if (check == Check::passed) check = check_sequence(reply);
+    if (check != Check::passed) {
+      if (check != Check::sequence_unknown) trust_ = Trust::none;
+      return {.failed = check};
+    }
+    trust_ = Trust::full;
+    return {.position = SafePosition(reply, latch_time(profile_, sent_at))};
+  }
+
+  /// A request was sent and no reply came.
+  constexpr void missed(const Request& request) {
+    trust_ = Trust::none;
+    last_id_ = request.id;
+  }
+
+  /// Another request than IDs 1 and 2 was answered by this encoder.
+  constexpr void other_exchange(DataId id) {
+    if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) ++step_;
+  }
+
+ private:
+  enum class Trust : std::uint8_t { none, one_reply, full };
+
+  [[nodiscard]] constexpr Check check_content(const Reply& reply) const {
+    if (!is_safety_position(reply.id)) return Check::not_a_safety_reply;
+    if ((reply.one.status & status::ready) == 0) return Check::ch1_not_ready;
+    if ((reply.two.status & status::ready) == 0) return Check::ch2_not_ready;
+    const unsigned forced = reply.one.status & reply.two.status & status::forced_test_passed;
+    if (profile_.require_forced_test && forced == 0) return Check::forced_test_missing;
+    if (((reply.one.status | reply.two.status) & status::safety_error) != 0) return Check::safety_error;
+    if (((reply.one.alarms | reply.two.alarms) & alarms::unsafe) != 0) return Check::alarm;
+    return Check::passed;
+  }
+
+  constexpr Check check_sequence(const Reply& reply) {
+    const auto moved = static_cast<std::uint8_t>(reply.one.sequence - last_sequence_);
+    const std::uint8_t step = step_;
+    const bool known = trust_ == Trust::full || (trust_ == Trust::one_reply && reply.id != baseline_id_);
+    last_sequence_ = reply.one.sequence;
+    step_ = 1;
+    if (!known) {
+      trust_ = Trust::one_reply;
+      baseline_id_ = reply.id;
+      return Check::sequence_unknown;
+    }
+    if (moved == 0) return Check::sequence_still;
+    if (profile_.sequence_step != SequenceStep::change && moved != step) return Check::sequence_jumped;
+    return Check::passed;
+  }
+
+  Profile profile_;
+  Trust trust_ = Trust::none;
+  DataId last_id_ = DataId::position;
+  DataId baseline_id_ = DataId::position;
+  std::uint8_t last_sequence_ = 0;
+  std::uint8_t step_ = 1;  // how far the counter has to move until the next reply
+};
+
+}  // namespace absenc::esl

@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can become a safe position: every single fault of one channel, every small error of the wire, replays and
+// delays. For each kind the number that was accepted although it was wrong is printed; README.md says which the checks
+// cannot see, and why.
+#include "absenc/protocol/esl/safety.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <deque>
+#include <string>
+#include <type_traits>
+
+#include "absenc/protocol/esl/bench_test.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc::esl {
+namespace {
+
+using Wire = std::vector<std::uint8_t>;
+using testing::Bench;
+
+static_assert(!std::is_default_constructible_v<SafePosition>);
+static_assert(!std::is_constructible_v<SafePosition, const Reply&, Time>);
+static_assert(!std::is_constructible_v<SafePosition, Reading>);
+
+void print(const char* kind, unsigned tried, unsigned accepted) {
+  std::printf("%-58s %7u tried %6u accepted\n", kind, tried, accepted);
+}
+
+/// Exchanges without a line: the encoder's reply as bytes, some position apart each time.
+class Exchanges {
+ public:
+  explicit Exchanges(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
+    encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    shaft.put(1, 0x123456);
+  }
+  Wire reply_to(DataId id) {
+    now_ += 100us;
+    const RequestBytes request = encode_request(profile_, {id, profile_.address});
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now_, .items = request});
+    const Step<std::uint8_t> step = encoder.next(now_);
+    Wire bytes(step.out.begin(), step.out.end());
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now_ + 20us});
+    return bytes;
+  }
+  SafetyVerdict judge(DataId id, Bytes bytes) { return monitor.judge({id, profile_.address}, bytes, now_); }
+  SafetyVerdict next(DataId wanted = DataId::position) {
+    const DataId id = monitor.next_id(wanted);
+    return judge(id, reply_to(id));
+  }
+  void trust() {
+    while (next().failed != Check::passed) {
+    }
+  }
+
+ private:
+  Profile profile_;
+  Time now_{};
+
+ public:
+  testing::TestShaft shaft;
+  VirtualEncoder encoder;
+  SafetyMonitor monitor;
+};
+
+TEST(EslSafety, TheSecondGoodReplyToTheOtherIdIsSafe) {
+  Exchanges line;
+  EXPECT_EQ(line.next().failed, Check::sequence_unknown);
+  const SafetyVerdict verdict = line.next();
+  ASSERT_EQ(verdict.failed, Check::passed);
+  EXPECT_EQ(verdict.position->singleturn(), 0x123456u);
+  for (unsigned i = 0; i < 1000; ++i) EXPECT_TRUE(line.next().position.has_value());
+}
+
+TEST(EslSafety, RepliesToOneIdAloneAreNotTrusted) {
+  Exchanges line;
+  for (unsigned i = 0; i < 5; ++i) {
+    EXPECT_EQ(line.judge(DataId::position, line.reply_to(DataId::position)).failed, Check::sequence_unknown);
+  }
+  EXPECT_EQ(line.judge(DataId::singleturn, line.reply_to(DataId::singleturn)).failed, Check::passed);
+  EXPECT_EQ(line.judge(DataId::singleturn, line.reply_to(DataId::singleturn)).failed, Check::passed);
+}
+
+TEST(EslSafety, EveryCheckIsNamed) {
+  struct Row {
+    ChannelFault one;
+    ChannelFault two;
+    Check failed;
+  };
+  for (const Row& row : {
+           Row{{.status_clear = status::ready}, {}, Check::ch1_not_ready},
+           Row{{}, {.status_clear = status::ready}, Check::ch2_not_ready},
+           Row{{.status_set = status::safety_error}, {}, Check::safety_error},
+           Row{{}, {.status_set = status::safety_error}, Check::safety_error},
+           Row{{.status_set = status::parity_error}, {}, Check::parity_reported},
+           Row{{}, {.status_set = status::stop_error}, Check::stop_reported},
+           Row{{.status_set = status::channel_2}, {}, Check::ch1_channel_bit},
+           Row{{}, {.status_clear = status::channel_2}, Check::ch2_channel_bit},
+           Row{{.alarms = alarms::led_or_lissajous_error, .status_clear = status::safety_error}, {}, Check::alarm},
+           Row{{}, {.alarms = alarms::memory_error, .status_clear = status::safety_error}, Check::alarm},
+           Row{{.sequence = std::uint8_t{7}}, {}, Check::sequences_differ},
+           Row{{}, {.sequence = std::uint8_t{7}}, Check::sequences_differ},
+           Row{{}, {.redundant_offset = 2}, Check::redundant_position},
+           Row{{.singleturn = 0x123456u ^ 0x800000u}, {}, Check::redundant_position},
+       }) {
+    Exchanges line;
+    line.trust();
+    line.encoder.set_fault(Channel::one, row.one);
+    line.encoder.set_fault(Channel::two, row.two);
+    const SafetyVerdict verdict = line.next();
+    EXPECT_EQ(verdict.failed, row.failed) << text_of(verdict.failed).sentence << " / " << text_of(row.failed).sentence;
+    EXPECT_FALSE(verdict.position.has_value());
+    // One good reply is not enough afterwards.
+    line.encoder.set_fault(Channel::one, {});
+    line.encoder.set_fault(Channel::two, {});
+    EXPECT_EQ(line.next().failed, Check::sequence_unknown);
+    EXPECT_EQ(line.next().failed, Check::passed);
+  }
+}
+
+TEST(EslSafety, TheForcedTestCanBeRequired) {
+  Exchanges line({.require_forced_test = true});
+  EXPECT_EQ(line.next().failed, Check::forced_test_missing);
+  line.encoder.set_environment({.forced_test_passed = true});
+  line.trust();
+  EXPECT_EQ(line.next().failed, Check::passed);
+}
+
+TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
+  for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety, SequenceStep::request}) {
+    Exchanges line({.sequence_step = step});
+    line.trust();
+    for (const DataId other : {DataId::temperature, DataId::zero, DataId::encoder_id, DataId::alarms}) {
+      line.reply_to(other);
+      line.monitor.other_exchange(other);
+      EXPECT_EQ(line.next().failed, Check::passed) << static_cast<int>(step) << " " << static_cast<int>(other);
+    }
+    line.reply_to(DataId::position);  // lost
+    EXPECT_EQ(line.next().failed, step == SequenceStep::change ? Check::passed : Check::sequence_jumped);
+  }
+  EXPECT_EQ(Exchanges().judge(DataId::singleturn_short, {}).failed, Check::length);
+}
+
+TEST(EslSafety, RepliesToOtherIdsMakeNoSafePosition) {
+  Exchanges line;
+  line.trust();
+  EXPECT_EQ(line.judge(DataId::zero, line.reply_to(DataId::zero)).failed, Check::not_a_safety_reply);
+  EXPECT_EQ(line.judge(DataId::singleturn_short, line.reply_to(DataId::singleturn_short)).failed,
+            Check::not_a_safety_reply);
+}
+
+// ---- The campaign
+
+// One channel wrong from some moment on: how many are accepted, and how far off they are.
+unsigned accepted_with(Channel channel, const ChannelFault& fault, unsigned exchanges, std::int64_t& off) {
+  Exchanges line;
+  line.trust();
+  line.encoder.set_fault(channel, fault);
+  unsigned accepted = 0;
+  for (unsigned i = 0; i < exchanges; ++i) {
+    const SafetyVerdict verdict = line.next();
+    if (!verdict.position) continue;
+    ++accepted;
+    const std::int64_t error = wrapped_difference(verdict.position->singleturn(), 0x123456, 24);
+    off = std::max(off, error < 0 ? -error : error);
+  }
+  return accepted;
+}
+
+TEST(EslSafetyCampaign, StuckAndWrongFieldsOfOneChannel) {
+  constexpr unsigned each = 600;  // more than the counters take to come round
+  std::int64_t off = 0;
+  for (const Channel channel : {Channel::one, Channel::two}) {
+    const char* number = channel == Channel::one ? "channel 1" : "channel 2";
+    std::printf("%s:\n", number);
+    unsigned tried = 0;
+    unsigned accepted = 0;
+    for (unsigned value = 0; value < 256; value += 17) {
+      tried += each;
+      accepted += accepted_with(channel, {.sequence = static_cast<std::uint8_t>(value)}, each, off);
+    }
+    print("stuck sequence counter", tried, accepted);
+    // The other channel comes by the stuck value once in 128 replies: that one reply is a good one, but trust is gone.
+    EXPECT_EQ(accepted, 0u);
+    tried = accepted = 0;
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      const auto mask = static_cast<std::uint8_t>(1u << bit);
+      if ((mask & alarms::unsafe) == 0) continue;
+      tried += each;
+      accepted += accepted_with(channel, {.alarms = mask}, each, off);
+    }
+    print("an unsafe alarm stuck at 1", tried, accepted);
+    EXPECT_EQ(accepted, 0u);
+    tried = accepted = 0;
+    for (const std::uint8_t bit : {status::parity_error, status::stop_error, status::safety_error}) {
+      tried += each;
+      accepted += accepted_with(channel, {.status_set = bit}, each, off);
+    }
+    tried += 2 * each;
+    accepted += accepted_with(channel, {.status_clear = status::ready}, each, off);
+    accepted += channel == Channel::one ? accepted_with(channel, {.status_set = status::channel_2}, each, off)
+                                        : accepted_with(channel, {.status_clear = status::channel_2}, each, off);
+    print("a status bit stuck where it matters", tried, accepted);
+    EXPECT_EQ(accepted, 0u);
+    tried = accepted = 0;
+    unsigned near = 0;
+    off = 0;
+    for (std::uint32_t stuck = 0; stuck < 0x1000000; stuck += 0x4001) {  // every 9-bit position twice
+      const std::int64_t distance = wrapped_difference(stuck >> 15, 0x123456 >> 15, 9);
+      const unsigned made = accepted_with(channel, {.singleturn = stuck}, 4, off);
+      ++tried;
+      if (distance >= -1 && distance <= 1) {
+        near += made;
+      } else {
+        accepted += made;
+      }
+    }
+    print("stuck position, 2/512 turn off or more", tried, accepted);
+    std::printf("%-58s %7s       %6u accepted, off by up to %lld counts\n", "stuck position, nearer (cannot be seen)",
+                "", near, static_cast<long long>(off));
+    EXPECT_EQ(accepted, 0u);
+    EXPECT_LE(off, 2 * (1 << 15));
+  }
+  unsigned accepted = 0;
+  for (std::uint32_t offset = 2; offset < 511; ++offset) {
+    accepted += accepted_with(Channel::two, {.redundant_offset = offset}, 4, off);
+  }
+  print("wrong RS", 509 * 4, accepted);
+  EXPECT_EQ(accepted, 0u);
+}
+
+// A reply of ID 1: which byte is what, and which of its bits the checks see when it is stuck before the CRC is taken.
+struct StuckField {
+  const char* name;
+  std::size_t byte;
+  unsigned seen;
+};
+constexpr unsigned seen_status =
+    status::parity_error | status::stop_error | status::safety_error | status::channel_2 | status::ready;
+constexpr std::array<StuckField, 14> stuck_fields{{
+    {"CF1", 0, 0xFF},
+    {"SF1", 1, seen_status},
+    {"ALM1", 2, alarms::unsafe},
+    {"ABS0", 3, 0},  // below the resolution of channel 2
+    {"ABS1", 4, 0},  // its top bit is the lowest of RS: within the tolerance
+    {"ABS2", 5, 0xFF},
+    {"ABM0", 6, 0},  // no part of a safe position
+    {"ABM1", 7, 0},
+    {"SC1", 8, 0x7F},  // SC2 has seven bits
+    {"CF2", 11, 0xFF},
+    {"SF2", 12, seen_status},
+    {"ALM2", 13, alarms::unsafe},
+    {"RS0", 14, 0xFF},
+    {"RS1, SC2", 15, 0x7F},  // RS1: within the tolerance
+}};
+
+// The reply with one bit stuck, the CRC of its channel right.
+Wire stuck(Wire reply, std::size_t byte, unsigned bit, bool value) {
+  const auto mask = static_cast<std::uint8_t>(1u << bit);
+  reply[byte] = static_cast<std::uint8_t>(value ? reply[byte] | mask : reply[byte] & ~mask);
+  const bool first = byte < 11;
+  const std::size_t begin = first ? 0 : 11;
+  const std::size_t end = first ? 9 : 16;
+  const std::uint16_t crc =
+      checksum16(CrcBitOrder::lsb, first ? Channel::one : Channel::two, Bytes(reply).subspan(begin, end - begin));
+  reply[end] = static_cast<std::uint8_t>(crc);
+  reply[end + 1] = static_cast<std::uint8_t>(crc >> 8);
+  return reply;
+}
+
+// Counted is what was accepted although a byte of the reply was not what it should have been.
+TEST(EslSafetyCampaign, EveryBitOfEveryFieldStuckAt0AndAt1) {
+  sim::Random random(7);
+  for (const StuckField& field : stuck_fields) {
+    unsigned changed = 0;
+    unsigned seen = 0;
+    unsigned unseen = 0;
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      const bool visible = (field.seen >> bit & 1) != 0;
+      for (const bool value : {false, true}) {
+        Exchanges line;
+        for (unsigned i = 0; i < 300; ++i) {
+          line.encoder.lower_alarms(0xFF);
+          line.shaft.put(static_cast<std::int64_t>(random.below(65536)),
+                         static_cast<std::int64_t>(random.below(1 << 24)));
+          line.trust();
+          const bool alarmed = i % 2 == 1;
+          if (alarmed) line.encoder.raise_alarms(1u << random.below(8));
+          const Wire good = line.reply_to(DataId::position);
+          const Wire bad = stuck(good, field.byte, bit, value);
+          if (bad == good) continue;
+          ++changed;
+          if (!line.judge(DataId::position, bad).position) continue;
+          ++(visible ? seen : unseen);
+        }
+      }
+    }
+    print((std::string(field.name) + " stuck, bits that the checks see").c_str(), changed, seen);
+    if (field.seen != 0xFF) std::printf("%-58s %7s       %6u accepted\n", "  bits that cannot be seen", "", unseen);
+    EXPECT_GT(changed, 0u);
+    EXPECT_EQ(seen, 0u) << field.name;
+    EXPECT_EQ(unseen > 0, field.seen != 0xFF) << field.name;
+  }
+}
+
+TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
+  Exchanges line;
+  line.trust();
+  const SafetyMonitor trusting = line.monitor;
+  const Wire good = line.reply_to(DataId::position);
+  ASSERT_TRUE(SafetyMonitor(trusting).judge({}, good, {}).position.has_value());
+  const auto accepted = [&trusting](Bytes bytes) {
+    return SafetyMonitor(trusting).judge({}, bytes, {}).position.has_value() ? 1u : 0u;
+  };
+  unsigned ones = 0;
+  unsigned twos = 0;
+  unsigned pairs = 0;
+  for (unsigned a = 0; a < 144; ++a) {
+    Wire bad = good;
+    bad[a / 8] ^= static_cast<std::uint8_t>(1u << a % 8);
+    ones += accepted(bad);
+    for (unsigned b = a + 1; b < 144; ++b, ++pairs) {
+      bad[b / 8] ^= static_cast<std::uint8_t>(1u << b % 8);
+      twos += accepted(bad);
+      bad[b / 8] ^= static_cast<std::uint8_t>(1u << b % 8);
+    }
+  }
+  print("1-bit errors", 144, ones);
+  print("2-bit errors", pairs, twos);
+  EXPECT_EQ(pairs, 10'296u);
+  EXPECT_EQ(ones + twos, 0u);
+
+  unsigned swaps = 0;
+  unsigned swapped = 0;
+  for (unsigned i = 0; i < 200; ++i) {
+    line.shaft.put(i, std::int64_t{i} * 83'617);
+    line.trust();
+    const SafetyMonitor then = line.monitor;
+    const Wire reply = line.reply_to(DataId::position);
+    for (std::size_t a = 0; a < reply.size(); ++a) {
+      for (std::size_t b = a + 1; b < reply.size(); ++b) {
+        if (reply[a] == reply[b]) continue;
+        Wire bad = reply;
+        std::swap(bad[a], bad[b]);
+        ++swaps;
+        swapped += SafetyMonitor(then).judge({}, bad, {}).position.has_value() ? 1u : 0u;
+      }
+    }
+  }
+  print("swaps of two bytes", swaps, swapped);
+  EXPECT_GT(swaps, 10'000u);
+  EXPECT_EQ(swapped, 0u);
+
+  unsigned cut = 0;
+  for (std::size_t size = 0; size < good.size(); ++size) cut += accepted(Bytes(good).first(size));
+  print("cut short", 18, cut);
+  EXPECT_EQ(cut, 0u);
+}
+
+// Replies of the past: the last one again and again, one of `age` replies ago, and a line that is late.
+TEST(EslSafetyCampaign, ReplaysAndDelays) {
+  for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety}) {
+    const char* name = step == SequenceStep::change ? "sequence_step=change" : "sequence_step=safety";
+    std::printf("%s:\n", name);
+    Exchanges line({.sequence_step = step});
+    unsigned again = 0;
+    for (unsigned i = 0; i < 1000; ++i) {
+      line.trust();
+      const Wire last = line.reply_to(DataId::position);
+      line.judge(DataId::position, last);
+      for (unsigned times = 0; times < 4; ++times) {
+        again += line.judge(line.monitor.next_id(), last).position.has_value() ? 1u : 0u;
+      }
+    }
+    print("the last reply again", 4000, again);
+    EXPECT_EQ(again, 0u);
+
+    unsigned older = 0;
+    std::deque<Wire> past;
+    line.trust();
+    for (unsigned i = 0; i < 1000; ++i) {
+      past.push_back(line.reply_to(DataId::position));
+      line.judge(DataId::position, past.back());
+      if (past.size() < 11) continue;
+      SafetyMonitor monitor = line.monitor;
+      older += monitor.judge({}, past[i % 9], {}).position.has_value() ? 1u : 0u;
+      past.pop_front();
+    }
+    print(step == SequenceStep::change ? "an older reply once (cannot be seen)" : "an older reply once", 990, older);
+    EXPECT_EQ(older, step == SequenceStep::change ? 990u : 0u);
+
+    // From some moment on every reply comes one cycle late: the first cycle has none.
+    unsigned late = 0;
+    line.trust();
+    Wire held = line.reply_to(line.monitor.next_id());
+    line.monitor.missed({line.monitor.next_id()});
+    for (unsigned i = 0; i < 1000; ++i) {
+      const DataId id = line.monitor.next_id();
+      const Wire now = line.reply_to(id);
+      late += line.judge(id, held).position.has_value() ? 1u : 0u;
+      held = now;
+    }
+    print("every reply one cycle late", 1000, late);
+    EXPECT_EQ(late, 0u);
+  }
+}
+
+// What is left when random bytes come instead of a reply of the right length: 2^-32 for the CRCs alone.
+TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
+  sim::Random random(1);
+  Exchanges line;
+  line.trust();
+  const SafetyMonitor trusting = line.monitor;
+  unsigned accepted = 0;
+  for (unsigned i = 0; i < 200'000; ++i) {
+    Wire noise(18);
+    for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random.next());
+    noise[0] = noise[11] = control_field({}, 0, DataId::position);
+    accepted += SafetyMonitor(trusting).judge({}, noise, {}).position.has_value() ? 1u : 0u;
+  }
+  print("noise with the right control fields", 200'000, accepted);
+  EXPECT_EQ(accepted, 0u);
+}
+
+}  // namespace
+}  // namespace absenc::esl
