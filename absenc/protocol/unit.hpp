@@ -71,6 +71,16 @@ struct MemoryArea {
   }
 };
 
+/// A register of the encoder: accessed as a whole, at its address. The commands memory_read and memory_write reach it
+/// by their arguments `address` and `value` (most significant byte first).
+struct RegisterInfo {
+  std::string_view name;
+  std::uint32_t address;
+  std::uint32_t size;  // bytes
+  bool readable = true;
+  bool writable = false;
+};
+
 /// A frame in the form its link carries.
 struct Frame {
   Bytes bytes{};
@@ -85,6 +95,7 @@ struct Expected {
   std::string_view field;
   std::int64_t number = 0;
   double real = 0;
+  std::string_view text{};  // of text and bytes fields: the bytes themselves
 };
 
 /// A frame with what it must decode to. `options` is "name=value name=value". Clocked links: request and reply are
@@ -135,7 +146,8 @@ struct Unit {
   std::span<const Model> models;
   std::span<const FieldInfo> fields;
   std::span<const Command> commands;
-  std::span<const MemoryArea> memory{};  // what the commands memory_read and memory_write reach, in order
+  std::span<const MemoryArea> memory{};       // what the commands memory_read and memory_write reach, in order
+  std::span<const RegisterInfo> registers{};  // the same of an encoder that has registers instead of bytes
   std::span<const Vector> vectors;
   const FieldInfo* status;     // the flags of Reading::status; null when the unit has none
   const FieldInfo* alarms;     // the flags of Reading::alarms

@@ -16,9 +16,16 @@ struct VectorCheck final : FieldSink {
     for (const Expected& one : expected) {
       const double difference = one.real - value.real;
       const bool near = difference < 1e-9 && difference > -1e-9;
-      if (one.field == value.info->name && one.number == value.number && near) ++matches;
+      if (one.field == value.info->name && one.number == value.number && near && same(one.text, value.bytes)) ++matches;
     }
     ++count;
+  }
+  [[nodiscard]] static constexpr bool same(std::string_view text, Bytes bytes) {
+    if (text.size() != bytes.size()) return false;
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      if (static_cast<std::uint8_t>(text[i]) != bytes[i]) return false;
+    }
+    return true;
   }
   [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
 

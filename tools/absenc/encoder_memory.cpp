@@ -4,37 +4,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <initializer_list>
 
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/run.hpp"
+#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
 namespace {
-
-struct Value {
-  std::string_view argument;
-  std::int64_t value;
-};
 
 const Argument* find_argument(const Command& command, std::string_view name) {
   for (const Argument& argument : command.arguments) {
     if (argument.name == name) return &argument;
   }
   return nullptr;
-}
-
-// In the order of the command, which need not have all of them.
-std::vector<std::int64_t> arguments(const Command& command, std::initializer_list<Value> values) {
-  std::vector<std::int64_t> all;
-  for (const Argument& argument : command.arguments) {
-    const auto value =
-        std::find_if(values.begin(), values.end(), [&](const Value& one) { return one.argument == argument.name; });
-    all.push_back(value != values.end() ? value->value : argument.default_value);
-  }
-  return all;
 }
 
 /// What memory_read reports.
@@ -85,10 +69,10 @@ MemoryImage EncoderMemory::read(const MemoryImage& image) {
 std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t count) {
   const Command& command = *find_command(encoder_->unit(), Verb::memory_read);
   ReadBytes bytes;
-  run_into(
-      *encoder_, command,
-      arguments(command, {{"page", at.page}, {"address", at.address}, {"count", static_cast<std::int64_t>(count)}}),
-      bytes);
+  run_into(*encoder_, command,
+           named_arguments(command,
+                           {{"page", at.page}, {"address", at.address}, {"count", static_cast<std::int64_t>(count)}}),
+           bytes);
   if (bytes.data.size() == count) return bytes.data;
   throw ToolFailure(fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(encoder_->unit(), at),
                                 bytes.data.size()));
@@ -97,7 +81,7 @@ std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t 
 void EncoderMemory::write(MemoryAddress at, std::uint8_t value) {
   const Command& command = *find_command(encoder_->unit(), Verb::memory_write);
   ReadBytes ignored;
-  run_into(*encoder_, command, arguments(command, {{"page", at.page}, {"address", at.address}, {"value", value}}),
+  run_into(*encoder_, command, named_arguments(command, {{"page", at.page}, {"address", at.address}, {"value", value}}),
            ignored);
 }
 

@@ -86,6 +86,16 @@ Rows command_rows(const Unit& unit) {
   return rows;
 }
 
+Rows register_rows(const Unit& unit) {
+  Rows rows;
+  for (const RegisterInfo& one : unit.registers) {
+    const std::string_view access = !one.writable ? "read only" : one.readable ? "read and write" : "write only";
+    rows.push_back({std::string(one.name), fmt::format("0x{:02X}", one.address),
+                    fmt::format("{} byte{}", one.size, one.size == 1 ? "" : "s"), std::string(access)});
+  }
+  return rows;
+}
+
 Rows memory_rows(const Unit& unit) {
   Rows rows;
   for (const MemoryArea& area : unit.memory) {
@@ -123,6 +133,7 @@ std::string details(const Unit& unit) {
   text += section("Options (--option NAME=VALUE, or ?NAME=VALUE behind an encoder)", option_rows(unit));
   text += section("Settings of the port (?NAME=VALUE behind an encoder)", port_rows());
   text += section(fmt::format("Commands (absenc run {}:PORT <command>)", unit.id), command_rows(unit));
+  text += section(fmt::format("Registers (absenc memory read {}:PORT <name>)", unit.id), register_rows(unit));
   text += section(fmt::format("Memory (absenc memory read {}:PORT <address> --page P)", unit.id), memory_rows(unit));
   text += section("Fields", field_rows(unit));
   return text;
@@ -184,6 +195,19 @@ Json commands_json(const Unit& unit) {
   return commands;
 }
 
+Json registers_json(const Unit& unit) {
+  Json registers = Json::array();
+  for (const RegisterInfo& one : unit.registers) {
+    registers.append(Json::object()
+                         .set("name", one.name)
+                         .set("address", one.address)
+                         .set("size", one.size)
+                         .set("readable", one.readable)
+                         .set("writable", one.writable));
+  }
+  return registers;
+}
+
 Json memory_json(const Unit& unit) {
   Json areas = Json::array();
   for (const MemoryArea& area : unit.memory) {
@@ -231,6 +255,7 @@ Json unit_json(const Unit& unit) {
       .set("options", options_json(unit))
       .set("commands", commands_json(unit))
       .set("memory", memory_json(unit))
+      .set("registers", registers_json(unit))
       .set("fields", fields_json(unit));
 }
 

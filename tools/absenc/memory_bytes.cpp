@@ -9,8 +9,11 @@
 #include "tools/absenc/encoder_memory.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/memory_change.hpp"
+#include "tools/absenc/nearest.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/run.hpp"
+#include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
@@ -37,9 +40,47 @@ std::string hex_dump(const MemoryImage& image) {
   return table(rows);
 }
 
+// By name or address. An address that the table does not have is left to the encoder.
+std::int64_t register_address(const Invocation& invocation, const Unit& unit, bool for_writing) {
+  const std::string_view written = invocation.text("address");
+  const Result<std::int64_t> number = parse_number(written);
+  std::vector<std::string_view> names;
+  for (const RegisterInfo& one : unit.registers) {
+    if (!(for_writing ? one.writable : one.readable)) continue;
+    if (one.name == written) return one.address;
+    names.push_back(one.name);
+  }
+  if (number && *number >= 0) return *number;
+  throw UsageError(fmt::format("{} has no register \"{}\" to be {}{}", unit.id, written,
+                               for_writing ? "written" : "read", suggestion(written, names)));
+}
+
+const Command& register_command(const Invocation& invocation, const Unit& unit, Verb verb) {
+  for (const std::string_view option : {"--page", "--count", "--dry-run"}) {
+    if (invocation.has(option)) throw UsageError(fmt::format("{} is for bytes, but {} has registers", option, unit.id));
+  }
+  return *find_command(unit, verb);
+}
+
+int read_register(const Invocation& invocation, const EncoderUri& uri) {
+  const Command& command = register_command(invocation, *uri.unit, Verb::memory_read);
+  const std::int64_t address = register_address(invocation, *uri.unit, false);
+  return run_command(invocation, uri, command, named_arguments(command, {{"address", address}}));
+}
+
+int write_register(const Invocation& invocation, const EncoderUri& uri) {
+  const Command& command = register_command(invocation, *uri.unit, Verb::memory_write);
+  const std::int64_t address = register_address(invocation, *uri.unit, true);
+  const std::span<const std::string> values = invocation.texts("values");
+  const Result<std::int64_t> value = parse_number(values.front());
+  if (values.size() > 1 || !value) throw UsageError("a register takes one number");
+  return run_command(invocation, uri, command, named_arguments(command, {{"address", address}, {"value", *value}}));
+}
+
 int run_read(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  if (!uri.unit->registers.empty()) return read_register(invocation, uri);
   require_memory(*uri.unit, false);
   const MemoryAddress first = first_address(invocation);
   const std::int64_t count = invocation.number("--count", 1, 1, most_bytes);
@@ -66,6 +107,7 @@ int run_read(const Invocation& invocation) {
 int run_write(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  if (!uri.unit->registers.empty()) return write_register(invocation, uri);
   require_memory(*uri.unit, true);
   MemoryAddress at = first_address(invocation);
   MemoryImage wanted;
@@ -81,7 +123,8 @@ int run_write(const Invocation& invocation) {
   return change_memory(invocation, uri, wanted);
 }
 
-constexpr Parameter address{"address", "", "of the first byte: decimal, or hexadecimal with 0x", "", true};
+constexpr Parameter address{
+    "address", "", "of the first byte: decimal, or hexadecimal with 0x; of a register also its name", "", true};
 constexpr Parameter page{"--page", "P", "of the memory, where it has pages", "0"};
 
 constexpr std::array<Parameter, 6> read_parameters{{
@@ -94,13 +137,13 @@ constexpr std::array<Parameter, 6> read_parameters{{
 }};
 constexpr std::array<Example, 2> read_examples{{
     {"absenc memory read tformat:/dev/ttyUSB0 0x10 --count 16 --page 2", "16 bytes of page 2"},
-    {"absenc memory read sim:tformat 0", "try it without hardware"},
+    {"absenc memory read sim:encolink serial_number", "a register by its name; try it without hardware"},
 }};
 
 constexpr std::array<Parameter, 8> write_parameters{{
     parameter::encoder,
     address,
-    {"values", "", "bytes: decimal, or hexadecimal with 0x", "", true, true},
+    {"values", "", "bytes, or the number for a register: decimal, or hexadecimal with 0x", "", true, true},
     page,
     {"--dry-run", "", "only show what differs"},
     parameter::yes,

@@ -96,6 +96,12 @@ std::string closed(const Unit& unit, MemoryAddress at, bool for_writing) {
 void require_memory(const Unit& unit, bool for_writing) {
   const Verb verb = for_writing ? Verb::memory_write : Verb::memory_read;
   if (!unit.memory.empty() && find_command(unit, verb) != nullptr) return;
+  if (!unit.registers.empty()) {
+    throw UsageError(
+        fmt::format("{} has registers: `absenc memory read` and `write` take one by name or address, and "
+                    "`absenc list {}` shows them",
+                    unit.id, unit.id));
+  }
   throw UsageError(fmt::format("the memory of a {} encoder cannot be {}", unit.id, for_writing ? "written" : "read"));
 }
 

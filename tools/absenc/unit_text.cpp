@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -118,6 +119,16 @@ std::vector<std::int64_t> require_arguments(const Command& command, std::span<co
     values.push_back(*value);
   }
   return values;
+}
+
+std::vector<std::int64_t> named_arguments(const Command& command, std::initializer_list<NamedArgument> values) {
+  std::vector<std::int64_t> all;
+  for (const Argument& argument : command.arguments) {
+    const auto value =
+        std::find_if(values.begin(), values.end(), [&](const NamedArgument& one) { return one.name == argument.name; });
+    all.push_back(value != values.end() ? value->value : argument.default_value);
+  }
+  return all;
 }
 
 std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names) {

@@ -62,8 +62,9 @@ Json expected_fields(const Unit& unit, const Vector& vector) {
   Json fields = Json::object();
   for (const Expected& expected : vector.fields) {
     const FieldInfo* info = find_field(unit, expected.field);
-    fields.set(expected.field,
-               info != nullptr ? to_json(FieldValue{info, expected.number, expected.real}) : Json(expected.number));
+    const std::vector<std::uint8_t> text(expected.text.begin(), expected.text.end());
+    const FieldValue value{.info = info, .number = expected.number, .real = expected.real, .bytes = text};
+    fields.set(expected.field, info != nullptr ? to_json(value) : Json(expected.number));
   }
   return fields;
 }

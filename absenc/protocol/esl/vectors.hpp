@@ -8,6 +8,7 @@
 #include "absenc/protocol/esl/fields.hpp"
 #include "absenc/protocol/esl/settings.hpp"
 #include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/vector_check.hpp"
 
 namespace absenc::esl {
 
@@ -140,26 +141,10 @@ inline constexpr std::array<Vector, 70> vectors{{
 
 namespace detail {
 
-// Compares what a frame decodes to with what is expected, in any order.
-struct Comparison final : FieldSink {
-  constexpr explicit Comparison(std::span<const Expected> wanted) : expected(wanted) {}
-  constexpr void put(const FieldValue& value) override {
-    for (const Expected& one : expected) {
-      if (one.field == value.info->name && one.number == value.number) ++matches;
-    }
-    ++count;
-  }
-  [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
-
-  std::span<const Expected> expected;
-  std::size_t matches = 0;
-  std::size_t count = 0;
-};
-
 constexpr bool holds(const Vector& vector) {
-  Comparison comparison(vector.fields);
-  const Error error = decode(to_profile(vector.options), vector.request, vector.reply, comparison);
-  return error == vector.error && comparison.all();
+  VectorCheck check(vector.fields);
+  const Error error = decode(to_profile(vector.options), vector.request, vector.reply, check);
+  return error == vector.error && check.all();
 }
 
 constexpr std::size_t first_that_fails() {

@@ -7,6 +7,7 @@
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/tformat/fields.hpp"
 #include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/vector_check.hpp"
 
 namespace absenc::tformat {
 
@@ -108,29 +109,13 @@ inline constexpr std::array<Vector, 43> vectors{{
 
 namespace detail {
 
-// Compares what a frame decodes to with what is expected, in any order.
-struct Comparison final : FieldSink {
-  constexpr explicit Comparison(std::span<const Expected> wanted) : expected(wanted) {}
-  constexpr void put(const FieldValue& value) override {
-    for (const Expected& one : expected) {
-      if (one.field == value.info->name && one.number == value.number) ++matches;
-    }
-    ++count;
-  }
-  [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
-
-  std::span<const Expected> expected;
-  std::size_t matches = 0;
-  std::size_t count = 0;
-};
-
 constexpr bool holds(const Vector& vector) {
   Format format;
   if (vector.options == "singleturn_bits=23") format = {.singleturn_bits = 23, .encoder_id = 0x17};
   if (vector.options == "strict=false") format.strict = false;
-  Comparison comparison(vector.fields);
-  const Error error = decode(format, vector.request, vector.reply, comparison);
-  return error == vector.error && comparison.all();
+  VectorCheck check(vector.fields);
+  const Error error = decode(format, vector.request, vector.reply, check);
+  return error == vector.error && check.all();
 }
 
 constexpr bool all_hold() {

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+// EncoLink frames of channel 1, cycles of channel 2 and the identity (RLS AksIM-2, UART and SPI): encode, decode and
+// every check they allow. README.md draws them; the bytes of channel 3 are in registers.hpp.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/crc.hpp"
+#include "absenc/core/result.hpp"
+
+namespace absenc::encolink {
+
+/// "Inverted CRC, 0x97 polynom", in normal notation: x8 + x7 + x4 + x2 + x + 1.
+inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
+
+[[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters>::of(bytes); }
+
+/// Whether the last byte is the checksum of those before it.
+[[nodiscard]] constexpr bool is_sealed(Bytes bytes) {
+  return !bytes.empty() && checksum(bytes.first(bytes.size() - 1)) == bytes.back();
+}
+
+/// First byte of a request.
+enum class Config : std::uint8_t {
+  position = 0x00,
+  reset_channels = 0xAA,  // and the position
+  identify = 0xBB,        // the frame after this one carries the identity
+};
+
+inline constexpr std::size_t request_bytes = 2;    // config, ra
+inline constexpr std::size_t identity_bytes = 19;  // with the checksum
+inline constexpr std::size_t reply_capacity = 20;
+inline constexpr unsigned maximum_resolution = 22;
+inline constexpr unsigned maximum_multiturn_bits = 16;
+using ReplyBytes = ByteBuffer<reply_capacity>;
+
+/// What an encoder's frames carry. What is unknown is asked: the identity tells it.
+struct Format {
+  unsigned resolution = 0;  // bits of the turn, 1 to 22; 0: unknown
+  int multiturn_bits = -1;  // 0 to 16; -1: unknown
+  bool has_ch2 = true;      // false: frames as those of an AksIM-1, without the last byte
+
+  [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
+  [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
+  /// Of channel 1; the checksum stands behind them.
+  [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
+  [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
+  [[nodiscard]] constexpr std::size_t cycle_bytes() const { return position_bytes() + 4; }
+};
+
+/// What channel 1 says. `channel2` is outside the checksum.
+struct Position {
+  std::uint32_t singleturn = 0;
+  std::uint16_t multiturn = 0;
+  bool error = false;    // the position is not valid
+  bool warning = false;  // valid, but near the limits
+  std::uint8_t channel2 = 0;
+};
+
+/// One cycle of channel 2, a byte a frame; its position was taken with its first byte.
+struct Cycle {
+  Position position{};  // channel2: unused
+  std::uint16_t status = 0;
+  std::uint8_t channel3 = 0;
+};
+
+/// Bits of the detailed status.
+namespace status {
+inline constexpr std::uint16_t acceleration = 0x0001;
+inline constexpr std::uint16_t magnetic_pattern = 0x0002;
+inline constexpr std::uint16_t system = 0x0004;
+inline constexpr std::uint16_t supply = 0x0008;
+inline constexpr std::uint16_t temperature = 0x0010;
+inline constexpr std::uint16_t signal_lost = 0x0020;
+inline constexpr std::uint16_t position_invalid = 0x0200;
+inline constexpr std::uint16_t multiturn_mismatch = 0x8000;
+inline constexpr std::uint16_t warnings = 0x21D0;  // amplitude high and low, near limits, temperature
+inline constexpr std::uint16_t errors = 0xDE2F;    // all others
+static_assert((warnings ^ errors) == 0xFFFF);
+}  // namespace status
+
+/// Bits of Reading::status, from the position frame.
+namespace general {
+inline constexpr std::uint32_t error = 1;
+inline constexpr std::uint32_t warning = 2;
+}  // namespace general
+
+struct Identity {
+  std::uint8_t protocol_version = 2;
+  std::uint8_t frame_bytes = 5;
+  unsigned resolution = 20;
+  std::array<std::uint8_t, 18> text{};  // the whole of it; text[2..17] is the part number
+  [[nodiscard]] constexpr Bytes part_number() const { return Bytes(text).subspan(2); }
+};
+
+namespace detail {
+
+constexpr void store_position(const Format& format, const Position& position, MutableBytes bytes) {
+  if (format.turns_bytes() != 0) {
+    const unsigned spare = maximum_multiturn_bits - static_cast<unsigned>(format.multiturn_bits);
+    store_big_endian(bytes.first(2), std::uint64_t{position.multiturn} << spare);
+  }
+  std::uint32_t word = position.singleturn << (24 - format.resolution);
+  if (!position.error) word |= 2;
+  if (!position.warning) word |= 1;
+  store_big_endian(bytes.subspan(format.turns_bytes(), 3), word);
+}
+
+// Padding that is not zero means another resolution.
+constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
+  Position position;
+  if (format.turns_bytes() != 0) {
+    const unsigned spare = maximum_multiturn_bits - static_cast<unsigned>(format.multiturn_bits);
+    const std::uint64_t turns = load_big_endian(bytes.first(2));
+    if ((turns & low_mask(spare)) != 0) return Error::out_of_range;
+    position.multiturn = static_cast<std::uint16_t>(turns >> spare);
+  }
+  const auto word = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(format.turns_bytes(), 3)));
+  if ((word >> 2 & low_mask(maximum_resolution - format.resolution)) != 0) return Error::out_of_range;
+  position.singleturn = word >> (24 - format.resolution);
+  position.error = (word & 2) == 0;
+  position.warning = (word & 1) == 0;
+  return position;
+}
+
+}  // namespace detail
+
+/// `format` must be known.
+[[nodiscard]] constexpr ReplyBytes encode_position(const Format& format, const Position& position) {
+  std::array<std::uint8_t, 5> bytes{};
+  detail::store_position(format, position, bytes);
+  ReplyBytes frame;
+  frame.append(Bytes(bytes).first(format.position_bytes()));
+  frame.push_back(checksum(frame));
+  if (format.has_ch2) frame.push_back(position.channel2);
+  return frame;
+}
+
+/// Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
+[[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes) {
+  if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
+  if (!is_sealed(bytes.first(format.position_bytes() + 1))) return Error::bad_checksum;
+  Result<Position> position = detail::load_position(format, bytes);
+  if (position && format.has_ch2) position->channel2 = bytes.back();
+  return position;
+}
+
+[[nodiscard]] constexpr ReplyBytes encode_cycle(const Format& format, const Cycle& cycle) {
+  std::array<std::uint8_t, 5> position{};
+  detail::store_position(format, cycle.position, position);
+  ReplyBytes bytes;
+  bytes.append(Bytes(position).first(format.position_bytes()));
+  bytes.push_back(static_cast<std::uint8_t>(cycle.status >> 8));
+  bytes.push_back(static_cast<std::uint8_t>(cycle.status));
+  bytes.push_back(cycle.channel3);
+  bytes.push_back(checksum(bytes));
+  return bytes;
+}
+
+/// Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
+[[nodiscard]] constexpr Result<Cycle> decode_cycle(const Format& format, Bytes bytes) {
+  if (bytes.size() != format.cycle_bytes()) return Error::wrong_length;
+  if (!is_sealed(bytes)) return Error::bad_checksum;
+  const Result<Position> position = detail::load_position(format, bytes);
+  if (!position) return position.error();
+  const Bytes rest = bytes.subspan(format.position_bytes());
+  return Cycle{*position, static_cast<std::uint16_t>(load_big_endian(rest.first(2))), rest[2]};
+}
+
+[[nodiscard]] constexpr ReplyBytes encode_identity(const Identity& identity) {
+  ReplyBytes bytes;
+  bytes.append(identity.text);
+  bytes[0] = identity.protocol_version;
+  bytes[1] = identity.frame_bytes;
+  bytes[10] = static_cast<std::uint8_t>('0' + identity.resolution / 10);
+  bytes[11] = static_cast<std::uint8_t>('0' + identity.resolution % 10);
+  bytes.push_back(checksum(bytes));
+  return bytes;
+}
+
+/// Errors in this order: wrong_length, bad_checksum, unexpected_reply (another protocol version or frame length),
+/// out_of_range (the resolution is no number from 1 to 22).
+[[nodiscard]] constexpr Result<Identity> decode_identity(Bytes bytes) {
+  if (bytes.size() != identity_bytes) return Error::wrong_length;
+  if (!is_sealed(bytes)) return Error::bad_checksum;
+  if ((bytes[0] != 2 && bytes[0] != 4) || (bytes[1] != 5 && bytes[1] != 7)) return Error::unexpected_reply;
+  const unsigned tens = bytes[10] - unsigned{'0'};
+  const unsigned ones = bytes[11] - unsigned{'0'};
+  if (tens > 9 || ones > 9) return Error::out_of_range;
+  Identity identity{bytes[0], bytes[1], 10 * tens + ones};
+  if (identity.resolution == 0 || identity.resolution > maximum_resolution) return Error::out_of_range;
+  for (std::size_t i = 0; i < identity.text.size(); ++i) identity.text[i] = bytes[i];
+  return identity;
+}
+
+/// The format with what was unknown taken from the identity. Error: unexpected_reply (it says that there are turns
+/// where none were expected, or the other way round).
+[[nodiscard]] constexpr Result<Format> complete(const Format& format, const Identity& identity) {
+  Format known = format;
+  if (known.resolution == 0) known.resolution = identity.resolution;
+  if (known.multiturn_bits < 0) known.multiturn_bits = identity.frame_bytes == 7 ? 16 : 0;
+  if ((known.multiturn_bits > 0) != (identity.frame_bytes == 7)) return Error::unexpected_reply;
+  return known;
+}
+
+/// Whether two positions are the same; channel 2 repeats that of channel 1.
+[[nodiscard]] constexpr bool same_place(const Position& a, const Position& b) {
+  return a.singleturn == b.singleturn && a.multiturn == b.multiturn;
+}
+
+/// What may be a real position as well as what an encoder sends while it starts.
+[[nodiscard]] constexpr bool is_all_zero(const Position& position) {
+  return position.singleturn == 0 && position.multiturn == 0;
+}
+
+[[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position) {
+  Reading reading;
+  reading.singleturn = position.singleturn;
+  reading.singleturn_bits = format.resolution;
+  reading.singleturn_valid_bits = position.error ? 0 : format.resolution;
+  reading.multiturn = position.multiturn;
+  reading.multiturn_bits = static_cast<unsigned>(format.multiturn_bits);
+  reading.multiturn_valid = format.multiturn_bits > 0 && !position.error;
+  reading.status = (position.error ? general::error : 0) | (position.warning ? general::warning : 0);
+  return reading;
+}
+
+/// The same with what the detailed status adds.
+constexpr void add_status(Reading& reading, std::uint16_t detailed) {
+  reading.alarms = detailed;
+  if ((detailed & status::multiturn_mismatch) != 0) reading.multiturn_valid = false;
+  if ((detailed & status::position_invalid) != 0) reading.singleturn_valid_bits = 0;
+}
+
+}  // namespace absenc::encolink

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Positions a second while registers are read: channel 3 must not cost a single frame.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "absenc/protocol/encolink/bench_test.hpp"
+
+namespace absenc::encolink {
+namespace {
+
+using testing::Bench;
+
+/// Reads the order number (20 bytes: the longest register) and counts its positions.
+double positions_a_second(const Format& format, Wire wire) {
+  Bench bench(format, wire);
+  ReadRegister read(format, wire, registers[part_number].address);
+  bench.run(read);
+  EXPECT_EQ(read.error(), Error::none);
+  EXPECT_EQ(read.data().size(), 20u);
+  EXPECT_EQ(bench.emits + 1, read.frames());  // the last one is the end
+  EXPECT_GT(read.frames(), 100u);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  return read.frames() / std::chrono::duration<double>(bench.took).count();
+}
+
+class EncolinkRate : public ::testing::TestWithParam<Format> {};
+
+TEST_P(EncolinkRate, UartReachesWhatTheCharactersAllow) {
+  const Format format = GetParam();
+  const auto characters = static_cast<std::int64_t>(request_bytes + format.frame_bytes());
+  const Time frame = characters * uart_settings.character() + answer_time;
+  const double most = 1 / std::chrono::duration<double>(frame).count();
+  const double reached = positions_a_second(format, Wire::uart);
+  std::printf("%zu-byte frames at 1 Mbps: %.0f positions a second of %.0f (%.4f) during register access\n",
+              format.frame_bytes(), reached, most, reached / most);
+  EXPECT_GE(reached, 0.99 * most);
+  EXPECT_LE(reached, 1.001 * most);
+}
+
+TEST_P(EncolinkRate, SpiReachesWhatClockAndPauseAllow) {
+  const Format format = GetParam();
+  const Time frame = spi_settings.bits(8 * format.frame_bytes()) + spi_pause;
+  const double most = 1 / std::chrono::duration<double>(frame).count();
+  const double reached = positions_a_second(format, Wire::spi);
+  EXPECT_GE(reached, 0.99 * most);
+  EXPECT_LE(reached, 1.01 * most);
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, EncolinkRate, ::testing::Values(testing::single, testing::multi),
+                         [](const auto& test) { return test.param.turns_bytes() == 0 ? "single" : "multi"; });
+
+}  // namespace
+}  // namespace absenc::encolink

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+// Channel 3: the registers of an AksIM-2 as one table, and the bytes that ask for them, one in each request.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/protocol/encolink/frame.hpp"
+
+namespace absenc::encolink {
+
+/// What the encoder says in the channel 3 byte of a cycle.
+namespace channel3 {
+inline constexpr std::uint8_t idle = 0x33;
+inline constexpr std::uint8_t busy = 0x66;
+inline constexpr std::uint8_t read_ready = 0x88;   // status and data follow, a byte a cycle
+inline constexpr std::uint8_t write_ready = 0x99;  // the status follows
+}  // namespace channel3
+
+/// Answer of the encoder to a register access.
+enum class AccessStatus : std::uint8_t {
+  ok = 0x09,
+  no_such_register = 0x26,
+  out_of_range = 0x56,
+  denied = 0x96,
+  read_checksum = 0xE4,
+  read_checksum_too = 0xE6,  // in other code of the vendor
+  byte_count = 0xEE,
+  locked = 0xF6,
+  write_checksum = 0xF9,
+};
+
+/// The request arrived damaged: sending it again helps.
+[[nodiscard]] constexpr bool is_damaged(AccessStatus status) {
+  return status == AccessStatus::read_checksum || status == AccessStatus::read_checksum_too ||
+         status == AccessStatus::write_checksum;
+}
+
+[[nodiscard]] constexpr std::string_view text_of(AccessStatus status) {
+  switch (status) {
+    case AccessStatus::ok:
+      return "done";
+    case AccessStatus::no_such_register:
+      return "the encoder has no register at this address";
+    case AccessStatus::out_of_range:
+      return "the value is outside the range of this register";
+    case AccessStatus::denied:
+      return "access denied: this register cannot be written";
+    case AccessStatus::read_checksum:
+    case AccessStatus::read_checksum_too:
+    case AccessStatus::write_checksum:
+      return "the request reached the encoder with a wrong CRC";
+    case AccessStatus::byte_count:
+      return "the register has another number of bytes";
+    case AccessStatus::locked:
+      return "the configuration is locked: write 0 to the register write_lock first";
+  }
+  return "the encoder answered with an unknown status";
+}
+
+enum class Access : std::uint8_t { read_only, read_write, write_only };
+
+/// How the bytes of a register are to be understood; all are big endian.
+enum class Content : std::uint8_t { number, tenths, flags, text };
+
+struct Register {
+  std::string_view name;
+  std::uint16_t address;
+  std::uint8_t size;
+  Access access;
+  Content content;
+  bool in_info;  // part of what `info` shows
+};
+
+enum RegisterIndex : std::size_t {
+  position_offset,
+  multiturn_preset,
+  write_lock,
+  firmware_major,
+  firmware_minor,
+  protocol_register,
+  command_register,
+  temperature,
+  speed,
+  calibration_status,
+  serial_number,
+  part_number,
+};
+
+// Addresses and sizes: rls-encolink 1.0.1, product_aksim2_map.h. Some overlap; each is accessed as a whole.
+inline constexpr std::array<Register, 12> registers{{
+    {"position_offset", 0x00, 4, Access::read_write, Content::number, false},
+    {"multiturn_preset", 0x14, 4, Access::read_write, Content::number, false},
+    {"write_lock", 0x2E, 1, Access::read_write, Content::number, true},
+    {"firmware_major", 0x2F, 2, Access::read_only, Content::number, true},
+    {"firmware_minor", 0x31, 2, Access::read_only, Content::number, true},
+    {"protocol_register", 0x33, 4, Access::read_only, Content::number, false},
+    {"command", 0x49, 1, Access::write_only, Content::number, false},
+    {"temperature_c", 0x4C, 2, Access::read_only, Content::tenths, true},
+    {"speed_rpm", 0x50, 4, Access::read_only, Content::tenths, true},
+    {"calibration_status", 0x52, 1, Access::read_only, Content::flags, false},
+    {"serial_number", 0x5C, 8, Access::read_only, Content::text, true},
+    {"order_number", 0x64, 20, Access::read_only, Content::text, true},
+}};
+
+/// Values of the command register.
+namespace commands {
+inline constexpr std::uint8_t save = 0x63;
+inline constexpr std::uint8_t reset = 0x72;
+inline constexpr std::uint8_t self_calibrate = 0x41;
+}  // namespace commands
+
+/// Bits of calibration_status.
+namespace calibration {
+inline constexpr std::uint8_t count = 0x03;  // of calibrations that ended, modulo 4
+inline constexpr std::uint8_t timed_out = 0x04;
+inline constexpr std::uint8_t out_of_range = 0x08;
+}  // namespace calibration
+
+/// Null when the table has none at this address.
+[[nodiscard]] constexpr const Register* find_register(std::uint32_t address) {
+  for (const Register& one : registers) {
+    if (one.address == address) return &one;
+  }
+  return nullptr;
+}
+
+inline constexpr std::size_t access_capacity = 100;  // bytes of one access: what the vendor's library allows
+
+struct RegisterRequest {
+  enum class Operation : std::uint8_t { write = 0x58, read = 0x59 } operation = Operation::read;
+  std::uint32_t address = 0;
+  std::uint16_t length = 0;
+  ByteBuffer<access_capacity> data{};  // write: `length` bytes
+};
+
+inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
+inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;  // keys, operation, length, address
+using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
+
+[[nodiscard]] constexpr RegisterRequest read_request(std::uint32_t address, std::uint16_t length) {
+  return {RegisterRequest::Operation::read, address, length};
+}
+
+/// `size` bytes of `value`, 1 to 8.
+[[nodiscard]] constexpr RegisterRequest write_request(std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+  RegisterRequest request{RegisterRequest::Operation::write, address, size};
+  std::array<std::uint8_t, 8> bytes{};
+  store_big_endian(bytes, value);
+  request.data.append(Bytes(bytes).last(size));
+  return request;
+}
+
+/// All the `ra` bytes of an access.
+[[nodiscard]] constexpr AccessBytes encode_access(const RegisterRequest& request) {
+  std::array<std::uint8_t, access_header> header{};
+  for (std::size_t i = 0; i < access_keys.size(); ++i) header[i] = access_keys[i];
+  header[access_keys.size()] = static_cast<std::uint8_t>(request.operation);
+  const MutableBytes numbers = MutableBytes(header).last(6);
+  store_big_endian(numbers.first(2), request.length);
+  store_big_endian(numbers.last(4), request.address);
+  AccessBytes bytes;
+  bytes.append(header);
+  if (request.operation == RegisterRequest::Operation::write) bytes.append(request.data);
+  bytes.push_back(checksum(bytes.view().subspan(access_keys.size() + 1)));
+  return bytes;
+}
+
+/// Errors in this order: bad_framing (keys), unsupported (no such operation), wrong_length, bad_checksum.
+[[nodiscard]] constexpr Result<RegisterRequest> decode_access(Bytes bytes) {
+  for (std::size_t i = 0; i < access_keys.size(); ++i) {
+    if (i == bytes.size()) return Error::wrong_length;
+    if (bytes[i] != access_keys[i]) return Error::bad_framing;
+  }
+  if (bytes.size() <= access_header) return Error::wrong_length;
+  RegisterRequest request;
+  request.operation = static_cast<RegisterRequest::Operation>(bytes[access_keys.size()]);
+  const bool writes = request.operation == RegisterRequest::Operation::write;
+  if (!writes && request.operation != RegisterRequest::Operation::read) return Error::unsupported;
+  const Bytes body = bytes.subspan(access_keys.size() + 1);
+  request.length = static_cast<std::uint16_t>(load_big_endian(body.first(2)));
+  request.address = static_cast<std::uint32_t>(load_big_endian(body.subspan(2, 4)));
+  if (bytes.size() != access_header + (writes ? request.length : 0) + 1) return Error::wrong_length;
+  if (!is_sealed(body)) return Error::bad_checksum;
+  if (writes && !request.data.append(body.subspan(6, request.length))) return Error::wrong_length;
+  return request;
+}
+
+}  // namespace absenc::encolink

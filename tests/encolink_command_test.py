@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""EncoLink as a user types it: over a pseudo-terminal (UART), and both wires in the simulator."""
+import json
+import unittest
+
+from command_support import Case, Emulator, absenc
+
+KNOWN = "resolution=20&multiturn_bits=16"
+
+
+def fields(*arguments):
+    result = absenc("run", *arguments, "--json")
+    return json.loads(result.stdout)["fields"]
+
+
+class OverAPseudoTerminal(Case):
+    def emulator(self, *arguments):
+        emulator = Emulator(self.directory, *arguments, protocol="encolink")
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def test_reads_what_it_was_not_told_and_what_it_was(self):
+        path = self.emulator("--singleturn", "1000", "--multiturn", "7").path
+        for uri in (f"encolink:{path}", f"encolink:{path}?{KNOWN}"):
+            with self.subTest(uri):
+                reading = json.loads(absenc("read", uri, "--json").stdout)
+                self.assertEqual((reading["singleturn"], reading["multiturn"]), (1000, 7))
+                self.assertEqual((reading["singleturn_bits"], reading["confirmed"]), (20, True))
+
+    def test_a_wrong_resolution(self):
+        path = self.emulator("--singleturn", "1001").path
+        result = absenc("read", f"encolink:{path}?resolution=19&multiturn_bits=16")
+        self.assert_failed(result, "out_of_range", "resolution")
+
+    def test_zero_is_saved(self):
+        memory = self.file("memory")
+        emulator = self.emulator("--singleturn", "1000", "--memory", memory)
+        self.assert_good(absenc("zero", f"encolink:{emulator.path}?{KNOWN}", "--yes"))
+        emulator.end()
+        again = self.emulator("--singleturn", "1005", "--memory", memory)
+        self.assertEqual(json.loads(absenc("read", f"encolink:{again.path}?{KNOWN}", "--json").stdout)["singleturn"], 5)
+
+    def test_an_encoder_that_transmits_by_itself(self):
+        path = self.emulator("--singleturn", "77", "--option", "stream_rate=500").path
+        reading = json.loads(absenc("read", f"encolink:{path}?{KNOWN}&stream_rate=500", "--json").stdout)
+        self.assertEqual(reading["singleturn"], 77)
+
+    def test_breaks_no_rule(self):
+        emulator = self.emulator("--motion", "rpm=60")
+        self.assert_good(absenc("run", f"encolink:{emulator.path}", "info"))
+        self.assert_good(absenc("read", f"encolink:{emulator.path}", "--count", "20", "--rate", "0"))
+        self.assertNotIn("rules", emulator.end()[2])
+
+
+class InTheSimulator(Case):
+    def test_both_wires(self):
+        for unit in ("sim:encolink", "sim:encolink-spi"):
+            with self.subTest(unit):
+                info = fields(f"{unit}?motion=rpm=60", "info")
+                self.assertEqual((info["resolution"], info["frame_bytes"], info["firmware_major"]), (20, 7, 1))
+                self.assertEqual((info["serial_number"], info["speed_rpm"]), ("AK2A0001", 60.0))
+                self.assertEqual(fields(unit, "temperature")["temperature_c"], 35.0)
+                alarms = fields(f"{unit}?alarm=signal_lost", "alarms")
+                self.assertEqual((alarms["alarms"], alarms["error"]), (["signal_lost"], True))
+                self.assertEqual(fields(unit, "preset-multiturn", "42")["multiturn"], 42)
+                self.assertEqual(fields(unit, "memory-read", "0x64")["order_number"], "MB080SLA20MENT00 SIM")
+                self.assertEqual(fields(unit, "set-position-offset", "4096")["position_offset"], 4096)
+                self.assertEqual(fields(f"{unit}?motion=rpm=120", "self-calibrate")["calibrations"], 1)
+
+    def test_alarms_in_words(self):
+        result = absenc("read", "sim:encolink?alarm=amplitude_low")
+        self.assert_good(result)
+        self.assertIn("make the gap smaller", result.stdout + result.stderr)
+
+    def test_refusals(self):
+        self.assert_failed(absenc("run", "sim:encolink", "memory-write", "0x4C", "1"), "request_rejected", "access denied")
+        self.assert_failed(absenc("run", "sim:encolink", "memory-read", "0x9999", "2"), "no register at this address")
+        self.assert_failed(absenc("run", "sim:encolink", "self-calibrate"), "turn the shaft")
+        self.assert_failed(absenc("run", "sim:encolink?has_ch2=false", "temperature"), "unsupported", "has_ch2")
+
+
+if __name__ == "__main__":
+    unittest.main()
