@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -288,6 +289,24 @@ TEST(Units, MemoryIsReachedByTheirCommands) {
         EXPECT_TRUE(verb == Verb::memory_read || takes(*command, "value", 0, 255)) << unit->id;
       }
     }
+  }
+}
+
+TEST(Units, RegistersAreReachedByTheirCommands) {
+  for (const Unit* unit : all_units()) {
+    std::set<std::string_view> names;
+    for (const RegisterInfo& one : unit->registers) {
+      EXPECT_TRUE(names.insert(one.name).second) << one.name << " is there twice";
+      EXPECT_GT(one.size, 0u);
+      EXPECT_TRUE(one.readable || one.writable) << one.name;
+      for (const Verb verb : {Verb::memory_read, Verb::memory_write}) {
+        const Command* command = find_command(*unit, verb);
+        ASSERT_NE(command, nullptr) << unit->id;
+        EXPECT_TRUE(takes(*command, "address", one.address, one.address)) << unit->id << " " << one.name;
+        EXPECT_TRUE(verb == Verb::memory_read || takes(*command, "value", 0, 255)) << unit->id;
+      }
+    }
+    EXPECT_TRUE(unit->registers.empty() || unit->memory.empty()) << unit->id << " has bytes or registers, not both";
   }
 }
 
