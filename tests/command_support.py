@@ -72,7 +72,7 @@ class Emulator:
 class FakeEncoder:
     """Answers every byte 1A on a pseudo-terminal with the same bytes."""
 
-    def __init__(self, reply):
+    def __init__(self, reply=b""):
         self.reply = bytes(reply)
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
@@ -80,13 +80,15 @@ class FakeEncoder:
         self.wake, self.waker = os.pipe()
         self.thread = threading.Thread(target=self.serve)
 
+    def answer(self, request):
+        return self.reply if 0x1A in request else b""
+
     def serve(self):
         while True:
             ready, _, _ = select.select([self.master, self.wake], [], [])
             if self.wake in ready:
                 return
-            if 0x1A in os.read(self.master, 64):
-                os.write(self.master, self.reply)
+            os.write(self.master, self.answer(os.read(self.master, 64)))
 
     def __enter__(self):
         self.thread.start()

@@ -147,7 +147,7 @@ class WrongFiles(ConfigCase):
     def test_the_place_comes_first(self):
         for text, words in [("[encoder.elbow\n", ["1:15: this is no TOML"]),
                             (SIM + 'modle = "23-bit"\n', ["4:1:", "did you mean model?"]),
-                            (SIM + "latency = 2.5\n", ["4:1:", "a number with a fraction"]),
+                            (ELBOW + 'port = "/dev/x"\nlatency = 2.5\n', ["4:1:", '"2.5"', "a whole number"]),
                             (SIM + 'model = "24-bit"\n', ["4:1:", "did you mean 23-bit?"]),
                             (SIM + 'echo = "maybe"\n', ["4:1:", "auto, on or off"]),
                             (SIM + "singleturn_bits = 99\n", ["4:1:", "1 to 24"]),

@@ -2,12 +2,46 @@
 # SPDX-License-Identifier: Apache-2.0
 """The E201-9S on a pseudo-terminal, read and set up by the command."""
 import json
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import time
 import unittest
 
-from command_support import Case, Emulator, absenc
+from command_support import ABSENC, PATIENCE, Case, Emulator, FakeEncoder, absenc
+
+CR = b"\r"
+# What comes in reply to `4`; the error, what is found and what is advised.
+FRAMES = [
+    (b"0" * 16 + CR, "line_stuck", "never changed", "supply-on"),
+    (b"f" * 16 + CR, "line_stuck", "never changed", "supply-on"),
+    (b"e0014328ff300000" + CR, "bad_framing", "do not begin with 110", "lower MA clock"),
+    (b"c000000000000000" + CR, "bad_framing", "no start bit", "lower MA clock"),
+    (b"c0034328ff300000" + CR, "bad_framing", "CDS bit is 1", "lower MA clock"),
+    (b"c0014328ff30000g" + CR, "bad_framing", "hexadecimal digits", "it is an E201-9S"),
+    (b"c000000000000001" + CR, "truncated", "ACK is too long", "lower MA clock"),
+    (b"c0014328fe300000" + CR, "bad_checksum", "delay of the line", "another MA clock"),
+    (b"c0014328ff300000", "wrong_length", "16 hexadecimal digits and CR", "stream-off"),
+    (b"c0014328ff30000" + CR, "wrong_length", "16 hexadecimal digits and CR", "stream-off"),
+    (b"12345" + CR, "wrong_length", "16 hexadecimal digits and CR", "stream-off"),
+]
 
 
-class Interface(Case):
+class FakeInterface(FakeEncoder):
+    """Answers `4` and `v` with the same bytes each time."""
+
+    def __init__(self, samples=b"", version=b"E201-9S V1.16" + CR):
+        super().__init__()
+        self.replies = {ord("4"): samples, ord("v"): version}
+
+    def answer(self, request):
+        return b"".join(self.replies.get(letter, b"") for letter in request)
+
+
+class InterfaceCase(Case):
     def emulator(self, *arguments):
         return Emulator(self.directory, *arguments, protocol="e201")
 
@@ -16,6 +50,12 @@ class Interface(Case):
         self.assert_good(result)
         return json.loads(result.stdout)
 
+    def clock(self, path):
+        settings = json.loads(absenc("config", "get", f"e201:{path}", "clock", "--json").stdout)["settings"]
+        return settings["clock"]["clock"]
+
+
+class Interface(InterfaceCase):
     def test_reads_a_biss_encoder(self):
         options = ["--option", "singleturn_bits=19", "--option", "multiturn_bits=16"]
         with self.emulator(*options, "--singleturn", "275096", "--multiturn", "1") as emulator:
@@ -33,20 +73,41 @@ class Interface(Case):
             self.assertEqual(self.run_json(emulator.path, "run", "set-clock", "560", "--yes")["fields"]["clock"], 5)
             info = self.run_json(emulator.path, "run", "info")["fields"]
             self.assertEqual((info["version"], info["clock_khz"]), ("E201-9S V1.16", 560))
-            self.run_json(emulator.path, "run", "supply-off", "--yes")
+            off = self.run_json(emulator.path, "run", "supply-off", "--yes")["fields"]
+            self.assertLess(off["supply_mv"], 1000)
             self.assert_failed(absenc("read", f"e201:{emulator.path}"), "line_stuck", "supply-on")
-            self.run_json(emulator.path, "run", "supply-on", "--yes")
+            on = self.run_json(emulator.path, "run", "supply-on", "--yes")["fields"]
+            self.assertGreater(on["supply_mv"], 4000)
             self.assert_good(absenc("read", f"e201:{emulator.path}"))
 
-    def test_clock_sweep(self):
-        with self.emulator() as emulator:
-            fields = self.run_json(emulator.path, "run", "clock-sweep", "3")["fields"]
-            self.assertEqual((fields["valid_35_khz"], fields["valid_4400_khz"]), (3, 0))
-            self.assertEqual((fields["recommended_khz"], fields["restored_clock"]), (280, 4))
+    def test_info_tells_of_interface_and_encoder(self):
+        with self.emulator("--singleturn", "1000", "--alarm", "warning") as emulator:
+            info = self.run_json(emulator.path, "info")
+            answers = info["answers"]
+            self.assertEqual(info["resolution"], {"singleturn_bits": 19, "multiturn_bits": 0})
+            self.assertEqual(answers["info"]["fields"]["serial"], "09S0417")
+            self.assertEqual(answers["clock"]["fields"], {"clock": 4, "clock_khz": 280})
+            self.assertEqual(answers["width"]["fields"], {"width": 19})
+            self.assertEqual((answers["position"]["singleturn"], answers["position"]["alarms"]), (1000, ["warning"]))
+            absenc("run", f"e201:{emulator.path}", "supply-off", "--yes")
+            result = absenc("info", f"e201:{emulator.path}")
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("E201-9S V1.16", result.stdout)
+            self.assertRegex(result.stdout, "position +FAILED +line_stuck")
+            self.assertIn("supply-on", result.stderr)
 
-    def test_old_firmware(self):
-        with self.emulator("--option", "firmware=1.15") as emulator:
-            self.assert_failed(absenc("read", f"e201:{emulator.path}"), "unsupported", "1.16")
+    def test_zero(self):
+        def counts(path):
+            return self.run_json(path, "run", "decimal")["fields"]["counts"]
+        with self.emulator("--singleturn", "1000") as emulator:
+            self.assertEqual(counts(emulator.path), 1000)
+            self.assert_good(absenc("zero", f"e201:{emulator.path}", "--yes"))
+            self.assertEqual(counts(emulator.path), 0)
+            self.assertEqual(self.run_json(emulator.path, "read")["singleturn"], 1000)
+            self.assert_good(absenc("run", f"e201:{emulator.path}", "clear-zero", "--yes"))
+            self.assertEqual(counts(emulator.path), 1000)
+        with self.emulator("--motion", "rpm=60") as emulator:
+            self.assert_failed(absenc("zero", f"e201:{emulator.path}", "--yes"), "stand still")
 
     def test_a_line_that_is_too_long(self):
         with self.emulator("--option", "line_delay_ns=3600") as emulator:
@@ -54,6 +115,145 @@ class Interface(Case):
             self.assertEqual(result.returncode, 1)
             self.run_json(emulator.path, "run", "set-clock", "140", "--yes")
             self.assert_good(absenc("read", f"e201:{emulator.path}"))
+
+
+class Failures(InterfaceCase):
+    def test_read_says_what_came_and_what_to_do(self):
+        for reply, error, found, advice in FRAMES:
+            with self.subTest(reply), FakeInterface(reply) as interface:
+                result = absenc("read", f"e201:{interface.path}")
+                self.assert_failed(result, error, found, reply.hex(" ").upper())
+                self.assertIn(advice, result.stderr.partition("Try: ")[2])
+                trouble = json.loads(absenc("read", f"e201:{interface.path}", "--json").stdout)
+                self.assertEqual((trouble["ok"], trouble["error"]), (False, error))
+                self.assertIn(found, trouble["message"])
+                self.assertIn(advice, trouble["advice"])
+
+    def test_decode_says_the_same(self):
+        for reply, error, found, advice in FRAMES:
+            with self.subTest(reply):
+                result = absenc("decode", "e201", "--request", "34", "--hex", reply.hex())
+                self.assert_failed(result, error, found, advice)
+
+    def test_other_replies_are_judged_by_what_was_asked(self):
+        self.assert_failed(absenc("decode", "e201", "--request", "6d", "--hex", "39390d"), "bad_framing", "that command")
+        self.assert_failed(absenc("decode", "e201", "--request", "76", "--hex", "4142"), "wrong_length", "a line that ends")
+
+    def test_another_encoder_is_recognized(self):
+        with FakeInterface(b"c0014328ff300000" + CR) as interface:
+            result = absenc("read", f"e201:{interface.path}?model=linear-26-1um")
+            self.assert_failed(result, "bad_checksum", "set model=rotary-19")
+
+    def test_silence(self):
+        with FakeInterface() as interface:
+            self.assert_failed(absenc("read", f"e201:{interface.path}"), "timeout", "`v` but not `4`", "`info`")
+        with FakeInterface(version=b"") as interface:
+            self.assert_failed(absenc("read", f"e201:{interface.path}"), "timeout", "is silent", "it is an E201-9S")
+
+    def test_old_firmware(self):
+        with self.emulator("--option", "firmware=1.15") as emulator:
+            for arguments in (["read"], ["run", "clock-sweep"]):
+                result = absenc(arguments[0], f"e201:{emulator.path}", *arguments[1:])
+                self.assert_failed(result, "unsupported", "1.16", "`info`")
+        with FakeInterface(b"?" + CR, b"V0.9" + CR) as interface:
+            self.assert_failed(absenc("read", f"e201:{interface.path}"), "unsupported", "1.16")
+
+    def test_an_ssi_encoder_with_other_bits(self):
+        with self.emulator("--option", "carries=ssi", "--option", "singleturn_bits=13", "--singleturn", "4660") as emulator:
+            result = absenc("read", f"e201:{emulator.path}", "--option", "carries=ssi", "--option", "singleturn_bits=12")
+            self.assert_failed(result, "cross_check_failed", "after_word", "number of bits")
+
+    def test_a_word_that_does_not_fit(self):
+        self.assert_wrong_usage(absenc("read", "sim:e201?word=position:60"), "e201")
+        self.assert_failed(absenc("decode", "e201", "--hex", FRAMES[0][0].hex(), "--option", "word=position:60"), "64 bits")
+
+
+class ClockSweep(InterfaceCase):
+    def start(self, path, frames):
+        """The sweep with a terminal for its messages: its process and our end of the terminal."""
+        ours, terminal = pty.openpty()
+        self.addCleanup(os.close, ours)
+        process = subprocess.Popen([ABSENC, "run", f"e201:{path}", "clock-sweep", str(frames)],
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=terminal)
+        os.close(terminal)
+        return process, ours
+
+    def read_until(self, descriptor, words=None):
+        """What is shown up to these words; without words, until it is closed."""
+        deadline = time.monotonic() + PATIENCE
+        text = ""
+        while words is None or words not in text:
+            if not select.select([descriptor], [], [], max(0, deadline - time.monotonic()))[0]:
+                raise AssertionError(f"in vain waited for {words}: {text}")
+            try:
+                text += os.read(descriptor, 4096).decode()
+            except OSError:  # nobody has the other end any more
+                if words is None:
+                    return text
+                raise AssertionError(f"{words} never came: {text}") from None
+        return text
+
+    def leave(self, process):
+        """Status and standard output of a process that ends by itself."""
+        out, _ = process.communicate(timeout=PATIENCE)
+        return process.returncode, out.decode()
+
+    def test_counts_and_recommends(self):
+        with self.emulator() as emulator:
+            fields = self.run_json(emulator.path, "run", "clock-sweep", "3")["fields"]
+            self.assertEqual((fields["valid_35_khz"], fields["valid_4400_khz"]), (3, 0))
+            self.assertEqual((fields["recommended_khz"], fields["restored_clock"]), (280, 4))
+            self.assertFalse(fields["aborted"])
+
+    def test_a_long_line_fails_at_high_clocks(self):
+        with self.emulator("--option", "line_delay_ns=905", "--option", "latency_us=0") as emulator:
+            self.assert_good(absenc("config", "set", f"e201:{emulator.path}", "clock", "6", "--yes"))
+            fields = self.run_json(emulator.path, "run", "clock-sweep", "20")["fields"]
+            self.assertEqual((fields["valid_560_khz"], fields["valid_2200_khz"]), (20, 0))
+            self.assertLess(fields["valid_1100_khz"], 20)
+            self.assertEqual(fields["restored_clock"], 6)
+            self.assertEqual(self.clock(emulator.path), 6)
+            clock = str(fields["recommended_clock"])
+            self.assert_good(absenc("config", "set", f"e201:{emulator.path}", "clock", clock, "--yes"))
+            self.assertEqual(self.clock(emulator.path), fields["recommended_clock"])
+            self.assert_good(absenc("read", f"e201:{emulator.path}", "--count", "20", "--rate", "0"))
+
+    def test_nothing_is_good(self):
+        with self.emulator() as emulator:
+            absenc("run", f"e201:{emulator.path}", "supply-off", "--yes")
+            result = absenc("run", f"e201:{emulator.path}", "clock-sweep", "2")
+            self.assert_failed(result, "line_stuck", "no MA clock", "supply-on")
+            self.assertEqual(self.clock(emulator.path), 4)
+
+    def test_an_interrupt_restores_the_clock(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(number), self.emulator() as emulator:
+                process, terminal = self.start(emulator.path, 300)
+                self.read_until(terminal, "clock-sweep: valid_35_khz: 300")
+                process.send_signal(number)
+                messages = self.read_until(terminal)
+                status, out = self.leave(process)
+                self.assertEqual(status, 1)
+                self.assertRegex(messages, "absenc: interrupted: clock-sweep .* as it was before")
+                self.assertRegex(out, "valid_35_khz +300")
+                self.assertRegex(out, "restored_clock +4")
+                self.assertRegex(out, "aborted +yes")
+                self.assertNotIn("valid_4400_khz", out)
+                self.assertEqual(self.clock(emulator.path), 4)
+
+    def test_a_port_that_goes_away_leaves_a_clock(self):
+        with self.emulator() as emulator:
+            process, terminal = self.start(emulator.path, 300)
+            self.read_until(terminal, "clock-sweep: valid_35_khz: 300")
+            emulator.end(signal.SIGKILL)
+            messages = self.read_until(terminal)
+            self.assertEqual(self.leave(process), (1, ""))
+        self.assertIn("went away", messages)
+        self.assertIn("clock-sweep was broken off and has left", messages)
+        self.assertRegex(messages, r"previous_clock +4 ")
+        left, khz = (int(re.search(name + r" +(\d+)", messages)[1]) for name in ("left_clock", "left_khz"))
+        self.assertGreaterEqual(left, 2)
+        self.assertEqual(khz, [35, 70, 140, 280, 560, 1100, 2200, 4400][left - 1])
 
 
 class Decode(Case):

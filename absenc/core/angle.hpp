@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position reading and the only place where counts become an angle.
+// A position reading and the only place where counts become an angle or a way.
 #pragma once
 
 #include <cstdint>
@@ -33,6 +33,15 @@ struct Reading {
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
   if (bits > 48) return degrees(counts >> (bits - 48), 48);  // more would be rounded up to 360
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
+}
+
+/// The way of a linear encoder, or that in a second.
+[[nodiscard]] constexpr double micrometres(double counts, double unit_um) { return counts * unit_um; }
+[[nodiscard]] constexpr double micrometres(std::uint64_t counts, double unit_um) {
+  return micrometres(static_cast<double>(counts), unit_um);
+}
+[[nodiscard]] constexpr double micrometres(std::int64_t counts, double unit_um) {
+  return micrometres(static_cast<double>(counts), unit_um);
 }
 
 /// The shortest way from `from` to `to` on a circle of 2^bits counts: -2^(bits-1) .. 2^(bits-1) - 1. 1 to 63 bits.

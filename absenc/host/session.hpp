@@ -84,6 +84,13 @@ class Session {
     return conversation;
   }
 
+  /// Asks the conversation that is running to end early; see Conversation::abort.
+  bool abort() { return current_ != nullptr && current_->abort(); }
+  /// What the last conversation leaves changed when its port threw; see Conversation::report_left.
+  void report_left(FieldSink& sink) const {
+    if (current_ != nullptr) current_->report_left(sink);
+  }
+
   /// To be fed from now on; null: none. 5 kB, which firmware may not have.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
@@ -97,10 +104,11 @@ class Session {
   Conversation<Item>* make(const Command& command, Arguments arguments) {
     const Any<Conversation> made = unit_->host(options_, command, arguments, storage_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
-      return made.frames;
+      current_ = made.frames;
     } else {
-      return made.bytes;
+      current_ = made.bytes;
     }
+    return current_;
   }
 
   template <class OnEmit>
@@ -120,6 +128,7 @@ class Session {
   Options options_;
   Port<Item>* port_;
   std::span<std::byte> storage_;
+  Conversation<Item>* current_ = nullptr;  // in `storage_`
   EchoFilter echo_;
   unsigned attempts_;
   FirstReading first_;

@@ -22,6 +22,12 @@ struct Exchange {
   Time received_at{};  // end of the last bit received; sent_at when nothing came
 };
 
+/// An error in words: more than its own text has. Either may be empty.
+struct Explanation {
+  std::string_view found{};   // which step failed, what was found
+  std::string_view advice{};  // what to do, in place of the error's own advice
+};
+
 /// Host side. At `emit` and `done` the accessors describe the result; they stay valid until the next feed.
 template <class Item>
 struct Conversation : Machine<Item> {
@@ -29,14 +35,18 @@ struct Conversation : Machine<Item> {
   [[nodiscard]] virtual Error error() const = 0;
   /// More than the error's own text, for people: which step failed, what was found. May be empty.
   [[nodiscard]] virtual std::string_view detail() const { return {}; }
+  /// What to do about the error, where there is something better than its own advice. May be empty.
+  [[nodiscard]] virtual std::string_view advice() const { return {}; }
   /// The position, when the result is one and there was no error; otherwise null.
   [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
   /// Every named value of the result. Nothing is put when there was an error.
   virtual void report(FieldSink& sink) const = 0;
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
   /// Asks to end early, from the next step on: a conversation that changes the encoder for its own use leaves it as it
-  /// was, and ends by itself. The others ignore it: they may be left at any step.
-  virtual void abort() {}
+  /// was, ends by itself and returns true. The others ignore it: they may be left at any step.
+  virtual bool abort() { return false; }
+  /// Puts what such a conversation leaves changed when it cannot go on after this step.
+  virtual void report_left(FieldSink&) const {}
 
  protected:
   ~Conversation() = default;

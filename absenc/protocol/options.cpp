@@ -60,6 +60,23 @@ Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
   return number;
 }
 
+OptionError parse_word(const Unit& unit, std::string_view text, WordFormat& word) {
+  const WordFormatError error = parse_word_format(text, word, unit.fields);
+  if (error.reason.empty()) return {};
+  return {.kind = OptionError::Kind::bad_word, .text = text, .word = error};
+}
+
+// What says the same as the word in another way.
+OptionError check_beside_word(const Unit& unit, std::string_view model, std::span<const bool> set) {
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    if (set[i] && unit.options[i].describes_word) {
+      return {.kind = OptionError::Kind::beside_word, .text = unit.options[i].name};
+    }
+  }
+  if (!model.empty()) return {.kind = OptionError::Kind::beside_word, .text = "model"};
+  return {};
+}
+
 bool agrees(const Model& model, std::span<const bool> set, const Options& options) {
   for (const OptionValue& value : model.values) {
     if (set[value.option] && options[value.option] != value.value) return false;
@@ -76,16 +93,25 @@ OptionError resolve_options(const Unit& unit, std::string_view model, std::span<
   for (std::size_t i = 0; i < unit.options.size(); ++i) options.values[i] = unit.options[i].default_value;
 
   for (const OptionText& setting : settings) {
+    if (setting.name == word_option_name && takes_word(unit)) {
+      const OptionError error = parse_word(unit, setting.value, options.word);
+      if (error.kind != OptionError::Kind::none) return error;
+      continue;
+    }
     std::size_t index = 0;
     while (index < unit.options.size() && unit.options[index].name != setting.name) ++index;
-    if (index == unit.options.size()) return {OptionError::Kind::unknown_option, setting.name, nullptr};
+    if (index == unit.options.size()) return {.kind = OptionError::Kind::unknown_option, .text = setting.name};
     const Option& option = unit.options[index];
     const Result<std::int64_t> value = parse_value(option, setting.value);
-    if (!value) return {OptionError::Kind::bad_value, setting.value, &option};
+    if (!value) return {.kind = OptionError::Kind::bad_value, .text = setting.value, .option = &option};
     options.values[index] = *value;
     set[index] = true;
   }
 
+  if (options.has_word()) {
+    resolved = options;
+    return check_beside_word(unit, model, set);
+  }
   for (const Model& candidate : unit.models) {
     if (model.empty() ? agrees(candidate, set, options) : candidate.name == model) {
       options.model = &candidate;
@@ -97,7 +123,7 @@ OptionError resolve_options(const Unit& unit, std::string_view model, std::span<
       if (!set[value.option]) options.values[value.option] = value.value;
     }
   } else if (!model.empty()) {
-    return {OptionError::Kind::unknown_model, model, nullptr};
+    return {.kind = OptionError::Kind::unknown_model, .text = model};
   }
   resolved = options;
   return {};

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "absenc/core/result.hpp"
+#include "absenc/protocol/word_format.hpp"
 
 namespace absenc {
 
@@ -25,6 +26,7 @@ struct Option {
   std::span<const std::string_view> choices{};
   bool probeable = false;  // whether captured frames can tell which value is right
   unsigned decimals = 0;
+  bool describes_word = false;  // a word format says it instead: the two cannot be given together
 };
 
 struct OptionValue {
@@ -41,11 +43,16 @@ struct Model {
 
 inline constexpr std::size_t maximum_options = 16;
 
+/// What a word format is given as, beside the options of units that take one.
+inline constexpr std::string_view word_option_name = "word";
+
 /// The value of every option of one unit, by the index of the option.
 struct Options {
   std::array<std::int64_t, maximum_options> values{};
   const Model* model = nullptr;  // null: no known model has these values
+  WordFormat word{};             // in place of the options that describe one; empty: they do
 
+  [[nodiscard]] constexpr bool has_word() const { return word.bits() != 0; }
   [[nodiscard]] constexpr std::int64_t operator[](std::size_t option) const { return values[option]; }
 };
 
@@ -57,15 +64,24 @@ struct OptionText {
 
 /// Why options could not be resolved: `text` is the name or value at fault, `option` the one it was meant for.
 struct OptionError {
-  enum class Kind : std::uint8_t { none, unknown_model, unknown_option, bad_value } kind = Kind::none;
+  enum class Kind : std::uint8_t {
+    none,
+    unknown_model,
+    unknown_option,
+    bad_value,
+    bad_word,     // `word` says why and where
+    beside_word,  // the option or model `text` cannot be given together with a word
+  } kind = Kind::none;
   std::string_view text{};
   const Option* option = nullptr;
+  WordFormatError word{};
 };
 
 struct Unit;
 
 /// Option values from a model and single settings, which override it. Without a model name (empty), the first model
 /// that agrees with all the settings is taken; when none does, the unit's defaults, which know no particular model.
+/// With a word no model is taken.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 

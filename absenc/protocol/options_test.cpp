@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
+#include "absenc/protocol/biss/unit.hpp"
+#include "absenc/protocol/ssi/unit.hpp"
+
 namespace absenc {
 namespace {
 
@@ -19,6 +25,60 @@ TEST(Options, WhatIsNoDecimalNumber) {
                            "9223372036854775807"}) {
     EXPECT_EQ(parse_decimal(text, 3).error(), Error::invalid_argument) << text;
   }
+}
+
+struct Resolved {
+  Options options;
+  OptionError error;
+};
+
+Resolved resolve(const Unit& unit, std::string_view model, const std::vector<OptionText>& settings) {
+  Resolved resolved;
+  resolved.error = resolve_options(unit, model, settings, resolved.options);
+  return resolved;
+}
+
+constexpr std::string_view word = "multiturn:12 position:24 battery=value:3 error:1";
+
+TEST(Options, AWordStandsInForTheOptionsThatDescribeOne) {
+  const Resolved resolved = resolve(biss::unit, {}, {{"ma_khz", "500"}, {"word", word}, {"unit_um", "0.5"}});
+  ASSERT_EQ(resolved.error.kind, OptionError::Kind::none);
+  EXPECT_EQ(resolved.options.model, nullptr);
+  const biss::Format format = biss::to_format(Options(resolved.options));
+  EXPECT_EQ(format.word.bits(), 40u);
+  EXPECT_EQ(format.word.fields()[2].name, "battery");
+  EXPECT_EQ(format.scale.unit_um, 0.5);
+  const Resolution resolution = biss::unit.resolution(resolved.options);
+  EXPECT_EQ(resolution.singleturn_bits, 24u);
+  EXPECT_EQ(resolution.multiturn_bits, 12u);
+  EXPECT_EQ(resolution.unit_um, 0.5);
+  EXPECT_EQ(resolved.options[biss::option_ma_khz], 500);
+}
+
+TEST(Options, AWordExcludesWhatSaysTheSame) {
+  for (const Unit* unit : {&biss::unit, &ssi::unit}) {
+    ASSERT_TRUE(takes_word(*unit));
+    for (const Option& option : unit->options) {
+      std::int64_t most = option.maximum;
+      for (unsigned i = 0; i < option.decimals; ++i) most /= 10;
+      const std::string value = option.choices.empty() ? std::to_string(most) : std::string(option.choices[0]);
+      const Resolved resolved = resolve(*unit, {}, {{"word", word}, {option.name, value}});
+      EXPECT_EQ(resolved.error.kind == OptionError::Kind::beside_word, option.describes_word) << option.name;
+      EXPECT_EQ(resolved.error.text, option.describes_word ? option.name : "");
+    }
+    EXPECT_EQ(resolve(*unit, unit->models[0].name, {{"word", word}}).error.kind, OptionError::Kind::beside_word);
+  }
+}
+
+TEST(Options, WhatIsNoWordIsToldWithItsPlace) {
+  const Resolved wrong = resolve(ssi::unit, {}, {{"word", "position:12 eror:1"}});
+  EXPECT_EQ(wrong.error.kind, OptionError::Kind::bad_word);
+  EXPECT_EQ(wrong.error.word.at, 12u);
+  // A value must not hide a field of the protocol.
+  const Resolved hiding = resolve(biss::unit, {}, {{"word", "position:12 crc=value:3"}});
+  EXPECT_EQ(hiding.error.kind, OptionError::Kind::bad_word);
+  EXPECT_EQ(hiding.error.word.at, 12u);
+  EXPECT_EQ(resolve(ssi::unit, {}, {{"word", "position:12 crc=value:3"}}).error.kind, OptionError::Kind::none);
 }
 
 }  // namespace

@@ -134,6 +134,7 @@ struct Any {
 struct Resolution {
   unsigned singleturn_bits = 0;
   unsigned multiturn_bits = 0;
+  double unit_um = 0;  // linear encoders: micrometres a count; 0: a rotation
 };
 
 struct Unit {
@@ -168,7 +169,17 @@ struct Unit {
   /// Whether a flip of this bit of this good reply must be noticed; null: every bit. Bits count from the least
   /// significant of the first byte on; on clocked links in the order of the wire.
   bool (*covered)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
+  /// About a reply that `decode` refuses with `error`, what the document says; null: nothing.
+  Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
 };
+
+/// Whether a word format may stand in for some of its options.
+[[nodiscard]] constexpr bool takes_word(const Unit& unit) {
+  for (const Option& option : unit.options) {
+    if (option.describes_word) return true;
+  }
+  return false;
+}
 
 /// The first command with this verb, or null.
 [[nodiscard]] constexpr const Command* find_command(const Unit& unit, Verb verb) {

@@ -165,7 +165,7 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
     const WordField& field = format.fields()[i];
     const auto position = static_cast<std::int64_t>(word.position);
     if (field.meaning == Meaning::position && scale.linear) {
-      const double um = static_cast<double>(word.position) * scale.unit_um;
+      const double um = micrometres(word.position, scale.unit_um);
       put(word_field_position, position);
       if (scale.unit_um > 0) put(word_field_position_um, 0, um);
       if (scale.unit_um > 0) put(word_field_position_mm, 0, um / 1000);

@@ -4,6 +4,7 @@
 //   word    = item { " " item }
 //   item    = [ name "=" ] meaning ":" bits [ "!" ]  |  "gray"
 //   meaning = position | multiturn | error | warning | parity | value | skip
+//   name    = up to 15 letters, digits and _
 //
 // `!` is active low. `gray`: multiturn and position, in the order of the wire, are one Gray-coded number. `parity` is
 // even over all bits before it, with `!` odd. `value` is any other number; `skip` carries nothing and is sent as 0.
@@ -16,6 +17,7 @@
 #include <string_view>
 
 #include "absenc/core/text.hpp"
+#include "absenc/protocol/field.hpp"
 
 namespace absenc {
 
@@ -24,8 +26,35 @@ enum class Meaning : std::uint8_t { position, multiturn, error, warning, parity,
 inline constexpr std::array<std::string_view, 7> meaning_names{"position", "multiturn", "error", "warning",
                                                                "parity",   "value",     "skip"};
 
+/// A short text that is copied with what it names.
+class WordFieldName {
+ public:
+  static constexpr std::size_t capacity = 15;
+
+  constexpr WordFieldName() = default;
+  /// What is longer than `capacity` is cut.
+  constexpr WordFieldName(std::string_view text)
+      : text_(copied(text)), size_(static_cast<std::uint8_t>(first_of(text, capacity).size())) {}
+  constexpr WordFieldName(const char* text) : WordFieldName(std::string_view(text)) {}
+
+  constexpr operator std::string_view() const { return {text_.data(), size_}; }
+  friend constexpr bool operator==(const WordFieldName& left, std::string_view right) {
+    return std::string_view(left) == right;
+  }
+
+ private:
+  static constexpr std::array<char, capacity> copied(std::string_view text) {
+    std::array<char, capacity> characters{};
+    for (std::size_t i = 0; i < capacity && i < text.size(); ++i) characters[i] = text[i];
+    return characters;
+  }
+
+  std::array<char, capacity> text_{};
+  std::uint8_t size_ = 0;
+};
+
 struct WordField {
-  std::string_view name;  // that of the meaning unless another was given; views the text it was parsed from
+  WordFieldName name;  // that of the meaning unless another was given
   Meaning meaning;
   unsigned bits;  // 1 to 64; error, warning and parity have 1
   bool active_low = false;
@@ -50,6 +79,8 @@ class WordFormat {
     if (field.bits < 1 || field.bits > 64) return "a field has 1 to 64 bits";
     if (flag && field.bits != 1) return "error, warning and parity have 1 bit";
     if (field.meaning <= Meaning::parity && find(field.meaning) != nullptr) return "there is one of this already";
+    if (field.meaning == Meaning::value && find_value(field.name))
+      return "two values have this name: write NAME=value:8";
     if (size_ == maximum_fields) return "a word has at most 12 fields";
     if (field.bits > maximum_bits - bits_) return "a word has at most 128 bits";
     fields_[size_++] = field;
@@ -76,6 +107,13 @@ class WordFormat {
   }
 
  private:
+  [[nodiscard]] constexpr bool find_value(std::string_view name) const {
+    for (const WordField& field : fields()) {
+      if (field.meaning == Meaning::value && field.name == name) return true;
+    }
+    return false;
+  }
+
   std::array<WordField, maximum_fields> fields_{};
   std::size_t size_ = 0;
   unsigned bits_ = 0;
@@ -83,6 +121,17 @@ class WordFormat {
 };
 
 namespace detail {
+
+constexpr WordFormatError check_name(std::string_view name) {
+  if (name.empty()) return {"the name before = is missing", 0};
+  if (name.size() > WordFieldName::capacity) return {"a name has at most 15 characters", 0};
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const char c = name[i];
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+    if (!letter && c != '_' && (c < '0' || c > '9')) return {"a name has only letters, digits and _", i};
+  }
+  return {};
+}
 
 // [name=]meaning:bits[!], without spaces. `at` of the error is relative to the item.
 constexpr WordFormatError parse_word_field(std::string_view item, WordField& field) {
@@ -98,7 +147,10 @@ constexpr WordFormatError parse_word_field(std::string_view item, WordField& fie
     return {"this is none of position, multiturn, error, warning, parity, value, skip, gray", begin};
   }
   if (colon == rest.size()) return {"the number of bits is missing, as in position:24", item.size()};
-  if (equals == 0) return {"the name before = is missing", 0};
+  if (named) {
+    const WordFormatError error = check_name(first_of(item, equals));
+    if (!error.reason.empty()) return error;
+  }
 
   std::string_view number = behind(rest, colon + 1);
   const bool active_low = number.ends_with('!');
@@ -115,10 +167,18 @@ constexpr WordFormatError parse_word_field(std::string_view item, WordField& fie
   return {};
 }
 
+constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken) {
+  for (const FieldInfo& info : taken) {
+    if (info.name == name) return true;
+  }
+  return false;
+}
+
 }  // namespace detail
 
-/// `format` is only changed when there is no error. Its names view `text`, which must live as long.
-[[nodiscard]] constexpr WordFormatError parse_word_format(std::string_view text, WordFormat& format) {
+/// `format` is only changed when there is no error. No value may have a name of `taken`.
+[[nodiscard]] constexpr WordFormatError parse_word_format(std::string_view text, WordFormat& format,
+                                                          std::span<const FieldInfo> taken = {}) {
   WordFormat parsed;
   std::size_t at = 0;
   while (at < text.size()) {
@@ -135,14 +195,17 @@ constexpr WordFormatError parse_word_field(std::string_view item, WordField& fie
       WordField field{};
       const WordFormatError error = detail::parse_word_field(item, field);
       if (!error.reason.empty()) return {error.reason, at + error.at};
+      if (field.meaning == Meaning::value && detail::is_taken(field.name, taken)) {
+        return {"the protocol has a field of this name: give it another", at};
+      }
       const std::string_view reason = parsed.add(field);
       if (!reason.empty()) return {reason, at};
     }
     at += item.size();
   }
   if (parsed.find(Meaning::position) == nullptr) return {"a word needs a position", text.size()};
-  if (parsed.gray() && parsed.bits_of(Meaning::position) + parsed.bits_of(Meaning::multiturn) > 64) {
-    return {"a Gray-coded number has at most 64 bits", 0};
+  if (parsed.bits_of(Meaning::position) + parsed.bits_of(Meaning::multiturn) > 64) {
+    return {"position and turns have at most 64 bits together", 0};
   }
   format = parsed;
   return {};

@@ -62,7 +62,12 @@ TEST(WordFormat, ErrorsNameThePlace) {
            {"position:64 skip:64 skip:1", 20, "128 bits"},
            {"position:1 skip:1 skip:1 skip:1 skip:1 skip:1 skip:1 skip:1 skip:1 skip:1 skip:1 skip:1 skip:1", 88,
             "12 fields"},
-           {"multiturn:12 position:60 gray", 0, "Gray"},
+           {"multiturn:12 position:60 gray", 0, "64 bits together"},
+           {"multiturn:12 position:60", 0, "64 bits together"},
+           {"position:24 a-b=value:3", 13, "only letters"},
+           {"position:24 a_name_too_long_=value:3", 12, "at most 15"},
+           {"position:24 value:3 value:3", 20, "two values have this name"},
+           {"position:24 a=value:3 a=value:3", 22, "two values have this name"},
        })) {
     const Parsed parsed = parse(one.text);
     EXPECT_EQ(parsed.error.at, one.at) << one.text;

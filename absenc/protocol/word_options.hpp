@@ -15,23 +15,27 @@ inline constexpr Option singleturn_bits_option{.name = "singleturn_bits",
                                                .default_value = 19,
                                                .minimum = 0,
                                                .maximum = 64,
-                                               .probeable = true};
+                                               .probeable = true,
+                                               .describes_word = true};
 inline constexpr Option multiturn_bits_option{.name = "multiturn_bits",
                                               .meaning = "bits of the turns; 0: no turns",
                                               .default_value = 0,
                                               .minimum = 0,
                                               .maximum = 63,
-                                              .probeable = true};
+                                              .probeable = true,
+                                              .describes_word = true};
 inline constexpr Option multiturn_first_option{.name = "multiturn_first",
                                                .meaning = "whether the turns come before the position",
                                                .default_value = 1,
-                                               .choices = boolean_choices};
+                                               .choices = boolean_choices,
+                                               .describes_word = true};
 inline constexpr Option position_bits_option{.name = "position_bits",
                                              .meaning = "linear encoders: bits of the position; 0: rotary encoder",
                                              .default_value = 0,
                                              .minimum = 0,
                                              .maximum = 64,
-                                             .probeable = true};
+                                             .probeable = true,
+                                             .describes_word = true};
 inline constexpr Option unit_um_option{.name = "unit_um",
                                        .meaning = "linear encoders: micrometres a count",
                                        .default_value = 0,
@@ -53,8 +57,10 @@ inline constexpr Option after_word_option{.name = "after_word",
   return {.position = bits(0), .multiturn = bits(1), .multiturn_first = bits(2) != 0};
 }
 
-[[nodiscard]] constexpr Scale scale_of(std::int64_t position_bits, std::int64_t unit_um) {
-  return {.linear = position_bits != 0, .unit_um = static_cast<double>(unit_um) / 1e6};
+/// `position_bits` and `unit_um`: indices of these options. A word is linear when there is a unit.
+[[nodiscard]] constexpr Scale scale_of(const Options& values, std::size_t position_bits, std::size_t unit_um) {
+  const std::size_t linear = values.has_word() ? unit_um : position_bits;
+  return {.linear = values[linear] != 0, .unit_um = static_cast<double>(values[unit_um]) / 1e6};
 }
 
 /// Whether there is a position, and position and turns have at most 64 bits together.
@@ -65,8 +71,8 @@ inline constexpr Option after_word_option{.name = "after_word",
 /// Whether readings can be told from angles: a linear encoder needs its unit.
 [[nodiscard]] constexpr bool is_usable(const Scale& scale) { return !scale.linear || scale.unit_um > 0; }
 
-[[nodiscard]] constexpr Resolution resolution_of(const WordFormat& word) {
-  return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn)};
+[[nodiscard]] constexpr Resolution resolution_of(const WordFormat& word, const Scale& scale) {
+  return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn), scale.linear ? scale.unit_um : 0};
 }
 
 /// The bits of a clocked frame; all of its bytes when it does not say how many count.

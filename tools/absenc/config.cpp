@@ -124,9 +124,9 @@ class Reader {
     if (const auto* text = node.as_string()) return text->get();
     if (must_be_text) refuse(key, fmt::format("{} is {}, but must be text in quotes", key.str(), type_of(node)));
     if (const auto* number = node.as_integer()) return fmt::format("{}", number->get());
+    if (const auto* real = node.as_floating_point()) return fmt::format("{}", real->get());
     if (const auto* truth = node.as_boolean()) return truth->get() ? "true" : "false";
-    refuse(key, fmt::format("{} is {}, but must be text in quotes, a whole number, true or false", key.str(),
-                            type_of(node)));
+    refuse(key, fmt::format("{} is {}, but must be text in quotes, a number, true or false", key.str(), type_of(node)));
   }
 
   std::string path_;

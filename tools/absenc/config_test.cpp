@@ -88,7 +88,7 @@ TEST(Config, Sections) {
 TEST(Config, Types) {
   EXPECT_THAT(refusal_of("bus = 3\n"), AllOf(StartsWith("file:4:1: "), HasSubstr("bus is a whole number")));
   EXPECT_THAT(refusal_of("model = true\n"), AllOf(StartsWith("file:4:1: "), HasSubstr("text in quotes")));
-  EXPECT_THAT(refusal_of("latency = 2.5\n"), HasSubstr("latency is a number with a fraction"));
+  EXPECT_THAT(refusal_of("model = 2.5\n"), HasSubstr("model is a number with a fraction"));
   EXPECT_THAT(refusal_of("latency = {ms = 2}\n"), HasSubstr("latency is a table"));
   EXPECT_THAT(refusal_of("latency = 2026-01-01\n"), HasSubstr("latency is a date"));
   EXPECT_THAT(refusal_of("alarm = [\"over_heat\", [\"over_heat\"]]\n"), HasSubstr("alarm is a list"));

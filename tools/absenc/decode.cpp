@@ -45,8 +45,11 @@ int run_decode(const Invocation& invocation) {
   const Frame sent = request.frame();
   const Frame received = reply.frame();
   const Diagnosis diagnosis = diagnose(unit, options, sent, received);
-  std::string message = describe(error, {}, diagnosis.finding);
-  if (!diagnosis.advice.empty()) message += fmt::format(": {}", diagnosis.advice);
+  const Explanation explanation =
+      unit.explain == nullptr ? Explanation{} : unit.explain(options, error, sent, received);
+  std::string message = describe(error, explanation.found, diagnosis.finding);
+  const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
+  if (!advice.empty()) message += fmt::format(": {}", advice);
   if (json) {
     print_line(Json::object()
                    .set("protocol", unit.id)

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "tools/absenc/aborting_port.hpp"
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
@@ -26,7 +27,7 @@ class EncoderOn final : public Encoder {
   explicit EncoderOn(const EncoderUri& uri)
       : Encoder(uri),
         storage_(std::make_unique<std::byte[]>(uri.unit->host_storage)),
-        session_(*uri.unit, uri.options, port_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
+        session_(*uri.unit, uri.options, aborting_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
     session_.observe(&statistics_);
   }
 
@@ -50,11 +51,16 @@ class EncoderOn final : public Encoder {
     return outcome(*command, session_.read(*command));
   }
 
-  Outcome run(const Command& command, Arguments arguments) override {
-    return outcome(command, session_.run(command, arguments));
+  Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
+    return outcome(command, session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
+      last_ = &conversation;
+      if (on_emit) on_emit();
+      return true;
+    }));
   }
 
   void report(FieldSink& sink) const override { last_->report(sink); }
+  void report_left(FieldSink& sink) const override { session_.report_left(sink); }
   bool confirmed() const override { return session_.confirmed(); }
   const host::Counters& counters() const override { return session_.counters(); }
   const host::Latencies& latencies() const override { return statistics_.latencies(); }
@@ -76,6 +82,7 @@ class EncoderOn final : public Encoder {
     const bool callers_fault = outcome.error <= Error::buffer_too_small;
     if (callers_fault || port_.sent.empty()) {
       trouble.message = describe(outcome.error, outcome.detail, {});
+      trouble.advice = outcome.advice;
       return trouble;
     }
     const Diagnosis diagnosis = diagnose_last();
@@ -83,7 +90,8 @@ class EncoderOn final : public Encoder {
     trouble.sent = wire_text(port_.sent);
     trouble.received = wire_text(port_.received);
     trouble.exchange = exchange(trouble);
-    trouble.advice = diagnosis.advice.empty() ? std::string(text_of(outcome.error).advice) : diagnosis.advice;
+    const std::string_view advice = outcome.advice.empty() ? text_of(outcome.error).advice : outcome.advice;
+    trouble.advice = diagnosis.advice.empty() ? std::string(advice) : diagnosis.advice;
     return trouble;
   }
 
@@ -93,7 +101,8 @@ class EncoderOn final : public Encoder {
       throw UsageError(fmt::format("{} cannot run {} with these options", unit().id, command.name));
     }
     last_ = conversation;
-    return {conversation->error(), conversation->detail(), conversation->reading()};
+    return {conversation->error(), conversation->detail(), conversation->advice(), aborting_.take_aborted(),
+            conversation->reading()};
   }
 
   [[nodiscard]] Diagnosis diagnose_last() const {
@@ -139,6 +148,7 @@ class EncoderOn final : public Encoder {
 
   std::optional<Link> link_;
   WatchedPort<Item> port_;
+  AbortingPort<Item> aborting_{port_, [this] { return session_.abort(); }};
   std::unique_ptr<std::byte[]> storage_;
   host::Session<Item> session_;
   host::Statistics<Item> statistics_;

@@ -2,6 +2,7 @@
 // An opened encoder: runs the commands of its unit, whatever its link carries, and explains what went wrong.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -17,6 +18,8 @@ namespace absenc::tool {
 struct Outcome {
   Error error = Error::none;
   std::string_view detail{};
+  std::string_view advice{};         // "": that of the error
+  bool aborted = false;              // ended early because of a signal, and left the encoder as it was
   const Reading* reading = nullptr;  // null when it failed, or is no position
 };
 
@@ -62,9 +65,12 @@ class Encoder {
 
   /// The position, with all the alarms the unit can tell. Throws UsageError when the unit has none.
   virtual Outcome read() = 0;
-  virtual Outcome run(const Command& command, Arguments arguments) = 0;
+  /// `on_emit` is called for each result but the last; `report` then tells of it.
+  virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// The fields of the last outcome.
   virtual void report(FieldSink& sink) const = 0;
+  /// After `run` threw: what the encoder was left with. Nothing for most commands.
+  virtual void report_left(FieldSink& sink) const = 0;
   /// Of the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
   /// Whether two positions in a row agreed since the encoder was opened or silent.

@@ -148,6 +148,7 @@ bool is_name(std::string_view address) {
 
 bool fits(const EncoderUri& uri, std::string_view setting) {
   if (const LinkParameter* parameter = find_link_parameter(setting)) return allowed(*parameter, uri.place);
+  if (setting == word_option_name) return takes_word(*uri.unit);
   return std::any_of(uri.unit->options.begin(), uri.unit->options.end(),
                      [&](const Option& option) { return option.name == setting; });
 }

@@ -44,6 +44,7 @@ std::vector<const Command*> questions(const EncoderUri& uri) {
 }
 
 std::string resolution_text(const Resolution& resolution) {
+  if (resolution.unit_um > 0) return fmt::format("{} bits of {} um", resolution.singleturn_bits, resolution.unit_um);
   std::vector<std::string> parts;
   if (resolution.singleturn_bits != 0) parts.push_back(fmt::format("{} bits in a turn", resolution.singleturn_bits));
   if (resolution.multiturn_bits != 0) parts.push_back(fmt::format("{} bits of turns", resolution.multiturn_bits));
@@ -59,9 +60,8 @@ Rows identity_rows(const EncoderUri& uri) {
   rows.push_back({"line", line_of(unit.link, uri.line)});
   rows.push_back({"resolution", resolution_text(unit.resolution(uri.options))});
   std::string_view heading = "options";
-  for (std::size_t i = 0; i < unit.options.size(); ++i) {
-    const Option& option = unit.options[i];
-    rows.push_back({std::string(heading), fmt::format("{}={}", option.name, to_text(option, uri.options[i]))});
+  for (const std::string& option : option_texts(unit, uri.options)) {
+    rows.push_back({std::string(heading), option});
     heading = "";
   }
   return rows;
@@ -70,15 +70,16 @@ Rows identity_rows(const EncoderUri& uri) {
 Json identity_json(const EncoderUri& uri) {
   const Unit& unit = *uri.unit;
   const Resolution resolution = unit.resolution(uri.options);
+  Json bits = Json::object().set("singleturn_bits", resolution.singleturn_bits);
+  bits.set("multiturn_bits", resolution.multiturn_bits);
+  if (resolution.unit_um > 0) bits.set("unit_um", resolution.unit_um);
   return Json::object()
       .set("encoder", address_of(uri))
       .set("protocol", unit.id)
       .set("model", uri.options.model == nullptr ? Json() : Json(uri.options.model->name))
       .set("link", name_of(unit.link))
       .set("rate", uri.line.rate)
-      .set("resolution", Json::object()
-                             .set("singleturn_bits", resolution.singleturn_bits)
-                             .set("multiturn_bits", resolution.multiturn_bits))
+      .set("resolution", bits)
       .set("options", options_to_json(unit, uri.options));
 }
 

@@ -59,7 +59,28 @@ Rows option_rows(const Unit& unit) {
     rows.push_back({std::string(option.name), range_of(option),
                     fmt::format("default {}", to_text(option, option.default_value)), std::string(option.meaning)});
   }
+  if (!takes_word(unit)) return rows;
+  std::vector<std::string_view> others;
+  for (const Option& option : unit.options) {
+    if (option.describes_word) others.push_back(option.name);
+  }
+  rows.push_back({std::string(word_option_name), "a word format, see below", "",
+                  fmt::format("the fields of the position word, in place of {}", fmt::join(others, ", "))});
   return rows;
+}
+
+// As in protocol/word_format.hpp.
+Rows word_rows(const Unit& unit) {
+  if (!takes_word(unit)) return {};
+  return {
+      {"word", "items with a space between them, from the MSB on, as in \"multiturn:12 position:24 error:1!\""},
+      {"item", "[NAME=]MEANING:BITS[!], or gray"},
+      {"", "NAME: letters, digits and _; !: active low; gray: multiturn and position are one Gray-coded number"},
+      {"MEANING", fmt::format("one of {}", fmt::join(meaning_names, ", "))},
+      {"  parity", "even over all bits before it, with ! odd"},
+      {"  value", "any other number: shown by its name"},
+      {"  skip", "nothing; sent as 0"},
+  };
 }
 
 Rows port_rows() {
@@ -131,6 +152,7 @@ std::string details(const Unit& unit) {
   }
   text += section("Models (--model NAME, or ?model=NAME behind an encoder; the first is the default)", models);
   text += section("Options (--option NAME=VALUE, or ?NAME=VALUE behind an encoder)", option_rows(unit));
+  text += section("A word format (the position word of an encoder that the options do not describe)", word_rows(unit));
   text += section("Settings of the port (?NAME=VALUE behind an encoder)", port_rows());
   text += section(fmt::format("Commands (absenc run {}:PORT <command>)", unit.id), command_rows(unit));
   text += section(fmt::format("Registers (absenc memory read {}:PORT <name>)", unit.id), register_rows(unit));
@@ -224,7 +246,8 @@ Json memory_json(const Unit& unit) {
 }
 
 Json fields_json(const Unit& unit) {
-  static constexpr std::array<std::string_view, 6> kinds{"number", "boolean", "flags", "real", "text", "bytes"};
+  static constexpr std::array<std::string_view, 7> kinds{"number", "counts", "boolean", "flags",
+                                                         "real",   "text",   "bytes"};
   Json fields = Json::array();
   for (const FieldInfo& field : unit.fields) {
     Json json = Json::object().set("name", field.name).set("kind", kinds[static_cast<std::size_t>(field.kind)]);
@@ -253,6 +276,7 @@ Json unit_json(const Unit& unit) {
                        .set("stop_bits", unit.line.stop_bits))
       .set("models", models_json(unit))
       .set("options", options_json(unit))
+      .set("takes_word", takes_word(unit))
       .set("commands", commands_json(unit))
       .set("memory", memory_json(unit))
       .set("registers", registers_json(unit))

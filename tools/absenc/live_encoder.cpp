@@ -31,7 +31,8 @@ Time longest_gap(const EncoderUri& uri, Time period) {
   return std::max({host::longest_gap(multiturn_bits(uri), maximum_rpm(uri)), 3 * period, Time(50ms)});
 }
 
-double revolutions_a_minute(const Reading& reading, double counts_per_second) {
+double speed_of(const Reading& reading, double counts_per_second) {
+  if (reading.unit_um > 0) return micrometres(counts_per_second, reading.unit_um) / 1000;
   return std::ldexp(60 * counts_per_second, -static_cast<int>(reading.singleturn_bits));
 }
 
@@ -107,9 +108,22 @@ Sample LiveEncoder::take(Reading reading) {
   sample.position_valid = true;
   sample.position = unwrapper_.position();
   sample.speed_valid = velocity_.valid();
-  sample.speed_rpm = revolutions_a_minute(reading, velocity_.counts_per_second());
+  sample.speed = speed_of(reading, velocity_.counts_per_second());
   sample.speed_delay = velocity_.delay();
   return sample;
+}
+
+std::string_view speed_unit(const Reading& reading) { return reading.unit_um > 0 ? "mm/s" : "rpm"; }
+
+void set_motion(Json& json, const Sample& sample, double unit_um) {
+  const Json speed = sample.speed_valid ? Json(sample.speed) : Json();
+  json.set("position", sample.position_valid ? Json(sample.position) : Json());
+  if (unit_um > 0) {
+    const double mm = micrometres(sample.position, unit_um) / 1000;
+    json.set("unwrapped_mm", sample.position_valid ? Json(mm) : Json()).set("speed_mm_s", speed);
+  } else {
+    json.set("speed_rpm", speed);
+  }
 }
 
 std::string LiveEncoder::rate_note() const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/host/unwrap.hpp"
@@ -32,7 +33,7 @@ struct Sample {
   bool position_valid = false;
   std::int64_t position = 0;  // counts, continued past the end of the counter
   bool speed_valid = false;
-  double speed_rpm = 0;  // of the shaft `speed_delay` before `at`
+  double speed = 0;  // `speed_delay` before `at`: rpm, of linear encoders mm/s
   Time speed_delay{};
   Trouble trouble{};      // failed
   std::string message{};  // lost, absent, back
@@ -79,5 +80,12 @@ class LiveEncoder {
   bool was_there_ = false;
   std::uint64_t losses_ = 0;
 };
+
+/// "rpm", or of linear encoders "mm/s"
+[[nodiscard]] std::string_view speed_unit(const Reading& reading);
+
+/// Sets the position in counts and the speed, of linear encoders (`unit_um` is not 0) both in millimetres; what is not
+/// valid is null.
+void set_motion(Json& json, const Sample& sample, double unit_um);
 
 }  // namespace absenc::tool

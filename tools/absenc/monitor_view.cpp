@@ -29,16 +29,30 @@ Style style_of(Snapshot::State state) {
 
 bool is_live(const Snapshot& snapshot) { return snapshot.state == Snapshot::State::live; }
 
-bool has_angle(const Snapshot& snapshot) {
+bool has_position(const Snapshot& snapshot) {
   const Reading& reading = snapshot.last.reading;
   return is_live(snapshot) && reading.ready && reading.singleturn_valid();
 }
 
-std::string angle_text(const Snapshot& snapshot) {
+double unit_um(const Shown& shown) {
+  const EncoderUri& uri = shown.watch->uri();
+  return uri.unit->resolution(uri.options).unit_um;
+}
+
+// With fewer decimals, where it would not fit into a column of the list.
+std::string short_text(double value, int decimals) {
+  constexpr std::size_t width = 9;
+  while (decimals > 0 && fmt::formatted_size("{:.{}f}", value, decimals) > width) --decimals;
+  const std::string text = fmt::format("{:.{}f}", value, decimals);
+  return text.size() <= width ? text : fmt::format("{:.2e}", value);
+}
+
+std::string position_text(const Snapshot& snapshot) {
   if (!is_live(snapshot)) return "-";
-  if (!has_angle(snapshot)) return "INVALID";
+  if (!has_position(snapshot)) return "INVALID";
   const Reading& reading = snapshot.last.reading;
-  return fmt::format("{:.3f}", degrees(reading.singleturn, reading.singleturn_bits));
+  if (reading.unit_um == 0) return fmt::format("{:.3f}", degrees(reading.singleturn, reading.singleturn_bits));
+  return short_text(micrometres(reading.singleturn, reading.unit_um) / 1000, 3);
 }
 
 std::string turns_text(const Snapshot& snapshot) {
@@ -49,8 +63,8 @@ std::string turns_text(const Snapshot& snapshot) {
 
 std::string speed_text(const Snapshot& snapshot) {
   if (!is_live(snapshot) || !snapshot.last.speed_valid) return "-";
-  const double rpm = std::abs(snapshot.last.speed_rpm) < 0.05 ? 0 : snapshot.last.speed_rpm;  // no "-0.0"
-  return fmt::format("{:.1f}", rpm);
+  const double speed = std::abs(snapshot.last.speed) < 0.05 ? 0 : snapshot.last.speed;  // no "-0.0"
+  return short_text(speed, 1);
 }
 
 std::string alarm_names(const Shown& shown) {
@@ -81,10 +95,19 @@ void draw_list_line(Screen& screen, int row, const Shown& shown, bool selected) 
              selected ? Style::bold : Style::plain);
   screen.put(row, width + 3, name_of(snapshot.state), style_of(snapshot.state));
   const std::string values =
-      fmt::format("{:>9} {:>8} {:>9} {:>8} {:>7}", angle_text(snapshot), turns_text(snapshot), speed_text(snapshot),
+      fmt::format("{:>9} {:>8} {:>9} {:>8} {:>7}", position_text(snapshot), turns_text(snapshot), speed_text(snapshot),
                   fmt::format("{:.1f}", snapshot.rate), failures(snapshot));
   screen.put(row, width + 11, values);
   if (is_live(snapshot) && !alarm_names(shown).empty()) screen.put(row, width + 57, "!", Style::bad);
+}
+
+// What the columns of position and speed hold.
+std::array<std::string_view, 2> units_of(const View& view) {
+  const auto linear =
+      std::count_if(view.encoders.begin(), view.encoders.end(), [](const Shown& one) { return unit_um(one) > 0; });
+  if (linear == 0) return {"degrees", "rpm"};
+  if (linear < std::ssize(view.encoders)) return {"deg, mm", "rpm, mm/s"};
+  return {"mm", "mm/s"};
 }
 
 // The rows of the list around the selected encoder; returns the row behind it.
@@ -92,9 +115,10 @@ int draw_list(Screen& screen, int row, const View& view) {
   const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(screen.rows() - 14));
   const std::size_t count = std::min(view.encoders.size(), most);
   const std::size_t first = std::min(view.selected - std::min(view.selected, count / 2), view.encoders.size() - count);
+  const auto [position, speed] = units_of(view);
   screen.put(row++, 2,
-             fmt::format("{:<{}} {:<7} {:>9} {:>8} {:>9} {:>8} {:>7}", "encoder", name_width(screen), "state",
-                         "degrees", "turns", "rpm", "a second", "failed"),
+             fmt::format("{:<{}} {:<7} {:>9} {:>8} {:>9} {:>8} {:>7}", "encoder", name_width(screen), "state", position,
+                         "turns", speed, "a second", "failed"),
              Style::faint);
   for (std::size_t i = first; i < first + count; ++i)
     draw_list_line(screen, row++, view.encoders[i], i == view.selected);
@@ -106,23 +130,33 @@ int draw_list(Screen& screen, int row, const View& view) {
 
 // ---- One encoder
 
-void draw_bar(Screen& screen, int row, const Snapshot& snapshot) {
-  const int width = std::min(screen.columns() - 12, 73);
+// What the bar is long: the turn, or all that a linear encoder can count.
+std::string range_text(const Shown& shown) {
+  const EncoderUri& uri = shown.watch->uri();
+  const Resolution resolution = uri.unit->resolution(uri.options);
+  if (resolution.unit_um == 0) return "360";
+  return fmt::format("{:.6g} mm", std::ldexp(resolution.unit_um, static_cast<int>(resolution.singleturn_bits)) / 1000);
+}
+
+void draw_bar(Screen& screen, int row, const Shown& shown) {
+  const Snapshot& snapshot = shown.snapshot;
+  const std::string range = range_text(shown);
+  const int width = std::min(screen.columns() - 9 - static_cast<int>(range.size()), 73);
   std::string bar(static_cast<std::size_t>(width), '-');
   for (const double quarter : {0.25, 0.5, 0.75}) bar[static_cast<std::size_t>(quarter * width)] = '+';
   const Reading& reading = snapshot.last.reading;
-  if (has_angle(snapshot)) {
+  if (has_position(snapshot)) {
     const double share = degrees(reading.singleturn, reading.singleturn_bits) / 360;
     bar[static_cast<std::size_t>(share * width)] = 'O';
   }
-  screen.put(row, 2, fmt::format("0 |{}| 360", bar), has_angle(snapshot) ? Style::plain : Style::faint);
+  screen.put(row, 2, fmt::format("0 |{}| {}", bar, range), has_position(snapshot) ? Style::plain : Style::faint);
 }
 
 void draw_position(Screen& screen, int row, const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   if (is_live(snapshot)) {
     std::string text = to_text(*shown.watch->uri().unit, snapshot.last.reading);
-    const bool good = has_angle(snapshot);
+    const bool good = has_position(snapshot);
     return screen.put(row, 2, text, good ? Style::bold : Style::bad);
   }
   std::string text = fmt::format("{}: no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
@@ -134,9 +168,15 @@ void draw_position(Screen& screen, int row, const Shown& shown) {
 
 std::string speed_line(const Snapshot& snapshot) {
   if (!is_live(snapshot) || !snapshot.last.position_valid) return "speed -";
+  const Reading& reading = snapshot.last.reading;
   std::string text = fmt::format("position {} counts", snapshot.last.position);
+  if (reading.unit_um > 0) {
+    const double mm = micrometres(snapshot.last.position, reading.unit_um) / 1000;
+    text = fmt::format("position {} mm", millimetres_text(mm, reading.unit_um));
+  }
   if (!snapshot.last.speed_valid) return text;
-  return fmt::format("speed {} rpm, {} ago; {}", speed_text(snapshot), to_text(snapshot.last.speed_delay), text);
+  return fmt::format("speed {} {}, {} ago; {}", speed_text(snapshot), speed_unit(reading),
+                     to_text(snapshot.last.speed_delay), text);
 }
 
 std::string statistics_line(const Snapshot& snapshot) {
@@ -196,7 +236,7 @@ void draw_errors(Screen& screen, int row, int end, const Shown& shown) {
 void draw_encoder(Screen& screen, int row, int end, const Shown& shown, bool errors) {
   const Snapshot& snapshot = shown.snapshot;
   draw_position(screen, row++, shown);
-  draw_bar(screen, row++, snapshot);
+  draw_bar(screen, row++, shown);
   screen.put(row++, 2, speed_line(snapshot));
   screen.put(row++, 2, statistics_line(snapshot));
   const bool flawless = failures(snapshot) == 0 && snapshot.losses == 0;
@@ -258,7 +298,8 @@ std::string to_line(const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   std::string text = fmt::format("{}: ", shown.watch->name());
   if (is_live(snapshot)) {
-    text += fmt::format("{}   {} rpm", to_text(*shown.watch->uri().unit, snapshot.last.reading), speed_text(snapshot));
+    text += fmt::format("{}   {} {}", to_text(*shown.watch->uri().unit, snapshot.last.reading), speed_text(snapshot),
+                        speed_unit(snapshot.last.reading));
   } else {
     text += fmt::format("{}, no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   }
@@ -273,9 +314,7 @@ Json to_json(const Shown& shown) {
   const double seconds = std::chrono::duration<double>(snapshot.last.at - shown.watch->start()).count();
   json.set("reading",
            is_live(snapshot) ? to_json(unit, snapshot.last.reading, seconds, snapshot.last.confirmed) : Json());
-  const bool has_speed = is_live(snapshot) && snapshot.last.speed_valid;
-  json.set("position", is_live(snapshot) && snapshot.last.position_valid ? Json(snapshot.last.position) : Json());
-  json.set("speed_rpm", has_speed ? Json(snapshot.last.speed_rpm) : Json());
+  set_motion(json, is_live(snapshot) ? snapshot.last : Sample{}, unit_um(shown));
   const auto microseconds = [](Time time) { return static_cast<double>(time.count()) / 1e3; };
   json.set("rate_hz", snapshot.rate).set("readings", snapshot.readings);
   json.set("latency_us", Json::object()

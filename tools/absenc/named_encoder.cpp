@@ -19,6 +19,7 @@ using Names = std::vector<std::string_view>;
 
 void add_options(Names& names, const Unit& unit) {
   for (const Option& option : unit.options) names.push_back(option.name);
+  if (takes_word(unit)) names.push_back(word_option_name);
 }
 
 void add_link_parameters(Names& names) {

@@ -23,7 +23,9 @@ enum class Format : std::uint8_t { human, json, csv };
 class Display {
  public:
   Display(const LiveEncoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
-    if (format == Format::csv) print_line(csv_header);
+    const EncoderUri& uri = live.encoder().uri();
+    const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
+    if (format == Format::csv) print_line(linear ? linear_csv_header : csv_header);
   }
 
   void show(const Sample& sample) {
@@ -166,6 +168,7 @@ const Subcommand read_subcommand{
     "read the position, the turns and the alarms",
     "Readings go to standard output, messages to standard error. What the encoder says is not valid is\n"
     "shown as INVALID, and in JSON and CSV by the _valid fields; there the angle is then null or empty.\n"
+    "Linear encoders, those with a unit_um, have millimetres and micrometres in place of degrees.\n"
     "Settings of the port: baud=RATE, rs485=auto|on|off, latency=MS, echo=auto|on|off; of sim also\n"
     "motion=, singleturn=, multiturn=, alarm=, fault=. `absenc list <protocol>` shows the protocol's options.\n"
     "Exit status 1 when a reading failed; endless reading is judged by its last one.",

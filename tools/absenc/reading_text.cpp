@@ -18,6 +18,15 @@ int decimals(unsigned bits) {
   return std::max(0, static_cast<int>(std::ceil(std::log10(std::ldexp(1.0, static_cast<int>(bits)) / 360))));
 }
 
+// As many as a count has; options have up to six behind the micrometre.
+int linear_decimals(double unit_um) {
+  int decimals = 9;
+  for (auto nanometres_e3 = std::llround(unit_um * 1e6); decimals > 0 && nanometres_e3 % 10 == 0; --decimals) {
+    nanometres_e3 /= 10;
+  }
+  return decimals;
+}
+
 // The digits of the largest number of so many bits.
 int digits(unsigned bits) { return static_cast<int>(fmt::formatted_size("{}", low_mask(bits))); }
 
@@ -25,11 +34,24 @@ std::string flags_text(const FieldInfo* field, std::uint32_t bits) {
   return field == nullptr ? "" : fmt::format("{}", fmt::join(flag_names(*field, bits), " "));
 }
 
+std::string linear_text(const Reading& reading) {
+  const unsigned bits = reading.singleturn_bits;
+  const double most = micrometres(low_mask(bits), reading.unit_um);
+  const double um = micrometres(reading.singleturn, reading.unit_um);
+  const int behind_mm = linear_decimals(reading.unit_um);
+  const int behind_um = std::max(0, behind_mm - 3);
+  const std::size_t width_mm = fmt::formatted_size("{:.{}f}", most / 1000, behind_mm);
+  const std::size_t width_um = fmt::formatted_size("{:.{}f}", most, behind_um);
+  return fmt::format("{:>{}.{}f} mm   {:>{}.{}f} um   {:>{}} counts", um / 1000, width_mm, behind_mm, um, width_um,
+                     behind_um, reading.singleturn, digits(bits));
+}
+
 std::string position_text(const Reading& reading) {
   const unsigned bits = reading.singleturn_bits;
   const unsigned valid = reading.singleturn_valid_bits;
   if (!reading.ready) return fmt::format("position INVALID ({}: the encoder is starting)", reading.singleturn);
   if (valid == 0) return fmt::format("position INVALID ({})", reading.singleturn);
+  if (reading.unit_um > 0) return linear_text(reading);
   const std::string angle = fmt::format("{:.{}f}", degrees(reading.singleturn, bits), decimals(valid));
   if (valid < bits)
     return fmt::format("position INVALID (only the top {} of {} bits hold: {} deg)", valid, bits, angle);
@@ -56,6 +78,10 @@ std::string to_text(const Unit& unit, const Reading& reading) {
   return text;
 }
 
+std::string millimetres_text(double millimetres, double unit_um) {
+  return fmt::format("{:.{}f}", millimetres, linear_decimals(unit_um));
+}
+
 std::string flags_in_words(const FieldInfo* field, std::uint32_t bits) {
   std::string lines;
   for (std::size_t i = 0; field != nullptr && i < field->flags.size(); ++i) {
@@ -75,7 +101,12 @@ std::string alarms_in_words(const Unit& unit, const Reading& reading) {
 void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed) {
   if (reading.singleturn_bits != 0) {
     const bool valid = reading.singleturn_valid() && reading.ready;
-    json.set("angle_deg", valid ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
+    const double um = micrometres(reading.singleturn, reading.unit_um);
+    if (reading.unit_um > 0) {
+      json.set("position_mm", valid ? Json(um / 1000) : Json()).set("position_um", valid ? Json(um) : Json());
+    } else {
+      json.set("angle_deg", valid ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
+    }
     json.set("singleturn", reading.singleturn).set("singleturn_bits", reading.singleturn_bits);
     json.set("singleturn_valid", valid).set("singleturn_valid_bits", reading.singleturn_valid_bits);
   }
@@ -105,7 +136,11 @@ std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
   std::string row = fmt::format("{:.6f},", seconds);
   if (reading.singleturn_bits != 0) {
     const bool valid = reading.singleturn_valid() && reading.ready;
-    if (valid) row += fmt::format("{}", degrees(reading.singleturn, reading.singleturn_bits));
+    const bool linear = reading.unit_um > 0;
+    const double um = micrometres(reading.singleturn, reading.unit_um);
+    if (valid && linear) row += fmt::format("{},{}", um / 1000, um);
+    if (valid && !linear) row += fmt::format("{}", degrees(reading.singleturn, reading.singleturn_bits));
+    if (!valid && linear) row += ",";
     row += fmt::format(",{},{}", reading.singleturn, valid);
   } else {
     row += ",,";

@@ -12,7 +12,8 @@
 
 namespace absenc::tool {
 
-/// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"
+/// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"; of a linear encoder
+/// "  78.96355 mm      78963.55 um   1579271 counts   no alarms"
 [[nodiscard]] std::string to_text(const Unit& unit, const Reading& reading);
 
 /// What each flag that is set means and what to do, a line each; "" when there is none, or no such field.
@@ -26,9 +27,15 @@ void set_reading(Json& json, const Unit& unit, const Reading& reading, bool conf
 /// A position that no second one confirmed is not valid.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
+/// "0.125" without more decimals than the unit of a count has.
+[[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);
+
 inline constexpr std::string_view csv_header =
     "time_s,angle_deg,singleturn,singleturn_valid,multiturn,multiturn_valid,status,alarms";
-/// Flags are separated by spaces; what the reply does not carry is empty, and so is the angle when it is not valid.
+inline constexpr std::string_view linear_csv_header =
+    "time_s,position_mm,position_um,singleturn,singleturn_valid,multiturn,multiturn_valid,status,alarms";
+/// Flags are separated by spaces; what the reply does not carry is empty, and so is what is not valid in degrees or
+/// millimetres.
 [[nodiscard]] std::string to_csv(const Unit& unit, const Reading& reading, double seconds);
 
 }  // namespace absenc::tool

@@ -28,21 +28,34 @@ struct Column {
   std::string_view unit;
 };
 
+using Columns = std::vector<Column>;
+
 // Those of `read --csv` and more.
-constexpr std::array<Column, 12> columns{{
-    {"time_s", "seconds after `started`"},
-    {"angle_deg", "degrees within the turn, empty when not valid"},
-    {"singleturn", "counts"},
-    {"singleturn_valid", ""},
-    {"multiturn", "revolutions as the encoder counts them"},
-    {"multiturn_valid", ""},
-    {"status", "names, separated by spaces"},
-    {"alarms", "names, separated by spaces"},
-    {"position", "counts, continued past the end of the encoder's own counter"},
-    {"speed_rpm", "mean over twice speed_delay_s"},
-    {"speed_delay_s", "how long before time_s the shaft had that speed"},
-    {"event", "empty for a reading; lost or back: the port; otherwise the error that came in its place"},
-}};
+Columns columns_of(bool linear) {
+  Columns columns{{"time_s", "seconds after `started`"}};
+  const auto add = [&columns](const Columns& more) { columns.insert(columns.end(), more.begin(), more.end()); };
+  if (linear) {
+    add({{"position_mm", "millimetres, empty when not valid"}, {"position_um", "micrometres, empty when not valid"}});
+  } else {
+    add({{"angle_deg", "degrees within the turn, empty when not valid"}});
+  }
+  add({{"singleturn", "counts"},
+       {"singleturn_valid", ""},
+       {"multiturn", "revolutions as the encoder counts them"},
+       {"multiturn_valid", ""},
+       {"status", "names, separated by spaces"},
+       {"alarms", "names, separated by spaces"},
+       {"position", "counts, continued past the end of the encoder's own counter"}});
+  if (linear) {
+    add({{"unwrapped_mm", "the same in millimetres"}, {"speed_mm_s", "mean over twice speed_delay_s"}});
+  } else {
+    add({{"speed_rpm", "mean over twice speed_delay_s"}});
+  }
+  add({{"speed_delay_s",
+        linear ? "how long before time_s it was so fast" : "how long before time_s the shaft had that speed"},
+       {"event", "empty for a reading; lost or back: the port; otherwise the error that came in its place"}});
+  return columns;
+}
 
 std::string date_and_time() {
   const auto now = std::chrono::time_point_cast<std::chrono::milliseconds>(std::chrono::system_clock::now());
@@ -67,7 +80,12 @@ std::string_view event_of(const Sample& sample) {
 }  // namespace
 
 Recording::Recording(const RecordingSettings& settings, const EncoderUri& uri)
-    : settings_(settings), unit_(uri.unit), options_(uri.options), start_(os::now()), started_(date_and_time()) {
+    : settings_(settings),
+      unit_(uri.unit),
+      options_(uri.options),
+      unit_um_(uri.unit->resolution(uri.options).unit_um),
+      start_(os::now()),
+      started_(date_and_time()) {
   const std::string ending = fs::path(settings.path).extension();
   if (ending != ".csv" && ending != ".jsonl" && ending != ".ndjson") {
     throw UsageError(
@@ -116,10 +134,8 @@ void Recording::open_part() {
 }
 
 std::string Recording::header() const {
-  std::vector<std::string> options;
-  for (std::size_t i = 0; i < unit_->options.size(); ++i) {
-    options.push_back(fmt::format("{}={}", unit_->options[i].name, to_text(unit_->options[i], options_[i])));
-  }
+  const std::vector<std::string> options = option_texts(*unit_, options_);
+  const Columns columns = columns_of(unit_um_ > 0);
   const std::string_view model = options_.model != nullptr ? options_.model->name : "none";
   if (format_ == Format::json_lines) {
     Json json = Json::object().set("absenc_record", 1).set("encoder", settings_.encoder).set("protocol", unit_->id);
@@ -148,15 +164,21 @@ std::string Recording::line_of(const Sample& sample) const {
   const double delay = std::chrono::duration<double>(sample.speed_delay).count();
   const bool is_reading = sample.kind == Sample::Kind::reading;
   if (format_ == Format::csv) {
-    if (!is_reading) return fmt::format("{:.6f},,,,,,,,,,,{}\n", seconds, event_of(sample));
-    const std::string position = sample.position_valid ? fmt::format("{}", sample.position) : "";
-    const std::string speed = sample.speed_valid ? fmt::format("{:.6g},{:.6f}", sample.speed_rpm, delay) : ",";
+    if (!is_reading) {
+      const std::string commas(columns_of(unit_um_ > 0).size() - 1, ',');
+      return fmt::format("{:.6f}{}{}\n", seconds, commas, event_of(sample));
+    }
+    std::string position = sample.position_valid ? fmt::format("{}", sample.position) : "";
+    if (unit_um_ > 0) position += ",";
+    if (unit_um_ > 0 && sample.position_valid) {
+      position += fmt::format("{}", micrometres(sample.position, unit_um_) / 1000);
+    }
+    const std::string speed = sample.speed_valid ? fmt::format("{:.6g},{:.6f}", sample.speed, delay) : ",";
     return fmt::format("{},{},{},\n", to_csv(*unit_, sample.reading, seconds), position, speed);
   }
   if (is_reading) {
     Json json = to_json(*unit_, sample.reading, seconds, sample.confirmed);
-    json.set("position", sample.position_valid ? Json(sample.position) : Json());
-    json.set("speed_rpm", sample.speed_valid ? Json(sample.speed_rpm) : Json());
+    set_motion(json, sample, unit_um_);
     json.set("speed_delay_s", sample.speed_valid ? Json(delay) : Json());
     return json.line() + '\n';
   }

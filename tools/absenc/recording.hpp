@@ -51,6 +51,7 @@ class Recording {
   RecordingSettings settings_;
   const Unit* unit_;
   Options options_;
+  double unit_um_;  // linear encoders; 0: rotary
   Format format_;
   Time start_;
   std::string started_;  // the same as date and time

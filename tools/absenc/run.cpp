@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <vector>
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -9,6 +10,7 @@
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/progress.hpp"
 #include "tools/absenc/run.hpp"
 #include "tools/absenc/unit_text.hpp"
 
@@ -20,6 +22,35 @@ int run_run(const Invocation& invocation) {
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const Command& command = require_command(*uri.unit, invocation.text("command"));
   return run_command(invocation, uri, command, require_arguments(command, invocation.texts("arguments")));
+}
+
+// The newest of what is known so far.
+void show_progress(Progress& progress, const Encoder& encoder, const Command& command) {
+  if (!progress.visible()) return;
+  FieldTable so_far;
+  encoder.report(so_far);
+  if (so_far.rows.empty()) return;
+  const std::vector<std::string>& newest = so_far.rows.back();
+  progress.show(fmt::format("{}: {}: {}", command.name, newest[0], newest[1]));
+}
+
+Outcome run_watched(Encoder& encoder, const Command& command, Arguments arguments) {
+  Progress progress;
+  try {
+    return encoder.run(command, arguments, [&] { show_progress(progress, encoder, command); });
+  } catch (const os::Interrupted&) {
+    if (!command.changes_encoder) throw;
+    throw ToolFailure(
+        fmt::format("interrupted in the middle of {}: whether it was done is not known, read the encoder "
+                    "before you try again",
+                    command.name));
+  } catch (const os::Failure& failure) {
+    FieldTable left;
+    encoder.report_left(left);
+    if (left.rows.empty()) throw;
+    throw ToolFailure(
+        fmt::format("{}\n{} was broken off and has left:\n{}", failure.what(), command.name, table(left.rows)));
+  }
 }
 
 constexpr std::array<Parameter, 6> parameters{{
@@ -47,20 +78,16 @@ int run_command(const Invocation& invocation, const EncoderUri& uri, const Comma
   }
 
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const Outcome outcome = run_watched(*encoder, command, arguments);
+  if (outcome.error != Error::none) throw CommandFailure(encoder->trouble(outcome));
   JsonFields fields;
   FieldTable rows;
   const bool json = invocation.has("--json");
-  try {
-    run_into(*encoder, command, arguments, json ? static_cast<FieldSink&>(fields) : rows);
-  } catch (const os::Interrupted&) {
-    if (!command.changes_encoder) throw;
-    throw ToolFailure(
-        fmt::format("interrupted in the middle of {}: whether it was done is not known, read the encoder "
-                    "before you try again",
-                    command.name));
-  }
-  print_line(json ? Json::object().set("ok", true).set("fields", fields.fields).line() : table(rows.rows));
-  return exit_good;
+  encoder->report(json ? static_cast<FieldSink&>(fields) : rows);
+  print_line(json ? Json::object().set("ok", !outcome.aborted).set("fields", fields.fields).line() : table(rows.rows));
+  if (!outcome.aborted) return exit_good;
+  print_message(fmt::format("interrupted: {} ended early, and what it had changed is as it was before", command.name));
+  return exit_failed;
 }
 
 void run_into(Encoder& encoder, const Command& command, Arguments arguments, FieldSink& sink) {

@@ -33,10 +33,19 @@ std::string sentence(const Unit& unit, const OptionError& error, std::span<const
                          suggestion(error.text, names_of(unit.models)));
     case OptionError::Kind::bad_value:
       return fmt::format("{} is \"{}\", but must be {}", error.option->name, error.text, range_of(*error.option));
+    case OptionError::Kind::bad_word: {
+      const std::string_view item = error.text.substr(0, error.text.find(' ', error.word.at)).substr(error.word.at);
+      const std::string what = item.empty() ? "its end" : fmt::format("\"{}\"", item);
+      return fmt::format("{} is \"{}\", where at character {}, {}: {}", word_option_name, error.text, error.word.at + 1,
+                         what, error.word.reason);
+    }
+    case OptionError::Kind::beside_word:
+      return fmt::format("{} cannot be given together with {}, which says it already", error.text, word_option_name);
     default:
       break;
   }
   std::vector<std::string_view> names = names_of(unit.options);
+  if (takes_word(unit)) names.push_back(word_option_name);
   names.push_back("model");
   names.insert(names.end(), extra_names.begin(), extra_names.end());
   return fmt::format("{} has no option \"{}\"{}", unit.id, error.text, suggestion(error.text, names));
@@ -161,9 +170,31 @@ Json to_json(const Option& option, std::int64_t value) {
   return option.choices[static_cast<std::size_t>(value)];
 }
 
+std::string to_text(const WordFormat& word) {
+  std::string text;
+  for (const WordField& field : word.fields()) {
+    const std::string_view meaning = meaning_names[static_cast<std::size_t>(field.meaning)];
+    const std::string name = field.name == meaning ? "" : fmt::format("{}=", std::string_view(field.name));
+    text += fmt::format("{}{}{}:{}{}", text.empty() ? "" : " ", name, meaning, field.bits, field.active_low ? "!" : "");
+  }
+  return word.gray() ? text + " gray" : text;
+}
+
+std::vector<std::string> option_texts(const Unit& unit, const Options& options) {
+  std::vector<std::string> texts;
+  if (options.has_word()) texts.push_back(fmt::format("{}={}", word_option_name, to_text(options.word)));
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    if (options.has_word() && unit.options[i].describes_word) continue;
+    texts.push_back(fmt::format("{}={}", unit.options[i].name, to_text(unit.options[i], options[i])));
+  }
+  return texts;
+}
+
 Json options_to_json(const Unit& unit, const Options& options) {
   Json json = Json::object();
+  if (options.has_word()) json.set(word_option_name, to_text(options.word));
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    if (options.has_word() && unit.options[i].describes_word) continue;
     json.set(unit.options[i].name, to_json(unit.options[i], options[i]));
   }
   return json;

@@ -47,6 +47,10 @@ struct NamedArgument {
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
 [[nodiscard]] Json to_json(const Option& option, std::int64_t value);
 
+/// As it was written, or would be: "multiturn:12 position:24 gray"
+[[nodiscard]] std::string to_text(const WordFormat& word);
+/// "name=value" of each that counts; a word in place of those that it stands in for.
+[[nodiscard]] std::vector<std::string> option_texts(const Unit& unit, const Options& options);
 /// {"singleturn_bits":17,...}
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 

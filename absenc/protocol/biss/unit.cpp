@@ -77,7 +77,10 @@ Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byt
   return {.bytes = new (storage.data()) VirtualEncoder(format, shaft, behaviour_of(values))};
 }
 
-Resolution resolution(const Options& values) { return resolution_of(to_format(values).word); }
+Resolution resolution(const Options& values) {
+  const Format format = to_format(values);
+  return resolution_of(format.word, format.scale);
+}
 
 // Around the end of the idle line a flip only changes the length of the ACK. Within the ACK, and at the start bit, it
 // moves the frame, which a CRC of 6 bits misses once in 64 times.
@@ -90,9 +93,9 @@ bool covered(const Options&, Frame, Frame reply, std::size_t bit) {
 }  // namespace
 
 Format to_format(const Options& values) {
-  return {.word = word_with_status(position_bits(values, option_singleturn_bits)),
+  return {.word = values.has_word() ? values.word : word_with_status(position_bits(values, option_singleturn_bits)),
           .check = static_cast<Check>(values[option_check]),
-          .scale = scale_of(values[option_position_bits], values[option_unit_um])};
+          .scale = scale_of(values, option_position_bits, option_unit_um)};
 }
 
 constinit const Unit unit{

@@ -27,9 +27,12 @@ enum FieldIndex : std::size_t {
   field_recommended_khz,
   field_restored,
   field_aborted,
+  field_left,
+  field_left_khz,
+  field_previous,
 };
 
-inline constexpr std::array<FieldInfo, 23> own_fields{{
+inline constexpr std::array<FieldInfo, 26> own_fields{{
     {"command", FieldInfo::Kind::text, "", "the request"},
     {"version", FieldInfo::Kind::text, "", "firmware of the interface"},
     {"serial", FieldInfo::Kind::text, "", "serial number of the interface"},
@@ -53,6 +56,9 @@ inline constexpr std::array<FieldInfo, 23> own_fields{{
     {"recommended_khz", FieldInfo::Kind::number, "kHz", "that clock"},
     {"restored_clock", FieldInfo::Kind::number, "", "what it was before and is again"},
     {"aborted", FieldInfo::Kind::boolean, "", "the sweep was ended early: not all clocks were tried"},
+    {"left_clock", FieldInfo::Kind::number, "", "the clock that the sweep set last"},
+    {"left_khz", FieldInfo::Kind::number, "kHz", "that clock"},
+    {"previous_clock", FieldInfo::Kind::number, "", "what it was before: give it back with set-clock"},
 }};
 
 constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&own_fields[field], number}); }

@@ -13,26 +13,11 @@ using ByteEvent = Event<std::uint8_t>;
 constexpr std::array info_letters{command::version, command::serial, command::supply, command::clock};
 constexpr unsigned supplied_above = 1000;  // mV
 
-}  // namespace
+constexpr std::string_view needs_firmware = "reading by `4` needs firmware 1.16 of the interface";
+constexpr std::string_view check_firmware = "`info` shows which firmware it has";
+constexpr std::string_view check_clocks = "read it and set it with clock and set-clock";
 
-std::string_view advice(Error error) {
-  switch (error) {
-    case Error::line_stuck:
-      return "is an encoder connected and supplied? supply-on switches its supply on";
-    case Error::bad_framing:
-      return "the interface read no BiSS frame: check what is connected, or select a lower MA clock (set-clock)";
-    case Error::truncated:
-      return "the ACK is too long for the 64 samples: select a lower MA clock (set-clock, clock-sweep)";
-    case Error::bad_checksum:
-      return "the interface does not compensate the delay of the line: select another MA clock (set-clock, "
-             "clock-sweep)";
-    case Error::wrong_length:
-      return "the interface answers with 16 hexadecimal digits and CR: is it an E201-9S, and not streaming "
-             "(stream-off)?";
-    default:
-      return {};
-  }
-}
+}  // namespace
 
 void Procedure::ask(const RequestText& request, Answer answer, Time earliest) {
   request_ = request;
@@ -41,9 +26,9 @@ void Procedure::ask(const RequestText& request, Answer answer, Time earliest) {
   state_ = State::ready;
 }
 
-void Procedure::finish(Error error, std::string_view detail) {
+void Procedure::finish(Error error, const Explanation& explanation) {
   error_ = error;
-  detail_ = detail;
+  explanation_ = explanation;
   state_ = State::done;
 }
 
@@ -137,16 +122,14 @@ ReadPosition::ReadPosition(const Format& format) : format_(format) {
 }
 
 void ReadPosition::answered(Bytes reply) {
-  if (failure_ != Error::none) {
+  if (phase_ == Phase::version) {
     const std::optional<Version> version = find_version(reply);
-    if (version && !has_samples(*version)) {
-      return finish(Error::unsupported,
-                    "reading by `4` needs firmware 1.16 of the interface: `info` shows what it has");
-    }
-    return finish(failure_, failure_ == Error::timeout ? "the interface answers `v` but not `4`" : advice(failure_));
+    if (version && !has_samples(*version)) return finish(Error::unsupported, {needs_firmware, check_firmware});
+    phase_ = Phase::again;
+    return ask(encode_request(command::samples), Answer::samples);
   }
   const Result<Position> position = decode_position(format_, reply);
-  if (!position) return finish(position.error(), advice(position.error()));
+  if (!position) return finish(position.error(), explain_reply(position.error(), format_));
   position_ = *position;
   reading_ = to_reading(format_.word(), position_.word, format_.scale());
   reading_.latched = sent_at();  // clocking begins when the command is there
@@ -156,9 +139,16 @@ void ReadPosition::answered(Bytes reply) {
 }
 
 void ReadPosition::failed(Error error) {
-  if (failure_ != Error::none) return finish(failure_, advice(failure_));
-  if (error == Error::bad_framing) return finish(error, advice(error));
+  if (phase_ == Phase::version) {
+    if (failure_ == Error::timeout) return finish(failure_, explain_reply(failure_));
+    return finish(failure_, explain(format_, failure_, command::samples, {}));
+  }
+  if (phase_ == Phase::again && error == Error::timeout) {
+    return finish(error, {"the interface answers `v` but not `4`", check_firmware});
+  }
+  if (phase_ == Phase::again || error == Error::bad_framing) return finish(error, explain_reply(error, format_));
   failure_ = error;
+  phase_ = Phase::version;
   ask(encode_request(command::version), Answer::line);
 }
 
@@ -177,7 +167,8 @@ void Query::answered(Bytes reply) {
   struct Nowhere final : FieldSink {
     void put(const FieldValue&) override {}
   } nowhere;
-  finish(detail::decode_line(letter_, line_, nowhere));
+  const Error error = detail::decode_line(letter_, line_, nowhere);
+  finish(error, explain_reply(error));
 }
 
 void Query::report(FieldSink& sink) const {
@@ -192,7 +183,7 @@ void Info::answered(Bytes reply) {
 }
 
 void Info::failed(Error error) {
-  if (index_ == 0) return finish(error, advice(error));
+  if (index_ == 0) return finish(error, explain_reply(error));
   go_on();
 }
 
@@ -221,9 +212,9 @@ void Set::answered(Bytes reply) {
     return ask(encode_request(clock ? command::clock : command::width), Answer::line);
   }
   const std::optional<unsigned> found = clock ? find_clock(reply) : find_number(reply);
-  if (!found) return finish(Error::bad_framing);
-  finish(*found == value_ ? Error::none : Error::cross_check_failed,
-         *found == value_ ? "" : "the interface has another setting than it was given");
+  if (!found) return finish(Error::bad_framing, explain_reply(Error::bad_framing));
+  if (*found == value_) return finish();
+  finish(Error::cross_check_failed, {"the interface has another setting than it was given", {}});
 }
 
 void Set::report(FieldSink& sink) const {
@@ -247,8 +238,8 @@ void SwitchSupply::answered(Bytes reply) {
   line_.append(reply);
   const std::optional<unsigned> voltage = find_milli(line_, 'V');
   const bool wrong = voltage && (*voltage > supplied_above) != on_;
-  finish(wrong ? Error::cross_check_failed : Error::none,
-         wrong ? "the voltage that the interface shows contradicts it" : "");
+  if (!wrong) return finish();
+  finish(Error::cross_check_failed, {"the voltage that the interface shows contradicts it", "look at it with `info`"});
 }
 
 void SwitchSupply::report(FieldSink& sink) const {
@@ -275,7 +266,7 @@ void Zero::answered(Bytes reply) {
     return ask(encode_request(command::decimal), Answer::line);
   }
   const Result<std::int64_t> counts = decode_number(reply, 10);
-  if (!counts) return finish(counts.error());
+  if (!counts) return finish(counts.error(), explain_reply(counts.error()));
   const std::int64_t before = counts_;
   counts_ = *counts;
   switch (phase_) {
@@ -284,15 +275,15 @@ void Zero::answered(Bytes reply) {
       return ask(encode_request(command::decimal), Answer::line, received_at() + between_looks);
     case Phase::second_look:
       if (!is_near(counts_ - before)) {
-        return finish(Error::invalid_argument, "the encoder moves: it must stand still");
+        return finish(Error::invalid_argument, {"the encoder moves: it must stand still", {}});
       }
       phase_ = Phase::zero;
       return ask(encode_request(command::zero), Answer::unknown);
     default:
       break;
   }
-  finish(is_near(counts_) ? Error::none : Error::cross_check_failed,
-         is_near(counts_) ? "" : "the position is not zero afterwards");
+  if (is_near(counts_)) return finish();
+  finish(Error::cross_check_failed, {"the position is not zero afterwards", {}});
 }
 
 void Zero::report(FieldSink& sink) const {
@@ -309,14 +300,12 @@ void ClockSweep::answered(Bytes reply) {
   switch (phase_) {
     case Phase::version: {
       const std::optional<Version> version = find_version(reply);
-      if (version && !has_samples(*version)) {
-        return finish(Error::unsupported, "reading by `4` needs firmware 1.16 of the interface");
-      }
+      if (version && !has_samples(*version)) return finish(Error::unsupported, {needs_firmware, check_firmware});
       phase_ = Phase::previous;
       return ask(encode_request(command::clock), Answer::line);
     }
     case Phase::previous:
-      if (!find_clock(reply)) return finish(Error::bad_framing, "the interface does not say which clock it has");
+      if (!find_clock(reply)) return finish(Error::bad_framing, {"the interface does not say which clock it has", {}});
       previous_ = *find_clock(reply);
       return next_clock();
     case Phase::set:
@@ -324,7 +313,7 @@ void ClockSweep::answered(Bytes reply) {
       return ask(encode_request(command::clock), Answer::line);
     case Phase::check:
       if (find_clock(reply) != clock_) {
-        return restore(Error::cross_check_failed, "the interface has another clock than it was given");
+        return restore(Error::cross_check_failed, {"the interface has another clock than it was given", {}});
       }
       phase_ = Phase::frames;
       return ask(encode_request(command::samples), Answer::samples);
@@ -334,24 +323,25 @@ void ClockSweep::answered(Bytes reply) {
       phase_ = Phase::verify;
       return ask(encode_request(command::clock), Answer::line);
     case Phase::verify:
-      if (find_clock(reply) == previous_) return finish(outcome_, outcome_detail_);
-      return finish(Error::cross_check_failed, "the clock that was set before could not be restored: use set-clock");
+      if (find_clock(reply) == previous_) return finish(outcome_, outcome_explanation_);
+      return finish(Error::cross_check_failed, {"the clock that was set before could not be restored", check_clocks});
   }
 }
 
 void ClockSweep::failed(Error error) {
   if (phase_ == Phase::frames) return count(error);
-  if (previous_ == 0) return finish(error, advice(error));
+  if (previous_ == 0) return finish(error, explain_reply(error));
   if (phase_ == Phase::restore || phase_ == Phase::verify) {
-    return finish(error, "it is not known whether the clock that was set before is restored: use clock and set-clock");
+    return finish(error, {"it is not known whether the clock that was set before is restored", check_clocks});
   }
-  restore(error, advice(error));
+  restore(error, explain_reply(error));
 }
 
 void ClockSweep::next_clock() {
   if (clock_ == clocks_khz.size() || aborted_) {
     const bool none = recommended() == 0 && !aborted_;
-    return restore(none ? last_error_ : Error::none, none ? "no MA clock gave good frames only" : "");
+    if (!none) return restore(Error::none, {});
+    return restore(last_error_, {"no MA clock gave good frames only", last_advice_});
   }
   ++clock_;
   read_ = 0;
@@ -365,6 +355,7 @@ void ClockSweep::count(Error error) {
     ++valid_[clock_ - 1];
   } else {
     last_error_ = error;
+    last_advice_ = explain_reply(error, format_).advice;
   }
   if (aborted_) return next_clock();
   if (read_ < frames_) return ask(encode_request(command::samples), Answer::samples);
@@ -373,9 +364,9 @@ void ClockSweep::count(Error error) {
   next_clock();
 }
 
-void ClockSweep::restore(Error error, std::string_view detail) {
+void ClockSweep::restore(Error error, const Explanation& explanation) {
   outcome_ = error;
-  outcome_detail_ = detail;
+  outcome_explanation_ = explanation;
   phase_ = Phase::restore;
   ask(encode_request(command::set_clock, previous_), Answer::unknown);
 }
@@ -404,6 +395,14 @@ void ClockSweep::report(FieldSink& sink) const {
   }
   put(sink, field_restored, previous_);
   put(sink, field_aborted, aborted_ ? 1 : 0);
+}
+
+void ClockSweep::report_left(FieldSink& sink) const {
+  if (clock_ == 0) return;
+  const unsigned left = phase_ == Phase::restore || phase_ == Phase::verify ? previous_ : clock_;
+  put(sink, field_left, left);
+  put(sink, field_left_khz, clocks_khz[left - 1]);
+  put(sink, field_previous, previous_);
 }
 
 }  // namespace absenc::e201

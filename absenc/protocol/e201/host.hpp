@@ -8,13 +8,11 @@
 #include <string_view>
 
 #include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/e201/explain.hpp"
 #include "absenc/protocol/e201/frame.hpp"
 #include "absenc/protocol/e201/timing.hpp"
 
 namespace absenc::e201 {
-
-/// What the E201-9S document says to do about this error; empty where it says nothing.
-[[nodiscard]] std::string_view advice(Error error);
 
 /// One request and its reply at a time; a subclass decides what comes next.
 class Procedure : public Conversation<std::uint8_t> {
@@ -22,7 +20,8 @@ class Procedure : public Conversation<std::uint8_t> {
   void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
-  [[nodiscard]] std::string_view detail() const final { return detail_; }
+  [[nodiscard]] std::string_view detail() const final { return explanation_.found; }
+  [[nodiscard]] std::string_view advice() const final { return explanation_.advice; }
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final;
 
  protected:
@@ -36,7 +35,7 @@ class Procedure : public Conversation<std::uint8_t> {
 
   /// Sends `request`, not before `earliest`.
   void ask(const RequestText& request, Answer answer, Time earliest = {});
-  void finish(Error error = Error::none, std::string_view detail = {});
+  void finish(Error error = Error::none, const Explanation& explanation = {});
   /// Hands out an intermediate result before what was asked last is sent.
   void emit() { emitting_ = true; }
 
@@ -44,8 +43,12 @@ class Procedure : public Conversation<std::uint8_t> {
   /// `finish`.
   virtual void answered(Bytes reply) = 0;
   /// No such reply came. Calls `ask` or `finish`; by default the procedure ends with this error.
-  virtual void failed(Error error) { finish(error, advice(error)); }
+  virtual void failed(Error error) { finish(error, explain_reply(error)); }
 
+  /// The error of what came last in reply.
+  [[nodiscard]] Explanation explain_reply(Error error, const Format& format = {}) const {
+    return explain(format, error, request_[0], reply_);
+  }
   [[nodiscard]] Time sent_at() const { return sent_at_; }
   [[nodiscard]] Time received_at() const { return received_at_; }
 
@@ -65,10 +68,11 @@ class Procedure : public Conversation<std::uint8_t> {
   Time sent_at_{};
   Time received_at_{};
   Error error_ = Error::none;
-  std::string_view detail_{};
+  Explanation explanation_{};
 };
 
-/// `4`. When nothing usable comes, the firmware is asked: before 1.16 it is `unsupported`.
+/// `4`. When nothing usable comes, the firmware is asked: before 1.16 it is `unsupported`, otherwise `4` is sent once
+/// more.
 class ReadPosition final : public Procedure {
  public:
   explicit ReadPosition(const Format& format);
@@ -78,11 +82,13 @@ class ReadPosition final : public Procedure {
   [[nodiscard]] const Position& position() const { return position_; }
 
  private:
+  enum class Phase : std::uint8_t { first, version, again };
   void answered(Bytes reply) override;
   void failed(Error error) override;
 
   Format format_;
-  Error failure_ = Error::none;  // of `4`, while the firmware is asked
+  Phase phase_ = Phase::first;
+  Error failure_ = Error::none;  // of the first `4`
   bool good_ = false;
   Position position_{};
   Reading reading_{};
@@ -180,7 +186,11 @@ class ClockSweep final : public Procedure {
  public:
   ClockSweep(const Format& format, unsigned frames);
   void report(FieldSink& sink) const override;
-  void abort() override { aborted_ = true; }
+  bool abort() override {
+    aborted_ = true;
+    return true;
+  }
+  void report_left(FieldSink& sink) const override;
 
   /// 1 to 8; 0: no clock gave good frames only.
   [[nodiscard]] unsigned recommended() const;
@@ -191,7 +201,7 @@ class ClockSweep final : public Procedure {
   void failed(Error error) override;
   void next_clock();
   void count(Error error);
-  void restore(Error error, std::string_view detail);
+  void restore(Error error, const Explanation& explanation);
 
   Format format_;
   unsigned frames_;
@@ -203,8 +213,9 @@ class ClockSweep final : public Procedure {
   unsigned measured_ = 0;  // clocks that are done
   std::array<unsigned, clocks_khz.size()> valid_{};
   Error last_error_ = Error::none;  // of a frame
-  Error outcome_ = Error::none;     // what the sweep ends with when the clock is restored
-  std::string_view outcome_detail_{};
+  std::string_view last_advice_{};
+  Error outcome_ = Error::none;  // what the sweep ends with when the clock is restored
+  Explanation outcome_explanation_{};
 };
 
 }  // namespace absenc::e201

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <set>
 
 #include "absenc/protocol/e201/bench_test.hpp"
 
@@ -132,20 +133,26 @@ TEST(E201Host, EachFailureHasItsAdvice) {
   struct Case {
     std::string reply;
     Error error;
-    std::string_view words;
+    std::string_view found;
+    std::string_view advice;
   };
-  for (const Case& one : std::vector<Case>{{"c0014328fe300000\r", Error::bad_checksum, "another MA clock"},
-                                           {"c000000000000001\r", Error::truncated, "lower MA clock"},
-                                           {"0000000000000000\r", Error::line_stuck, "supplied"},
-                                           {"e0014328ff300000\r", Error::bad_framing, "no BiSS frame"},
-                                           {"c0014328ff30000g\r", Error::bad_framing, "no BiSS frame"},
-                                           {"c0014328ff300000", Error::wrong_length, "16 hexadecimal digits"},
-                                           {"c0014328ff3000000\r", Error::wrong_length, "16 hexadecimal digits"}}) {
+  for (const Case& one :
+       std::vector<Case>{{"c0014328fe300000\r", Error::bad_checksum, "delay of the line", "another MA clock"},
+                         {"c000000000000001\r", Error::truncated, "ACK is too long", "lower MA clock"},
+                         {"0000000000000000\r", Error::line_stuck, "", "supply-on"},
+                         {"ffffffffffffffff\r", Error::line_stuck, "", "supply-on"},
+                         {"e0014328ff300000\r", Error::bad_framing, "begin with 110", "lower MA clock"},
+                         {"c000000000000000\r", Error::bad_framing, "no start bit", "lower MA clock"},
+                         {"c0034328ff300000\r", Error::bad_framing, "CDS bit is 1", "lower MA clock"},
+                         {"c0014328ff30000g\r", Error::bad_framing, "hexadecimal digits", "E201-9S"},
+                         {"c0014328ff300000", Error::wrong_length, "16 hexadecimal digits and CR", "stream-off"},
+                         {"c0014328ff3000000\r", Error::wrong_length, "16 hexadecimal digits and CR", "stream-off"}}) {
     Bench bench(testing::biss_format({.position = 19}));
     ReadPosition read(bench.format);
     run_tampered(read, answering('4', one.reply), bench);
     EXPECT_EQ(text_of(read.error()).name, text_of(one.error).name) << one.reply;
-    EXPECT_NE(read.detail().find(one.words), std::string_view::npos) << read.detail();
+    EXPECT_NE(read.detail().find(one.found), std::string_view::npos) << one.reply << read.detail();
+    EXPECT_NE(read.advice().find(one.advice), std::string_view::npos) << one.reply << read.advice();
     EXPECT_EQ(read.reading(), nullptr);
     EXPECT_TRUE(report(read).empty());
   }
@@ -323,6 +330,28 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
     EXPECT_EQ(report(sweep)["restored_clock"], 6);
     EXPECT_FALSE(report(sweep).contains("recommended_clock"));
   }
+}
+
+TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
+  Bench bench(testing::biss_format(), {.clock = 6});
+  ClockSweep sweep(bench.format, 3);
+  const std::size_t host = bench.line.attach(sim::Role::host, sweep);
+  std::set<std::int64_t> left;
+  while (!bench.line.done(host)) {
+    bench.line.step();
+    struct Left final : FieldSink {
+      void put(const FieldValue& value) override { fields[std::string(value.info->name)] = value.number; }
+      Fields fields;
+    } sink;
+    sweep.report_left(sink);
+    if (sink.fields.empty()) {
+      EXPECT_EQ(bench.adapter.clock(), 6u);
+      continue;
+    }
+    EXPECT_EQ(sink.fields["previous_clock"], 6);
+    left.insert(sink.fields["left_clock"]);
+  }
+  EXPECT_EQ(left, (std::set<std::int64_t>{1, 2, 3, 4, 5, 6, 7, 8}));
 }
 
 TEST(E201Sweep, NothingGoodIsTheErrorOfTheFrames) {

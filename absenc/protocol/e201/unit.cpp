@@ -28,7 +28,8 @@ constexpr std::array<Option, 11> options{{
     {.name = "gray",
      .meaning = "SSI: turns and position are one Gray-coded number",
      .default_value = 0,
-     .choices = boolean_choices},
+     .choices = boolean_choices,
+     .describes_word = true},
     after_word_option,
     {.name = "latency_us",
      .meaning = "virtual encoder: time until its position is ready, us",
@@ -78,7 +79,12 @@ constexpr std::array<Command, 14> commands{{
 
 constexpr auto fields = joined_fields(joined_fields(word_fields, biss::own_fields), own_fields);
 
-bool is_usable(const Format& format) { return absenc::is_usable(format.word()); }
+// Whether a frame fits into the samples: of BiSS with the shortest ACK.
+bool is_usable(const Format& format) {
+  const bool is_biss = format.carries == Carries::biss;
+  const unsigned samples = is_biss ? biss::idle_bits + 3 + biss::data_bits(format.biss) : 1 + format.ssi.word.bits();
+  return absenc::is_usable(format.word()) && samples <= sample_bits;
+}
 
 Error decode_frame(const Options& values, Frame request, Frame reply, FieldSink& sink) {
   const Format format = to_format(values);
@@ -163,7 +169,15 @@ Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byt
   return {.bytes = new (storage.data()) VirtualAdapter(format, shaft, settings)};
 }
 
-Resolution resolution(const Options& values) { return resolution_of(to_format(values).word()); }
+Resolution resolution(const Options& values) {
+  const Format format = to_format(values);
+  return resolution_of(format.word(), format.scale());
+}
+
+Explanation explain_frame(const Options& values, Error error, Frame request, Frame reply) {
+  const std::uint8_t letter = request.bytes.empty() ? command::samples : request.bytes[0];
+  return explain(to_format(values), error, letter, reply.bytes);
+}
 
 // What follows the CRC is ignored, capitals are the same digits, and SSI has no checksum.
 bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
@@ -187,13 +201,14 @@ bool covered(const Options& values, Frame request, Frame reply, std::size_t bit)
 
 Format to_format(const Options& values) {
   const PositionBits bits = position_bits(values, option_singleturn_bits);
-  const Scale scale = scale_of(values[option_position_bits], values[option_unit_um]);
+  const Scale scale = scale_of(values, option_position_bits, option_unit_um);
   Format format;
   format.carries = static_cast<Carries>(values[option_carries]);
   format.biss = {.word = biss::word_with_status(bits), .scale = scale};
   format.ssi = {.word = ssi::word_with(bits, values[option_gray] != 0, ssi::ErrorBit::none, Parity::none),
                 .after_word = static_cast<ssi::AfterWord>(values[option_after_word]),
                 .scale = scale};
+  if (values.has_word()) format.biss.word = format.ssi.word = values.word;
   return format;
 }
 
@@ -220,6 +235,7 @@ constinit const Unit unit{
     .device = device,
     .resolution = resolution,
     .covered = covered,
+    .explain = explain_frame,
 };
 
 }  // namespace absenc::e201

@@ -17,31 +17,40 @@ namespace {
 constexpr std::array<std::string_view, 3> error_bit_choices{"none", "active_high", "active_low"};
 constexpr std::array<std::string_view, 3> parity_choices{"none", "odd", "even"};
 
-constexpr std::array<Option, 8> options{{
+constexpr std::array<Option, 9> options{{
     {.name = "bits",
      .meaning = "bits of the position within the turn",
      .default_value = 12,
      .minimum = 1,
-     .maximum = 64},
+     .maximum = 64,
+     .describes_word = true},
     multiturn_bits_option,
     multiturn_first_option,
     {.name = "gray",
      .meaning = "turns and position are one Gray-coded number",
      .default_value = 0,
-     .choices = boolean_choices},
-    {.name = "error_bit", .meaning = "a bit behind the position", .default_value = 0, .choices = error_bit_choices},
+     .choices = boolean_choices,
+     .describes_word = true},
+    {.name = "error_bit",
+     .meaning = "a bit behind the position",
+     .default_value = 0,
+     .choices = error_bit_choices,
+     .describes_word = true},
     {.name = "parity",
      .meaning = "the last bit, over all before it",
      .default_value = 0,
      .choices = parity_choices,
-     .probeable = true},
+     .probeable = true,
+     .describes_word = true},
     after_word_option,
     {.name = "extra_clocks",
      .meaning = "clocks behind the word, compared with after_word; as many as the word has bits read it twice",
      .default_value = 0,
      .minimum = 0,
      .maximum = WordFormat::maximum_bits},
+    unit_um_option,
 }};
+static_assert(options[option_unit_um].name == "unit_um");
 
 constexpr std::array<OptionValue, 3> raa38s6_12{{{option_bits, 12}, {option_multiturn_bits, 0}, {option_gray, 0}}};
 constexpr std::array<Model, 1> models{{{"RAA38S6-12", "RAA38S6 with 12 bits, binary", 0, raa38s6_12}}};
@@ -74,21 +83,29 @@ Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byt
   return {.bytes = new (storage.data()) VirtualEncoder(format, shaft)};
 }
 
-Resolution resolution(const Options& values) { return resolution_of(to_format(values).word); }
+Resolution resolution(const Options& values) {
+  const Format format = to_format(values);
+  return resolution_of(format.word, format.scale);
+}
 
 // SSI has no checksum.
 bool covered(const Options&, Frame, Frame, std::size_t) { return false; }
 
-}  // namespace
-
-Format to_format(const Options& values) {
+WordFormat word_of_options(const Options& values) {
   const PositionBits bits{.position = static_cast<unsigned>(values[option_bits]),
                           .multiturn = static_cast<unsigned>(values[option_multiturn_bits]),
                           .multiturn_first = values[option_multiturn_first] != 0};
-  return {.word = word_with(bits, values[option_gray] != 0, static_cast<ErrorBit>(values[option_error_bit]),
-                            static_cast<Parity>(values[option_parity])),
+  return word_with(bits, values[option_gray] != 0, static_cast<ErrorBit>(values[option_error_bit]),
+                   static_cast<Parity>(values[option_parity]));
+}
+
+}  // namespace
+
+Format to_format(const Options& values) {
+  return {.word = values.has_word() ? values.word : word_of_options(values),
           .after_word = static_cast<AfterWord>(values[option_after_word]),
-          .extra_clocks = static_cast<unsigned>(values[option_extra_clocks])};
+          .extra_clocks = static_cast<unsigned>(values[option_extra_clocks]),
+          .scale = scale_of(values, option_unit_um, option_unit_um)};
 }
 
 constinit const Unit unit{

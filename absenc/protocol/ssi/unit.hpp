@@ -19,6 +19,7 @@ enum OptionIndex : std::size_t {
   option_parity,
   option_after_word,
   option_extra_clocks,
+  option_unit_um,
 };
 
 [[nodiscard]] Format to_format(const Options& options);
