@@ -101,4 +101,11 @@ void sleep_until(Time time) {
   while (now() < time) wait_for({}, time);
 }
 
+void reach(Time time) {
+  constexpr Time wake_up = std::chrono::microseconds(100);  // the kernel is as late: timer slack and scheduling
+  if (time - now() > wake_up) sleep_until(time - wake_up);
+  while (now() < time) {
+  }
+}
+
 }  // namespace absenc::os

@@ -37,4 +37,8 @@ bool wait_for(std::span<pollfd> watched, Time deadline);
 /// Throws as `wait_for` does. Late by the kernel's timer slack (50 us) and scheduling, never early.
 void sleep_until(Time time);
 
+/// Returns in the moment itself, give or take a look at the clock: the last 100 us are spent looking. Throws as
+/// `wait_for` does.
+void reach(Time time);
+
 }  // namespace absenc::os

@@ -84,13 +84,9 @@ ByteEvent StreamPort::tell(const ByteEvent& event) {
   return event;
 }
 
-// The kernel wakes up to 100 us late (timer slack and scheduling): the rest is spent looking at the clock.
 void StreamPort::reach(Time time) {
-  constexpr Time wake_up = 100us;
-  if (time - os::now() > wake_up) sleep_until(std::min(time - wake_up, end_));
-  while (os::now() < time) {
-    if (os::now() >= end_) throw Ended{};
-  }
+  os::reach(std::min(time, end_));
+  if (os::now() < time) throw Ended{};
 }
 
 void StreamPort::pulse(const ByteStep& step) {

@@ -61,6 +61,16 @@ void Line<Item>::observe(Observer observer) {
 }
 
 template <class Item>
+void Line<Item>::observe_exchanges(ExchangeObserver observer) {
+  exchange_observer_ = std::move(observer);
+}
+
+template <class Item>
+Role Line<Item>::role(Node node) const {
+  return nodes_[node]->role;
+}
+
+template <class Item>
 bool Line<Item>::done(Node node) const {
   return nodes_[node]->done;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <queue>
+#include <span>
 #include <vector>
 
 #include "absenc/link/step.hpp"
@@ -29,6 +30,16 @@ class Line {
   using OnEmit = std::function<bool()>;
   /// Called for every character or CAN frame that was on the wire, at its end.
   using Observer = std::function<void(Node sender, Time start, Time end, const Item& item)>;
+  /// Of an exchange or of `bits` clocks: what the host sent and what it received, the last byte left-aligned.
+  struct Exchange {
+    Time start;
+    Time end;
+    std::size_t bits;
+    std::span<const Item> out;
+    std::span<const Item> in;
+  };
+  /// Called for every exchange, at its end.
+  using ExchangeObserver = std::function<void(const Exchange& exchange)>;
 
   Line(LinkKind kind, LineSettings settings);
   ~Line();
@@ -43,8 +54,10 @@ class Line {
   void wake(Node node);
   void set_echo(Node node, bool echo);
   void observe(Observer observer);
+  void observe_exchanges(ExchangeObserver observer);
 
   [[nodiscard]] Time now() const { return now_; }
+  [[nodiscard]] Role role(Node node) const;
   [[nodiscard]] bool done(Node node) const;
   /// Time of the next event, or `never`.
   [[nodiscard]] Time next_event() const;
@@ -100,6 +113,7 @@ class Line {
   std::vector<std::unique_ptr<State>> nodes_;
   std::priority_queue<Happening, std::vector<Happening>, std::greater<>> happenings_;
   Observer observer_;
+  ExchangeObserver exchange_observer_;
   bool frame_on_bus_ = false;
 };
 

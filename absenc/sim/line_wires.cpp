@@ -162,6 +162,7 @@ void Line<Item>::end_exchange(Node node) {
     std::vector<Item> out = host.out;
     out.resize(host.expect, 0);
     const std::size_t bits = host.bits;
+    if (exchange_observer_ && bits > 0) exchange_observer_({host.start, now_, bits, out, in});
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (nodes_[other]->role == Role::host) continue;
       nodes_[other]->doing = Step<Item>::Kind::wait;

@@ -21,7 +21,7 @@ bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_v
 }
 
 bool confirmed(const EncoderUri& uri, std::string_view meaning) {
-  const std::string where = uri.place == Place::serial ? uri.path : fmt::format("{}:{}", uri.host, uri.port);
+  const std::string where = uri.place == Place::tcp ? fmt::format("{}:{}", uri.host, uri.port) : uri.path;
   print_prompt(fmt::format("This changes the encoder at {}: {}. Go on? [y/N] ", where, meaning));
   pollfd input{0, POLLIN, 0};
   try {

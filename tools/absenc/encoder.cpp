@@ -18,8 +18,10 @@ namespace absenc::tool {
 
 namespace {
 
-Frame to_frame(Bytes bytes) { return {.bytes = bytes}; }
-Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty() ? nullptr : &frames.front()}; }
+Frame to_frame(Bytes bytes, std::size_t bits = 0) { return {.bytes = bytes, .bits = std::min(bits, bytes.size() * 8)}; }
+Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
+  return {.can = frames.empty() ? nullptr : &frames.front()};
+}
 
 template <class Item>
 class EncoderOn final : public Encoder {
@@ -80,7 +82,7 @@ class EncoderOn final : public Encoder {
   Trouble trouble(const Outcome& outcome) const override {
     Trouble trouble{.error = outcome.error};
     const bool callers_fault = outcome.error <= Error::buffer_too_small;
-    if (callers_fault || port_.sent.empty()) {
+    if (callers_fault || (port_.sent.empty() && port_.clocks == 0)) {
       trouble.message = describe(outcome.error, outcome.detail, {});
       trouble.advice = outcome.advice;
       return trouble;
@@ -88,7 +90,7 @@ class EncoderOn final : public Encoder {
     const Diagnosis diagnosis = diagnose_last();
     trouble.message = describe(outcome.error, outcome.detail, diagnosis.finding);
     trouble.sent = wire_text(port_.sent);
-    trouble.received = wire_text(port_.received);
+    trouble.received = port_.clocks == 0 ? wire_text(port_.received) : clocked_text();
     trouble.exchange = exchange(trouble);
     const std::string_view advice = outcome.advice.empty() ? text_of(outcome.error).advice : outcome.advice;
     trouble.advice = diagnosis.advice.empty() ? std::string(advice) : diagnosis.advice;
@@ -109,7 +111,7 @@ class EncoderOn final : public Encoder {
     const Frame sent = to_frame(std::span<const Item>(port_.sent));
     const std::span<const Item> received(port_.received);
     const auto diagnosed = [&](std::span<const Item> reply) {
-      return diagnose(unit(), uri().options, sent, to_frame(reply));
+      return diagnose(unit(), uri().options, sent, to_frame(reply, port_.clocks));
     };
     const bool takes_echo = session_.echo().mode() == host::EchoMode::on && received.size() > port_.sent.size();
     if (!takes_echo) return diagnosed(received);
@@ -121,6 +123,10 @@ class EncoderOn final : public Encoder {
   }
 
   [[nodiscard]] std::string exchange(const Trouble& trouble) const {
+    if (port_.clocks != 0) {
+      const std::string came = port_.received.empty() ? "nothing" : trouble.received;
+      return fmt::format("{} clocks to {}; received {}", port_.clocks, link_->place, came);
+    }
     const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->place);
     if (port_.received.empty()) {
       const std::string latency =
@@ -130,6 +136,11 @@ class EncoderOn final : public Encoder {
     const Time after = port_.first_received_at - port_.sent_at;
     const std::string later = after > Time{} ? fmt::format(" {} later", to_text(after)) : "";
     return fmt::format("{}; received {}{}", sent, trouble.received, later);
+  }
+
+  // What the last clocks brought.
+  [[nodiscard]] std::string clocked_text() const {
+    return to_wire_text(unit().link, to_frame(std::span<const Item>(port_.received), port_.clocks));
   }
 
   [[nodiscard]] std::string wire_text(std::span<const Item> items) const {

@@ -41,6 +41,10 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
     uri.rs485 = modes[switch_of(setting)];
   } else if (setting.name == "latency") {
     uri.latency = std::chrono::milliseconds(number_of(setting, 0, 60'000));
+  } else if (setting.name == "speed") {
+    uri.spi.speed = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000'000));
+  } else if (setting.name == "spi_mode") {
+    uri.spi.mode = static_cast<std::uint8_t>(number_of(setting, 0, 3));
   } else if (setting.name == "echo") {
     constexpr std::array modes{host::EchoMode::automatic, host::EchoMode::on, host::EchoMode::off};
     uri.echo = modes[switch_of(setting)];
@@ -60,7 +64,17 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
 }
 
 bool allowed(const LinkParameter& parameter, Place place) {
-  return place == Place::serial ? parameter.serial : place == Place::tcp ? parameter.tcp : parameter.sim;
+  switch (place) {
+    case Place::serial:
+      return parameter.serial;
+    case Place::tcp:
+      return parameter.tcp;
+    case Place::spi:
+      return parameter.spi;
+    case Place::sim:
+      break;
+  }
+  return parameter.sim;
 }
 
 // Takes what is a link parameter; the rest are options of the unit.
@@ -83,9 +97,31 @@ void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
   uri.options = require_options(*uri.unit, {}, options, names);
 }
 
-std::string examples(std::string_view unit) {
-  const std::vector<std::string> ports = os::serial_ports();
-  return fmt::format("{0}:{1}, {0}:tcp:HOST:PORT or sim:{0}", unit, ports.empty() ? "/dev/ttyUSB0" : ports.front());
+bool goes_over_serial(const Unit& unit) {
+  return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
+}
+bool goes_over_spi(const Unit& unit) { return unit.link == LinkKind::exchange || unit.link == LinkKind::clocked; }
+
+std::string examples(const Unit& unit) {
+  const auto first = [](const std::vector<std::string>& ports, const char* otherwise) {
+    return ports.empty() ? std::string(otherwise) : ports.front();
+  };
+  if (goes_over_serial(unit)) {
+    return fmt::format("{0}:{1}, {0}:tcp:HOST:PORT or sim:{0}", unit.id, first(os::serial_ports(), "/dev/ttyUSB0"));
+  }
+  if (!goes_over_spi(unit)) return fmt::format("sim:{}", unit.id);
+  return fmt::format("{0}:spi:{1} or sim:{0}", unit.id, first(os::spi_devices(), "/dev/spidev0.0"));
+}
+
+// What a place carries, and what the unit speaks.
+void check_place(const EncoderUri& uri, std::string_view address) {
+  const bool fits = uri.place == Place::spi ? goes_over_spi(*uri.unit) : goes_over_serial(*uri.unit);
+  if (fits) return;
+  const std::string_view place = uri.place == Place::spi   ? "an SPI controller"
+                                 : uri.place == Place::tcp ? "TCP"
+                                                           : "a serial port";
+  throw UsageError(fmt::format("\"{}\": {} ({}) does not go over {}: write {}", address, uri.unit->id,
+                               line_of(*uri.unit), place, examples(*uri.unit)));
 }
 
 void parse_tcp(EncoderUri& uri, std::string_view where) {
@@ -120,14 +156,20 @@ void parse_where(EncoderUri& uri, std::string_view address) {
   }
   uri.unit = &require_unit(unit);
   if (colon == std::string_view::npos || colon + 1 == address.size()) {
-    throw UsageError(fmt::format("\"{}\" does not say where the encoder is: write {}", address, examples(unit)));
+    throw UsageError(fmt::format("\"{}\" does not say where the encoder is: write {}", address, examples(*uri.unit)));
   }
   const std::string_view where = address.substr(colon + 1);
   if (where.starts_with("tcp:")) {
     uri.place = Place::tcp;
-    return parse_tcp(uri, where.substr(4));
+  } else if (where.starts_with("spi:")) {
+    uri.place = Place::spi;
   }
-  uri.path = where;
+  check_place(uri, address);
+  if (uri.place == Place::tcp) return parse_tcp(uri, where.substr(4));
+  uri.path = uri.place == Place::spi ? where.substr(4) : where;
+  if (uri.path.empty()) {
+    throw UsageError(fmt::format("\"{}\" does not say which SPI device: write {}", address, examples(*uri.unit)));
+  }
 }
 
 EncoderUri parse_address(std::string_view address) {
@@ -212,6 +254,7 @@ EncoderUri parse_encoder(std::string_view text, std::span<const std::string> mor
 
 std::string address_of(const EncoderUri& uri) {
   if (uri.place == Place::sim) return fmt::format("sim:{}", uri.unit->id);
+  if (uri.place == Place::spi) return fmt::format("{}:spi:{}", uri.unit->id, uri.path);
   if (uri.place == Place::tcp) return fmt::format("{}:tcp:{}:{}", uri.unit->id, uri.host, uri.port);
   return fmt::format("{}:{}", uri.unit->id, uri.path);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder as the user writes it: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001, sim:tformat, or
-// a name of absenc.toml.
+// An encoder as the user writes it: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001,
+// ssi:spi:/dev/spidev0.0, sim:tformat, or a name of absenc.toml.
 #pragma once
 
 #include <array>
@@ -12,36 +12,39 @@
 
 #include "absenc/host/echo.hpp"
 #include "absenc/os/serial.hpp"
+#include "absenc/os/spi_port.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "tools/absenc/virtual_device.hpp"
 
 namespace absenc::tool {
 
-enum class Place : std::uint8_t { serial, tcp, sim };
+enum class Place : std::uint8_t { serial, tcp, spi, sim };
 
 /// A setting of the way to the encoder, beside the options of its protocol.
 struct LinkParameter {
   std::string_view name;
   std::string_view value;
   std::string_view meaning;
-  std::string_view places;  // for people
-  bool serial, tcp, sim;    // where it may be given
+  std::string_view places;     // for people
+  bool serial, tcp, spi, sim;  // where it may be given
   bool repeatable = false;
 };
 
-inline constexpr std::array<LinkParameter, 10> link_parameters{{
-    {"baud", "RATE", "bits a second, instead of the protocol's own", "serial", true, false, false},
+inline constexpr std::array<LinkParameter, 12> link_parameters{{
+    {"baud", "RATE", "bits a second, instead of the protocol's own", "serial", true, false, false, false},
     {"rs485", "auto|on|off", "whether the kernel switches the direction of the transceiver", "serial", true, false,
-     false},
-    {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp", true, true, false},
-    {"echo", "auto|on|off", "whether the adapter sends back what is sent", "all", true, true, true},
-    {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim", false, false, true},
-    {"singleturn", "COUNTS", "position within the turn at the start", "sim", false, false, true},
-    {"multiturn", "TURNS", "turns at the start", "sim", false, false, true},
-    {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", false, false, true, true},
+     false, false},
+    {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp", true, true, false, false},
+    {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi", false, false, true, false},
+    {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi", false, false, true, false},
+    {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim", true, true, false, true},
+    {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim", false, false, false, true},
+    {"singleturn", "COUNTS", "position within the turn at the start", "sim", false, false, false, true},
+    {"multiturn", "TURNS", "turns at the start", "sim", false, false, false, true},
+    {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", false, false, false, true, true},
     {"fault", "KIND=RATE", "a fault to inject, with its probability; may be given more than once", "sim", false, false,
-     true, true},
-    {"seed", "N", "another series of faults", "sim", false, false, true},
+     false, true, true},
+    {"seed", "N", "another series of faults", "sim", false, false, false, true},
 }};
 
 /// Null when there is none with this name.
@@ -51,13 +54,14 @@ struct EncoderUri {
   const Unit* unit = nullptr;
   Options options;
   Place place = Place::serial;
-  std::string path;  // serial
+  std::string path;  // serial, spi
   std::string host;  // tcp
   std::uint16_t port = 0;
 
   LineSettings line;
   os::Rs485 rs485 = os::Rs485::automatic;
   std::optional<Time> latency;
+  os::SpiChoice spi;
   host::EchoMode echo = host::EchoMode::off;
   DeviceSettings device;
 };

@@ -5,9 +5,9 @@
 
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
+#include "absenc/os/spi_port.hpp"
 #include "absenc/os/tcp.hpp"
 #include "absenc/sim/sim_port.hpp"
-#include "tools/absenc/error.hpp"
 
 namespace absenc::tool {
 
@@ -36,6 +36,15 @@ Link open_tcp(const EncoderUri& uri) {
   return link;
 }
 
+Link open_spi(const EncoderUri& uri) {
+  Link link;
+  const auto port = std::make_shared<os::SpiPort>(uri.path, uri.unit->link, uri.line, uri.spi);
+  link.place = fmt::format("{} in SPI mode {}", uri.path, port->settings().spi_mode);
+  link.bytes = port.get();
+  link.owner = port;
+  return link;
+}
+
 // Virtual time keeps pace with ours, so that a moving shaft moves.
 Link open_sim(const EncoderUri& uri) {
   Link link;
@@ -59,12 +68,17 @@ Link open_sim(const EncoderUri& uri) {
 }  // namespace
 
 Link open_link(const EncoderUri& uri) {
-  if (uri.place == Place::sim) return open_sim(uri);
-  const LinkKind kind = uri.unit->link;
-  if (kind != LinkKind::half_duplex && kind != LinkKind::full_duplex) {
-    throw UsageError(fmt::format("{} does not go over a serial port or TCP", uri.unit->id));
+  switch (uri.place) {
+    case Place::serial:
+      return open_serial(uri);
+    case Place::tcp:
+      return open_tcp(uri);
+    case Place::spi:
+      return open_spi(uri);
+    case Place::sim:
+      break;
   }
-  return uri.place == Place::tcp ? open_tcp(uri) : open_serial(uri);
+  return open_sim(uri);
 }
 
 }  // namespace absenc::tool

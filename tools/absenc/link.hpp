@@ -37,6 +37,7 @@ class WatchedPort final : public Port<Item> {
     if (step.kind == Step<Item>::Kind::transfer) {
       sent.assign(step.out.begin(), step.out.end());
       received.clear();
+      clocks = step.bits;
       answer = step.answer;
       items_sent += step.out.size();
       first_received_at = Time{};
@@ -58,8 +59,9 @@ class WatchedPort final : public Port<Item> {
 
   std::vector<Item> sent;
   std::vector<Item> received;
-  Time answer{};   // how long the protocol waits for an answer
-  Time sent_at{};  // end of sending
+  std::size_t clocks = 0;  // of a clocked link, which sends nothing else
+  Time answer{};           // how long the protocol waits for an answer
+  Time sent_at{};          // end of sending
   Time first_received_at{};
   Time received_at{};  // last of `received`
   std::uint64_t items_sent = 0;

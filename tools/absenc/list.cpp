@@ -346,7 +346,7 @@ const Subcommand list_subcommand{
     "  [defaults]             # for every encoder, where they fit\n"
     "  echo = \"auto\"\n"
     "  [bus.arm]              # a line that several encoders share\n"
-    "  port = \"/dev/ttyUSB0\"  # or \"tcp:192.168.1.20:4001\", or \"sim\"\n"
+    "  port = \"/dev/ttyUSB0\"  # or \"tcp:192.168.1.20:4001\", \"spi:/dev/spidev0.0\", or \"sim\"\n"
     "  latency = 5\n"
     "  [encoder.elbow]        # all that can stand behind ? in an encoder; lists for what may be repeated\n"
     "  protocol = \"tformat\"\n"

@@ -165,7 +165,7 @@ Watches make_watches(const Invocation& invocation, double rate) {
   for (const std::string& name : names) uris.push_back(parse_encoder(name, invocation.texts("--option")));
   for (const EncoderUri& uri : uris) {
     const auto same = std::count_if(uris.begin(), uris.end(), [&](const EncoderUri& other) {
-      return uri.place == Place::serial && other.place == Place::serial && other.path == uri.path;
+      return !uri.path.empty() && other.place == uri.place && other.path == uri.path;
     });
     if (same > 1) throw UsageError(fmt::format("the port {} is named {} times", uri.path, same));
   }

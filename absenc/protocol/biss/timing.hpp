@@ -13,7 +13,7 @@ namespace absenc::biss {
 
 using namespace std::chrono_literals;
 
-inline constexpr LineSettings line_settings{.rate = 1'000'000};
+inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 inline constexpr Time shortest_period = 100ns;     // of MA: 10 MHz
 inline constexpr Time timeout_minimum = 12'500ns;  // SLO stays low so long after the last clock
 inline constexpr Time timeout_maximum = 40us;      // the host clocks no earlier

@@ -9,7 +9,7 @@ namespace absenc::ssi {
 
 using namespace std::chrono_literals;
 
-inline constexpr LineSettings line_settings{.rate = 200'000};
+inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
 inline constexpr Time shortest_period = 4us;  // 250 kHz
 inline constexpr Time longest_period = 10us;  // 100 kHz
 inline constexpr Time pause = 500us;          // Tm: more than that between two words, or the old one goes on

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/spi_port.hpp"
+
+#include <fcntl.h>
+#include <linux/spi/spidev.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "absenc/core/bit_view.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/serial_ports.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::os {
+
+using namespace std::chrono_literals;
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+using Kind = Failure::Kind;
+
+namespace {
+
+constexpr std::uint8_t word_bits = 8;  // what every controller can do
+
+std::string reason(int error) { return " (" + std::generic_category().message(error) + ")"; }
+
+Failure not_found(const std::string& path) {
+  std::string there;
+  for (const std::string& device : spi_devices()) there += (there.empty() ? "" : ", ") + device;
+  const std::string what = "there is no SPI device " + path;
+  if (!there.empty()) return {Kind::not_found, what + ": this machine has " + there};
+  return {Kind::not_found, what +
+                               ", nor any other: switch the controller on (Raspberry Pi: dtparam=spi=on in "
+                               "config.txt; others: a spidev node in the device tree)"};
+}
+
+Failure spi_failure(const std::string& path, int error) {
+  switch (error) {
+    case ENOENT:
+    case ENOTDIR:
+    case ENXIO:
+    case ENODEV:
+      return not_found(path);
+    case ENOTTY:
+    case EISDIR:
+    case EINVAL:
+      return {Kind::unsupported,
+              path + " is not an SPI device: its name is /dev/spidevB.C, of bus B and chip select C"};
+    default:
+      return open_failure(path, error);
+  }
+}
+
+}  // namespace
+
+int SpiKernel::open(const std::string& path) { return ::open(path.c_str(), O_RDWR | O_CLOEXEC); }
+
+int SpiKernel::control(int descriptor, unsigned long request, void* argument) {
+  return ::ioctl(descriptor, request, argument);
+}
+
+SpiKernel& system_kernel() {
+  static SpiKernel kernel;
+  return kernel;
+}
+
+std::vector<std::string> spi_devices(const std::filesystem::path& sys) {
+  std::vector<std::string> devices;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(sys, ignored)) {
+    devices.push_back("/dev/" + entry.path().filename().string());
+  }
+  std::sort(devices.begin(), devices.end());
+  return devices;
+}
+
+SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice,
+                 SpiKernel& kernel)
+    : path_(path), kind_(kind), choice_(choice), kernel_(&kernel), descriptor_(kernel.open(path)) {
+  if (kind != LinkKind::exchange && kind != LinkKind::clocked) {
+    throw std::invalid_argument("an SPI controller exchanges bytes or clocks bits");
+  }
+  if (!descriptor_) throw spi_failure(path, errno);
+  std::uint32_t mode = 0;
+  if (control(SPI_IOC_RD_MODE32, &mode) < 0) throw spi_failure(path, errno);
+  if (::flock(descriptor_.get(), LOCK_EX | LOCK_NB) < 0) throw spi_failure(path, errno);
+  board_flags_ = mode & (SPI_CS_HIGH | SPI_NO_CS | SPI_READY);
+  set_word();
+  apply(settings);
+}
+
+Time SpiPort::now() {
+  told_ = os::now();
+  return told_;
+}
+
+void SpiPort::begin(const ByteStep& step) {
+  switch (step.kind) {
+    case ByteStep::Kind::transfer:
+      // Whoever reads without a pause never waits.
+      if (interrupted() && take_interrupt()) throw Interrupted{};
+      reach(step.at);
+      transfer(step);
+      break;
+    case ByteStep::Kind::pulse:
+      throw Failure(Kind::unsupported, "an SPI controller has no trigger and clear lines: use a serial port");
+    case ByteStep::Kind::configure:
+      apply(step.settings);
+      break;
+    case ByteStep::Kind::wait:
+    case ByteStep::Kind::emit:
+    case ByteStep::Kind::done:
+      break;
+  }
+}
+
+ByteEvent SpiPort::wait(const ByteStep& step) {
+  // A timer stays due when another event came in its moment and the machine asks for it once more.
+  armed_ = step.at > told_ || step.at == armed_ ? step.at : never;
+  if (std::exchange(sent_pending_, false)) return tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
+  if (std::exchange(heard_pending_, false)) {
+    return tell({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_});
+  }
+  const Time limit = heard_ ? step.gap : step.answer;
+  const Time quiet_end = limit > 0ns && !silence_told_ ? sent_at_ + limit : never;
+  sleep_until(std::min(armed_, quiet_end));
+  if (armed_ <= quiet_end) {
+    armed_ = never;
+    return tell({.kind = ByteEvent::Kind::timer, .at = os::now()});
+  }
+  silence_told_ = true;
+  return tell({.kind = ByteEvent::Kind::silence, .at = os::now()});
+}
+
+// The machine's time is that of its last event.
+ByteEvent SpiPort::tell(const ByteEvent& event) {
+  told_ = event.at;
+  return event;
+}
+
+void SpiPort::transfer(const ByteStep& step) {
+  const bool clocked = kind_ == LinkKind::clocked;
+  const std::size_t clocks = settings_.idle_clocks + step.bits;
+  in_.assign(clocked ? (clocks + 7) / 8 : std::max(step.out.size(), step.expect), 0);
+  out_.assign(step.out.begin(), step.out.end());
+  out_.resize(in_.size(), 0);
+  if (!in_.empty()) send_message(!clocked);
+  sent_at_ = os::now();
+  if (clocked) keep_bits(step.bits);
+  sent_pending_ = true;
+  heard_ = heard_pending_ = !in_.empty();
+  silence_told_ = false;
+}
+
+// One message: the chip stays selected from its first transfer to its last.
+void SpiPort::send_message(bool with_output) {
+  std::array<spi_ioc_transfer, 2> transfers{};
+  const auto lead = std::chrono::ceil<std::chrono::microseconds>(settings_.select_lead).count();
+  transfers[0].delay_usecs = static_cast<std::uint16_t>(lead);  // a transfer of no bytes that only waits
+  spi_ioc_transfer& bytes = transfers[1];
+  if (with_output) bytes.tx_buf = reinterpret_cast<std::uintptr_t>(out_.data());
+  bytes.rx_buf = reinterpret_cast<std::uintptr_t>(in_.data());
+  bytes.len = static_cast<std::uint32_t>(in_.size());
+  const int result = lead > 0 ? control(SPI_IOC_MESSAGE(2), transfers.data()) : control(SPI_IOC_MESSAGE(1), &bytes);
+  if (result == static_cast<int>(in_.size())) return;
+  const int error = result < 0 ? errno : EIO;
+  if (error == ENODEV || error == ESHUTDOWN) {
+    throw Failure(Kind::lost, path_ + " went away: was its driver unloaded?");
+  }
+  const std::string what = path_ + " refused a message of " + std::to_string(in_.size()) + " bytes at " +
+                           std::to_string(settings_.rate) + " Hz in mode " + std::to_string(settings_.spi_mode) +
+                           reason(error);
+  if (error == EMSGSIZE) {
+    throw Failure(Kind::unsupported, what + ": load the module spidev with a larger bufsiz");
+  }
+  throw Failure(Kind::system, what + ": try another speed=HZ, and see what the kernel says in dmesg");
+}
+
+// What the idle line showed and what the controller clocked beyond the last bit goes.
+void SpiPort::keep_bits(std::size_t bits) {
+  const BitView clocked{in_, in_.size() * 8};
+  std::vector<std::uint8_t> kept((bits + 7) / 8);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const auto count = static_cast<unsigned>(std::min<std::size_t>(8, bits - 8 * i));
+    kept[i] = static_cast<std::uint8_t>(clocked.load(settings_.idle_clocks + 8 * i, count) << (8 - count));
+  }
+  in_ = std::move(kept);
+}
+
+// Only what changes: a conversation may configure the line before each reading.
+void SpiPort::apply(LineSettings settings) {
+  settings.rate = choice_.speed.value_or(settings.rate);
+  settings.spi_mode = choice_.mode.value_or(settings.spi_mode);
+  const bool first = settings_.rate == 0;
+  if (first || settings.spi_mode != settings_.spi_mode) set_mode(settings.spi_mode);
+  if (first || settings.rate != settings_.rate) set_speed(settings.rate);
+  settings_ = settings;
+}
+
+void SpiPort::set_mode(std::uint8_t mode) {
+  constexpr std::uint32_t ours = SPI_CPHA | SPI_CPOL | SPI_LSB_FIRST | SPI_3WIRE | SPI_LOOP;
+  std::uint32_t wanted = board_flags_ | mode;
+  std::uint32_t given = 0;
+  const bool set = control(SPI_IOC_WR_MODE32, &wanted) >= 0;
+  const int error = set ? EINVAL : errno;
+  if (set && control(SPI_IOC_RD_MODE32, &given) >= 0 && (given & ours) == mode) return;
+  std::string advice = "use another controller";
+  if (kind_ == LinkKind::clocked) {
+    advice =
+        "swap the two wires of the clock pair and set spi_mode=" + std::to_string(mode ^ SPI_CPOL) + ", or " + advice;
+  }
+  throw Failure(Kind::unsupported, "the controller of " + path_ + " refused SPI mode " + std::to_string(mode) +
+                                       reason(error) + ": " + advice);
+}
+
+void SpiPort::set_word() {
+  std::uint8_t wanted = word_bits;
+  std::uint8_t given = 0;
+  const bool set = control(SPI_IOC_WR_BITS_PER_WORD, &wanted) >= 0;
+  const int error = set ? EINVAL : errno;
+  // 0 stands for 8.
+  if (set && control(SPI_IOC_RD_BITS_PER_WORD, &given) >= 0 && (given == word_bits || given == 0)) return;
+  throw Failure(Kind::unsupported, "the controller of " + path_ + " refused words of " + std::to_string(word_bits) +
+                                       " bits" + reason(error) + ": use another controller");
+}
+
+void SpiPort::set_speed(std::uint32_t speed) {
+  std::uint32_t given = 0;
+  if (control(SPI_IOC_WR_MAX_SPEED_HZ, &speed) < 0 || control(SPI_IOC_RD_MAX_SPEED_HZ, &given) < 0) {
+    throw Failure(Kind::bad_rate, "the controller of " + path_ + " refused a clock of " + std::to_string(speed) +
+                                      " Hz" + reason(errno) + ": try another one with speed=HZ");
+  }
+  if (given == speed) return;
+  throw Failure(Kind::bad_rate, "the controller of " + path_ + " makes a clock of " + std::to_string(given) +
+                                    " Hz when asked for " + std::to_string(speed) +
+                                    " Hz: set speed=" + std::to_string(given));
+}
+
+}  // namespace absenc::os

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// An SPI controller of Linux (spidev): encoders that speak SPI, and as the clock master those that are clocked (SSI,
+// BiSS).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absenc/link/port.hpp"
+#include "absenc/os/descriptor.hpp"
+
+namespace absenc::os {
+
+/// The system calls of SpiPort. Machines that build and test this rarely have an SPI controller, and no kernel offers a
+/// virtual one: a test overrides these two, and sees exactly what is asked of the kernel.
+struct SpiKernel {
+  virtual ~SpiKernel() = default;
+  /// As open(2) with O_RDWR: negative, with errno, when refused.
+  virtual int open(const std::string& path);
+  /// As ioctl(2).
+  virtual int control(int descriptor, unsigned long request, void* argument);
+};
+[[nodiscard]] SpiKernel& system_kernel();
+
+/// What the user says of the controller; goes before what the protocol asks for, now and in every `configure`.
+struct SpiChoice {
+  std::optional<std::uint32_t> speed;  // Hz
+  std::optional<std::uint8_t> mode;    // 0 to 3
+};
+
+/// Every function throws Failure or Interrupted (os/signals.hpp). Locked against other programs that lock it.
+///
+/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. `expect` says on an `exchange` link
+/// how many bytes come at least; on a `clocked` one nothing is sent but clocks. A controller clocks whole bytes: after
+/// `idle_clocks` the first `bits` bits are handed out, and up to seven clocks more are given.
+/// `timer` is reported as by StreamPort.
+class SpiPort final : public Port<std::uint8_t> {
+ public:
+  /// `path`: /dev/spidevB.C. `kind` is exchange or clocked. `kernel` must outlive the port.
+  SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice = {},
+          SpiKernel& kernel = system_kernel());
+  SpiPort(const SpiPort&) = delete;
+  SpiPort& operator=(const SpiPort&) = delete;
+
+  [[nodiscard]] Time now() override;
+  void begin(const Step<std::uint8_t>& step) override;
+  [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) override;
+
+  /// As the controller has them.
+  [[nodiscard]] const LineSettings& settings() const { return settings_; }
+
+ private:
+  Event<std::uint8_t> tell(const Event<std::uint8_t>& event);
+  void transfer(const Step<std::uint8_t>& step);
+  void send_message(bool with_output);
+  void keep_bits(std::size_t bits);
+
+  void apply(LineSettings settings);
+  void set_mode(std::uint8_t mode);
+  void set_word();
+  void set_speed(std::uint32_t speed);
+  int control(unsigned long request, void* argument) { return kernel_->control(descriptor_.get(), request, argument); }
+
+  std::string path_;
+  LinkKind kind_;
+  SpiChoice choice_;
+  SpiKernel* kernel_;
+  Descriptor descriptor_;
+  std::uint32_t board_flags_ = 0;  // of the mode: how the chip select is wired
+  LineSettings settings_{};
+
+  std::vector<std::uint8_t> out_;
+  std::vector<std::uint8_t> in_;
+  Time told_{};                 // the time that the machine knows: of `now`, or of its last event
+  Time armed_ = never;          // the `timer` that was promised and not yet reported
+  Time sent_at_{};              // end of the last transfer
+  bool sent_pending_ = false;   // `sent` is to be reported,
+  bool heard_pending_ = false;  // and then `received`
+  bool heard_ = false;          // by the last transfer
+  bool silence_told_ = false;   // one `silence` for each transfer
+};
+
+/// "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.
+[[nodiscard]] std::vector<std::string> spi_devices(const std::filesystem::path& sys = "/sys/class/spidev");
+
+}  // namespace absenc::os

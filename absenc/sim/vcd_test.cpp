@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+// Waveforms as text, and as sigrok-cli's decoders read them.
+#include "absenc/sim/vcd.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+
+#include "absenc/protocol/biss/bench_test.hpp"
+#include "absenc/protocol/ssi/device.hpp"
+#include "absenc/protocol/ssi/host.hpp"
+#include "absenc/protocol/tformat/bench_test.hpp"
+#include "tests/shape_toys.hpp"
+
+namespace absenc::sim {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+constexpr LineSettings slow{.rate = 1'000'000};
+
+std::string body(const Waveform& waveform) {
+  const std::string text = waveform.vcd("test");
+  const std::size_t end = text.find("$enddefinitions $end\n");
+  EXPECT_NE(end, std::string::npos);
+  return text.substr(end + 21);
+}
+
+TEST(Waveform, NamesItsWires) {
+  EXPECT_THAT(Waveform(LinkKind::exchange, slow).vcd("encolink"),
+              ::testing::StartsWith("$version absenc $end\n$timescale 1 ns $end\n$scope module encolink $end\n"
+                                    "$var wire 1 ! cs $end\n$var wire 1 \" sck $end\n$var wire 1 # mosi $end\n"
+                                    "$var wire 1 $ miso $end\n$upscope $end\n$enddefinitions $end\n#0\n"
+                                    "1!\n0\"\n0#\n1$\n"));
+  EXPECT_THAT(Waveform(LinkKind::full_duplex, slow).vcd("x"), HasSubstr("! host $end\n$var wire 1 \" device $end\n"));
+  EXPECT_THROW(Waveform(LinkKind::can, slow), std::invalid_argument);
+}
+
+TEST(Waveform, CommentsListTheItems) {
+  Waveform waveform(LinkKind::full_duplex, slow);
+  waveform.character(Role::device, 7us, 17us, 0x00);
+  waveform.character(Role::host, 5us, 15us, 0x1A);
+  EXPECT_THAT(waveform.vcd("x"), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
+                                           "$comment #7000 device 00 $end\n$scope"));
+  Waveform spi(LinkKind::exchange, slow);
+  const std::array<std::uint8_t, 2> out{0x12, 0x34};
+  const std::array<std::uint8_t, 2> in{0xAB, 0xCD};
+  spi.exchange({0us, 16us, 16, out, in});
+  EXPECT_THAT(spi.vcd("x"), HasSubstr("$comment #0 mosi 12 34 miso AB CD $end\n"));
+  Waveform clocked(LinkKind::clocked, slow);
+  clocked.exchange({0us, 12us, 12, {}, in});
+  EXPECT_THAT(clocked.vcd("x"), HasSubstr("$comment #0 12 bits AB CD $end\n"));
+}
+
+TEST(Waveform, Character) {
+  Waveform waveform(LinkKind::half_duplex, slow);
+  waveform.character(Role::host, 5us, 15us, 0x1A);  // 0 01011000 1
+  EXPECT_EQ(body(waveform),
+            "#0\n1!\n#5000\n0!\n#7000\n1!\n#8000\n0!\n#9000\n1!\n#11000\n0!\n#14000\n1!\n"
+            "#25000\n");
+}
+
+TEST(Waveform, ParityAndTwoStopBits) {
+  for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
+    Waveform waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
+    waveform.character(Role::device, 0us, 12us, 0x80);  // 0 00000001 p 11
+    EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
+  }
+}
+
+TEST(Waveform, CollisionIsTheAnd) {
+  Waveform waveform(LinkKind::half_duplex, slow);
+  waveform.character(Role::device, 0us, 10us, 0xFE);
+  waveform.character(Role::device, 1us, 11us, 0xFE);
+  EXPECT_EQ(body(waveform), "#0\n0!\n#3000\n1!\n#21000\n");
+}
+
+TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
+  Waveform waveform(LinkKind::half_duplex, {.rate = 3'000'000});
+  waveform.character(Role::host, 0ns, 3333ns, 0x55);  // a change at each edge
+  std::string edges;
+  for (const int edge : {333, 667, 1000, 1333, 1667, 2000, 2333, 2666, 3000}) {
+    edges += "#" + std::to_string(edge) + '\n';
+    EXPECT_THAT(body(waveform), HasSubstr(edges.substr(edges.rfind('#'))));
+  }
+}
+
+TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
+  const std::array<std::uint8_t, 1> out{0x80};
+  const std::array<std::uint8_t, 1> in{0x7F};
+  const auto drawn = [&](std::uint8_t mode) {
+    Waveform waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = mode});
+    waveform.exchange({1us, 9us, 8, out, in});
+    return body(waveform);
+  };
+  using ::testing::EndsWith;
+  using ::testing::StartsWith;
+  EXPECT_THAT(drawn(0),
+              StartsWith("#0\n1!\n0\"\n0#\n1$\n#1000\n0!\n1#\n0$\n#1500\n1\"\n#2000\n0\"\n0#\n1$\n#2500\n1\"\n"));
+  EXPECT_THAT(drawn(0), EndsWith("#8500\n1\"\n#9000\n1!\n0\"\n#19000\n"));
+  EXPECT_THAT(drawn(1),
+              StartsWith("#0\n1!\n0\"\n0#\n1$\n#1000\n0!\n1\"\n1#\n0$\n#1500\n0\"\n#2000\n1\"\n0#\n1$\n#2500\n0\"\n"));
+  EXPECT_THAT(drawn(1), EndsWith("#8500\n0\"\n#9000\n1!\n#19000\n"));
+  EXPECT_THAT(drawn(2), StartsWith("#0\n1!\n1\"\n0#\n1$\n#1000\n0!\n1#\n0$\n#1500\n0\"\n#2000\n1\"\n0#\n1$\n"));
+  EXPECT_THAT(drawn(3), StartsWith("#0\n1!\n1\"\n0#\n1$\n#1000\n0!\n0\"\n1#\n0$\n#1500\n1\"\n#2000\n0\"\n0#\n1$\n"));
+}
+
+TEST(Waveform, ClockedBits) {
+  Waveform at_once(LinkKind::clocked, slow);
+  const std::array<std::uint8_t, 1> bits{0x50};  // 010
+  at_once.exchange({1us, 4us, 3, {}, bits});
+  EXPECT_EQ(body(at_once),
+            "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
+            "#3500\n1!\n1\"\n#14000\n");
+  Waveform after_an_edge(LinkKind::clocked, {.rate = 1'000'000, .idle_clocks = 1});
+  after_an_edge.exchange({1us, 4us, 3, {}, bits});
+  EXPECT_EQ(body(after_an_edge),
+            "#0\n1!\n1\"\n#1000\n0!\n#1500\n1!\n0\"\n#2000\n0!\n#2500\n1!\n1\"\n#3000\n0!\n"
+            "#3500\n1!\n0\"\n#4000\n0!\n#4500\n1!\n1\"\n#14500\n");
+}
+
+// What others see in a file.
+struct Sigrok : ::testing::Test {
+  Sigrok() {
+    std::string name = std::filesystem::temp_directory_path() / "absenc-vcd-XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp");
+    directory = name;
+  }
+  ~Sigrok() override { std::filesystem::remove_all(directory); }
+
+  // The annotations, a line each, without the decoder's name.
+  [[nodiscard]] std::string decode(const Waveform& waveform, const std::string& decoder,
+                                   const std::string& what) const {
+    const std::filesystem::path file = directory / "waveform.vcd";
+    std::ofstream(file) << waveform.vcd("encoder");
+    const std::string command =
+        "sigrok-cli -I vcd -i " + file.string() + " -P " + decoder + " -A " + what + " 2>&1 </dev/null";
+    FILE* pipe = ::popen(command.c_str(), "r");
+    EXPECT_NE(pipe, nullptr);
+    std::string text;
+    std::array<char, 4096> part;
+    while (const std::size_t size = ::fread(part.data(), 1, part.size(), pipe)) text.append(part.data(), size);
+    EXPECT_EQ(::pclose(pipe), 0) << command << '\n' << text;
+    std::string values;
+    for (std::size_t from = 0, to = 0; (to = text.find('\n', from)) != std::string::npos; from = to + 1) {
+      const std::string row = text.substr(from, to - from);
+      values += row.substr(row.find(": ") + 2) + ' ';
+    }
+    return values;
+  }
+
+  std::filesystem::path directory;
+};
+
+// As the decoder prints them: those of a word backwards.
+std::string bits_of(BitView bits) {
+  std::string text;
+  for (std::size_t i = bits.size; i-- > 0;) text += bits[i] ? "1 " : "0 ";
+  return text;
+}
+
+TEST_F(Sigrok, ReadsTheBitsOfSsi) {
+  const ssi::Format format{.word = "multiturn:12 position:13 gray"_word, .extra_clocks = 25};
+  biss::testing::ClockedBench<ssi::VirtualEncoder> bench(ssi::line_settings, format);
+  Waveform waveform(LinkKind::clocked, ssi::line_settings);
+  waveform.observe(bench.line);
+  bench.shaft.state.position = 0x123'95C6'1234;
+  ssi::ReadPosition read(format);
+  bench.run(read);
+  ASSERT_EQ(read.error(), Error::none);
+  const std::string bits = bits_of({read.exchange().received, 50});
+  EXPECT_THAT(bits, ::testing::AllOf(HasSubstr("0 1"), HasSubstr("1 0")));
+  // What a controller reads in mode 2, which takes the falling edges: the idle line, and then the word.
+  EXPECT_EQ(decode(waveform, "spi:clk=clock:miso=data:cpol=1:cpha=0:wordsize=51", "spi=miso-bits"), bits + "1 ");
+}
+
+TEST_F(Sigrok, ReadsTheSamplesOfBiss) {
+  const biss::Format format{.word = "multiturn:16 position:19 error:1! warning:1!"_word};
+  biss::testing::Bench bench(biss::line_settings, format);
+  Waveform waveform(LinkKind::clocked, biss::line_settings);
+  waveform.observe(bench.line);
+  bench.shaft.state.position = 0x123'95C6'1234;
+  biss::ReadPosition read(format, {});
+  bench.run(read);
+  ASSERT_EQ(read.error(), Error::none);
+  const Time latency = std::chrono::microseconds(10);
+  const std::size_t clocks = biss::clocks(format, latency, biss::line_settings.bits(1));
+  const std::string bits = bits_of({read.exchange().received, clocks});
+  EXPECT_EQ(
+      decode(waveform, "spi:clk=clock:miso=data:cpol=1:cpha=0:wordsize=" + std::to_string(clocks), "spi=miso-bits"),
+      bits);
+}
+
+TEST_F(Sigrok, ReadsAnExchangeInEveryMode) {
+  for (std::uint8_t mode = 0; mode < 4; ++mode) {
+    const LineSettings settings{.rate = 4'000'000, .spi_mode = mode};
+    Line<std::uint8_t> line(LinkKind::exchange, settings);
+    Waveform waveform(LinkKind::exchange, settings);
+    waveform.observe(line);
+    toy::Toy<std::uint8_t> device([](auto& self, const Event<std::uint8_t>& event) {
+      if (event.kind == Event<std::uint8_t>::Kind::selected) self.send({0xA1, 0x5E, 0xC3});
+    });
+    toy::Toy<std::uint8_t> host;
+    host.send({0x11, 0x93}, 10us, 0, 3);
+    line.attach(Role::device, device);
+    line.attach(Role::host, host);
+    line.run_until(100us);
+    const std::string decoder =
+        "spi:clk=sck:miso=miso:mosi=mosi:cs=cs:cpol=" + std::to_string(mode / 2) + ":cpha=" + std::to_string(mode % 2);
+    EXPECT_EQ(decode(waveform, decoder, "spi=miso-data"), "A1 5E C3 ") << int{mode};
+    EXPECT_EQ(decode(waveform, decoder, "spi=mosi-data"), "11 93 00 ") << int{mode};
+  }
+}
+
+TEST_F(Sigrok, ReadsTheBytesOfTformat) {
+  tformat::testing::Bench bench;
+  Waveform waveform(LinkKind::half_duplex, tformat::line_settings);
+  waveform.observe(bench.line);
+  bench.shaft.put(3, 4660);
+  bench.pass(20us);  // a decoder wants to see the line idle first
+  tformat::ReadPosition read({});
+  bench.run(read);
+  ASSERT_EQ(read.error(), Error::none);
+  std::string bytes;
+  for (const Bytes part : {read.exchange().sent, read.exchange().received}) {
+    for (const std::uint8_t byte : part) bytes += toy::hex(byte, 2) + ' ';
+  }
+  EXPECT_THAT(bytes, ::testing::StartsWith("1A 1A "));
+  EXPECT_EQ(decode(waveform, "uart:rx=line:baudrate=2500000", "uart=rx-data"), bytes);
+}
+
+}  // namespace
+}  // namespace absenc::sim

@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Encoders that are clocked: the virtual ones behind sim:, and how they are named behind an SPI controller."""
+import csv
+import json
+import os
+import unittest
+
+from command_support import Case, absenc, json_lines
+
+BISS = "sim:biss?singleturn_bits=19&multiturn_bits=16&singleturn=275087&multiturn=7"
+SSI = "sim:ssi?bits=13&multiturn_bits=12&gray=true&singleturn=4660&multiturn=3"
+
+
+class Virtual(Case):
+    def run_json(self, verb, *arguments):
+        result = absenc(verb, *arguments, "--json")
+        self.assert_good(result)
+        return json_lines(result.stdout)
+
+    def test_read(self):
+        for encoder, singleturn, multiturn, bits in [(BISS, 275087, 7, 19), (SSI, 4660, 3, 13)]:
+            with self.subTest(encoder):
+                readings = self.run_json("read", encoder, "--count", "3")
+                self.assertEqual([(one["singleturn"], one["multiturn"]) for one in readings],
+                                 [(singleturn, multiturn)] * 3)
+                self.assertAlmostEqual(readings[0]["angle_deg"], 360 * singleturn / 2**bits, 4)
+                self.assertTrue(readings[0]["singleturn_valid"])
+
+    def test_monitor(self):
+        result = absenc("monitor", BISS, SSI, "--json", "--for", "1", "--interval", "0.3")
+        self.assert_good(result)
+        seen = {line["encoder"]: line for line in json_lines(result.stdout)}
+        self.assertEqual({encoder: line["reading"]["singleturn"] for encoder, line in seen.items()}, {BISS: 275087, SSI: 4660})
+
+    def test_record(self):
+        for encoder, singleturn in [(BISS, 275087), (SSI, 4660)]:
+            with self.subTest(encoder):
+                file = self.file(f"{singleturn}.csv")
+                self.assert_good(absenc("record", encoder, "--output", file, "--count", "5"))
+                with open(file, encoding="utf-8") as rows:
+                    lines = [line for line in rows if not line.startswith("#")]
+                self.assertEqual([row["singleturn"] for row in csv.DictReader(lines)], [str(singleturn)] * 5)
+
+    def test_info(self):
+        for encoder, line in [(BISS, "clocked bits, 1 Mbit/s"), (SSI, "clocked bits, 200 kbit/s")]:
+            with self.subTest(encoder):
+                result = absenc("info", encoder)
+                self.assert_good(result)
+                self.assertIn(line, result.stdout)
+                self.assertIn("12 bits of turns" if encoder == SSI else "16 bits of turns", result.stdout)
+
+    def test_alarms(self):
+        for encoder in (BISS, SSI + "&error_bit=active_high"):
+            with self.subTest(encoder):
+                self.assertIn("no alarms", absenc("alarms", encoder).stdout)
+                result = absenc("alarms", encoder + "&alarm=error")
+                self.assert_good(result)
+                self.assertIn("error", result.stdout)
+                reading, = self.run_json("read", encoder + "&alarm=error")
+                self.assertEqual((reading["alarms"], reading["singleturn_valid"]), (["error"], False))
+
+    def test_trouble_shows_what_the_clocks_brought(self):
+        result = absenc("read", "sim:biss?singleturn_bits=19&fault=silence=1")
+        self.assert_failed(result, "line_stuck", "41 clocks to the virtual encoder; received 1111 1111 1111 1111 ",
+                           "check the wiring")
+        line, = json_lines(absenc("read", "sim:biss?singleturn_bits=19&fault=silence=1", "--json").stdout)
+        self.assertEqual((line["ok"], line["error"], line["sent"]), (False, "line_stuck", ""))
+        self.assertEqual(line["received"].replace(" ", ""), "1" * 41)
+
+
+class Places(Case):
+    def test_the_wrong_one(self):
+        for encoder, words in [("ssi:/dev/ttyUSB0", ["does not go over a serial port", "write ssi:spi:/dev/spidev"]),
+                               ("biss:tcp:host:4001", ["does not go over TCP", "write biss:spi:/dev/spidev"]),
+                               ("tformat:spi:/dev/spidev0.0", ["does not go over an SPI controller", "write tformat:/"]),
+                               ("e201:spi:/dev/spidev0.0", ["does not go over an SPI controller", "write e201:/"]),
+                               ("ssi:spi:", ["does not say which SPI device", "write ssi:spi:/dev/spidev"]),
+                               ("ssi", ["does not say where", "write ssi:spi:/dev/spidev", "or sim:ssi"]),
+                               ("ssi:spi:/dev/spidev0.0?baud=9600", ["baud", "it is for: serial"]),
+                               ("ssi:spi:/dev/spidev0.0?echo=on", ["echo", "it is for: serial, tcp, sim"]),
+                               ("ssi:spi:/dev/spidev0.0?speed=fast", ["speed", '"fast"']),
+                               ("ssi:spi:/dev/spidev0.0?spi_mode=4", ["spi_mode", "0 to 3"]),
+                               ("ssi:spi:/dev/spidev0.0?sped=3", ["did you mean speed?"]),
+                               ("tformat:/dev/ttyUSB0?speed=3", ["speed", "it is for: spi"]),
+                               ("sim:ssi?spi_mode=3", ["spi_mode", "it is for: spi"])]:
+            with self.subTest(encoder):
+                self.assert_wrong_usage(absenc("read", encoder), *words)
+
+    def test_what_is_no_spi_device(self):
+        self.assert_failed(absenc("read", "ssi:spi:/dev/spidev255.255?speed=100000&spi_mode=2"),
+                           "there is no SPI device /dev/spidev255.255")
+        self.assert_failed(absenc("read", "biss:spi:/dev/null"), "/dev/null is not an SPI device", "/dev/spidevB.C")
+
+    def test_named_in_absenc_toml(self):
+        config = self.file("absenc.toml", '[encoder.drum]\nprotocol = "ssi"\nport = "spi:/dev/spidev255.255"\n'
+                                          'speed = 150000\nspi_mode = 2\nbits = 13\n')
+        environment = {**os.environ, "ABSENC_CONFIG": config}
+        names = absenc("list", "--names", "--json", env=environment)
+        self.assert_good(names)
+        self.assertEqual(json.loads(names.stdout)["encoder"], "ssi:spi:/dev/spidev255.255")
+        self.assert_failed(absenc("read", "drum", env=environment), "there is no SPI device /dev/spidev255.255")
+
+    def test_monitor_knows_the_same_device(self):
+        self.assert_wrong_usage(absenc("monitor", "ssi:spi:/dev/spidev0.0", "biss:spi:/dev/spidev0.0", "--json"),
+                                "/dev/spidev0.0 is named 2 times")
+
+    def test_help(self):
+        self.assertIn("ssi:spi:/dev/spidev0.0", absenc("--help").stdout)
+        listed = absenc("list", "ssi").stdout
+        self.assertRegex(listed, r"speed=HZ +spi ")
+        self.assertRegex(listed, r"spi_mode=0\.\.3 +spi ")
+
+
+if __name__ == "__main__":
+    unittest.main()
