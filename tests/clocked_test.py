@@ -90,6 +90,7 @@ class Places(Case):
     def test_what_is_no_spi_device(self):
         self.assert_failed(absenc("read", "ssi:spi:/dev/spidev255.255?speed=100000&spi_mode=2"),
                            "there is no SPI device /dev/spidev255.255")
+        self.assert_failed(absenc("read", "encolink:spi:/dev/spidev255.255"), "there is no SPI device")
         self.assert_failed(absenc("read", "biss:spi:/dev/null"), "/dev/null is not an SPI device", "/dev/spidevB.C")
 
     def test_named_in_absenc_toml(self):

@@ -171,6 +171,8 @@ struct Unit {
   bool (*covered)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// About a reply that `decode` refuses with `error`, what the document says; null: nothing.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
+  /// The unit of the same encoder behind an SPI controller, where that is another one.
+  const Unit* over_spi = nullptr;
 };
 
 /// Whether a word format may stand in for some of its options.

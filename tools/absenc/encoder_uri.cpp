@@ -163,6 +163,7 @@ void parse_where(EncoderUri& uri, std::string_view address) {
     uri.place = Place::tcp;
   } else if (where.starts_with("spi:")) {
     uri.place = Place::spi;
+    if (uri.unit->over_spi != nullptr) uri.unit = uri.unit->over_spi;
   }
   check_place(uri, address);
   if (uri.place == Place::tcp) return parse_tcp(uri, where.substr(4));

@@ -9,10 +9,11 @@ namespace absenc::encolink {
 
 using namespace std::chrono_literals;
 
-inline constexpr LineSettings uart_settings{.rate = 1'000'000};                // interface variant L
-inline constexpr LineSettings spi_settings{.rate = 1'000'000, .spi_mode = 1};  // 4 MHz at most; CPOL 0, CPHA 1
+inline constexpr LineSettings uart_settings{.rate = 1'000'000};  // interface variant L
+// 4 MHz at most; CPOL 0, CPHA 1; t_s, from NCS to the first edge
+inline constexpr LineSettings spi_settings{.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us};
 inline constexpr Time shortest_clock = 250ns;
-inline constexpr Time spi_pause = 5us;  // t_p; t_s, from NCS to the first edge, belongs to the carrier
+inline constexpr Time spi_pause = 5us;  // t_p
 
 // Not in the document. The virtual encoder answers that long after a request; the host waits generously.
 inline constexpr Time answer_time = 5us;

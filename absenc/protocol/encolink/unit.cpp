@@ -325,6 +325,7 @@ constexpr Unit make_unit(std::string_view id, std::string_view name, Wire wire, 
       .device = spi ? device<Wire::spi> : device<Wire::uart>,
       .resolution = resolution,
       .covered = covered,
+      .over_spi = spi ? nullptr : &spi_unit,
   };
 }
 
