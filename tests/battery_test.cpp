@@ -287,6 +287,7 @@ TEST(Units, MemoryIsReachedByTheirCommands) {
         EXPECT_TRUE(takes(*command, "address", area.first, last)) << unit->id;
         EXPECT_TRUE(area.page == 0 || takes(*command, "page", area.page, area.page)) << unit->id;
         EXPECT_TRUE(verb == Verb::memory_read || takes(*command, "value", 0, 255)) << unit->id;
+        EXPECT_TRUE(verb == Verb::memory_read || area.protection.empty() || takes(*command, "force", 1, 1)) << unit->id;
       }
     }
   }

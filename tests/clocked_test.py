@@ -104,7 +104,7 @@ class Places(Case):
 
     def test_monitor_knows_the_same_device(self):
         self.assert_wrong_usage(absenc("monitor", "ssi:spi:/dev/spidev0.0", "biss:spi:/dev/spidev0.0", "--json"),
-                                "/dev/spidev0.0 is named 2 times")
+                                "are the same SPI device")
 
     def test_help(self):
         self.assertIn("ssi:spi:/dev/spidev0.0", absenc("--help").stdout)

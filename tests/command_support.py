@@ -70,10 +70,10 @@ class Emulator:
 
 
 class FakeEncoder:
-    """Answers every byte 1A on a pseudo-terminal with the same bytes."""
+    """Answers requests on a pseudo-terminal by their first byte, always the same; `replies` alone: to 1A."""
 
-    def __init__(self, reply=b""):
-        self.reply = bytes(reply)
+    def __init__(self, replies=b""):
+        self.replies = replies if isinstance(replies, dict) else {0x1A: bytes(replies)}
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
         self.path = os.ttyname(self.slave)
@@ -81,7 +81,7 @@ class FakeEncoder:
         self.thread = threading.Thread(target=self.serve)
 
     def answer(self, request):
-        return self.reply if 0x1A in request else b""
+        return self.replies.get(request[0], b"")
 
     def serve(self):
         while True:

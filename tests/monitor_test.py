@@ -87,6 +87,7 @@ class Screen(MonitorCase):
             r"  \d+ good; the port went away: 0",
             "  over_heat: the encoder is or was hotter than its threshold. What to do: let it",
             "  cool, then clear-alarms",
+            "  data_id 3       status alarm    encoder_id 17",
             "",
             r"      \d\.\d{3}  .*")
         self.assertEqual(screen.splitlines()[23].rstrip(), KEYS)
@@ -188,6 +189,18 @@ class Screen(MonitorCase):
         screen = terminal.wait_for(r"battery_alarm: the battery is below 3\.1 V")
         self.assertEqual(screen.splitlines()[15].rstrip(), KEYS)
 
+    def test_fields_that_the_reading_lacks(self):
+        terminal = Terminal(self, "sim:esl?singleturn=0xABCDEF&alarm=multiturn_error")
+        screen = terminal.wait_for(r"ch2_alarms multiturn_error")
+        self.assertRegex(screen, rf"(?m)^  .*redundant_singleturn {0xABCDEF >> 15} counts")
+        self.assertRegex(screen, r"ch2_status channel_2 ready non_safety_error|ch2_status .*channel_2")
+        self.assertNotRegex(screen, r"(?m)^  .*\bsingleturn \d")
+        terminal.resize(64, 16)
+        screen = terminal.wait_for(rf"\A(.*\n){{15}}{KEYS}")
+        self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")  # the trace keeps its place
+        terminal.press("e")
+        terminal.wait_for("no exchange has failed")
+
     def test_more_encoders_than_rows(self):
         terminal = Terminal(self, *["sim:tformat"] * 20)
         terminal.wait_for("1 to 10 of 20")
@@ -280,7 +293,7 @@ class Lines(MonitorCase):
     def test_wrong_usage(self):
         self.assert_wrong_usage(absenc("monitor"), "<encoder> is missing")
         self.assert_wrong_usage(absenc("monitor", "tformt:/dev/x"), "did you mean tformat?")
-        self.assert_wrong_usage(absenc("monitor", "tformat:/dev/x", "tformat:/dev/x?echo=on"), "/dev/x", "2 times")
+        self.assert_wrong_usage(absenc("monitor", "tformat:/dev/x", "tformat:/dev/x?echo=on"), "the same encoder")
         self.assert_wrong_usage(absenc("monitor", "sim:tformat", "--rate", "fast"), "--rate")
 
     def test_two_commands_and_one_port(self):

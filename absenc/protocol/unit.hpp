@@ -29,7 +29,8 @@ enum class Verb : std::uint8_t {
   memory_write,
   config_get,
   config_set,
-  run,  // a procedure only this unit has
+  scan,  // who answers on a line: for each, a record that begins with its `encoder_address`
+  run,   // a procedure only this unit has
 };
 
 struct Argument {
@@ -55,16 +56,17 @@ struct Command {
 };
 
 /// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments named
-/// `address`, `page` (only where there are pages), `count` (bytes to read; without it one at a time) and `value` (the
-/// byte to write). memory_read reports `data`, or `value` for a single byte.
+/// `address`, `page` (only where there are pages), `count` (bytes to read; without it one at a time), `value` (the byte
+/// to write) and `force` (1: also what is protected). memory_read reports `data`, or `value` for a single byte.
 struct MemoryArea {
   std::uint32_t page;  // 0 where there are no pages
   std::uint32_t first;
   std::uint32_t count;
   std::string_view meaning;
   bool writable = true;
-  bool in_dump = true;           // whether it belongs to a copy of the memory
-  std::uint32_t write_life = 0;  // how often a byte may be written; 0: not known
+  bool in_dump = true;            // whether it belongs to a copy of the memory
+  std::uint32_t write_life = 0;   // how often a byte may be written; 0: not known
+  std::string_view protection{};  // why only memory_write's argument `force` writes it; "": it needs none
 
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
     return on_page == page && address >= first && address - first < count;
@@ -109,6 +111,29 @@ struct Vector {
   Bytes reply;
   std::span<const Expected> fields{};
   Error error = Error::none;
+};
+
+/// A reply as it was captured on a link that carries bytes, and what had been asked. Without the request the reply
+/// itself must tell; an empty reply: none came.
+struct Capture {
+  Bytes request{};
+  Bytes reply{};
+};
+
+/// What captures say about one value of one option.
+struct OptionEvidence {
+  std::size_t option;  // index into the unit's options
+  std::int64_t value;
+  bool possible;
+  std::size_t capture;   // not possible: the first that contradicts
+  std::string_view why;  // a sentence
+};
+
+struct EvidenceSink {
+  virtual void put(const OptionEvidence& evidence) = 0;
+
+ protected:
+  ~EvidenceSink() = default;
 };
 
 enum class Direction : std::uint8_t { request, reply };
@@ -173,6 +198,10 @@ struct Unit {
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
   /// The unit of the same encoder behind an SPI controller, where that is another one.
   const Unit* over_spi = nullptr;
+  /// Puts every value of the probeable options; null: frames do not tell. Captures are in the order of time. Whether
+  /// any values explain them all: then `options`, which give what is not probed, become such values, defaults where the
+  /// captures do not tell.
+  bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
 };
 
 /// Whether a word format may stand in for some of its options.

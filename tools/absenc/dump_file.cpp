@@ -49,8 +49,8 @@ std::vector<std::string> header(const Unit& unit, const Options& options) {
 
 class Parser {
  public:
-  Parser(const std::string& name, std::string_view text, const Unit& unit, const Options& options, bool for_writing)
-      : name_(name), lines_(text), unit_(unit), options_(options), for_writing_(for_writing) {}
+  Parser(const std::string& name, std::string_view text, const Unit& unit, const Options& options, Access access)
+      : name_(name), lines_(text), unit_(unit), options_(options), access_(access) {}
 
   Dump parse() {
     read_title();
@@ -136,7 +136,7 @@ class Parser {
   }
 
   void put(MemoryAddress at, std::uint8_t byte) {
-    if (const std::string why = closed(unit_, at, for_writing_); !why.empty()) refuse(why);
+    if (const std::string why = closed(unit_, at, access_); !why.empty()) refuse(why);
     if (!dump_.image.emplace(at, byte).second) {
       refuse(fmt::format("{} was already given in line {}", to_text(unit_, at), given_in_[at]));
     }
@@ -157,7 +157,7 @@ class Parser {
   LineReader lines_;
   const Unit& unit_;
   const Options& options_;
-  bool for_writing_;
+  Access access_;
   Checksum sum_;
   Dump dump_;
   std::map<MemoryAddress, std::size_t> given_in_;  // line
@@ -182,8 +182,8 @@ std::string to_dump(const Unit& unit, const Options& options, const MemoryImage&
 }
 
 Dump parse_dump(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
-                bool for_writing) {
-  return Parser(name, text, unit, options, for_writing).parse();
+                Access access) {
+  return Parser(name, text, unit, options, access).parse();
 }
 
 }  // namespace absenc::tool

@@ -19,6 +19,6 @@ struct Dump {
 /// `name` is for messages. Throws ToolFailure for a text that is damaged, was made from another kind of encoder, or
 /// has what cannot be read or, if that is the purpose, written.
 [[nodiscard]] Dump parse_dump(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
-                              bool for_writing);
+                              Access access);
 
 }  // namespace absenc::tool

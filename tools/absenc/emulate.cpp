@@ -3,12 +3,16 @@
 #include <fmt/ranges.h>
 
 #include <array>
+#include <memory>
 #include <optional>
+#include <vector>
 
 #include "absenc/host/drive.hpp"
 #include "absenc/os/emulator_port.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
+#include "absenc/sim/bus.hpp"
+#include "tools/absenc/encoder_uri.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/memory_file.hpp"
 #include "tools/absenc/memory_keeper.hpp"
@@ -54,11 +58,10 @@ std::string fault_counts(const sim::FaultyDevice& faults) {
   return counts.empty() ? "none" : fmt::format("{}", fmt::join(counts, ", "));
 }
 
-void summarize(const VirtualDevice& device, const os::EmulatorPort& port, Time start) {
+void summarize(const VirtualDevice& device, std::string_view name, Time start) {
   const Device<std::uint8_t>& encoder = *device.device().bytes;
-  print_message(fmt::format("{} requests answered in {}", encoder.answered(), to_text(os::now() - start)));
+  print_message(fmt::format("{}{} requests answered in {}", name, encoder.answered(), to_text(os::now() - start)));
   if (device.faults() != nullptr) print_note(fmt::format("  faults injected: {}", fault_counts(*device.faults())));
-  if (port.dropped() != 0) print_note(fmt::format("  bytes that nobody read: {}", port.dropped()));
   if (encoder.violation_count() == 0) return;
   print_note(fmt::format("  rules that the host broke: {}", encoder.violation_count()));
   for (const Violation& violation : encoder.violations()) {
@@ -82,17 +85,66 @@ std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
   return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
 }
 
+/// All encoders on the line: the one of the other options, and those of --also.
+class VirtualLine {
+ public:
+  VirtualLine(const Unit& unit, const Options& options, const Invocation& invocation)
+      : further_(invocation.texts("--also")) {
+    const DeviceSettings settings = device_settings(invocation);
+    devices_.push_back(std::make_unique<VirtualDevice>(unit, options, settings));
+    std::string base = fmt::format("sim:{}?", unit.id);
+    if (invocation.has("--model")) base += fmt::format("model={}&", invocation.text("--model"));
+    for (const std::string& option : invocation.texts("--option")) base += option + '&';
+    for (const std::string& further : further_) {
+      EncoderUri uri = parse_encoder(base + further);
+      uri.device.delay = settings.delay;
+      uri.device.real_power_on = settings.real_power_on;
+      devices_.push_back(std::make_unique<VirtualDevice>(unit, uri.options, uri.device));
+    }
+    std::vector<Machine<std::uint8_t>*> machines;
+    for (const auto& device : devices_) machines.push_back(device->bytes());
+    if (machines.size() > 1) bus_ = std::make_unique<sim::Bus>(machines, unit.line.character());
+  }
+
+  [[nodiscard]] VirtualDevice& first() { return *devices_.front(); }
+  [[nodiscard]] Machine<std::uint8_t>& machine() { return bus_ != nullptr ? *bus_ : *first().bytes(); }
+
+  void power_on(Time now) {
+    for (const auto& device : devices_) device->power_on(now);
+  }
+
+  void summarize_all(const os::EmulatorPort& port, Time start) const {
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      const std::string name = i > 0 ? further_[i - 1] + ": " : devices_.size() > 1 ? "the first: " : "";
+      summarize(*devices_[i], name, start);
+    }
+    if (port.dropped() != 0) print_note(fmt::format("  bytes that nobody read: {}", port.dropped()));
+  }
+
+ private:
+  std::span<const std::string> further_;
+  std::vector<std::unique_ptr<VirtualDevice>> devices_;
+  std::unique_ptr<sim::Bus> bus_;
+};
+
+void check_line(const Unit& unit, const Invocation& invocation) {
+  if (unit.link != LinkKind::half_duplex && unit.link != LinkKind::full_duplex) {
+    throw UsageError(fmt::format("{} does not go over a serial line: use sim:{}", unit.id, unit.id));
+  }
+  if (!invocation.has("--also")) return;
+  if (unit.link != LinkKind::half_duplex) throw UsageError(fmt::format("{} has one encoder on a line", unit.id));
+  if (invocation.has("--memory")) throw UsageError("--memory keeps the memory of one encoder: not with --also");
+}
+
 int run_emulate(const Invocation& invocation) {
   os::catch_interrupts();
   const Unit& unit = require_unit(invocation.text("protocol"));
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
-  VirtualDevice device(unit, options, device_settings(invocation));
   const double seconds = invocation.real("--for", 0, 0.001, 1e9);
   const std::optional<std::uint16_t> listen = tcp_port(invocation);
-  if (device.bytes() == nullptr || (unit.link != LinkKind::half_duplex && unit.link != LinkKind::full_duplex)) {
-    throw UsageError(fmt::format("{} does not go over a serial line: use sim:{}", unit.id, unit.id));
-  }
-  Device<std::uint8_t>& encoder = *device.device().bytes;
+  check_line(unit, invocation);
+  VirtualLine line(unit, options, invocation);
+  Device<std::uint8_t>& encoder = *line.first().device().bytes;
   const MemoryFile file(std::string(invocation.text("--memory")), unit.id,
                         options.model != nullptr ? options.model->name : "none");
   const bool keeps_memory = invocation.has("--memory");
@@ -102,18 +154,18 @@ int run_emulate(const Invocation& invocation) {
   port.set_send_slack(send_slack);
   const Time start = port.now();
   if (seconds > 0) port.set_end(start + Time(static_cast<std::int64_t>(seconds * 1e9)));
-  device.power_on(start);
+  line.power_on(start);
   print_line(fmt::format("ready: {}", port.path()));
   if (listen) print_line(fmt::format("ready: tcp:127.0.0.1:{}", port.tcp_port()));
 
-  MemoryKeeper<std::uint8_t> keeper(*device.bytes(), encoder, file);
-  serve(keeps_memory ? static_cast<Machine<std::uint8_t>&>(keeper) : *device.bytes(), port);
+  MemoryKeeper<std::uint8_t> keeper(line.machine(), encoder, file);
+  serve(keeps_memory ? static_cast<Machine<std::uint8_t>&>(keeper) : line.machine(), port);
   const bool saved = !keeps_memory || keeper.finish();
-  summarize(device, port, start);
+  line.summarize_all(port, start);
   return saved ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 14> parameters{{
+constexpr std::array<Parameter, 15> parameters{{
     parameter::protocol,
     {"--pty", "PATH", "where to put the link to the pseudo-terminal", "only the pseudo-terminal itself"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
@@ -128,15 +180,20 @@ constexpr std::array<Parameter, 14> parameters{{
      "garbage, silence, repeat, request_corrupt",
      "", false, true},
     {"--seed", "N", "another series of faults", "1"},
+    {"--also", "SETTINGS",
+     "one more encoder on the line: what stands behind sim:PROTOCOL? to set it; --model and --option are for all", "",
+     false, true},
     {"--memory", "FILE", "keep the encoder's memory in this file; it is made if missing"},
     {"--power-on", "real|skip", "whether the encoder takes its time to start", "skip"},
     {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
 }};
 
-constexpr std::array<Example, 2> examples{{
+constexpr std::array<Example, 3> examples{{
     {"absenc emulate tformat --pty /tmp/encoder --motion rpm=60", "a turning encoder; read it as tformat:/tmp/encoder"},
     {"absenc emulate tformat --tcp 4001 --alarm battery_alarm --fault corrupt=0.01 --memory encoder.txt",
      "one that misbehaves, for whoever connects, and remembers what was written"},
+    {"absenc emulate esl --pty /tmp/line --also address=3 --also \"address=5&singleturn=1000&motion=rpm=60\"",
+     "three on one line; `absenc scan esl:/tmp/line` finds them"},
 }};
 
 }  // namespace

@@ -5,12 +5,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <optional>
 
 #include "tools/absenc/aborting_port.hpp"
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
+#include "tools/absenc/shared_link.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
 
@@ -34,30 +34,32 @@ class EncoderOn final : public Encoder {
   }
 
   void connect() override {
-    link_ = open_link(uri());
+    link_ = connect_link(uri());
     if constexpr (std::is_same_v<Item, CanFrame>) {
-      port_.attach(*link_->frames);
+      port_.attach(*link_->link().frames);
     } else {
-      port_.attach(*link_->bytes);
+      port_.attach(*link_->link().bytes);
     }
     session_.doubt();
   }
 
   void disconnect() override { link_.reset(); }
-  bool connected() const override { return link_.has_value(); }
-  const std::vector<std::string>& notes() const override { return link_->notes; }
+  bool connected() const override { return link_ != nullptr; }
+  const std::vector<std::string>& notes() const override { return link_->link().notes; }
 
   Outcome read() override {
     const Command* command = find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
-    return outcome(*command, session_.read(*command));
+    return outcome(*command, link_->take_turn([&] { return session_.read(*command); }));
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
-    return outcome(command, session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
-      last_ = &conversation;
-      if (on_emit) on_emit();
-      return true;
+    return outcome(command, link_->take_turn([&] {
+      return session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
+        last_ = &conversation;
+        if (on_emit) on_emit();
+        return true;
+      });
     }));
   }
 
@@ -77,7 +79,9 @@ class EncoderOn final : public Encoder {
   }
 
   std::uint64_t items() const override { return port_.items_sent + port_.items_received; }
-  Time now() override { return port_.now(); }
+  Time now() override {
+    return link_->take_turn([&] { return port_.now(); });
+  }
 
   Trouble trouble(const Outcome& outcome) const override {
     Trouble trouble{.error = outcome.error};
@@ -125,12 +129,12 @@ class EncoderOn final : public Encoder {
   [[nodiscard]] std::string exchange(const Trouble& trouble) const {
     if (port_.clocks != 0) {
       const std::string came = port_.received.empty() ? "nothing" : trouble.received;
-      return fmt::format("{} clocks to {}; received {}", port_.clocks, link_->place, came);
+      return fmt::format("{} clocks to {}; received {}", port_.clocks, link_->link().place, came);
     }
-    const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->place);
+    const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->link().place);
     if (port_.received.empty()) {
       const std::string latency =
-          link_->latency > Time{} ? fmt::format(" + {} for the way", to_text(link_->latency)) : "";
+          link_->link().latency > Time{} ? fmt::format(" + {} for the way", to_text(link_->link().latency)) : "";
       return fmt::format("{}; nothing came back within {}{}", sent, to_text(port_.answer), latency);
     }
     const Time after = port_.first_received_at - port_.sent_at;
@@ -157,7 +161,7 @@ class EncoderOn final : public Encoder {
     }
   }
 
-  std::optional<Link> link_;
+  std::shared_ptr<SharedLink> link_;
   WatchedPort<Item> port_;
   AbortingPort<Item> aborting_{port_, [this] { return session_.abort(); }};
   std::unique_ptr<std::byte[]> storage_;

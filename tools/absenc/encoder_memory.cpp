@@ -78,11 +78,15 @@ std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t 
                                 bytes.data.size()));
 }
 
-void EncoderMemory::write(MemoryAddress at, std::uint8_t value) {
+void EncoderMemory::write(MemoryAddress at, std::uint8_t value, Access access) {
   const Command& command = *find_command(encoder_->unit(), Verb::memory_write);
   ReadBytes ignored;
-  run_into(*encoder_, command, named_arguments(command, {{"page", at.page}, {"address", at.address}, {"value", value}}),
-           ignored);
+  run_into(
+      *encoder_, command,
+      named_arguments(
+          command,
+          {{"page", at.page}, {"address", at.address}, {"value", value}, {"force", access == Access::force ? 1 : 0}}),
+      ignored);
 }
 
 }  // namespace absenc::tool

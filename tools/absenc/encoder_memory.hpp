@@ -19,7 +19,7 @@ class EncoderMemory {
   [[nodiscard]] MemoryImage read(const MemoryImage& image);
 
   /// Returns when it was read back.
-  void write(MemoryAddress at, std::uint8_t value);
+  void write(MemoryAddress at, std::uint8_t value, Access access);
 
  private:
   [[nodiscard]] std::vector<std::uint8_t> read_run(MemoryAddress at, std::size_t count);

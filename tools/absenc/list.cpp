@@ -123,7 +123,9 @@ Rows memory_rows(const Unit& unit) {
     const std::uint32_t last = area.first + area.count - 1;
     const std::string to = last == area.first ? "" : fmt::format(" to 0x{:02X}", last);
     std::string writes = area.writable ? "" : "read only";
-    if (area.write_life != 0) writes = fmt::format("{} writes in a byte's life", area.write_life);
+    if (!area.protection.empty()) writes = "written only with --force";
+    if (area.write_life != 0 && area.protection.empty())
+      writes = fmt::format("{} writes in a byte's life", area.write_life);
     rows.push_back({fmt::format("page {}: 0x{:02X}{}", area.page, area.first, to), std::string(area.meaning), writes});
   }
   return rows;
@@ -240,7 +242,8 @@ Json memory_json(const Unit& unit) {
                      .set("meaning", area.meaning)
                      .set("writable", area.writable)
                      .set("in_dump", area.in_dump)
-                     .set("write_life", area.write_life));
+                     .set("write_life", area.write_life)
+                     .set("protection", area.protection));
   }
   return areas;
 }

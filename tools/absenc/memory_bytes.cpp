@@ -81,12 +81,12 @@ int run_read(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   if (!uri.unit->registers.empty()) return read_register(invocation, uri);
-  require_memory(*uri.unit, false);
+  require_memory(*uri.unit, Access::read);
   const MemoryAddress first = first_address(invocation);
   const std::int64_t count = invocation.number("--count", 1, 1, most_bytes);
   MemoryImage image;
   for (std::uint32_t i = 0; i < count; ++i) image[{first.page, first.address + i}] = 0;
-  require_open(*uri.unit, image, false);
+  require_open(*uri.unit, image, Access::read);
 
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
   image = EncoderMemory(*encoder).read(image);
@@ -108,7 +108,8 @@ int run_write(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   if (!uri.unit->registers.empty()) return write_register(invocation, uri);
-  require_memory(*uri.unit, true);
+  const Access access = write_access(invocation);
+  require_memory(*uri.unit, access);
   MemoryAddress at = first_address(invocation);
   MemoryImage wanted;
   for (const std::string& written : invocation.texts("values")) {
@@ -119,8 +120,8 @@ int run_write(const Invocation& invocation) {
     wanted[at] = static_cast<std::uint8_t>(*value);
     ++at.address;
   }
-  require_open(*uri.unit, wanted, true);
-  return change_memory(invocation, uri, wanted);
+  require_open(*uri.unit, wanted, access);
+  return change_memory(invocation, uri, wanted, access);
 }
 
 constexpr Parameter address{
@@ -140,12 +141,13 @@ constexpr std::array<Example, 2> read_examples{{
     {"absenc memory read sim:encolink serial_number", "a register by its name; try it without hardware"},
 }};
 
-constexpr std::array<Parameter, 8> write_parameters{{
+constexpr std::array<Parameter, 9> write_parameters{{
     parameter::encoder,
     address,
     {"values", "", "bytes, or the number for a register: decimal, or hexadecimal with 0x", "", true, true},
     page,
     {"--dry-run", "", "only show what differs"},
+    parameter::force,
     parameter::yes,
     parameter::json,
     parameter::option,

@@ -49,8 +49,8 @@ std::uint32_t write_life(const Unit& unit, const MemoryImage& image) {
 
 class Change {
  public:
-  Change(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted)
-      : invocation_(invocation), uri_(uri), unit_(*uri.unit), wanted_(wanted) {}
+  Change(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted, Access access)
+      : invocation_(invocation), uri_(uri), unit_(*uri.unit), wanted_(wanted), access_(access) {}
 
   int run() {
     const bool dry = invocation_.has("--dry-run");
@@ -105,7 +105,7 @@ class Change {
     while (!left_.empty()) {
       const auto [at, value] = *left_.begin();
       in_flight_ = at;
-      memory_->write(at, value);
+      memory_->write(at, value, access_);
       in_flight_.reset();
       done_[at] = value;
       left_.erase(at);
@@ -196,6 +196,7 @@ class Change {
   const EncoderUri& uri_;
   const Unit& unit_;
   const MemoryImage& wanted_;
+  Access access_;
   bool asks_ = false;
   std::unique_ptr<Encoder> encoder_;
   std::optional<EncoderMemory> memory_;
@@ -208,8 +209,8 @@ class Change {
 
 }  // namespace
 
-int change_memory(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted) {
-  return Change(invocation, uri, wanted).run();
+int change_memory(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted, Access access) {
+  return Change(invocation, uri, wanted, access).run();
 }
 
 std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,

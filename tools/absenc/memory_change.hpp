@@ -9,9 +9,14 @@
 
 namespace absenc::tool {
 
+/// What --force makes of it.
+[[nodiscard]] inline Access write_access(const Invocation& invocation) {
+  return invocation.has("--force") ? Access::force : Access::write;
+}
+
 /// Heeds --yes, --json and --dry-run; returns the exit status. When it ends too early it says which bytes were written
 /// and which were not. `wanted` must be open. Throws UsageError when nobody can be asked.
-int change_memory(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted);
+int change_memory(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted, Access access);
 
 /// WHERE, FILE, ENCODER: a row for up to 8 bytes that follow each other.
 [[nodiscard]] std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,

@@ -40,7 +40,7 @@ void require_replaceable(const std::string& path) {
 int run_dump(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
-  require_memory(*uri.unit, false);
+  require_memory(*uri.unit, Access::read);
   const bool to_file = invocation.has("--output");
   const std::string path = to_file ? link_target(std::string(invocation.text("--output"))) : "";
   if (to_file) require_replaceable(path);
@@ -59,10 +59,10 @@ int run_dump(const Invocation& invocation) {
   return exit_good;
 }
 
-MemoryImage read_dump(const Invocation& invocation, const EncoderUri& uri, bool for_writing) {
+MemoryImage read_dump(const Invocation& invocation, const EncoderUri& uri, Access access) {
   const std::string path(invocation.text("file"));
   const std::string text = read_text_file("the dump", path);
-  const Dump dump = parse_dump(path, text, *uri.unit, uri.options, for_writing);
+  const Dump dump = parse_dump(path, text, *uri.unit, uri.options, access);
   if (!dump.checked) print_message(fmt::format("note: {} has no checksum: damage would not be noticed", path));
   return dump.image;
 }
@@ -70,15 +70,16 @@ MemoryImage read_dump(const Invocation& invocation, const EncoderUri& uri, bool 
 int run_load(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
-  require_memory(*uri.unit, true);
-  return change_memory(invocation, uri, read_dump(invocation, uri, true));
+  const Access access = write_access(invocation);
+  require_memory(*uri.unit, access);
+  return change_memory(invocation, uri, read_dump(invocation, uri, access), access);
 }
 
 int run_verify(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
-  require_memory(*uri.unit, false);
-  const MemoryImage wanted = read_dump(invocation, uri, false);
+  require_memory(*uri.unit, Access::read);
+  const MemoryImage wanted = read_dump(invocation, uri, Access::read);
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
   EncoderMemory memory(*encoder);
   memory.check_model();
@@ -111,10 +112,11 @@ constexpr std::array<Example, 2> dump_examples{{
     {"absenc memory dump sim:tformat", "try it without hardware"},
 }};
 
-constexpr std::array<Parameter, 6> load_parameters{{
+constexpr std::array<Parameter, 7> load_parameters{{
     parameter::encoder,
     file,
     {"--dry-run", "", "only show what differs"},
+    parameter::force,
     parameter::yes,
     parameter::json,
     parameter::option,

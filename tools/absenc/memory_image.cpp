@@ -84,16 +84,22 @@ std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
   return fmt::format("{}", fmt::join(pages, "; "));
 }
 
-std::string closed(const Unit& unit, MemoryAddress at, bool for_writing) {
+std::string closed(const Unit& unit, MemoryAddress at, Access access) {
   const MemoryArea* area = find_area(unit, at);
-  if (area != nullptr && (area->writable || !for_writing)) return {};
-  if (area != nullptr) return fmt::format("{} ({}) can only be read", to_text(unit, at), area->meaning);
+  if (area != nullptr) {
+    if (access == Access::read) return {};
+    const std::string where = fmt::format("{} ({})", to_text(unit, at), area->meaning);
+    if (!area->writable) return fmt::format("{} can only be read", where);
+    if (access == Access::force || area->protection.empty()) return {};
+    return fmt::format("{} is written only with --force: {}", where, area->protection);
+  }
   MemoryImage all;
   for (const MemoryArea& one : unit.memory) add(all, one);
   return fmt::format("{} has no {}; it has {}", unit.id, to_text(unit, at), addresses_in_words(unit, all));
 }
 
-void require_memory(const Unit& unit, bool for_writing) {
+void require_memory(const Unit& unit, Access access) {
+  const bool for_writing = access != Access::read;
   const Verb verb = for_writing ? Verb::memory_write : Verb::memory_read;
   if (!unit.memory.empty() && find_command(unit, verb) != nullptr) return;
   if (!unit.registers.empty()) {
@@ -105,9 +111,9 @@ void require_memory(const Unit& unit, bool for_writing) {
   throw UsageError(fmt::format("the memory of a {} encoder cannot be {}", unit.id, for_writing ? "written" : "read"));
 }
 
-void require_open(const Unit& unit, const MemoryImage& image, bool for_writing) {
+void require_open(const Unit& unit, const MemoryImage& image, Access access) {
   for (const auto& [at, value] : image) {
-    if (const std::string why = closed(unit, at, for_writing); !why.empty()) throw UsageError(why);
+    if (const std::string why = closed(unit, at, access); !why.empty()) throw UsageError(why);
   }
 }
 

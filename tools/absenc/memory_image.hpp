@@ -43,11 +43,17 @@ struct MemoryRun {
 /// "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06"
 [[nodiscard]] std::string addresses_in_words(const Unit& unit, const MemoryImage& image);
 
-/// Why this address cannot be read (or written), or "".
-[[nodiscard]] std::string closed(const Unit& unit, MemoryAddress at, bool for_writing);
+enum class Access : std::uint8_t {
+  read,
+  write,
+  force,  // write also what is protected
+};
+
+/// Why this address cannot be reached so, or "".
+[[nodiscard]] std::string closed(const Unit& unit, MemoryAddress at, Access access);
 
 /// Throws UsageError.
-void require_memory(const Unit& unit, bool for_writing);
-void require_open(const Unit& unit, const MemoryImage& image, bool for_writing);
+void require_memory(const Unit& unit, Access access);
+void require_open(const Unit& unit, const MemoryImage& image, Access access);
 
 }  // namespace absenc::tool

@@ -13,6 +13,7 @@
 #include "tools/absenc/monitor_view.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/shared_link.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
@@ -163,11 +164,16 @@ Watches make_watches(const Invocation& invocation, double rate) {
   const std::span<const std::string> names = invocation.texts("encoder");
   std::vector<EncoderUri> uris;
   for (const std::string& name : names) uris.push_back(parse_encoder(name, invocation.texts("--option")));
-  for (const EncoderUri& uri : uris) {
-    const auto same = std::count_if(uris.begin(), uris.end(), [&](const EncoderUri& other) {
-      return !uri.path.empty() && other.place == uri.place && other.path == uri.path;
-    });
-    if (same > 1) throw UsageError(fmt::format("the port {} is named {} times", uri.path, same));
+  for (std::size_t i = 0; i < uris.size(); ++i) {
+    for (std::size_t other = 0; other < i; ++other) {
+      const bool one_chip = uris[i].place == Place::spi && uris[other].place == Place::spi;
+      if (one_chip && uris[i].path == uris[other].path) {
+        throw UsageError(fmt::format("{} and {} are the same SPI device", names[other], names[i]));
+      }
+      if (!share_line(uris[i], uris[other])) continue;
+      const bool same = uris[i].unit == uris[other].unit && uris[i].options.values == uris[other].options.values;
+      if (same) throw UsageError(fmt::format("{} and {} are the same encoder", names[other], names[i]));
+    }
   }
   Watches watches;
   for (std::size_t i = 0; i < uris.size(); ++i) {
@@ -208,10 +214,11 @@ constexpr std::array<Parameter, 6> parameters{{
     parameter::option,
 }};
 
-constexpr std::array<Example, 2> examples{{
+constexpr std::array<Example, 3> examples{{
     {"absenc monitor tformat:/dev/ttyUSB0", "one encoder on the screen; h shows the keys"},
     {"absenc monitor tformat:/dev/ttyUSB0 tformat:/dev/ttyUSB1 --json --interval 10 >> log.jsonl",
      "two, a line for each every ten seconds"},
+    {"absenc monitor \"esl:/dev/ttyUSB0?address=0\" \"esl:/dev/ttyUSB0?address=3\"", "two on one line, asked in turn"},
 }};
 
 }  // namespace

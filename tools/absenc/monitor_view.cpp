@@ -214,6 +214,23 @@ int draw_alarms(Screen& screen, int row, int end, const Shown& shown) {
   return row;
 }
 
+// In columns; returns the row behind them. The last two rows are left to what comes below.
+int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
+  if (!is_live(snapshot)) return row;
+  std::size_t longest = 0;
+  for (const std::string& field : snapshot.fields) longest = std::max(longest, field.size());
+  const int width = static_cast<int>(longest) + 3;
+  const int columns = std::max(1, (screen.columns() - 2) / width);
+  int column = 0;
+  for (const std::string& field : snapshot.fields) {
+    if (row >= end - 3) break;
+    screen.put(row, 2 + column * width, field);
+    column = (column + 1) % columns;
+    if (column == 0) ++row;
+  }
+  return column == 0 ? row : row + 1;
+}
+
 void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
   const auto room = static_cast<std::size_t>(std::max(0, end - row));
   const std::size_t count = std::min(room, snapshot.trace.size());
@@ -248,6 +265,7 @@ void draw_encoder(Screen& screen, int row, int end, const Shown& shown, bool err
   }
   row = draw_alarms(screen, row, end, shown);
   if (!snapshot.notice.empty()) row = draw_words(screen, row, end, snapshot.notice, Style::bold);
+  row = draw_fields(screen, row, end, snapshot);
   if (errors) return draw_errors(screen, row + 1, end, shown);
   draw_trace(screen, row + 1, end, snapshot);
 }

@@ -13,6 +13,7 @@ inline constexpr Parameter encoder{"encoder", "",
 inline constexpr Parameter option{
     "--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true};
 inline constexpr Parameter yes{"--yes", "", "do not ask before the encoder is changed"};
+inline constexpr Parameter force{"--force", "", "write also what the protocol protects, as calibration"};
 inline constexpr Parameter json{"--json", "", "one JSON object"};
 
 // Without an encoder:

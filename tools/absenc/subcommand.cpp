@@ -21,8 +21,9 @@ std::span<const Subcommand* const> all_subcommands() {
       &clear_alarms_subcommand, &memory_read_subcommand, &memory_write_subcommand,
       &memory_dump_subcommand,  &memory_load_subcommand, &memory_verify_subcommand,
       &config_get_subcommand,   &config_set_subcommand,  &run_subcommand,
-      &emulate_subcommand,      &decode_subcommand,      &encode_subcommand,
-      &vectors_subcommand,      &bench_subcommand,
+      &scan_subcommand,         &emulate_subcommand,     &decode_subcommand,
+      &encode_subcommand,       &probe_subcommand,       &vectors_subcommand,
+      &bench_subcommand,
   };
   return all;
 }

@@ -82,9 +82,11 @@ extern const Subcommand memory_verify_subcommand;
 extern const Subcommand config_get_subcommand;
 extern const Subcommand config_set_subcommand;
 extern const Subcommand run_subcommand;
+extern const Subcommand scan_subcommand;
 extern const Subcommand emulate_subcommand;
 extern const Subcommand decode_subcommand;
 extern const Subcommand encode_subcommand;
+extern const Subcommand probe_subcommand;
 extern const Subcommand vectors_subcommand;
 extern const Subcommand bench_subcommand;
 

@@ -289,9 +289,9 @@ std::string line_of(LinkKind link, const LineSettings& line) {
 }
 
 std::string_view name_of(Verb verb) {
-  static constexpr std::array<std::string_view, 12> names{
+  static constexpr std::array<std::string_view, 13> names{
       "read",        "read_part",    "info",       "temperature", "clear_alarms", "zero", "reset_multiturn",
-      "memory_read", "memory_write", "config_get", "config_set",  "run"};
+      "memory_read", "memory_write", "config_get", "config_set",  "scan",         "run"};
   return names[static_cast<std::size_t>(verb)];
 }
 

@@ -30,6 +30,24 @@ std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
 
+/// The fields of a reply that are not in the line of the reading.
+class OtherFields final : public FieldSink {
+ public:
+  explicit OtherFields(const Unit& unit) : unit_(&unit) {}
+
+  void put(const FieldValue& value) override {
+    const FieldInfo& info = *value.info;
+    const FieldInfo* shown = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
+    if (&info == shown || info.name == "singleturn" || info.name == "multiturn") return;
+    texts.push_back(fmt::format("{} {}{}{}", info.name, to_text(value), info.unit.empty() ? "" : " ", info.unit));
+  }
+
+  std::vector<std::string> texts;
+
+ private:
+  const Unit* unit_;
+};
+
 }  // namespace
 
 std::string_view name_of(Snapshot::State state) {
@@ -64,6 +82,7 @@ Snapshot Watch::snapshot(bool details) const {
     snapshot.trace.assign(lines_.begin(), lines_.end());
   } else {
     snapshot.bad.clear();
+    snapshot.fields.clear();
   }
   return snapshot;
 }
@@ -144,6 +163,11 @@ void Watch::publish(const LiveEncoder& live, const Sample& sample) {
   if (now < next_summary_ && sample.kind == Sample::Kind::reading) return;
   next_summary_ = now + between_summaries;
   const Encoder& encoder = live.encoder();
+  if (sample.kind == Sample::Kind::reading) {
+    OtherFields fields(encoder.unit());
+    encoder.report(fields);
+    known_.fields = std::move(fields.texts);
+  }
   known_.losses = live.losses();
   known_.rate = live.rate();
   known_.median = encoder.latencies().percentile(0.5);

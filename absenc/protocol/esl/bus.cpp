@@ -90,13 +90,16 @@ Scan::Scan(const Profile& profile) : Procedure(profile, scan_attempts) {
   ask(Request{DataId::singleturn_short, address_});
 }
 
-void Scan::answered(const Reply&) {
+void Scan::answered(const Reply& reply) {
   answering_ = static_cast<std::uint8_t>(answering_ | 1u << address_);
+  last_[address_] = reply;
+  if (reply.id != DataId::encoder_id) return ask(Request{DataId::encoder_id, address_}, received_at() + request_pause);
   go_on();
 }
 
 void Scan::failed(Error error) {
-  if (error != Error::timeout) disturbed_ = static_cast<std::uint8_t>(disturbed_ | 1u << address_);
+  const bool found = request().id == DataId::encoder_id;
+  if (!found && error != Error::timeout) disturbed_ = static_cast<std::uint8_t>(disturbed_ | 1u << address_);
   go_on();
 }
 
@@ -108,8 +111,17 @@ void Scan::go_on() {
 
 void Scan::report(FieldSink& sink) const {
   if (error() != Error::none) return;
-  put(sink, field_answering, answering_);
-  put(sink, field_disturbed, disturbed_);
+  for (std::uint8_t address = 0; address < most_encoders; ++address) {
+    const bool answers = (answering_ >> address & 1) != 0;
+    if (!answers && (disturbed_ >> address & 1) == 0) continue;
+    put(sink, field_encoder_address, address);
+    put(sink, field_clash, answers ? 0 : 1);
+    const Reply& reply = last_[address];
+    if (!answers) continue;
+    put(sink, field_ch1_status, reply.one.status);
+    if (reply.id != DataId::encoder_id) continue;
+    detail::put_part(sink, Part::encoder_id, reply, reply.one, true);
+  }
 }
 
 }  // namespace absenc::esl

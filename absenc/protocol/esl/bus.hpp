@@ -54,8 +54,8 @@ class Poll final : public Procedure {
   std::uint64_t cycles_ = 0;
 };
 
-/// Asks every address for ID 5. An answer that is damaged every time tells of two encoders with one address, or of a
-/// bad line. Error: timeout when nobody answers at all.
+/// Asks every address for ID 5, and who answers for ID 8. An answer that is damaged every time tells of two encoders
+/// with one address, or of a bad line. Error: timeout when nobody answers at all.
 class Scan final : public Procedure {
  public:
   explicit Scan(const Profile& profile);
@@ -72,6 +72,7 @@ class Scan final : public Procedure {
   std::uint8_t address_ = 0;
   std::uint8_t answering_ = 0;
   std::uint8_t disturbed_ = 0;
+  std::array<Reply, most_encoders> last_{};  // the last good reply of each
 };
 
 }  // namespace absenc::esl

@@ -135,9 +135,12 @@ TEST(EslBus, FindsWhoAnswers) {
   EXPECT_EQ(bench.run(scan).error(), Error::none);
   EXPECT_EQ(scan.answering(), 0b0101'0010);
   EXPECT_EQ(scan.disturbed(), 0);
-  EXPECT_EQ(report(scan)["answering"], 0b0101'0010);
+  const auto fields = report(scan);  // of the last record
+  EXPECT_EQ(fields.at("encoder_address"), 6);
+  EXPECT_EQ(fields.at("encoder_id"), 0xD8);
+  EXPECT_EQ(fields.at("clash"), 0);
   EXPECT_EQ(bench.violations(), 0u);
-  EXPECT_EQ(bench.encoders[0]->answered(), 1u);
+  EXPECT_EQ(bench.encoders[0]->answered(), 2u);  // ID 5, ID 8
   BusBench nobody({});
   Scan empty(on_a_bus);
   EXPECT_EQ(nobody.run(empty).error(), Error::timeout);

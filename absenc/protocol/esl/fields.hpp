@@ -81,9 +81,10 @@ enum FieldIndex : std::size_t {
   field_safe_singleturn,
   field_answering,
   field_disturbed,
+  field_clash,
 };
 
-inline constexpr std::array<FieldInfo, 28> fields{{
+inline constexpr std::array<FieldInfo, 29> fields{{
     {"data_id", FieldInfo::Kind::number, "", "which data was asked for (Table 3)"},
     {"control_field", FieldInfo::Kind::number, "", "CF: encoder address, data id, parity"},
     {"encoder_address", FieldInfo::Kind::number, "", "EAD: which encoder on the line"},
@@ -113,6 +114,8 @@ inline constexpr std::array<FieldInfo, 28> fields{{
     {"answering", FieldInfo::Kind::flags, "", "addresses with an encoder that answers well", address_flags},
     {"disturbed", FieldInfo::Kind::flags, "",
      "addresses whose answer is damaged: check the line, and whether two encoders share the address", address_flags},
+    {"clash", FieldInfo::Kind::boolean, "",
+     "yes: its answer is damaged every time; two encoders share the address, or the line is bad"},
 }};
 
 constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }

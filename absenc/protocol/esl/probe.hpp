@@ -9,15 +9,9 @@
 
 #include "absenc/protocol/esl/reply.hpp"
 #include "absenc/protocol/esl/settings.hpp"
+#include "absenc/protocol/unit.hpp"
 
 namespace absenc::esl {
-
-/// A request and what came back, in the order of time. Without the request, the reply's own control field says what was
-/// asked. An empty reply proves nothing.
-struct Capture {
-  Bytes request{};
-  Bytes reply{};
-};
 
 /// One value of one option.
 struct Evidence {
@@ -39,7 +33,8 @@ struct ProbeResult {
   }
 };
 
-/// `base` gives what is not open (tolerance). Captures must follow each other without a gap for sequence_step to be
+/// `base` gives what is not open (tolerance). Without a request, the reply's own control field says what was asked; an
+/// empty reply proves nothing. Captures must follow each other without a gap for sequence_step to be
 /// judged: nothing else may have been sent to the encoder between them.
 [[nodiscard]] ProbeResult probe(const Profile& base, std::span<const Capture> captures);
 

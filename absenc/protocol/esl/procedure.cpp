@@ -56,7 +56,7 @@ void Procedure::finish(Error error, std::string_view detail) {
 
 ByteStep Procedure::next(Time now) {
   // Something may have come in the very moment of the timer.
-  if (state_ == State::settling && now >= settle_until_) conclude(true);
+  if (state_ == State::settling && now >= settle_until_) end_settling(now);
   if (emit_pending_) {
     emit_pending_ = false;
     return {.kind = ByteStep::Kind::emit};
@@ -106,6 +106,7 @@ void Procedure::feed(const ByteEvent& event) {
       break;
     case ByteEvent::Kind::line_error:
       disturbed_ = true;
+      hear(event.at);
       if (state_ == State::receiving) settle(event.at);
       break;
     case ByteEvent::Kind::silence:
@@ -121,9 +122,21 @@ void Procedure::settle(Time at) {
   settle_until_ = at + settle_limit;
 }
 
+void Procedure::hear(Time at) {
+  heard_at_ = at;
+  if (settle_until_ == never) settle_until_ = at + settle_limit;
+}
+
+// A carrier with latency tells silence later than the limit: then the line is not noisy, but not yet known to be idle.
+void Procedure::end_settling(Time now) {
+  if (now - heard_at_ < settle_limit / 2) return conclude(true);
+  settle_until_ = never;
+}
+
 void Procedure::received(const ByteEvent& event) {
   if (state_ == State::done || state_ == State::ending || state_ == State::ready) return;
   received_at_ = event.at;
+  hear(event.at);
   for (const std::uint8_t byte : event.items) reply_bytes_.push_back(byte);
   if (state_ == State::sending) disturbed_ = true;
   if (state_ != State::receiving || reply_bytes_.size() < expected()) return;

@@ -75,6 +75,8 @@ class Procedure : public Conversation<std::uint8_t> {
   void explain(Error error, bool noisy);
   void start(Time earliest);
   void settle(Time at);
+  void hear(Time at);
+  void end_settling(Time now);
   [[nodiscard]] bool selects_page() const;
   [[nodiscard]] Time pause_before_repeat() const;
   [[nodiscard]] std::size_t expected() const { return reply_length(request_.id); }
@@ -94,6 +96,7 @@ class Procedure : public Conversation<std::uint8_t> {
   Time sent_at_{};
   Time received_at_{};
   Time settle_until_{};
+  Time heard_at_{};
   Error error_ = Error::none;
   Sentence detail_;
 };

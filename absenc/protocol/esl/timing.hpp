@@ -58,9 +58,9 @@ inline constexpr std::array<MemoryArea, 12> memory_map{{
     {4, 0x00, 0x7E, MemoryArea::Kind::eeprom, false, "IEC table"},
     {5, 0x00, 0x7E, MemoryArea::Kind::eeprom, false, "OAC table"},
     {6, 0x00, 0x0B, MemoryArea::Kind::eeprom, false, "remaining tables, channel 2 offset, temperature offset"},
+    {8, 0x00, 0x2F, MemoryArea::Kind::registers, false, "frames of both channels, error info, forced tests"},
     {14, 0x00, 0x0F, MemoryArea::Kind::mtp, false, "MTP 1"},
     {14, 0x10, 0x1F, MemoryArea::Kind::mtp, false, "MTP 2"},
-    {8, 0x00, 0x2F, MemoryArea::Kind::registers, false, "frames of both channels, error info, forced tests"},
     {14, 0x20, 0x2F, MemoryArea::Kind::registers, false, "calibration and test"},
     {14, 0x30, 0x3F, MemoryArea::Kind::registers, false, "lock bits"},
 }};

@@ -10,6 +10,7 @@
 #include "absenc/protocol/esl/fields.hpp"
 #include "absenc/protocol/esl/host.hpp"
 #include "absenc/protocol/esl/memory.hpp"
+#include "absenc/protocol/esl/probe.hpp"
 #include "absenc/protocol/esl/settings.hpp"
 #include "absenc/protocol/esl/vectors.hpp"
 
@@ -32,13 +33,19 @@ constexpr std::array<Argument, 4> write_arguments{
      {"force", "1: also pages with calibration, lock bits and undescribed commands", 0, 1, 0, false}}};
 constexpr std::array<Argument, 1> page_arguments{{{"page", "0 to 6, 8 or 14", 0, last_page}}};
 
+constexpr std::string_view protection = "what is written there can spoil the encoder";
+
+constexpr std::uint32_t write_life(MemoryArea::Kind kind) {
+  if (kind == MemoryArea::Kind::registers) return 0;
+  return kind == MemoryArea::Kind::eeprom ? 1'000'000 : 100'000;
+}
+
 constexpr std::uint8_t id_of(DataId id) { return static_cast<std::uint8_t>(id); }
 
 // Commands whose id does not tell what they are.
 constexpr std::string_view safe_position = "safe-position";
 constexpr std::string_view led_or_lissajous = "led-or-lissajous";
 constexpr std::string_view select_page = "select-page";
-constexpr std::string_view scan = "scan";
 
 constexpr std::array<Command, 17> commands{{
     {"position", Verb::read, id_of(DataId::position), "position, turns and alarms of both channels"},
@@ -53,7 +60,7 @@ constexpr std::array<Command, 17> commands{{
     {"alarms", Verb::info, id_of(DataId::alarms), "alarms of both channels"},
     {"temperature", Verb::temperature, id_of(DataId::temperature), "temperature inside the encoder"},
     {led_or_lissajous, Verb::run, id_of(DataId::read_memory), "which of the two is behind led_or_lissajous_error"},
-    {scan, Verb::run, id_of(DataId::singleturn_short), "which addresses answer"},
+    {"scan", Verb::scan, id_of(DataId::singleturn_short), "who answers on the line", {}, false, false},
     {"zero", Verb::zero, id_of(DataId::zero), "make this the zero of the turn", {}, true, false},
     {"clear-alarms",
      Verb::clear_alarms,
@@ -74,6 +81,22 @@ constexpr std::array<Command, 17> commands{{
      true, false},
     {select_page, Verb::run, id_of(DataId::write_memory), "select a memory page", page_arguments, true, true},
 }};
+
+// Table 11 in the order of pages.
+constexpr std::array<absenc::MemoryArea, memory_map.size()> memory_areas = [] {
+  std::array<absenc::MemoryArea, memory_map.size()> areas{};
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const MemoryArea& area = memory_map[i];
+    areas[i] = {.page = area.page,
+                .first = area.first,
+                .count = area.last - area.first + 1u,
+                .meaning = area.meaning,
+                .in_dump = area.page == 0,
+                .write_life = write_life(area.kind),
+                .protection = area.user ? "" : protection};
+  }
+  return areas;
+}();
 
 Error decode_frame(const Options& values, Frame request, Frame reply, FieldSink& sink) {
   return decode(to_profile(values), request.bytes, reply.bytes, sink);
@@ -138,6 +161,8 @@ Any<Conversation> host(const Options& values, const Command& command, Arguments 
       if (command.name == safe_position) return make<ReadSafePosition>(storage, profile);
       if (command.name == led_or_lissajous) return make<ReadErrorInfo>(storage, profile);
       if (command.name == select_page) return make<SelectPage>(storage, profile, argument(0));
+      return {};
+    case Verb::scan:
       return make<Scan>(storage, profile);
     default:
       return {};
@@ -147,6 +172,19 @@ Any<Conversation> host(const Options& values, const Command& command, Arguments 
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
   if (storage.size() < sizeof(VirtualEncoder)) return {};
   return {.bytes = new (storage.data()) VirtualEncoder(to_profile(values), shaft)};
+}
+
+bool probe_captures(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
+  const ProbeResult result = probe(to_profile(values), captures);
+  for (std::size_t option = 0; option < open_options; ++option) {
+    for (std::size_t value = 0; value < options[option].choices.size(); ++value) {
+      const Evidence& evidence = result.values[option][value];
+      sink.put({option, static_cast<std::int64_t>(value), evidence.possible, evidence.capture,
+                sentence(result, option, value)});
+    }
+    if (result.profiles != 0) values.values[option] = get_option(result.best, option);
+  }
+  return result.profiles != 0;
 }
 
 Resolution resolution(const Options&) { return {singleturn_bits, multiturn_bits}; }
@@ -169,6 +207,7 @@ constinit const Unit unit{
     .models = models,
     .fields = fields,
     .commands = commands,
+    .memory = memory_areas,
     .vectors = vectors,
     .status = &fields[field_ch1_status],
     .alarms = &fields[field_ch1_alarms],
@@ -181,6 +220,7 @@ constinit const Unit unit{
     .host = host,
     .device = device,
     .resolution = resolution,
+    .probe = probe_captures,
 };
 
 }  // namespace absenc::esl

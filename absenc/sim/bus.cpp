@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/sim/bus.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace absenc::sim {
+
+namespace {
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+// What begins later than this is kept here: in the carrier's hands it would keep the others from sending.
+constexpr Time soon = std::chrono::milliseconds(1);
+
+// The shorter of two limits; 0: none.
+Time shorter(Time one, Time other) {
+  if (one == Time{} || other == Time{}) return std::max(one, other);
+  return std::min(one, other);
+}
+
+}  // namespace
+
+Bus::Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character) : character_(character) {
+  for (Machine<std::uint8_t>* device : devices) nodes_.push_back({.device = device});
+}
+
+void Bus::feed(const ByteEvent& event) {
+  if (event.kind == ByteEvent::Kind::sent) return all_sent(event);
+  for (Node& node : nodes_) {
+    if (node.doing == Doing::done) continue;
+    if (event.kind == ByteEvent::Kind::timer) {
+      if (event.at < node.timer) continue;
+      node.timer = never;
+    }
+    if (event.kind == ByteEvent::Kind::silence && node.doing != Doing::waiting) continue;
+    node.device->feed(event);
+    serve(node, event.at);
+  }
+}
+
+// Behind a transfer the line is idle: nobody has to wait until that is noticed.
+void Bus::all_sent(const ByteEvent& event) {
+  sending_ = false;
+  for (Node& node : nodes_) {
+    if (node.doing == Doing::done) continue;
+    if (node.doing == Doing::sending) {
+      node.doing = Doing::waiting;
+      node.device->feed(event);
+    } else {
+      node.device->feed({.kind = ByteEvent::Kind::received, .at = event.at, .items = out_});
+      serve(node, event.at);
+      if (node.doing == Doing::waiting) node.device->feed({.kind = ByteEvent::Kind::silence, .at = event.at});
+    }
+    serve(node, event.at);
+  }
+}
+
+void Bus::serve(Node& node, Time now) {
+  while (node.doing != Doing::done) {
+    const ByteStep step = node.device->next(now);
+    switch (step.kind) {
+      case ByteStep::Kind::wait:
+        node.wait = step;
+        node.timer = step.at > now ? step.at : never;
+        return;
+      case ByteStep::Kind::transfer:
+        if (node.doing != Doing::waiting)
+          throw std::logic_error("a device began a transfer before its last one was sent");
+        node.doing = Doing::pending;
+        node.at = std::max(step.at, now);
+        node.out.assign(step.out.begin(), step.out.end());
+        break;
+      case ByteStep::Kind::done:
+        node.doing = Doing::done;
+        return;
+      case ByteStep::Kind::emit:
+      case ByteStep::Kind::pulse:
+      case ByteStep::Kind::configure:
+        break;
+    }
+  }
+}
+
+ByteStep Bus::next(Time now) {
+  for (Node& node : nodes_) serve(node, now);
+  if (!sending_ && first_begin() <= now + soon) {
+    const Time at = first_begin();
+    merge();
+    return {.kind = ByteStep::Kind::transfer, .out = out_, .at = at};
+  }
+  return wait_step();
+}
+
+Time Bus::first_begin() const {
+  Time first = never - soon;  // so that it can be compared with a time to come
+  for (const Node& node : nodes_) {
+    if (node.doing == Doing::pending) first = std::min(first, node.at);
+  }
+  return first;
+}
+
+// Of all that is pending, what begins first and whatever begins before that has ended.
+void Bus::merge() {
+  std::vector<Node*> pending;
+  for (Node& node : nodes_) {
+    if (node.doing == Doing::pending) pending.push_back(&node);
+  }
+  std::stable_sort(pending.begin(), pending.end(),
+                   [](const Node* one, const Node* other) { return one->at < other->at; });
+  out_.clear();
+  for (Node* node : pending) {
+    const auto offset = static_cast<std::size_t>((node->at - pending.front()->at + character_ / 2) / character_);
+    if (node != pending.front() && offset >= out_.size()) break;
+    out_.resize(std::max(out_.size(), offset + node->out.size()), 0xFF);
+    for (std::size_t i = 0; i < node->out.size(); ++i) out_[offset + i] &= node->out[i];
+    node->doing = Doing::sending;
+  }
+  sending_ = true;
+}
+
+ByteStep Bus::wait_step() const {
+  ByteStep step{.at = never};
+  for (const Node& node : nodes_) {
+    if (node.doing == Doing::done) continue;
+    step.at = std::min(step.at, node.timer);
+    if (node.doing == Doing::pending && !sending_) step.at = std::min(step.at, node.at);
+    if (node.doing != Doing::waiting) continue;
+    step.answer = shorter(step.answer, node.wait.answer);
+    step.gap = shorter(step.gap, node.wait.gap);
+  }
+  return step;
+}
+
+}  // namespace absenc::sim

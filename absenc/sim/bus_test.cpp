@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// Devices that answer a byte of theirs, on a bus and on sim::Line: what the host hears is the same.
+#include "absenc/sim/bus.hpp"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <memory>
+
+#include "absenc/sim/line.hpp"
+
+namespace absenc::sim {
+namespace {
+
+using namespace std::chrono_literals;
+using Wire = std::vector<std::uint8_t>;
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+constexpr LineSettings settings{.rate = 1'000'000};
+
+/// Answers `key`, when it comes after silence, `after` later.
+struct Answerer final : Machine<std::uint8_t> {
+  Answerer(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
+      : key(its_key), reply(std::move(its_reply)), after(its_after) {}
+
+  void feed(const ByteEvent& event) override {
+    switch (event.kind) {
+      case ByteEvent::Kind::received:
+        for (const std::uint8_t item : event.items) {
+          heard.push_back(item);
+          if (idle && item == key) begin = event.at + after;
+          idle = false;
+        }
+        break;
+      case ByteEvent::Kind::silence:
+        idle = true;
+        break;
+      case ByteEvent::Kind::sent:
+        idle = true;
+        ++sent;
+        break;
+      default:
+        break;
+    }
+  }
+  ByteStep next(Time) override {
+    if (begin != never) {
+      const Time at = begin;
+      begin = never;
+      return {.kind = ByteStep::Kind::transfer, .out = reply, .at = at};
+    }
+    return {.at = never, .gap = 15us};
+  }
+
+  std::uint8_t key;
+  Wire reply;
+  Time after;
+  Time begin = never;
+  Wire heard;
+  unsigned sent = 0;
+  bool idle = true;
+};
+
+/// Asks for one byte after the other, when the line is idle for all.
+struct Asker final : Machine<std::uint8_t> {
+  explicit Asker(const Wire& all) : questions(all.begin(), all.end()) {}
+
+  void feed(const ByteEvent& event) override {
+    if (event.kind == ByteEvent::Kind::received) {
+      answers.back().insert(answers.back().end(), event.items.begin(), event.items.end());
+    }
+    if (event.kind == ByteEvent::Kind::silence) asking = false;
+  }
+  ByteStep next(Time) override {
+    if (asking) return {.at = never, .answer = 300us, .gap = 25us};
+    if (questions.empty()) return {.kind = ByteStep::Kind::done};
+    now_asked = {questions.front()};
+    questions.pop_front();
+    answers.emplace_back();
+    asking = true;
+    return {.kind = ByteStep::Kind::transfer, .out = now_asked};
+  }
+
+  std::deque<std::uint8_t> questions;
+  Wire now_asked;
+  std::vector<Wire> answers;
+  bool asking = false;
+};
+
+std::vector<Wire> ask(const Wire& questions, const std::vector<Machine<std::uint8_t>*>& on_the_line) {
+  Line<std::uint8_t> line(LinkKind::half_duplex, settings);
+  for (Machine<std::uint8_t>* device : on_the_line) line.attach(Role::device, *device);
+  Asker asker(questions);
+  const auto host = line.attach(Role::host, asker);
+  EXPECT_TRUE(line.run(host, 1s));
+  return asker.answers;
+}
+
+TEST(Bus, HearsAsALineDoes) {
+  const auto devices = [] {
+    std::vector<std::unique_ptr<Answerer>> made;
+    made.push_back(std::make_unique<Answerer>(1, Wire{0x11, 0x22, 0x33}));
+    made.push_back(std::make_unique<Answerer>(2, Wire{0xF0, 0xAA, 0x55}));
+    made.push_back(std::make_unique<Answerer>(2, Wire{0x3C, 0xFF}));  // at the same time
+    return made;
+  };
+  const Wire questions{1, 2, 9, 1};
+  const auto alone = devices();
+  std::vector<Machine<std::uint8_t>*> pointers;
+  for (const auto& device : alone) pointers.push_back(device.get());
+  const std::vector<Wire> wanted = ask(questions, pointers);
+  EXPECT_EQ(wanted[1], (Wire{0x30, 0xAA, 0x55}));
+  EXPECT_TRUE(wanted[2].empty());
+
+  const auto behind = devices();
+  pointers.clear();
+  for (const auto& device : behind) pointers.push_back(device.get());
+  Bus bus(pointers, settings.character());
+  EXPECT_EQ(ask(questions, {&bus}), wanted);
+  for (std::size_t i = 0; i < behind.size(); ++i) EXPECT_EQ(behind[i]->sent, alone[i]->sent) << i;
+  EXPECT_EQ(behind[0]->heard, (Wire{1, 2, 0x30, 0xAA, 0x55, 9, 1}));
+}
+
+TEST(Bus, WhatOverlapsIsMergedAndTheRestComesLater) {
+  Answerer first(1, {0x81, 0x7E});
+  Answerer second(1, {0x0F, 0x0F}, 5us + 12us);  // about one character later
+  Answerer late(1, {0x77}, 50ms);
+  Bus bus({&second, &first, &late}, settings.character());
+  Line<std::uint8_t> line(LinkKind::half_duplex, settings);
+  line.attach(Role::device, bus);
+  struct Quiet final : Machine<std::uint8_t> {
+    void feed(const ByteEvent& event) override { heard.insert(heard.end(), event.items.begin(), event.items.end()); }
+    ByteStep next(Time) override {
+      if (asked) return {.at = never};
+      asked = true;
+      return {.kind = ByteStep::Kind::transfer, .out = question};
+    }
+    Wire question{1};
+    Wire heard;
+    bool asked = false;
+  } host;
+  line.attach(Role::host, host);
+  line.run_until(10ms);
+  EXPECT_EQ(host.heard, (Wire{0x81, 0x0E, 0x0F}));
+  line.run_until(60ms);
+  EXPECT_EQ(host.heard, (Wire{0x81, 0x0E, 0x0F, 0x77}));
+}
+
+}  // namespace
+}  // namespace absenc::sim

@@ -1,0 +1,391 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""QS35 ESL encoders on a pseudo-terminal: against a client that shares no code with them, and by the command."""
+import json
+import os
+import select
+import time
+import tty
+import unittest
+
+from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, json_lines
+
+POSITION, QUICK, TEMPERATURE, READ, WRITE = 0x1, 0x5, 0x9, 0xE, 0xF
+LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
+READY, CHANNEL_2 = 0x40, 0x20
+REQUEST = "0875"  # ID 1, address 0
+REPLY = "084000efcdab34125646b3086000abd6cd84"
+# The same encoder with another profile, and with one bit wrong in channel 2.
+MSB_REQUEST, MSB_REPLY = "0857", "084000efcdab341255277e086000abd57f67"
+WRONG_CHANNEL_2 = "084000efcdab3412553b5e086000afd5b069"
+
+
+def control_field(data_id, address=0):
+    parity = (bin(data_id).count("1") + 1) & 1  # with it the number of ones is odd
+    return parity << 7 | (data_id & 0xF) << 3 | address
+
+
+def remainder(data, polynomial, bits, register=0):
+    """Bytes least significant bit first."""
+    for byte in data:
+        for bit in range(8):
+            top = register >> (bits - 1) & 1
+            register = (register << 1) & ((1 << bits) - 1)
+            if top ^ (byte >> bit & 1):
+                register ^= polynomial
+    return int(f"{register:0{bits}b}"[::-1], 2)
+
+
+def crc8(data):
+    return bytes([remainder(data, 0x2F, 8)])
+
+
+def crc16(data, initial):
+    padded = bytes(data) + bytes(len(data) % 2)
+    return remainder(padded, 0x5935, 16, initial).to_bytes(2, "little")
+
+
+class Client:
+    """The host's end of the line."""
+
+    def __init__(self, path):
+        self.descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.descriptor)
+
+    def close(self):
+        os.close(self.descriptor)
+
+    def send(self, data):
+        os.write(self.descriptor, bytes(data))
+
+    def receive(self, length, patience=PATIENCE):
+        data = b""
+        deadline = time.monotonic() + patience
+        while len(data) < length:
+            if not select.select([self.descriptor], [], [], max(0, deadline - time.monotonic()))[0]:
+                break
+            data += os.read(self.descriptor, 256)
+        return data
+
+    def exchange(self, data_id, *body, address=0):
+        request = bytes([control_field(data_id, address), *body])
+        self.send(request + crc8(request))
+        return self.receive(LENGTH[data_id])
+
+
+class EslCase(EncoderCase):
+    def emulator(self, *arguments):
+        emulator = Emulator(self.directory, *arguments, protocol="esl")
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def encoder(self, *arguments, latency=300, more=""):
+        return f"esl:{self.emulator(*arguments).path}?latency={latency}{more}"
+
+    def client(self, *arguments):
+        client = Client(self.emulator(*arguments).path)
+        self.addCleanup(client.close)
+        return client
+
+    def good_json(self, *arguments):
+        result = absenc(*arguments, "--json")
+        self.assert_good(result)
+        return json.loads(result.stdout)
+
+
+class Wire(EslCase):
+    def check_position(self, reply, singleturn, multiturn, address=0, alarms=0):
+        """Both channels, each by itself and against the other; returns both sequence counters."""
+        self.assertEqual(len(reply), 18, reply.hex(" "))
+        one, two = reply[:11], reply[11:]
+        self.assertEqual(one[9:], crc16(one[:9], 0x0000), reply.hex(" "))
+        self.assertEqual(two[5:], crc16(two[:5], 0xFFFF), reply.hex(" "))
+        self.assertEqual((one[0], two[0]), (control_field(POSITION, address),) * 2)
+        self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))  # errors aside
+        self.assertEqual((one[2], two[2]), (alarms, alarms))
+        self.assertEqual(int.from_bytes(one[3:6], "little"), singleturn)
+        self.assertEqual(int.from_bytes(one[6:8], "little"), multiturn)
+        self.assertEqual(two[3] << 1 | two[4] >> 7, singleturn >> 15)
+        self.assertEqual(two[4] & 0x7F, one[8] & 0x7F)
+        return one[8], two[4] & 0x7F
+
+    def test_position_in_both_channels(self):
+        client = self.client("--singleturn", "0xABCDEF", "--multiturn", "0x1234")
+        before, _ = self.check_position(client.exchange(POSITION), 0xABCDEF, 0x1234)
+        after, _ = self.check_position(client.exchange(POSITION), 0xABCDEF, 0x1234)
+        self.assertNotEqual(before, after)
+
+    def test_alarms_are_in_both_channels(self):
+        client = self.client("--singleturn", "1", "--alarm", "multiturn_error")
+        self.check_position(client.exchange(POSITION), 1, 0, alarms=0x02)
+
+    def test_quick_position_and_temperature(self):
+        client = self.client("--singleturn", "0xABCDEF")
+        reply = client.exchange(QUICK)
+        self.assertEqual(reply, bytes([0xA8, READY, 0xEF, 0xCD, 0xAB]) + crc8(reply[:5]))
+        reply = client.exchange(TEMPERATURE)
+        self.assertEqual((reply[0], reply[1], reply[3:]), (0xC8, READY, crc8(reply[:3])))
+
+    def read_memory(self, client, address):
+        """EEPROM: the first answers are busy, what follows them is the byte."""
+        was_busy = False
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            reply = client.exchange(READ, address << 1)
+            self.assertEqual((len(reply), reply[3:]), (4, crc8(reply[:3])))
+            self.assertEqual(reply[1] >> 1, address)
+            if not reply[1] & 1 and was_busy:
+                return reply[2]
+            was_busy = was_busy or bool(reply[1] & 1)
+        raise AssertionError("busy without end")
+
+    def test_memory(self):
+        client = self.client()
+        self.assertEqual(client.exchange(WRITE, 0x7F << 1, 0)[1:3], bytes([0xFE, 0]))
+        self.assertEqual(self.read_memory(client, 5), 0)
+        reply = client.exchange(WRITE, 5 << 1, 0x5A)
+        self.assertEqual(reply[3:], crc8(reply[:3]))
+        self.assertEqual(self.read_memory(client, 5), 0x5A)
+
+    def test_wrong_requests_get_no_answer(self):
+        client = self.client("--option", "address=2")
+        for request in [bytes([control_field(POSITION, 3)]), bytes([control_field(POSITION, 2)])]:
+            wrong = b"\0" if request[0] & 7 == 2 else crc8(request)
+            client.send(request + wrong)
+            self.assertEqual(client.receive(1, 0.1), b"")
+        self.check_position(client.exchange(POSITION, address=2), 0, 0, address=2)
+
+    def test_several_on_one_line(self):
+        client = self.client("--singleturn", "1000", "--also", "address=3&singleturn=70000&multiturn=7",
+                             "--also", "address=5&alarm=multiturn_error", "--also", "address=6&singleturn=0x5555",
+                             "--also", "address=6&singleturn=0xAAAA")
+        for _ in range(3):  # without a pause between them
+            self.check_position(client.exchange(POSITION, address=0), 1000, 0)
+            self.check_position(client.exchange(POSITION, address=3), 70000, 7, address=3)
+            self.check_position(client.exchange(POSITION, address=5), 0, 0, address=5, alarms=2)
+            clash = client.exchange(QUICK, address=6)
+            self.assertEqual(clash[:5], bytes([control_field(QUICK, 6), READY, 0, 0, 0]))  # 0x5555 AND 0xAAAA
+            self.assertNotEqual(clash[5:], crc8(clash[:5]))
+
+
+class Command(EslCase):
+    def test_read_info_and_alarms(self):
+        encoder = self.encoder("--singleturn", "0xABCDEF", "--multiturn", "4660", "--alarm", "multiturn_error")
+        reading = self.good_json("read", encoder)
+        self.assertEqual((reading["singleturn"], reading["multiturn"]), (0xABCDEF, 4660))
+        self.assertEqual((reading["singleturn_valid"], reading["multiturn_valid"]), (True, False))
+        info = self.good_json("info", encoder)
+        self.assertTrue(info["ok"])
+        self.assertEqual(info["answers"]["encoder-id"]["fields"]["encoder_id"], 0xD8)
+        alarms = self.good_json("alarms", encoder)
+        self.assertEqual([alarm["name"] for alarm in alarms["ch1_alarms"]], ["multiturn_error"])
+        self.assertIn("temperature_c", self.good_json("temperature", encoder)["fields"])
+        safe = self.good_json("run", encoder, "safe-position")["fields"]
+        self.assertEqual(safe["safe_singleturn"], 0xABCDEF)
+
+    def test_what_changes_the_encoder(self):
+        encoder = self.encoder("--singleturn", "1000", "--multiturn", "5", "--alarm", "multiturn_error")
+        self.assert_wrong_usage(absenc("zero", encoder), "--yes")
+        for verb in ["zero", "reset-multiturn", "clear-alarms"]:
+            self.assert_good(absenc(verb, encoder, "--yes"))
+        reading = self.good_json("read", encoder)
+        self.assertEqual((reading["singleturn"], reading["multiturn"], reading["alarms"]), (0, 0, []))
+
+    def test_memory(self):
+        encoder = self.encoder()
+        self.assert_good(absenc("memory", "write", encoder, "3", "0x42", "0x43", "--page", "1", "--yes"))
+        self.assertEqual(self.good_json("memory", "read", encoder, "2", "--count", "4", "--page", "1")["data"], "00424300")
+        protected = ["memory", "write", encoder, "3", "0x42", "--page", "4", "--yes"]
+        self.assert_wrong_usage(absenc(*protected), "page 4", "IEC table", "--force")
+        self.assertEqual(self.good_json("memory", "read", encoder, "3", "--page", "4")["data"], "00")
+        self.assert_good(absenc(*protected, "--force"))
+        self.assertEqual(self.good_json("memory", "read", encoder, "3", "--page", "4")["data"], "42")
+        self.assert_wrong_usage(absenc("memory", "read", encoder, "0", "--page", "7"), "esl has no page 7")
+        self.assert_failed(absenc("memory", "read", f"{encoder}&bus=true", "0"), "unsupported", "bus=false")
+
+    def test_load_needs_force_too(self):
+        encoder = self.encoder()
+        dump = self.file("dump")
+        self.assert_good(absenc("memory", "dump", encoder, "--output", dump))
+        with open(dump, encoding="utf-8") as file:
+            lines = [line for line in file if not line.startswith(("checksum", "#"))]
+        self.assertTrue(all("page 0 " in line for line in lines if line.startswith("page")), lines)
+        text = "".join(lines) + "page 4 address 0x10: 11 22\n"
+        changed = self.file("changed", text)
+        self.assert_failed(absenc("memory", "load", encoder, changed, "--yes"), "page 4 address 0x10", "--force")
+        self.assert_good(absenc("memory", "load", encoder, changed, "--yes", "--force"))
+        self.assert_good(absenc("memory", "verify", encoder, changed))
+
+    def test_decode_and_encode(self):
+        self.assertEqual(absenc("encode", "esl", "position").stdout.strip(), "08 75")
+        fields = self.good_json("decode", "esl", "--request", REQUEST, "--hex", REPLY)["fields"]
+        self.assertEqual((fields["singleturn"], fields["redundant_singleturn"]), (0xABCDEF, 0xABCDEF >> 15))
+        self.assert_failed(absenc("decode", "esl", "--request", REQUEST, "--hex", WRONG_CHANNEL_2), "bad_checksum")
+
+    def test_scan(self):
+        line = self.encoder("--also", "address=3&singleturn=5", "--also", "address=6&singleturn=0x5555", "--also",
+                            "address=6&singleturn=0xAAAA", latency=60)
+        found = self.good_json("scan", line)["encoders"]
+        self.assertEqual([(one["encoder_address"], one["clash"]) for one in found], [(0, False), (3, False), (6, True)])
+        self.assertEqual(found[1]["encoder_id"], 0xD8)
+        self.assertEqual(self.good_json("run", line, "scan")["encoders"][1], found[1])
+        result = absenc("scan", line)
+        self.assert_good(result)
+        self.assertRegex(result.stdout, r"(?m)^6 +yes +-")
+        self.assert_sentence(result.stderr, "two encoders share the address")
+
+    def test_scan_of_nobody(self):
+        encoder = self.encoder(latency=20, more="&crc_bit_order=msb")
+        self.assert_failed(absenc("scan", encoder), "timeout")
+        self.assert_wrong_usage(absenc("scan", "sim:tformat"), "one encoder")
+
+
+class Probe(EslCase):
+    def test_one_reply(self):
+        result = absenc("probe", "esl", "--request", MSB_REQUEST, "--hex", MSB_REPLY)
+        self.assert_good(result)
+        self.assertRegex(result.stdout, r"(?m)^crc_bit_order +lsb +no +frame 1: ")
+        self.assertRegex(result.stdout, r"(?m)^ +msb +possible +only this value explains all frames$")
+        self.assertIn("go on with: --option crc_bit_order=msb ", result.stdout)
+
+    def test_what_it_says_can_be_used(self):
+        client = self.client("--option", "crc16_byte_order=high", "--option", "sequence_step=safety")
+        frames = []
+        for data_id in [POSITION, TEMPERATURE, POSITION]:
+            request = bytes([control_field(data_id)])
+            frames += ["--request", (request + crc8(request)).hex(), "--hex", client.exchange(data_id).hex()]
+        answer = self.good_json("probe", "esl", *frames)
+        self.assertIn("crc16_byte_order=high", answer["settled"])
+        excluded = {(one["option"], one["value"]): one["frame"] for one in answer["evidence"] if not one["possible"]}
+        self.assertEqual(excluded[("crc16_byte_order", "low")], 1)
+        self.assertEqual(excluded[("sequence_step", "request")], 3)
+        settings = [part for setting in answer["settled"] for part in ("--option", setting)]
+        self.assert_good(absenc("decode", "esl", *frames[:4], *settings))
+        self.assertEqual(absenc("decode", "esl", *frames[:4]).returncode, 1)
+
+    def test_damaged_and_missing_frames(self):
+        self.assert_failed(absenc("probe", "esl", "--hex", REPLY[:-2]), "whatever the options, frame 1")
+        self.assert_failed(absenc("probe", "esl", "--hex", MSB_REPLY, "--hex", REPLY), "no options explain all frames")
+        self.assert_wrong_usage(absenc("probe", "esl"), "--hex")
+        self.assert_wrong_usage(absenc("probe", "esl", "--hex", REPLY, "--request", "08", "--request", "08"),
+                                "2 --request for 1 --hex")
+        self.assert_wrong_usage(absenc("probe", "tformat", "--hex", "1A"), "leave nothing open")
+        self.assert_good(absenc("probe", "esl", "--request", "", "--hex", REPLY))
+
+
+class Sentences(EslCase):
+    """What is said of bad replies."""
+
+    def fake(self, *replies):
+        fake = FakeEncoder({reply[0]: reply for reply in replies})
+        fake.__enter__()
+        self.addCleanup(fake.__exit__)
+        return f"esl:{fake.path}?latency=50&echo=off"
+
+    def assert_said(self, reply, *words, options=""):
+        self.assert_failed(absenc("read", self.fake(reply) + options), *words)
+
+    def test_bad_replies(self):
+        good = bytes.fromhex(REPLY)
+        self.assert_said(bytes.fromhex(WRONG_CHANNEL_2), "bad_checksum", "channel 2")
+        self.assert_said(good[:5] + bytes([good[5] ^ 1]) + good[6:], "bad_checksum", "channel 1")
+        self.assert_said(good[:11], "wrong_length", "channel 2")
+
+    def test_the_address_of_another(self):
+        other = bytes.fromhex(REPLY)
+        fake = FakeEncoder({control_field(POSITION, 1): other})
+        with fake:
+            self.assert_failed(absenc("read", f"esl:{fake.path}?latency=50&echo=off&address=1"), "unexpected_reply",
+                               "address")
+
+    def test_a_profile_that_does_not_fit_is_named(self):
+        encoder = self.encoder("--option", "crc16_byte_order=high")
+        self.assert_failed(absenc("read", encoder), "bad_checksum", "crc16_byte_order=high")
+        self.assert_good(absenc("read", f"{encoder}&crc16_byte_order=high"))
+
+    def test_a_replay(self):
+        """Replies to IDs 1 and 2 that are good by themselves, with the same sequence counter."""
+        one = bytes([control_field(0x2), READY, 0, 0xEF, 0xCD, 0xAB, 0x56])
+        two = bytes([control_field(0x2), READY | CHANNEL_2, 0, 0xAB, 0x80 | 0x56])
+        singleturn = one + crc16(one, 0x0000) + two + crc16(two, 0xFFFF)
+        encoder = self.fake(bytes.fromhex(REPLY), singleturn)
+        self.assert_good(absenc("read", encoder))
+        self.assert_failed(absenc("run", encoder, "safe-position"), "sequence_mismatch", "stands still")
+
+    def test_a_memory_that_stays_busy(self):
+        page = bytes([control_field(WRITE), 0xFE, 0])
+        busy = bytes([control_field(READ), 1, 0])
+        encoder = self.fake(page + crc8(page), busy + crc8(busy))
+        self.assert_failed(absenc("memory", "read", encoder, "0"), "busy", "not executed")
+
+
+class OneLine(EslCase):
+    def lines(self, *arguments):
+        result = absenc("monitor", *arguments, "--for", "2", "--interval", "0.5", "--json")
+        last = {line["encoder"]: line for line in json_lines(result.stdout)}
+        return result, [last[name] for name in arguments if name in last]
+
+    def test_each_has_its_turn(self):
+        line = self.encoder("--also", "address=3&singleturn=70000", "--also", "address=6&singleturn=0x5555", "--also",
+                            "address=6&singleturn=0xAAAA", latency=20)
+        names = [line, f"{line}&address=3", f"{line}&address=6", f"{line}&address=7"]
+        result, last = self.lines(*names, "--rate", "0")
+        self.assertEqual(result.returncode, 1)  # two were never read
+        self.assertEqual([one["state"] for one in last], ["live", "live", "failing", "failing"])
+        self.assertEqual([one["reading"]["singleturn"] for one in last[:2]], [0, 70000])
+        self.assertEqual([one["errors"] for one in last[:2]], [{}, {}])
+        self.assertEqual(set(last[3]["errors"]), {"timeout"})
+        least, most = sorted(one["readings"] for one in last[:2])
+        self.assertGreater(least, 10)
+        self.assertLess(most, 1.5 * least + 10)
+
+    def test_names_of_one_bus(self):
+        path = self.emulator("--also", "address=3&singleturn=70000").path
+        config = self.file("absenc.toml", f"""
+            [bus.arm]
+            port = "{path}"
+            latency = 300
+            [encoder.shoulder]
+            protocol = "esl"
+            bus = "arm"
+            [encoder.elbow]
+            protocol = "esl"
+            bus = "arm"
+            address = 3
+            """)
+        result = absenc("monitor", "shoulder", "elbow", "--for", "1.2", "--json",
+                        env=dict(os.environ, ABSENC_CONFIG=config))
+        self.assert_good(result)
+        last = {line["encoder"]: line for line in json_lines(result.stdout)}
+        self.assertEqual([last[name]["reading"]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
+
+    def test_what_cannot_share_a_line(self):
+        self.assert_wrong_usage(absenc("monitor", "esl:/dev/x", "esl:/dev/x?address=1&baud=115200"), "/dev/x", "baud")
+        self.assert_wrong_usage(absenc("monitor", "esl:/dev/x", "tformat:/dev/x"), "one line", "baud")
+        self.assert_wrong_usage(absenc("monitor", "esl:/dev/x?address=1", "esl:/dev/x?address=1"), "the same encoder")
+        self.assert_wrong_usage(absenc("emulate", "esl", "--also", "adress=1"), "adress", "address")
+        self.assert_wrong_usage(absenc("emulate", "esl", "--also", "address=1", "--memory", "x"), "--memory")
+
+    def test_all_see_the_loss_and_the_return(self):
+        first = self.emulator("--also", "address=3")
+        names = [f"esl:{first.path}?latency=300&address={address}" for address in (0, 3)]
+        monitor = self.start("monitor", *names, "--json", "--interval", "0.1")
+        wanted = ["live", "gone", "live"]
+        seen = {name: 0 for name in names}
+        deadline = time.monotonic() + PATIENCE
+        while any(count < len(wanted) for count in seen.values()):
+            self.assertLess(time.monotonic(), deadline)
+            line = json.loads(self.first_line(monitor))
+            name = line["encoder"]
+            state = "gone" if line["state"] in ("lost", "opening") else line["state"]
+            if seen[name] < len(wanted) and state == wanted[seen[name]]:
+                seen[name] += 1
+            if first.process.poll() is None and all(count == 1 for count in seen.values()):
+                first.end()
+            if first.process.poll() is not None and all(count == 2 for count in seen.values()):
+                first = self.emulator("--also", "address=3")
+        self.assertEqual(line["losses"], 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
