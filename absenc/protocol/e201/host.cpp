@@ -57,6 +57,7 @@ ByteStep Procedure::next(Time now) {
     case State::settling:
       step.at = sent_at_ + reply_limit;
       break;
+    case State::ending:
     case State::done:
       step.kind = ByteStep::Kind::done;
       break;
@@ -64,34 +65,11 @@ ByteStep Procedure::next(Time now) {
   return step;
 }
 
-void Procedure::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::sent:
-      sent_at_ = received_at_ = event.at;
-      if (state_ == State::sending) state_ = disturbed_ ? State::settling : State::receiving;
-      break;
-    case ByteEvent::Kind::received:
-      if (state_ != State::done) received(event);
-      break;
-    case ByteEvent::Kind::line_error:
-      disturbed_ = true;
-      if (state_ == State::receiving) state_ = State::settling;
-      break;
-    case ByteEvent::Kind::silence:
-      if (state_ == State::receiving || state_ == State::settling) conclude();
-      break;
-    default:
-      break;
-  }
-}
-
-void Procedure::received(const ByteEvent& event) {
-  received_at_ = event.at;
-  for (const std::uint8_t byte : event.items) {
+void Procedure::received(Bytes bytes) {
+  for (const std::uint8_t byte : bytes) {
     const bool line_feed = answer_ == Answer::line && byte == '\n' && reply_.empty();  // of the reply before
     if (!line_feed) reply_.push_back(byte);
   }
-  if (state_ == State::ready || state_ == State::sending) disturbed_ = true;
   if (state_ != State::receiving || answer_ == Answer::unknown) return;
   if (answer_ == Answer::samples) {
     if (reply_.size() < samples_length) return;

@@ -7,17 +7,16 @@
 #include <cstdint>
 #include <string_view>
 
-#include "absenc/protocol/conversation.hpp"
 #include "absenc/protocol/e201/explain.hpp"
 #include "absenc/protocol/e201/frame.hpp"
 #include "absenc/protocol/e201/timing.hpp"
+#include "absenc/protocol/request_reply.hpp"
 
 namespace absenc::e201 {
 
 /// One request and its reply at a time; a subclass decides what comes next.
-class Procedure : public Conversation<std::uint8_t> {
+class Procedure : public RequestReply {
  public:
-  void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   [[nodiscard]] std::string_view detail() const final { return explanation_.found; }
@@ -49,24 +48,16 @@ class Procedure : public Conversation<std::uint8_t> {
   [[nodiscard]] Explanation explain_reply(Error error, const Format& format = {}) const {
     return explain(format, error, request_[0], reply_);
   }
-  [[nodiscard]] Time sent_at() const { return sent_at_; }
-  [[nodiscard]] Time received_at() const { return received_at_; }
 
  private:
-  enum class State : std::uint8_t { ready, sending, receiving, settling, done };
+  void received(Bytes bytes) final;
+  void conclude() final;
 
-  void received(const Event<std::uint8_t>& event);
-  void conclude();
-
-  State state_ = State::done;
   Answer answer_{};
   bool emitting_ = false;
-  bool disturbed_ = false;  // something came before the request was out
   RequestText request_;
   ReplyText reply_;  // what no longer fits changes nothing
   Time earliest_{};
-  Time sent_at_{};
-  Time received_at_{};
   Error error_ = Error::none;
   Explanation explanation_{};
 };

@@ -22,7 +22,9 @@ constexpr std::string_view disagreement =
 }  // namespace
 
 Stream::Stream(const Format& format, Wire wire, unsigned attempts)
-    : format_(format), wire_(wire), attempts_(attempts), frame_attempts_left_(attempts) {}
+    : format_(format), wire_(wire), attempts_(attempts), frame_attempts_left_(attempts) {
+  state_ = State::ready;
+}
 
 void Stream::reset_channels() {
   if (!format_.has_ch2) return finish(Error::unsupported, no_channel2);
@@ -73,6 +75,7 @@ ByteStep Stream::next(Time now) {
       break;
     case State::settling:
       break;
+    case State::ending:
     case State::done:
       step.kind = ByteStep::Kind::done;
       break;
@@ -108,32 +111,8 @@ std::size_t Stream::expected() const {
   return wire_ == Wire::spi ? identity_bytes : 0;
 }
 
-void Stream::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::sent:
-      sent_at_ = received_at_ = event.at;
-      if (state_ == State::sending) state_ = disturbed_ ? State::settling : State::receiving;
-      break;
-    case ByteEvent::Kind::received:
-      received(event);
-      break;
-    case ByteEvent::Kind::line_error:
-      disturbed_ = true;
-      if (state_ == State::receiving) state_ = State::settling;
-      break;
-    case ByteEvent::Kind::silence:
-      if (state_ == State::receiving || state_ == State::settling) conclude();
-      break;
-    default:
-      break;
-  }
-}
-
-void Stream::received(const ByteEvent& event) {
-  if (state_ == State::done) return;
-  received_at_ = event.at;
-  for (const std::uint8_t byte : event.items) reply_.push_back(byte);
-  if (state_ == State::sending) disturbed_ = true;
+void Stream::received(Bytes bytes) {
+  for (const std::uint8_t byte : bytes) reply_.push_back(byte);
   const std::size_t wanted = expected();
   if (state_ != State::receiving || wanted == 0 || reply_.size() < wanted) return;
   // After a wrong reply more may be coming: the next request waits for silence. SPI has brought all there is.

@@ -7,10 +7,10 @@
 #include <optional>
 #include <string_view>
 
-#include "absenc/protocol/conversation.hpp"
 #include "absenc/protocol/encolink/channels.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
 #include "absenc/protocol/encolink/timing.hpp"
+#include "absenc/protocol/request_reply.hpp"
 
 namespace absenc::encolink {
 
@@ -20,9 +20,8 @@ enum class Wire : std::uint8_t { uart, spi };
 /// Frame after frame, as fast as the encoder answers: positions in channel 1, cycles of channel 2 once it was asked
 /// for, and one register access at a time in channel 3. A subclass decides what comes next. What of the format is
 /// unknown is asked first.
-class Stream : public Conversation<std::uint8_t> {
+class Stream : public RequestReply {
  public:
-  void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   [[nodiscard]] std::string_view detail() const final { return detail_; }
@@ -67,15 +66,13 @@ class Stream : public Conversation<std::uint8_t> {
 
   [[nodiscard]] const RegisterAccess& access() const { return access_; }
   [[nodiscard]] bool is_done() const { return state_ == State::done; }
-  [[nodiscard]] Time received_at() const { return received_at_; }
 
  private:
-  enum class State : std::uint8_t { ready, sending, receiving, settling, done };
   enum class Asked : std::uint8_t { position, reset, to_identify, identity };
 
   void begin_frame(Time now);
-  void received(const Event<std::uint8_t>& event);
-  void conclude();
+  void received(Bytes bytes) final;
+  void conclude() final;
   [[nodiscard]] Error check();
   void good_frame();
   void good_position();
@@ -95,14 +92,12 @@ class Stream : public Conversation<std::uint8_t> {
   unsigned frame_attempts_left_;
   unsigned access_attempts_left_ = 0;
 
-  State state_ = State::ready;
   Asked asked_ = Asked::position;
   bool identify_pending_ = false;
   bool uses_channel2_ = false;
   bool reset_pending_ = false;
   bool emits_frames_ = false;
   bool emit_pending_ = false;
-  bool disturbed_ = false;  // something came before the request was out, or a damaged character
 
   CycleReader cycle_;
   RegisterAccess access_;
@@ -117,8 +112,6 @@ class Stream : public Conversation<std::uint8_t> {
   std::uint32_t frames_ = 0;
   Time earliest_{};
   Time began_at_{};
-  Time sent_at_{};
-  Time received_at_{};
   Error error_ = Error::none;
   std::string_view detail_{};
 };

@@ -78,32 +78,8 @@ ByteStep Procedure::next(Time now) {
   return step;
 }
 
-void Procedure::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::sent:
-      sent_at_ = received_at_ = event.at;
-      if (state_ == State::sending) state_ = disturbed_ ? State::settling : State::receiving;
-      break;
-    case ByteEvent::Kind::received:
-      received(event);
-      break;
-    case ByteEvent::Kind::line_error:
-      disturbed_ = true;
-      if (state_ == State::receiving) state_ = State::settling;
-      break;
-    case ByteEvent::Kind::silence:
-      if (state_ == State::receiving || state_ == State::settling) conclude();
-      break;
-    default:
-      break;
-  }
-}
-
-void Procedure::received(const ByteEvent& event) {
-  if (state_ == State::done || state_ == State::ending) return;
-  received_at_ = event.at;
-  for (const std::uint8_t byte : event.items) reply_bytes_.push_back(byte);
-  if (state_ == State::sending) disturbed_ = true;
+void Procedure::received(Bytes bytes) {
+  for (const std::uint8_t byte : bytes) reply_bytes_.push_back(byte);
   if (state_ != State::receiving || reply_bytes_.size() < expected()) return;
   const Result<Reply> reply = decode_reply(format_, request_, reply_bytes_);
   // A refusal is complete and may be repeated at once. After anything else that is wrong more may be coming: wait for

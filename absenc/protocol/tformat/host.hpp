@@ -7,16 +7,15 @@
 #include <optional>
 #include <string_view>
 
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/request_reply.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 #include "absenc/protocol/tformat/timing.hpp"
 
 namespace absenc::tformat {
 
 /// One request and its checked reply at a time; a subclass decides what comes next.
-class Procedure : public Conversation<std::uint8_t> {
+class Procedure : public RequestReply {
  public:
-  void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   [[nodiscard]] std::string_view detail() const final { return detail_; }
@@ -42,14 +41,10 @@ class Procedure : public Conversation<std::uint8_t> {
   virtual void failed(Error error) { finish(error); }
 
   [[nodiscard]] const Request& request() const { return request_; }
-  [[nodiscard]] Time sent_at() const { return sent_at_; }
-  [[nodiscard]] Time received_at() const { return received_at_; }
 
  private:
-  enum class State : std::uint8_t { ready, sending, receiving, settling, ending, done };
-
-  void received(const Event<std::uint8_t>& event);
-  void conclude();
+  void received(Bytes bytes) final;
+  void conclude() final;
   void start(Time earliest);
   [[nodiscard]] bool selects_page() const;
   [[nodiscard]] std::size_t expected() const { return expected_length(request_.id, reply_bytes_); }
@@ -57,15 +52,11 @@ class Procedure : public Conversation<std::uint8_t> {
   Format format_;
   unsigned read_attempts_;
   unsigned attempts_left_ = 0;
-  State state_ = State::done;
-  bool disturbed_ = false;  // something came before the request was out, or a damaged character
   Request request_{};
   RequestBytes request_bytes_;
   // One character more than the longest reply tells "too long"; what no longer fits changes nothing.
   ByteBuffer<4 * reply_capacity> reply_bytes_;
   Time earliest_{};
-  Time sent_at_{};
-  Time received_at_{};
   Error error_ = Error::none;
   std::string_view detail_{};
 };
