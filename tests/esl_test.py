@@ -227,7 +227,7 @@ class Command(EslCase):
                             "address=6&singleturn=0xAAAA", latency=60)
         found = self.good_json("scan", line)["encoders"]
         self.assertEqual([(one["encoder_address"], one["clash"]) for one in found], [(0, False), (3, False), (6, True)])
-        self.assertEqual(found[1]["encoder_id"], 0xD8)
+        self.assertEqual((found[1]["singleturn"], found[1]["ch1_status"]), (5, ["ready"]))
         self.assertEqual(self.good_json("run", line, "scan")["encoders"][1], found[1])
         result = absenc("scan", line)
         self.assert_good(result)

@@ -93,13 +93,11 @@ Scan::Scan(const Profile& profile) : Procedure(profile, scan_attempts) {
 void Scan::answered(const Reply& reply) {
   answering_ = static_cast<std::uint8_t>(answering_ | 1u << address_);
   last_[address_] = reply;
-  if (reply.id != DataId::encoder_id) return ask(Request{DataId::encoder_id, address_}, received_at() + request_pause);
   go_on();
 }
 
 void Scan::failed(Error error) {
-  const bool found = request().id == DataId::encoder_id;
-  if (!found && error != Error::timeout) disturbed_ = static_cast<std::uint8_t>(disturbed_ | 1u << address_);
+  if (error != Error::timeout) disturbed_ = static_cast<std::uint8_t>(disturbed_ | 1u << address_);
   go_on();
 }
 
@@ -119,8 +117,7 @@ void Scan::report(FieldSink& sink) const {
     const Reply& reply = last_[address];
     if (!answers) continue;
     put(sink, field_ch1_status, reply.one.status);
-    if (reply.id != DataId::encoder_id) continue;
-    detail::put_part(sink, Part::encoder_id, reply, reply.one, true);
+    put(sink, field_singleturn, reply.singleturn);
   }
 }
 

@@ -54,8 +54,8 @@ class Poll final : public Procedure {
   std::uint64_t cycles_ = 0;
 };
 
-/// Asks every address for ID 5, and who answers for ID 8. An answer that is damaged every time tells of two encoders
-/// with one address, or of a bad line. Error: timeout when nobody answers at all.
+/// Asks every address for ID 5, never for ID 8: eight of these in a row are "dynamic addressing". An answer that is
+/// damaged every time tells of two encoders with one address, or of a bad line. Error: timeout when nobody answers.
 class Scan final : public Procedure {
  public:
   explicit Scan(const Profile& profile);
