@@ -84,7 +84,7 @@ std::shared_ptr<SharedLink> connect_link(const EncoderUri& uri) {
   const std::lock_guard lock(all.mutex);
   std::erase_if(all.opened, [](const Opened& opened) { return opened.link.expired(); });
   for (const Opened& opened : all.opened) {
-    const std::shared_ptr<SharedLink> link = opened.link.lock();
+    std::shared_ptr<SharedLink> link = opened.link.lock();
     if (link != nullptr && !link->lost() && share_line(opened.uri, uri)) return link;
   }
   auto link = std::make_shared<SharedLink>(open_link(uri));

@@ -203,7 +203,7 @@ constexpr bool skip_to_digit(Bytes text, std::size_t& at) {
 }
 
 /// Thousandths of the first number that is followed by `unit` (V or A) or by m and `unit`.
-[[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, char unit) {
+[[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, std::uint8_t unit) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     std::uint64_t milli = std::uint64_t{detail::number_at(text, at)} * 1000;
     if (at < text.size() && text[at] == '.') {
