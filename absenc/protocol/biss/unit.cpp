@@ -2,10 +2,10 @@
 #include "absenc/protocol/biss/unit.hpp"
 
 #include <array>
-#include <new>
 
 #include "absenc/protocol/biss/fields.hpp"
 #include "absenc/protocol/biss/vectors.hpp"
+#include "absenc/protocol/make.hpp"
 #include "absenc/protocol/word_options.hpp"
 
 namespace absenc::biss {
@@ -65,16 +65,16 @@ Delimit delimit(const Options&, Direction, Bytes bytes) { return {Delimit::Kind:
 
 Any<Conversation> host(const Options& values, const Command&, Arguments, std::span<std::byte> storage) {
   const Format format = to_format(values);
-  if (!is_usable(format.word) || !is_usable(format.scale) || storage.size() < sizeof(ReadPosition)) return {};
+  if (!is_usable(format.word) || !is_usable(format.scale)) return {};
   const Clocking clocking{.rate = static_cast<std::uint32_t>(values[option_ma_khz]) * 1000,
                           .latency = Time(values[option_latency_us])};
-  return {.bytes = new (storage.data()) ReadPosition(format, clocking)};
+  return make_host<ReadPosition>(storage, format, clocking);
 }
 
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
   const Format format = to_format(values);
-  if (!is_usable(format.word) || storage.size() < sizeof(VirtualEncoder)) return {};
-  return {.bytes = new (storage.data()) VirtualEncoder(format, shaft, behaviour_of(values))};
+  if (!is_usable(format.word)) return {};
+  return make_device<VirtualEncoder>(storage, format, shaft, behaviour_of(values));
 }
 
 Resolution resolution(const Options& values) {

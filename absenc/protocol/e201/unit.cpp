@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <new>
 
 #include "absenc/protocol/e201/device.hpp"
 #include "absenc/protocol/e201/fields.hpp"
 #include "absenc/protocol/e201/host.hpp"
 #include "absenc/protocol/e201/vectors.hpp"
+#include "absenc/protocol/make.hpp"
 #include "absenc/protocol/word_options.hpp"
 
 namespace absenc::e201 {
@@ -124,49 +124,44 @@ Delimit delimit(const Options&, Direction direction, Bytes bytes) {
   return {end == bytes.end() ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
 }
 
-template <class Conversation, class... Parameters>
-Any<absenc::Conversation> make(std::span<std::byte> storage, const Parameters&... parameters) {
-  if (storage.size() < sizeof(Conversation)) return {};
-  return {.bytes = new (storage.data()) Conversation(parameters...)};
-}
-
 Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                        std::span<std::byte> storage) {
   const Format format = to_format(values);
   const bool readable = is_usable(format) && absenc::is_usable(format.scale());
   switch (command.id) {
     case command::samples:
-      return readable ? make<ReadPosition>(storage, format) : Any<Conversation>{};
+      return readable ? make_host<ReadPosition>(storage, format) : Any<Conversation>{};
     case command::version:
-      return make<Info>(storage);
+      return make_host<Info>(storage);
     case command::set_clock:
       if (clock_of(arguments[0]) == 0) return {};
-      return make<Set>(storage, command::set_clock, clock_of(arguments[0]));
+      return make_host<Set>(storage, command::set_clock, clock_of(arguments[0]));
     case command::set_width:
-      return make<Set>(storage, command::set_width, static_cast<unsigned>(arguments[0]));
+      return make_host<Set>(storage, command::set_width, static_cast<unsigned>(arguments[0]));
     case command::zero:
-      return make<Zero>(storage, format);
+      return make_host<Zero>(storage, format);
     case command::supply_on:
     case command::supply_off:
-      return make<SwitchSupply>(storage, command.id == command::supply_on);
+      return make_host<SwitchSupply>(storage, command.id == command::supply_on);
     case command::clear_zero:
     case command::stream_off:
-      return make<Tell>(storage, command.id);
+      return make_host<Tell>(storage, command.id);
     case 0:
-      return readable ? make<ClockSweep>(storage, format, static_cast<unsigned>(arguments[0])) : Any<Conversation>{};
+      return readable ? make_host<ClockSweep>(storage, format, static_cast<unsigned>(arguments[0]))
+                      : Any<Conversation>{};
     default:
-      return make<Query>(storage, command.id);
+      return make_host<Query>(storage, command.id);
   }
 }
 
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
   const Format format = to_format(values);
-  if (!is_usable(format) || storage.size() < sizeof(VirtualAdapter)) return {};
+  if (!is_usable(format)) return {};
   const auto firmware = static_cast<unsigned>(values[option_firmware]);
   const AdapterSettings settings{
       .firmware = {firmware / 100, firmware % 100},
       .behaviour = {.latency = Time(values[option_latency_us]), .line_delay = Time(values[option_line_delay_ns])}};
-  return {.bytes = new (storage.data()) VirtualAdapter(format, shaft, settings)};
+  return make_device<VirtualAdapter>(storage, format, shaft, settings);
 }
 
 Resolution resolution(const Options& values) {

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <new>
 
 #include "absenc/protocol/encolink/fields.hpp"
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
 #include "absenc/protocol/encolink/procedures.hpp"
 #include "absenc/protocol/encolink/vectors.hpp"
+#include "absenc/protocol/make.hpp"
 
 namespace absenc::encolink {
 
@@ -228,23 +228,17 @@ bool covered(const Options& values, Frame request, Frame, std::size_t bit) {
 
 // ---- Machines
 
-template <class Conversation, class... Parameters>
-Any<absenc::Conversation> make(std::span<std::byte> storage, const Parameters&... parameters) {
-  if (storage.size() < sizeof(Conversation)) return {};
-  return {.bytes = new (storage.data()) Conversation(parameters...)};
-}
-
 template <Wire wire>
 Any<Conversation> run(const Format& format, const Command& command, Arguments arguments, std::span<std::byte> storage) {
   switch (command.id) {
     case id_identify:
-      return make<Identify>(storage, format, wire);
+      return make_host<Identify>(storage, format, wire);
     case id_listen:
-      return make<Listen>(storage, format, static_cast<std::uint32_t>(argument(command, arguments, 0)));
+      return make_host<Listen>(storage, format, static_cast<std::uint32_t>(argument(command, arguments, 0)));
     case id_self_calibrate:
-      return make<SelfCalibrate>(storage, format, wire);
+      return make_host<SelfCalibrate>(storage, format, wire);
     default:
-      return make<SendCommand>(storage, format, wire, command.id);
+      return make_host<SendCommand>(storage, format, wire, command.id);
   }
 }
 
@@ -255,29 +249,29 @@ Any<Conversation> host(const Options& values, const Command& command, Arguments 
   const auto value = [&](std::size_t index) { return argument(command, arguments, index); };
   switch (command.verb) {
     case Verb::read:
-      if (wire == Wire::uart && values[option_stream_rate] > 0) return make<Listen>(storage, format);
-      return make<ReadPosition>(storage, format, wire);
+      if (wire == Wire::uart && values[option_stream_rate] > 0) return make_host<Listen>(storage, format);
+      return make_host<ReadPosition>(storage, format, wire);
     case Verb::read_part:
-      return make<ReadDetailedStatus>(storage, format, wire);
+      return make_host<ReadDetailedStatus>(storage, format, wire);
     case Verb::info:
-      return make<ReadInfo>(storage, format, wire);
+      return make_host<ReadInfo>(storage, format, wire);
     case Verb::temperature:
-      return make<ReadRegister>(storage, format, wire, registers[temperature].address);
+      return make_host<ReadRegister>(storage, format, wire, registers[temperature].address);
     case Verb::zero:
-      return make<Zero>(storage, format, wire, to_build(values).offset_sign, to_keep(value(0)));
+      return make_host<Zero>(storage, format, wire, to_build(values).offset_sign, to_keep(value(0)));
     case Verb::reset_multiturn:
-      return make<PresetMultiturn>(storage, format, wire, static_cast<std::uint16_t>(value(0)), to_keep(value(1)));
+      return make_host<PresetMultiturn>(storage, format, wire, static_cast<std::uint16_t>(value(0)), to_keep(value(1)));
     case Verb::memory_read:
-      return make<ReadRegister>(storage, format, wire, static_cast<std::uint32_t>(value(0)),
-                                static_cast<std::uint16_t>(value(1)));
+      return make_host<ReadRegister>(storage, format, wire, static_cast<std::uint32_t>(value(0)),
+                                     static_cast<std::uint16_t>(value(1)));
     case Verb::memory_write:
-      return make<WriteRegister>(storage, format, wire, static_cast<std::uint32_t>(value(0)),
-                                 static_cast<std::uint16_t>(value(2)), static_cast<std::uint64_t>(value(1)));
+      return make_host<WriteRegister>(storage, format, wire, static_cast<std::uint32_t>(value(0)),
+                                      static_cast<std::uint16_t>(value(2)), static_cast<std::uint64_t>(value(1)));
     case Verb::config_get:
-      return make<ReadRegister>(storage, format, wire, registers[command.id].address);
+      return make_host<ReadRegister>(storage, format, wire, registers[command.id].address);
     case Verb::config_set:
-      return make<WriteRegister>(storage, format, wire, registers[command.id].address, std::uint16_t{0},
-                                 static_cast<std::uint64_t>(value(0)));
+      return make_host<WriteRegister>(storage, format, wire, registers[command.id].address, std::uint16_t{0},
+                                      static_cast<std::uint64_t>(value(0)));
     case Verb::run:
       return run<wire>(format, command, arguments, storage);
     default:
@@ -287,8 +281,7 @@ Any<Conversation> host(const Options& values, const Command& command, Arguments 
 
 template <Wire wire>
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-  if (storage.size() < sizeof(VirtualEncoder)) return {};
-  return {.bytes = new (storage.data()) VirtualEncoder(to_format(values), wire, shaft, to_build(values))};
+  return make_device<VirtualEncoder>(storage, to_format(values), wire, shaft, to_build(values));
 }
 
 // Those of the virtual encoder where they are asked from the real one.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <new>
 
 #include "absenc/protocol/esl/bus.hpp"
 #include "absenc/protocol/esl/device.hpp"
@@ -13,6 +12,7 @@
 #include "absenc/protocol/esl/probe.hpp"
 #include "absenc/protocol/esl/settings.hpp"
 #include "absenc/protocol/esl/vectors.hpp"
+#include "absenc/protocol/make.hpp"
 
 namespace absenc::esl {
 
@@ -132,12 +132,6 @@ Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
   return {bytes.size() < length ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
 }
 
-template <class Conversation, class... Parameters>
-Any<absenc::Conversation> make(std::span<std::byte> storage, const Parameters&... parameters) {
-  if (storage.size() < sizeof(Conversation)) return {};
-  return {.bytes = new (storage.data()) Conversation(parameters...)};
-}
-
 Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                        std::span<std::byte> storage) {
   const Profile profile = to_profile(values);
@@ -147,31 +141,30 @@ Any<Conversation> host(const Options& values, const Command& command, Arguments 
     case Verb::read_part:
     case Verb::info:
     case Verb::temperature:
-      return make<Read>(storage, profile, static_cast<DataId>(command.id));
+      return make_host<Read>(storage, profile, static_cast<DataId>(command.id));
     case Verb::clear_alarms:
     case Verb::zero:
     case Verb::reset_multiturn:
-      return make<Reset>(storage, profile, static_cast<DataId>(command.id));
+      return make_host<Reset>(storage, profile, static_cast<DataId>(command.id));
     case Verb::memory_read:
-      return make<ReadMemory>(storage, profile, argument(1), argument(0), argument(2));
+      return make_host<ReadMemory>(storage, profile, argument(1), argument(0), argument(2));
     case Verb::memory_write:
-      return make<WriteMemory>(storage, profile, argument(2), argument(0), argument(1),
-                               argument(3) != 0 ? Force::yes : Force::no);
+      return make_host<WriteMemory>(storage, profile, argument(2), argument(0), argument(1),
+                                    argument(3) != 0 ? Force::yes : Force::no);
     case Verb::run:
-      if (command.name == safe_position) return make<ReadSafePosition>(storage, profile);
-      if (command.name == led_or_lissajous) return make<ReadErrorInfo>(storage, profile);
-      if (command.name == select_page) return make<SelectPage>(storage, profile, argument(0));
+      if (command.name == safe_position) return make_host<ReadSafePosition>(storage, profile);
+      if (command.name == led_or_lissajous) return make_host<ReadErrorInfo>(storage, profile);
+      if (command.name == select_page) return make_host<SelectPage>(storage, profile, argument(0));
       return {};
     case Verb::scan:
-      return make<Scan>(storage, profile);
+      return make_host<Scan>(storage, profile);
     default:
       return {};
   }
 }
 
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-  if (storage.size() < sizeof(VirtualEncoder)) return {};
-  return {.bytes = new (storage.data()) VirtualEncoder(to_profile(values), shaft)};
+  return make_device<VirtualEncoder>(storage, to_profile(values), shaft);
 }
 
 bool probe_captures(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {

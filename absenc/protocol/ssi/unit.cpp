@@ -2,8 +2,8 @@
 #include "absenc/protocol/ssi/unit.hpp"
 
 #include <array>
-#include <new>
 
+#include "absenc/protocol/make.hpp"
 #include "absenc/protocol/ssi/device.hpp"
 #include "absenc/protocol/ssi/fields.hpp"
 #include "absenc/protocol/ssi/host.hpp"
@@ -73,14 +73,14 @@ Delimit delimit(const Options&, Direction, Bytes bytes) { return {Delimit::Kind:
 
 Any<Conversation> host(const Options& values, const Command&, Arguments, std::span<std::byte> storage) {
   const Format format = to_format(values);
-  if (!is_usable(format) || storage.size() < sizeof(ReadPosition)) return {};
-  return {.bytes = new (storage.data()) ReadPosition(format)};
+  if (!is_usable(format)) return {};
+  return make_host<ReadPosition>(storage, format);
 }
 
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
   const Format format = to_format(values);
-  if (!is_usable(format) || storage.size() < sizeof(VirtualEncoder)) return {};
-  return {.bytes = new (storage.data()) VirtualEncoder(format, shaft)};
+  if (!is_usable(format)) return {};
+  return make_device<VirtualEncoder>(storage, format, shaft);
 }
 
 Resolution resolution(const Options& values) {

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <new>
 
+#include "absenc/protocol/make.hpp"
 #include "absenc/protocol/tformat/device.hpp"
 #include "absenc/protocol/tformat/fields.hpp"
 #include "absenc/protocol/tformat/host.hpp"
@@ -138,12 +138,6 @@ Delimit delimit(const Options&, Direction direction, Bytes bytes) {
   return {bytes.size() < length ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
 }
 
-template <class Conversation, class... Parameters>
-Any<absenc::Conversation> make(std::span<std::byte> storage, const Parameters&... parameters) {
-  if (storage.size() < sizeof(Conversation)) return {};
-  return {.bytes = new (storage.data()) Conversation(parameters...)};
-}
-
 Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                        std::span<std::byte> storage) {
   const Format format = to_format(values);
@@ -152,29 +146,28 @@ Any<Conversation> host(const Options& values, const Command& command, Arguments 
     case Verb::read:
     case Verb::read_part:
     case Verb::info:
-      return make<ReadPosition>(storage, format, static_cast<DataId>(command.id));
+      return make_host<ReadPosition>(storage, format, static_cast<DataId>(command.id));
     case Verb::clear_alarms:
     case Verb::zero:
     case Verb::reset_multiturn:
-      return make<Reset>(storage, format, static_cast<DataId>(command.id));
+      return make_host<Reset>(storage, format, static_cast<DataId>(command.id));
     case Verb::memory_read:
-      return make<ReadMemory>(storage, format, argument(1), argument(0), argument(2));
+      return make_host<ReadMemory>(storage, format, argument(1), argument(0), argument(2));
     case Verb::memory_write:
-      return make<WriteMemory>(storage, format, argument(2), argument(0), argument(1));
+      return make_host<WriteMemory>(storage, format, argument(2), argument(0), argument(1));
     case Verb::temperature:
-      return make<ReadTemperature>(storage, format);
+      return make_host<ReadTemperature>(storage, format);
     case Verb::config_get:
-      return make<ReadOverheatThreshold>(storage, format);
+      return make_host<ReadOverheatThreshold>(storage, format);
     case Verb::config_set:
-      return make<WriteOverheatThreshold>(storage, format, argument(0));
+      return make_host<WriteOverheatThreshold>(storage, format, argument(0));
     default:
       return {};
   }
 }
 
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-  if (storage.size() < sizeof(VirtualEncoder)) return {};
-  return {.bytes = new (storage.data()) VirtualEncoder(to_format(values), shaft)};
+  return make_device<VirtualEncoder>(storage, to_format(values), shaft);
 }
 
 Resolution resolution(const Options& values) {

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a unit makes its machines in the storage that the caller gives.
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <span>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc {
+
+namespace detail {
+template <class Machine, class... Parameters>
+Machine* make_in(std::span<std::byte> storage, const Parameters&... parameters) {
+  return storage.size() < sizeof(Machine) ? nullptr : new (storage.data()) Machine(parameters...);
+}
+}  // namespace detail
+
+/// A host machine; none when the storage is too small.
+template <class Machine, class... Parameters>
+[[nodiscard]] Any<Conversation> make_host(std::span<std::byte> storage, const Parameters&... parameters) {
+  return {.bytes = detail::make_in<Machine>(storage, parameters...)};
+}
+
+/// A virtual encoder; none when the storage is too small.
+template <class Machine, class... Parameters>
+[[nodiscard]] Any<Device> make_device(std::span<std::byte> storage, const Parameters&... parameters) {
+  return {.bytes = detail::make_in<Machine>(storage, parameters...)};
+}
+
+}  // namespace absenc
