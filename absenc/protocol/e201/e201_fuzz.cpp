@@ -9,25 +9,14 @@
 #include "absenc/protocol/e201/device.hpp"
 #include "absenc/protocol/e201/fields.hpp"
 #include "absenc/protocol/e201/host.hpp"
+#include "tests/fuzz_toys.hpp"
 
 namespace {
 
 using namespace absenc;
 using namespace absenc::e201;
+using namespace absenc::fuzz;
 using Kind = Event<std::uint8_t>::Kind;
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-struct Still final : Shaft {
-  [[nodiscard]] ShaftState at(Time) const override { return {}; }
-};
-
-struct Counting final : FieldSink {
-  void put(const FieldValue&) override { ++count; }
-  unsigned count = 0;
-};
 
 const Format encoders[]{
     {},

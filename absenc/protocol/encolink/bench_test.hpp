@@ -11,6 +11,7 @@
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
 #include "absenc/protocol/encolink/procedures.hpp"
+#include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/line.hpp"
 
 namespace absenc::encolink::testing {
@@ -18,25 +19,7 @@ namespace absenc::encolink::testing {
 inline constexpr Format single{.resolution = 20, .multiturn_bits = 0};
 inline constexpr Format multi{.resolution = 20, .multiturn_bits = 16};
 
-/// A shaft that can be grabbed: constant speed from where it was put.
-struct TestShaft final : Shaft {
-  [[nodiscard]] ShaftState at(Time time) const override {
-    ShaftState state = start;
-    const double revolutions = state.speed_millirpm / 60'000.0 * std::chrono::duration<double>(time - since).count();
-    state.position += static_cast<std::int64_t>(revolutions * 4294967296.0);
-    return state;
-  }
-  /// `counts` of 20 bits after `turns` whole turns.
-  void put(std::int64_t turns, std::int64_t counts) { start.position = (turns << 32) + (counts << 12); }
-  void spin(std::int32_t rpm, Time now) {
-    start.position = at(now).position;
-    since = now;
-    start.speed_millirpm = rpm * 1000;
-  }
-
-  ShaftState start{};
-  Time since{};
-};
+using TestShaft = sim::testing::TestShaft<20>;
 
 /// Changes what the encoder sends; by default nothing. `frame` counts replies from 0.
 class Tampered final : public Machine<std::uint8_t> {

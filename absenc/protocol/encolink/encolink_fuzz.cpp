@@ -10,24 +10,13 @@
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
 #include "absenc/protocol/encolink/procedures.hpp"
+#include "tests/fuzz_toys.hpp"
 
 namespace {
 
 using namespace absenc;
 using namespace absenc::encolink;
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-struct Still final : Shaft {
-  [[nodiscard]] ShaftState at(Time) const override { return {}; }
-};
-
-struct Counting final : FieldSink {
-  void put(const FieldValue&) override { ++count; }
-  unsigned count = 0;
-};
+using namespace absenc::fuzz;
 
 // The first byte chooses the format.
 Format format_of(std::uint8_t byte) {

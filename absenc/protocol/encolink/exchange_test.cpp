@@ -119,15 +119,7 @@ class Campaign {
   std::uint64_t registers_ = 0;
 };
 
-sim::FaultRates damaged_replies(double share) {
-  sim::FaultRates rates;
-  for (const FaultKind kind : {FaultKind::drop, FaultKind::truncate, FaultKind::delay, FaultKind::echo,
-                               FaultKind::garbage, FaultKind::silence, FaultKind::repeat}) {
-    rates[kind] = share / 5;
-  }
-  rates[FaultKind::corrupt] = share;
-  return rates;
-}
+using sim::testing::damaged_replies;
 
 void expect_no_violation(const Campaign& campaign) {
   for (const Violation& violation : campaign.encoder().violations()) {

@@ -12,60 +12,16 @@
 #include "absenc/protocol/esl/device.hpp"
 #include "absenc/protocol/esl/host.hpp"
 #include "absenc/protocol/esl/memory.hpp"
+#include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/line.hpp"
 
 namespace absenc::esl::testing {
 
-/// A shaft that can be grabbed: constant speed from where it was put.
-struct TestShaft final : Shaft {
-  [[nodiscard]] ShaftState at(Time time) const override {
-    ShaftState state = start;
-    const double revolutions = state.speed_millirpm / 60'000.0 * std::chrono::duration<double>(time - since).count();
-    state.position += static_cast<std::int64_t>(revolutions * 4294967296.0);
-    return state;
-  }
-  /// `counts` of 24 bits after `turns` whole turns.
-  void put(std::int64_t turns, std::int64_t counts) { start.position = (turns << 32) + (counts << 8); }
-  void spin(std::int32_t rpm, Time now) {
-    start.position = at(now).position;
-    since = now;
-    start.speed_millirpm = rpm * 1000;
-  }
+using TestShaft = sim::testing::TestShaft<24>;
 
-  ShaftState start{};
-  Time since{};
-};
-
-/// Sends any bytes and keeps what comes back until the line is silent.
-class RawHost final : public Machine<std::uint8_t> {
- public:
-  explicit RawHost(std::vector<std::uint8_t> request, Time at = {}) : request_(std::move(request)), at_(at) {}
-
-  void feed(const Event<std::uint8_t>& event) override {
-    if (event.kind == Event<std::uint8_t>::Kind::sent) sent_at = event.at;
-    if (event.kind == Event<std::uint8_t>::Kind::received) {
-      if (reply.empty()) first_byte_at = event.at;
-      reply.insert(reply.end(), event.items.begin(), event.items.end());
-    }
-    if (event.kind == Event<std::uint8_t>::Kind::silence) done_ = true;
-  }
-  Step<std::uint8_t> next(Time) override {
-    using Kind = Step<std::uint8_t>::Kind;
-    if (done_) return {.kind = Kind::done};
-    if (sending_) return {.at = never, .answer = answer_limit, .gap = gap_limit};
-    sending_ = true;
-    return {.kind = Kind::transfer, .out = request_, .at = at_};
-  }
-
-  std::vector<std::uint8_t> reply;
-  Time sent_at{};
-  Time first_byte_at{};
-
- private:
-  std::vector<std::uint8_t> request_;
-  Time at_;
-  bool sending_ = false;
-  bool done_ = false;
+struct RawHost final : sim::testing::RawHost {
+  explicit RawHost(std::vector<std::uint8_t> request, Time at = {})
+      : sim::testing::RawHost(std::move(request), answer_limit, gap_limit, at) {}
 };
 
 /// Changes the n-th reply (from 0) of an encoder as a script wants, on its way to the line.

@@ -9,24 +9,13 @@
 #include "absenc/protocol/esl/fields.hpp"
 #include "absenc/protocol/esl/host.hpp"
 #include "absenc/protocol/esl/probe.hpp"
+#include "tests/fuzz_toys.hpp"
 
 namespace {
 
 using namespace absenc;
 using namespace absenc::esl;
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-struct Still final : Shaft {
-  [[nodiscard]] ShaftState at(Time) const override { return {}; }
-};
-
-struct Counting final : FieldSink {
-  void put(const FieldValue&) override { ++count; }
-  unsigned count = 0;
-};
+using namespace absenc::fuzz;
 
 // The profile that the first byte stands for.
 Profile profile_of(Bytes input) {

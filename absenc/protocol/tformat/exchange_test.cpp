@@ -157,15 +157,7 @@ class Campaign {
 
 using sim::FaultKind;
 
-sim::FaultRates damaged_replies() {
-  sim::FaultRates rates;
-  for (const FaultKind kind : {FaultKind::drop, FaultKind::truncate, FaultKind::delay, FaultKind::echo,
-                               FaultKind::garbage, FaultKind::silence, FaultKind::repeat}) {
-    rates[kind] = 0.02;
-  }
-  rates[FaultKind::corrupt] = 0.1;
-  return rates;
-}
+using sim::testing::damaged_replies;
 
 void expect_every_fault(const Campaign& campaign, const sim::FaultRates& rates) {
   EXPECT_GT(campaign.accepted(), exchanges_per_seed / 4);
@@ -179,7 +171,7 @@ void expect_every_fault(const Campaign& campaign, const sim::FaultRates& rates) 
 class TformatExchange : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(TformatExchange, QuarterOfAMillionWithDamagedReplies) {
-  const sim::FaultRates rates = damaged_replies();
+  const sim::FaultRates rates = damaged_replies(0.1);
   Campaign campaign(GetParam(), rates);
   campaign.run(exchanges_per_seed);
   expect_every_fault(campaign, rates);
@@ -192,7 +184,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, TformatExchange, ::testing::Values(1, 2, 3, 4));
 
 // What the encoder hears is not what the host sent, so it may see rules broken that the host did not break: rarely.
 TEST(TformatExchangeBothWays, QuarterOfAMillionWithDamagedRequestsToo) {
-  sim::FaultRates rates = damaged_replies();
+  sim::FaultRates rates = damaged_replies(0.1);
   rates[FaultKind::request_corrupt] = 0.02;
   Campaign campaign(5, rates);
   campaign.run(exchanges_per_seed);

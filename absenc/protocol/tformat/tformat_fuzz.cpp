@@ -7,24 +7,13 @@
 #include "absenc/protocol/tformat/device.hpp"
 #include "absenc/protocol/tformat/fields.hpp"
 #include "absenc/protocol/tformat/host.hpp"
+#include "tests/fuzz_toys.hpp"
 
 namespace {
 
 using namespace absenc;
 using namespace absenc::tformat;
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-struct Still final : Shaft {
-  [[nodiscard]] ShaftState at(Time) const override { return {}; }
-};
-
-struct Counting final : FieldSink {
-  void put(const FieldValue&) override { ++count; }
-  unsigned count = 0;
-};
+using namespace absenc::fuzz;
 
 // Every split of the input into request and reply; an error puts no field, a good reply has its own length.
 void decode_all_splits(Bytes input) {
