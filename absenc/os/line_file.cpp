@@ -34,7 +34,9 @@ LineFile::LineFile(const std::string& path)
     : path_(path), file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0666)) {
   if (file_) return;
   const int error = errno;
-  if (error == EEXIST) throw Failure(Failure::Kind::in_use, "there is already a file " + path);
+  if (error == EEXIST)
+    throw Failure(Failure::Kind::in_use,
+                  "there is already a file " + path + ", which stays as it is: choose another name");
   throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
 }
 
