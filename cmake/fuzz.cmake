@@ -10,7 +10,7 @@ foreach(source IN LISTS fuzz_sources)
   add_executable(${name} "${source}")
   absenc_settings(${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/fuzzers")
-  target_link_libraries(${name} PRIVATE absenc::absenc)
+  target_link_libraries(${name} PRIVATE absenc::absenc absenc::capture)
   target_link_options(${name} PRIVATE -fsanitize=fuzzer)
 endforeach()
 
