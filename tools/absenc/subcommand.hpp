@@ -87,6 +87,7 @@ extern const Subcommand emulate_subcommand;
 extern const Subcommand decode_subcommand;
 extern const Subcommand encode_subcommand;
 extern const Subcommand probe_subcommand;
+extern const Subcommand crc_find_subcommand;
 extern const Subcommand vectors_subcommand;
 extern const Subcommand bench_subcommand;
 

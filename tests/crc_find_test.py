@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The check of an encoder that nobody has a document for, found from its frames."""
+import json
+import random
+import unittest
+
+from command_support import Case, absenc
+
+
+def crc(data, width, poly, init, xorout, reflected=False):
+    """Bit by bit, written down once more. `reflected`: refin and refout."""
+    remainder = init
+    for byte in data:
+        for bit in range(8) if reflected else range(7, -1, -1):
+            feedback = remainder >> (width - 1) & 1 ^ byte >> bit & 1
+            remainder = (remainder << 1 & (1 << width) - 1) ^ (poly if feedback else 0)
+    if reflected:
+        remainder = int(f"{remainder:0{width}b}"[::-1], 2)
+    return remainder ^ xorout
+
+
+class CrcFind(Case):
+    def setUp(self):
+        super().setUp()
+        self.random = random.Random(1)
+
+    def find(self, option, frames, *arguments):
+        return absenc("crc", "find", *[word for frame in frames for word in (option, frame)], *arguments)
+
+    def best(self, option, frames):
+        result = self.find(option, frames, "--json")
+        self.assert_good(result)
+        return json.loads(result.stdout)["solutions"][0]
+
+    def encolink_frames(self, count):
+        frames = [self.random.randbytes(5) for _ in range(count)]
+        return [(frame + bytes([crc(frame, 8, 0x97, 0, 0xFF)])).hex() for frame in frames]
+
+    def test_rls(self):
+        best = self.best("--hex", self.encolink_frames(4))
+        self.assertEqual((best["width"], best["poly"], best["init"], best["xorout"]), (8, "0x97", "0x00", "0xFF"))
+        self.assertEqual((best["refin"], best["refout"], best["covered_from"]), (False, False, [0]))
+
+    def test_esl_of_both_channels(self):
+        frames = []
+        for _ in range(4):
+            channels = [self.random.randbytes(10), self.random.randbytes(6)]
+            frames.append(b"".join(channel + crc(channel, 16, 0x5935, init, 0, True).to_bytes(2, "little")
+                                   for channel, init in zip(channels, (0, 0xFFFF))).hex())
+        result = self.find("--hex", frames, "--json")
+        self.assert_good(result)
+        first, second = sorted(json.loads(result.stdout)["solutions"][:2], key=lambda one: one["behind_check"])
+        for one, init, start, behind in ((first, "0xFFFF", 12, 0), (second, "0x0000", 0, 8)):
+            self.assertEqual((one["poly"], one["init"], one["refin"], one["byte_order"]),
+                             ("0x5935", init, True, "low_first"))
+            self.assertEqual((one["covered_from"], one["behind_check"]), ([start], behind))
+
+    def test_biss(self):
+        words = [self.random.randbytes(4) for _ in range(6)]
+        frames = ["".join(f"{byte:08b}" for byte in word) + f"{crc(word, 6, 3, 0, 0x3F):06b}" for word in words]
+        best = self.best("--bits", frames)
+        self.assertEqual((best["width"], best["poly"], best["xorout"], best["covered_from"]), (6, "0x03", "0x3F", [0]))
+
+    def test_for_people(self):
+        result = self.find("--hex", self.encolink_frames(6))
+        self.assert_good(result)
+        heading, best = result.stdout.splitlines()[:2]
+        self.assertEqual(heading.split()[:4], ["check", "width", "poly", "Koopman"])
+        self.assertEqual(best.split()[:4], ["CRC", "8", "0x97", "0xCB"])
+        self.assertIn("bytes 0 to 4", best)
+        self.assertEqual(result.stderr, "")
+
+    def test_says_how_many_more_frames(self):
+        result = self.find("--hex", self.encolink_frames(4))
+        self.assertIn("1 more frame with other data would settle it", result.stderr)
+        self.assertIn("3 more frames with other data", self.find("--hex", self.encolink_frames(2)).stderr)
+        result = self.find("--hex", [self.random.randbytes(20).hex() for _ in range(2)])
+        self.assertIn("tell too little", result.stderr)
+
+    def test_a_damaged_frame_is_named(self):
+        frames = self.encolink_frames(8)
+        frames[5] = f"{int(frames[5], 16) ^ 0x100:012x}"
+        result = self.find("--hex", frames)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("except frame 6", result.stderr)
+
+    def test_noise(self):
+        result = self.find("--hex", [self.random.randbytes(8).hex() for _ in range(8)])
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("explains all frames", result.stderr)
+
+    def test_wrong_usage(self):
+        for arguments, words in [([], "one frame fits"), (["--hex", "1A00"], "one frame fits"),
+                                 (["--hex", "1A", "--hex", "00"], "too short"),
+                                 (["--hex", "1A00", "--bits", "0101"], "all with --bits"),
+                                 (["--hex", "1G"], "is not a hexadecimal digit"),
+                                 (["--bits", "0120"], "is not a bit"),
+                                 (["--hex", "00" * 65] * 2, "more than the 64")]:
+            with self.subTest(arguments):
+                result = absenc("crc", "find", *arguments)
+                self.assertEqual(result.returncode, 2)
+                self.assertIn(words, result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
