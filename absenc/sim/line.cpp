@@ -66,6 +66,11 @@ void Line<Item>::observe_exchanges(ExchangeObserver observer) {
 }
 
 template <class Item>
+void Line<Item>::observe_pulses(PulseObserver observer) {
+  pulse_observer_ = std::move(observer);
+}
+
+template <class Item>
 Role Line<Item>::role(Node node) const {
   return nodes_[node]->role;
 }

@@ -40,6 +40,8 @@ class Line {
   };
   /// Called for every exchange, at its end.
   using ExchangeObserver = std::function<void(const Exchange& exchange)>;
+  /// Called for every pulse, at its beginning.
+  using PulseObserver = std::function<void(absenc::Line line, Time start, Time end)>;
 
   Line(LinkKind kind, LineSettings settings);
   ~Line();
@@ -55,6 +57,7 @@ class Line {
   void set_echo(Node node, bool echo);
   void observe(Observer observer);
   void observe_exchanges(ExchangeObserver observer);
+  void observe_pulses(PulseObserver observer);
 
   [[nodiscard]] Time now() const { return now_; }
   [[nodiscard]] Role role(Node node) const;
@@ -114,6 +117,7 @@ class Line {
   std::priority_queue<Happening, std::vector<Happening>, std::greater<>> happenings_;
   Observer observer_;
   ExchangeObserver exchange_observer_;
+  PulseObserver pulse_observer_;
   bool frame_on_bus_ = false;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What tests/shape_test.cpp does not need of sim::Line.
 #include "absenc/sim/line.hpp"
+#include "absenc/sim/can_bits.hpp"
 
 #include <gtest/gtest.h>
 
@@ -150,8 +151,13 @@ class CanPuppet final : public Machine<CanFrame> {
 };
 
 struct CanLine : testing::Test {
-  Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};  // an empty frame takes 47 us
+  Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};
   CanPuppet host{0, microseconds(1'000'000), false};
+  // "57000 4 ": the end of a frame that began so many us after the start, and its identifier.
+  static std::string seen(std::uint32_t id, std::size_t after) {
+    return std::to_string((after + length(id)) * 1000) + ' ' + std::to_string(id) + ' ';
+  }
+  static std::size_t length(std::uint32_t id) { return can_bits({.id = id}).size() + can_intermission_bits; }
   std::string run(CanPuppet first, CanPuppet second) {
     line.attach(Role::device, first);
     line.attach(Role::device, second);
@@ -162,15 +168,24 @@ struct CanLine : testing::Test {
 };
 
 TEST_F(CanLine, WhoeverBeginsAtOneTimeTakesPartInTheArbitration) {
-  EXPECT_EQ(run({5, microseconds(10), false}, {4, microseconds(10), true}), "57000 4 104000 5 ");
+  EXPECT_EQ(run({5, microseconds(10), false}, {4, microseconds(10), true}), seen(4, 10) + seen(5, 10 + length(4)));
 }
 
 TEST_F(CanLine, SameIdentifierLaterIsNoClash) {
-  EXPECT_EQ(run({5, microseconds(10), false}, {5, microseconds(20), false}), "57000 5 104000 5 ");
+  EXPECT_EQ(run({5, microseconds(10), false}, {5, microseconds(20), false}), seen(5, 10) + seen(5, 10 + length(5)));
 }
 
 TEST_F(CanLine, IdenticalFramesAreOne) {
-  EXPECT_EQ(run({5, microseconds(10), false}, {5, microseconds(10), false}), "57000 5 ");
+  EXPECT_EQ(run({5, microseconds(10), false}, {5, microseconds(10), false}), seen(5, 10));
+}
+
+TEST(CanBits, ABitOfTheOtherKindFollowsFiveEqualOnes) {
+  const std::vector<bool> bits = can_bits({.id = 0x7F0});
+  const std::vector<bool> begin{false, true,  true,  true,  true,  true,  false, true,
+                                true,  false, false, false, false, false, true};
+  EXPECT_EQ(std::vector<bool>(bits.begin(), bits.begin() + 15), begin);
+  EXPECT_EQ(std::vector<bool>(bits.end() - 10, bits.end()),
+            (std::vector<bool>{true, false, true, true, true, true, true, true, true, true}));
 }
 
 TEST(LineSettingsOfALine, RateIsNeeded) { EXPECT_THROW(Line<Byte>(LinkKind::can, {}), std::invalid_argument); }

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "absenc/sim/can_bits.hpp"
 #include "absenc/sim/line.hpp"
 #include "absenc/sim/line_state.hpp"
 
@@ -25,10 +26,7 @@ std::uint32_t arbitration_field(const CanFrame& frame) {
   return (frame.id >> 18) << 21 | 3u << 19 | (frame.id & 0x3FFFF) << 1 | remote;
 }
 
-// With the interframe space, without stuff bits.
-std::size_t frame_bits(const CanFrame& frame) {
-  return 47 + (frame.remote ? 0 : 8u * frame.size) + (frame.extended ? 20 : 0);
-}
+std::size_t frame_bits(const CanFrame& frame) { return can_bits(frame).size() + can_intermission_bits; }
 
 }  // namespace
 
@@ -40,6 +38,7 @@ void Line<Item>::begin(Node node) {
   state.index = 0;
   if (state.doing == Step<Item>::Kind::pulse) {
     schedule(Happening::Kind::finished, now_ + state.width, node);
+    if (pulse_observer_) pulse_observer_(state.pulse_line, now_, now_ + state.width);
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (other == node) continue;
       feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .line = state.pulse_line, .width = state.width});

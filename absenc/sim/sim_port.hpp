@@ -32,6 +32,9 @@ class SimPort final : public Port<Item> {
   /// Without a RealTime, a wait for something that can never happen is a std::logic_error.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
 
+  /// To observe it.
+  [[nodiscard]] Line<Item>& line() { return line_; }
+
   void set_echo(bool echo) { line_.set_echo(host_node_, echo); }
 
  private:

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/sim/vcd.hpp"
+#include "absenc/sim/waveform.hpp"
 
 #include <algorithm>
 #include <bit>
-#include <stdexcept>
 #include <utility>
 
 #include "absenc/core/bit_view.hpp"
+#include "absenc/sim/can_bits.hpp"
 
 namespace absenc::sim {
 
@@ -17,6 +17,7 @@ constexpr std::size_t line = 0;
 constexpr std::size_t host = 0, device = 1;
 constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
 constexpr std::size_t clock = 0, data = 1;
+constexpr std::size_t can = 0;
 
 // The boundary after `part` of `parts` equal parts, to the nearest nanosecond.
 struct Scale {
@@ -40,9 +41,6 @@ std::string to_hex(Bytes bytes) {
   return text;
 }
 
-// Identifiers are printable characters from '!' on.
-char identifier(std::size_t wire) { return static_cast<char>('!' + wire); }
-
 }  // namespace
 
 Waveform::Waveform(LinkKind kind, const LineSettings& settings) : kind_(kind), settings_(settings) {
@@ -60,7 +58,8 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings) : kind_(kind), s
       wires_ = {{"clock", true}, {"data", true}};
       break;
     case LinkKind::can:
-      throw std::invalid_argument("CAN has no waveform");
+      wires_ = {{"can", true}};
+      break;
   }
 }
 
@@ -69,6 +68,11 @@ void Waveform::observe(Line<std::uint8_t>& observed) {
     character(observed.role(sender), start, end, byte);
   });
   observed.observe_exchanges([this](const Line<std::uint8_t>::Exchange& seen) { exchange(seen); });
+  observed.observe_pulses([this](absenc::Line by, Time start, Time end) { pulse(by, start, end); });
+}
+
+void Waveform::observe(Line<CanFrame>& observed) {
+  observed.observe([this](std::size_t, Time start, Time, const CanFrame& seen) { frame(start, seen); });
 }
 
 void Waveform::drive(std::size_t wire, Time from, Time to) {
@@ -130,42 +134,58 @@ void Waveform::draw_exchange(const Line<std::uint8_t>::Exchange& seen) {
   }
 }
 
-std::string Waveform::vcd(std::string_view title) const {
-  std::string text = "$version absenc $end\n$timescale 1 ns $end\n";
-  // Not among the changes, where the standard allows them too: sigrok's reader stops at the first.
-  std::vector<Comment> comments = comments_;
-  std::stable_sort(comments.begin(), comments.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
-  for (const Comment& comment : comments) {
-    text += "$comment #" + std::to_string(comment.at.count()) + ' ' + comment.words + " $end\n";
+void Waveform::frame(Time start, const CanFrame& frame) {
+  const std::vector<bool> bits = can_bits(frame);
+  const auto count = static_cast<std::int64_t>(bits.size());
+  const Scale edge{start, settings_.bits(bits.size()), count};
+  for (std::int64_t i = 0; i < count; ++i) {
+    if (!bits[static_cast<std::size_t>(i)]) drive(can, edge(i), edge(i + 1));
   }
-  text += "$scope module " + std::string(title) + " $end\n";
-  for (std::size_t i = 0; i < wires_.size(); ++i) {
-    text += std::string("$var wire 1 ") + identifier(i) + ' ' + std::string(wires_[i].name) + " $end\n";
-  }
-  return text + "$upscope $end\n$enddefinitions $end\n" + changes();
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string id;
+  for (unsigned digit = frame.extended ? 8 : 3; digit-- > 0;) id += digits[frame.id >> 4 * digit & 15];
+  comments_.push_back({start, id + (frame.remote ? " remote" : ": " + to_hex(frame.bytes()))});
+  end_ = std::max(end_, edge(count));
 }
 
-// At 0 all levels, then what has changed; each time once.
-std::string Waveform::changes() const {
+void Waveform::pulse(absenc::Line by, Time start, Time end) {
+  drive(pulse_wire(by == absenc::Line::trigger ? "trigger" : "clear"), start, end);
+}
+
+std::size_t Waveform::pulse_wire(std::string_view name) {
+  const auto known = std::find_if(wires_.begin(), wires_.end(), [&](const Wire& wire) { return wire.name == name; });
+  if (known == wires_.end()) {
+    wires_.push_back({name, true});
+    return wires_.size() - 1;
+  }
+  return static_cast<std::size_t>(known - wires_.begin());
+}
+
+std::vector<Waveform::Comment> Waveform::comments() const {
+  std::vector<Comment> sorted = comments_;
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
+  return sorted;
+}
+
+std::vector<Waveform::Wire> Waveform::wires() const {
   std::vector<Change> sorted = changes_;
   std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
-  std::vector<int> drivers(wires_.size());
-  std::vector<int> told(wires_.size(), -1);
-  std::string text;
-  auto change = sorted.begin();
-  for (Time at{};; at = change->at) {
+  std::vector<Wire> wires = wires_;
+  std::vector<int> drivers(wires.size());
+  for (auto change = sorted.begin(); change != sorted.end();) {
+    const Time at = change->at;
+    std::vector<int> before = drivers;
     for (; change != sorted.end() && change->at == at; ++change) drivers[change->wire] += change->by;
-    std::string levels;
-    for (std::size_t i = 0; i < wires_.size(); ++i) {
-      const int level = (drivers[i] == 0) == wires_[i].idle ? 1 : 0;
-      if (std::exchange(told[i], level) != level) levels += std::to_string(level) + identifier(i) + '\n';
+    for (std::size_t i = 0; i < wires.size(); ++i) {
+      if ((before[i] == 0) == (drivers[i] == 0)) continue;
+      if (at == Time{}) {
+        wires[i].before = !wires[i].idle;
+      } else {
+        wires[i].changes.push_back(at);
+      }
     }
-    if (!levels.empty()) text += '#' + std::to_string(at.count()) + '\n' + levels;
-    if (change == sorted.end()) break;
   }
-  // Viewers and decoders end with the last time: leave room behind the last stop bit.
-  constexpr Time margin = std::chrono::microseconds(10);
-  return text + '#' + std::to_string((end_ + margin).count()) + '\n';
+  return wires;
 }
 
 }  // namespace absenc::sim

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Waveforms as text, and as sigrok-cli's decoders read them.
-#include "absenc/sim/vcd.hpp"
+#include "absenc/sim/waveform.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,12 +11,15 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 
+#include "absenc/capture/drawing.hpp"
 #include "absenc/protocol/biss/bench_test.hpp"
 #include "absenc/protocol/ssi/device.hpp"
 #include "absenc/protocol/ssi/host.hpp"
 #include "absenc/protocol/tformat/bench_test.hpp"
+#include "absenc/sim/can_bits.hpp"
 #include "tests/shape_toys.hpp"
 
 namespace absenc::sim {
@@ -27,37 +30,43 @@ using ::testing::HasSubstr;
 
 constexpr LineSettings slow{.rate = 1'000'000};
 
+std::string vcd(const Waveform& waveform, const std::string& title) {
+  std::ostringstream text;
+  capture::write_vcd(text, capture::drawing_of(title, waveform));
+  return text.str();
+}
+
 std::string body(const Waveform& waveform) {
-  const std::string text = waveform.vcd("test");
+  const std::string text = vcd(waveform, "test");
   const std::size_t end = text.find("$enddefinitions $end\n");
   EXPECT_NE(end, std::string::npos);
   return text.substr(end + 21);
 }
 
 TEST(Waveform, NamesItsWires) {
-  EXPECT_THAT(Waveform(LinkKind::exchange, slow).vcd("encolink"),
+  EXPECT_THAT(vcd(Waveform(LinkKind::exchange, slow), "encolink"),
               ::testing::StartsWith("$version absenc $end\n$timescale 1 ns $end\n$scope module encolink $end\n"
                                     "$var wire 1 ! cs $end\n$var wire 1 \" sck $end\n$var wire 1 # mosi $end\n"
                                     "$var wire 1 $ miso $end\n$upscope $end\n$enddefinitions $end\n#0\n"
                                     "1!\n0\"\n0#\n1$\n"));
-  EXPECT_THAT(Waveform(LinkKind::full_duplex, slow).vcd("x"), HasSubstr("! host $end\n$var wire 1 \" device $end\n"));
-  EXPECT_THROW(Waveform(LinkKind::can, slow), std::invalid_argument);
+  EXPECT_THAT(vcd(Waveform(LinkKind::full_duplex, slow), "x"), HasSubstr("! host $end\n$var wire 1 \" device $end\n"));
+  EXPECT_THAT(vcd(Waveform(LinkKind::can, slow), "x"), HasSubstr("! can $end\n"));
 }
 
 TEST(Waveform, CommentsListTheItems) {
   Waveform waveform(LinkKind::full_duplex, slow);
   waveform.character(Role::device, 7us, 17us, 0x00);
   waveform.character(Role::host, 5us, 15us, 0x1A);
-  EXPECT_THAT(waveform.vcd("x"), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
-                                           "$comment #7000 device 00 $end\n$scope"));
+  EXPECT_THAT(vcd(waveform, "x"), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
+                                            "$comment #7000 device 00 $end\n$scope"));
   Waveform spi(LinkKind::exchange, slow);
   const std::array<std::uint8_t, 2> out{0x12, 0x34};
   const std::array<std::uint8_t, 2> in{0xAB, 0xCD};
   spi.exchange({0us, 16us, 16, out, in});
-  EXPECT_THAT(spi.vcd("x"), HasSubstr("$comment #0 mosi 12 34 miso AB CD $end\n"));
+  EXPECT_THAT(vcd(spi, "x"), HasSubstr("$comment #0 mosi 12 34 miso AB CD $end\n"));
   Waveform clocked(LinkKind::clocked, slow);
   clocked.exchange({0us, 12us, 12, {}, in});
-  EXPECT_THAT(clocked.vcd("x"), HasSubstr("$comment #0 12 bits AB CD $end\n"));
+  EXPECT_THAT(vcd(clocked, "x"), HasSubstr("$comment #0 12 bits AB CD $end\n"));
 }
 
 TEST(Waveform, Character) {
@@ -127,6 +136,18 @@ TEST(Waveform, ClockedBits) {
             "#3500\n1!\n0\"\n#4000\n0!\n#4500\n1!\n1\"\n#14500\n");
 }
 
+TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
+  Waveform waveform(LinkKind::full_duplex, slow);
+  waveform.pulse(absenc::Line::trigger, 1us, 3us);
+  waveform.pulse(absenc::Line::clear, 5us, 6us);
+  const std::vector<Waveform::Wire> wires = waveform.wires();
+  ASSERT_EQ(wires.size(), 4u);
+  EXPECT_EQ(wires[2].name, "trigger");
+  EXPECT_EQ(wires[2].changes, (std::vector<Time>{1us, 3us}));
+  EXPECT_EQ(wires[3].name, "clear");
+  EXPECT_EQ(wires[3].changes, (std::vector<Time>{5us, 6us}));
+}
+
 // What others see in a file.
 struct Sigrok : ::testing::Test {
   Sigrok() {
@@ -140,7 +161,7 @@ struct Sigrok : ::testing::Test {
   [[nodiscard]] std::string decode(const Waveform& waveform, const std::string& decoder,
                                    const std::string& what) const {
     const std::filesystem::path file = directory / "waveform.vcd";
-    std::ofstream(file) << waveform.vcd("encoder");
+    std::ofstream(file) << vcd(waveform, "encoder");
     const std::string command =
         "sigrok-cli -I vcd -i " + file.string() + " -P " + decoder + " -A " + what + " 2>&1 </dev/null";
     FILE* pipe = ::popen(command.c_str(), "r");
@@ -218,6 +239,32 @@ TEST_F(Sigrok, ReadsAnExchangeInEveryMode) {
     EXPECT_EQ(decode(waveform, decoder, "spi=miso-data"), "A1 5E C3 ") << int{mode};
     EXPECT_EQ(decode(waveform, decoder, "spi=mosi-data"), "11 93 00 ") << int{mode};
   }
+}
+
+TEST_F(Sigrok, ReadsFramesOfCan) {
+  const LineSettings settings{.rate = 500'000};
+  Waveform waveform(LinkKind::can, settings);
+  Time at = 50us;
+  const auto add = [&](const CanFrame& frame) {
+    waveform.frame(at, frame);
+    at += settings.bits(can_bits(frame).size() + can_intermission_bits);
+  };
+  add({.id = 0x000, .size = 8});  // the most stuff bits
+  add({.id = 0x120, .size = 3, .data = {0x47, 0x26, 0xFF}});
+  add({.id = 0x1ABCDE01, .extended = true, .size = 1, .data = {0x5A}});
+  add({.id = 0x7E5, .remote = true});
+  add({.id = 0x100});
+  const std::string decoder = "can:can_rx=can:nominal_bitrate=500000";
+  std::string zeros;
+  for (char byte = '0'; byte < '8'; ++byte) zeros += std::string("Data byte ") + byte + ": 0x00 ";
+  EXPECT_EQ(decode(waveform, decoder, "can=data"),
+            zeros + "Data byte 0: 0x47 Data byte 1: 0x26 Data byte 2: 0xff Data byte 0: 0x5a ");
+  EXPECT_EQ(decode(waveform, decoder, "can=id:ext-id"),
+            "Identifier: 0 (0x0) Identifier: 288 (0x120) Identifier: 1711 (0x6af) Extended Identifier: 56833 (0xde01) "
+            "Identifier: 2021 (0x7e5) Identifier: 256 (0x100) ");
+  std::string ends;
+  for (int i = 0; i < 5; ++i) ends += "CRC delimiter: 1 ACK slot: ACK ACK delimiter: 1 End of frame ";
+  EXPECT_EQ(decode(waveform, decoder, "can=crc-delimiter:ack-slot:ack-delimiter:eof:warnings"), ends);
 }
 
 TEST_F(Sigrok, ReadsTheBytesOfTformat) {
