@@ -22,8 +22,8 @@ std::span<const Subcommand* const> all_subcommands() {
       &memory_dump_subcommand,  &memory_load_subcommand, &memory_verify_subcommand,
       &config_get_subcommand,   &config_set_subcommand,  &run_subcommand,
       &scan_subcommand,         &emulate_subcommand,     &decode_subcommand,
-      &encode_subcommand,       &probe_subcommand,       &crc_find_subcommand,
-      &vectors_subcommand,      &bench_subcommand,
+      &encode_subcommand,       &wave_subcommand,        &probe_subcommand,
+      &crc_find_subcommand,     &vectors_subcommand,     &bench_subcommand,
   };
   return all;
 }

@@ -86,6 +86,7 @@ extern const Subcommand scan_subcommand;
 extern const Subcommand emulate_subcommand;
 extern const Subcommand decode_subcommand;
 extern const Subcommand encode_subcommand;
+extern const Subcommand wave_subcommand;
 extern const Subcommand probe_subcommand;
 extern const Subcommand crc_find_subcommand;
 extern const Subcommand vectors_subcommand;

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include "absenc/capture/drawing.hpp"
+#include "absenc/host/drive.hpp"
+#include "absenc/protocol/all.hpp"
+#include "absenc/sim/sim_port.hpp"
+#include "absenc/sim/waveform.hpp"
+#include "tools/absenc/encoder_uri.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Time lead_in = 20us;                    // viewers and decoders want to see the line idle first
+constexpr std::uint64_t fastest = 1'000'000'000;  // samples a second: those of the drawing
+
+enum class FileFormat : std::uint8_t { vcd, sigrok, saleae };
+
+FileFormat format_of(const std::filesystem::path& path) {
+  const std::string ending = path.extension();
+  if (ending == ".vcd") return FileFormat::vcd;
+  if (ending == ".sr") return FileFormat::sigrok;
+  if (ending == ".csv") return FileFormat::saleae;
+  throw UsageError(
+      fmt::format("what to write is told by the end of the name: \"{}\" must end in .vcd (every viewer), .sr (sigrok, "
+                  "PulseView) or "
+                  ".csv (as Saleae Logic 2 exports it)",
+                  path.string()));
+}
+
+/// A command with its arguments, as it was written in one text.
+struct Spoken {
+  const Command* command;
+  std::vector<std::int64_t> arguments;
+};
+
+std::vector<Spoken> commands_of(const Unit& unit, std::span<const std::string> texts) {
+  std::vector<Spoken> commands;
+  for (const std::string& text : texts) {
+    std::istringstream words(text);
+    std::string name;
+    words >> name;
+    std::vector<std::string> arguments;
+    for (std::string word; words >> word;) arguments.push_back(word);
+    const Command& command = require_command(unit, name);
+    commands.push_back({&command, require_arguments(command, arguments)});
+  }
+  if (!commands.empty()) return commands;
+  const Command* read = find_command(unit, Verb::read);
+  if (read == nullptr)
+    throw UsageError(fmt::format("{} has no command that reads: choose one with --command", unit.id));
+  return {{read, require_arguments(*read, {})}};
+}
+
+/// A virtual encoder and its host in virtual time, and what their line shows.
+struct Conversations {
+  const EncoderUri& uri;
+  std::vector<Spoken> commands;
+  std::uint64_t rounds;
+  Time period;
+
+  std::uint64_t results = 0;
+  std::uint64_t failures = 0;
+  sim::Waveform waveform{uri.unit->link, uri.line};
+
+  template <class Item>
+  void hold(Machine<Item>& device) {
+    sim::SimPort<Item> port(uri.unit->link, uri.line, device);
+    waveform.observe(port.line());
+    for (Time next = lead_in; results < rounds; next += period) {
+      pass(port, next);
+      for (const Spoken& one : commands) hold(port, one);
+    }
+  }
+
+ private:
+  template <class Item>
+  static void pass(sim::SimPort<Item>& port, Time until) {
+    while (port.now() < until) static_cast<void>(port.wait({.at = until}));
+  }
+
+  // One that never ends by itself, as a stream, ends with the last round.
+  template <class Item>
+  void hold(sim::SimPort<Item>& port, const Spoken& one) {
+    std::vector<std::byte> storage(uri.unit->host_storage);
+    const Any<Conversation> made = uri.unit->host(uri.options, *one.command, one.arguments, storage);
+    Conversation<Item>* conversation = nullptr;
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      conversation = made.frames;
+    } else {
+      conversation = made.bytes;
+    }
+    if (conversation == nullptr) {
+      throw UsageError(fmt::format("{} cannot do {} with these options", uri.unit->id, one.command->name));
+    }
+    const bool reads = one.command->verb == Verb::read;
+    const auto count = [&] {
+      ++results;
+      if (conversation->error() != Error::none) ++failures;
+    };
+    const bool ended = host::drive(*conversation, port, [&] {
+      if (reads) count();
+      return results < rounds;
+    });
+    if (ended && (&one == &commands.back() || conversation->error() != Error::none)) count();
+  }
+};
+
+Conversations converse(const Invocation& invocation, const EncoderUri& uri) {
+  const double rate = invocation.real("--rate", 1000, 0.001, 1e6);
+  Conversations conversations{uri, commands_of(*uri.unit, invocation.texts("--command")),
+                              static_cast<std::uint64_t>(invocation.number("--count", 1, 1, 1'000'000)),
+                              Time(static_cast<std::int64_t>(1e9 / rate))};
+  VirtualDevice device(*uri.unit, uri.options, uri.device);
+  device.power_on(Time{});
+  if (device.bytes() != nullptr) {
+    conversations.hold(*device.bytes());
+  } else {
+    conversations.hold(*device.frames());
+  }
+  return conversations;
+}
+
+void write(const Invocation& invocation, const std::string& path, const capture::Drawing& drawing,
+           const LineSettings& line) {
+  const FileFormat format = format_of(path);
+  if (format == FileFormat::sigrok) {
+    const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
+    const std::int64_t rate =
+        invocation.number("--samplerate", static_cast<std::int64_t>(usual), 1, static_cast<std::int64_t>(fastest));
+    capture::write_sigrok(path, drawing, static_cast<std::uint64_t>(rate));
+    return;
+  }
+  if (invocation.has("--samplerate"))
+    throw UsageError("--samplerate is for .sr: the other files keep every nanosecond");
+  std::ofstream out(path, std::ios::binary);
+  format == FileFormat::vcd ? capture::write_vcd(out, drawing) : capture::write_saleae_csv(out, drawing);
+  out.flush();
+  if (!out) throw ToolFailure(fmt::format("{} cannot be written", path));
+}
+
+// "sim:" may be left out: no other encoder shows its wires.
+EncoderUri virtual_encoder(const Invocation& invocation) {
+  const std::string_view text = invocation.text("encoder");
+  const std::string_view id = text.substr(0, text.find_first_of("?:"));
+  const bool bare = find_unit(id) != nullptr && (id.size() == text.size() || text[id.size()] == '?');
+  EncoderUri uri = parse_encoder(bare ? fmt::format("sim:{}", text) : std::string(text), invocation.texts("--option"));
+  if (uri.place != Place::sim) {
+    throw UsageError(fmt::format("{} is no virtual encoder: waveforms are drawn of sim:{}", text, uri.unit->id));
+  }
+  return uri;
+}
+
+int run_wave(const Invocation& invocation) {
+  const std::string path(invocation.text("file"));
+  static_cast<void>(format_of(path));
+  if (std::filesystem::exists(path) && !invocation.has("--force")) {
+    throw UsageError(fmt::format("{} exists: give another name, or --force to replace it", path));
+  }
+  const EncoderUri uri = virtual_encoder(invocation);
+  const Conversations conversations = converse(invocation, uri);
+  const capture::Drawing drawing = capture::drawing_of(std::string(uri.unit->id), conversations.waveform);
+  write(invocation, path, drawing, uri.line);
+  std::string wires;
+  for (const capture::Trace& trace : drawing.traces) wires += (wires.empty() ? "" : ", ") + trace.name;
+  print_line(fmt::format("{}: {} result{} in {}, {} of them an error; wires: {}", path, conversations.results,
+                         conversations.results == 1 ? "" : "s", to_text(conversations.waveform.end()),
+                         conversations.failures, wires));
+  return exit_good;
+}
+
+constexpr std::array<Parameter, 8> parameters{{
+    {"encoder", "", "PROTOCOL, with ?NAME=VALUE&NAME=VALUE behind it as for sim:PROTOCOL: options, motion, faults", "",
+     true},
+    {"file", "", "what to write: .vcd, .sr or .csv (Saleae Logic 2)", "", true},
+    {"--command", "COMMAND", "what the host asks, its arguments behind it; several: one after the other",
+     "what `read` asks", false, true},
+    {"--count", "N", "how many results", "1"},
+    {"--rate", "HZ", "how many a second; less where the line cannot", "1000"},
+    {"--samplerate", "HZ", "of .sr files", "16 for each bit of the line"},
+    {"--force", "", "replace the file if it exists"},
+    parameter::option,
+}};
+
+constexpr std::array<Example, 3> examples{{
+    {"absenc wave tformat position.vcd", "one position as GTKWave and PulseView show it"},
+    {"absenc wave \"esl?fault=corrupt=0.1&motion=rpm=600\" damaged.sr --count 100",
+     "what a damaged line looks like, for comparison with a capture"},
+    {"absenc wave encolink-spi spi.csv --command position --count 3", "for Saleae's program"},
+}};
+
+}  // namespace
+
+const Subcommand wave_subcommand{"wave",
+                                 "write a conversation with a virtual encoder as a waveform",
+                                 "Time is virtual and exact to the nanosecond: what the protocol's document says, with "
+                                 "the faults that are asked for.",
+                                 parameters,
+                                 examples,
+                                 run_wave};
+
+}  // namespace absenc::tool
