@@ -66,7 +66,8 @@ TEST_F(SigrokSession, HasTheLevelsAtEverySample) {
   EXPECT_EQ(read("-O csv:header=false:label=off"),
             "1,0,0\n1,0,0\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n1,1,0\n0,1,0\n0,1,0\n0,1,0\n0,1,0\n0,1,0\n0,1,0\n0,1,0\n0,1,0\n"
             "0,1,0\n");
-  EXPECT_THAT(read("--show"), ::testing::AllOf(::testing::HasSubstr("2000000"), ::testing::HasSubstr("- a: logic\n- b: logic\n- c: logic")));
+  EXPECT_THAT(read("--show"), ::testing::AllOf(::testing::HasSubstr("2000000"),
+                                               ::testing::HasSubstr("- a: logic\n- b: logic\n- c: logic")));
 }
 
 TEST_F(SigrokSession, OfMoreThanOnePartAndManyTraces) {
