@@ -25,7 +25,7 @@ enum class Content : std::uint8_t {
 
 struct Layout {
   Content content = Content::samples;
-  std::vector<std::string> channels;   // by index; of bytes: the directions or lines they were seen on, if told
+  std::vector<std::string> channels;   // by index; of bytes and frames: the directions or lines they were seen on
   std::uint64_t ticks_per_second = 0;  // 0: the file has no times
   std::uint64_t ticks = 0;             // 0: not known before the end
 };
@@ -60,6 +60,7 @@ struct CanRecord {
   Tick at = 0;
   CanFrame frame{};
   bool error_frame = false;  // reported by the controller: `frame` holds the kernel's error class and data
+  std::uint8_t channel = 0;  // index into the layout's channels
 };
 
 /// Where a file stops making sense, and what is wrong there.
@@ -67,12 +68,14 @@ struct Damage {
   std::uint64_t offset = 0;  // bytes from the beginning of the file
   Tick tick = 0;             // decoded up to here
   std::string what;          // a sentence; "": none
+  bool note = false;         // nothing is missing, but worth to know
 };
 
 /// A part of a capture, decoded on its own. Owns its storage, which is used again for the next part.
 struct Block {
   std::uint64_t index = 0;            // 0, 1, 2 ... in the order of time
-  Tick first = 0;                     // of its first sample, or the time from which its changes count
+  Tick first = 0;                     // of its first sample, or the time from which its changes count; behind a damage
+                                      // it may be later than the end of the block before: nobody knows what was between
   Tick end = 0;                       // one behind its last
   std::vector<std::uint8_t> samples;  // samples: `bytes_per_sample` each, little endian, channel 0 in bit 0
   unsigned bytes_per_sample = 1;      // 1, 2, 4 or 8

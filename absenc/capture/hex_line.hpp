@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// One line of hexadecimal text.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "absenc/capture/text_lines.hpp"
+
+namespace absenc::capture {
+
+/// What a file of bytes as text is made of; see hex_text.hpp.
+enum class HexForm : std::uint8_t { plain, dump, xxd, sigrok };
+
+struct HexLine {
+  std::optional<Instant> at;
+  std::optional<Tick> begin;  // samples
+  Tick end = 0;
+  int channel = -1;  // 0: tx, 1: rx, -1: not told
+  std::optional<std::uint64_t> offset;
+  std::vector<std::uint8_t> bytes;
+  const char* trouble = nullptr;  // what is wrong with it
+};
+
+/// The line without its comment and without blanks around it.
+[[nodiscard]] std::string_view strip_comment(std::string_view line);
+
+/// The form of a file by its first line; nothing: none that is known.
+[[nodiscard]] std::optional<HexForm> hex_form(std::string_view line);
+
+/// False: the line is not of this form; `trouble` may tell why.
+[[nodiscard]] bool parse_hex_line(HexForm form, std::string_view line, HexLine& parsed);
+
+}  // namespace absenc::capture

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any bytes as a session, a good one with some of its bytes changed, and any metadata.
+#include "absenc/capture/sigrok.hpp"
+
+#include "absenc/capture/test_files.hpp"
+
+namespace {
+
+using namespace absenc::capture;
+
+FileBytes session(const FileBytes& metadata, const FileBytes& samples, bool deflate) {
+  return make_zip({{"version", to_bytes("2")}, {"metadata", metadata}, {"logic-1-1", samples}, {"logic-1-2", samples}},
+                  deflate);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const FileBytes samples(600, 0x5A);
+  static const FileBytes metadata = to_bytes(sigrok_metadata("1 MHz", 24, 3));
+  static const FileBytes deflated = session(metadata, samples, true);
+  static const FileBytes stored = session(metadata, samples, false);
+  for (const FileBytes& file : {deflated, stored}) {
+    fuzz_file(data, size, file, [](FileBytes bytes) { read_or_refuse(std::move(bytes)); });
+  }
+  fuzz_file(data, size, metadata, [](const FileBytes& text) { read_or_refuse(session(text, samples, false)); });
+  return 0;
+}
