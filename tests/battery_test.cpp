@@ -311,6 +311,10 @@ TEST(Units, RegistersAreReachedByTheirCommands) {
   }
 }
 
+bool has_option(const Unit& unit, std::string_view name) {
+  return std::ranges::any_of(unit.options, [&](const Option& option) { return option.name == name; });
+}
+
 TEST(Units, EverySetterReadsBack) {
   for (const Unit* unit : all_units()) {
     for (const Command& command : unit->commands) {
@@ -321,6 +325,7 @@ TEST(Units, EverySetterReadsBack) {
       const Command* getter = find_command(*unit, command.reads_back);
       ASSERT_NE(getter, nullptr) << unit->id << " " << command.name;
       EXPECT_EQ(getter->verb, Verb::config_get);
+      EXPECT_TRUE(command.changes_option.empty() || has_option(*unit, command.changes_option)) << command.name;
     }
   }
 }

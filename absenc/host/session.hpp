@@ -91,6 +91,9 @@ class Session {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
+  /// From the next command on.
+  void set_options(const Options& options) { options_ = options; }
+
   /// To be fed from now on; null: none. 5 kB, which firmware may not have.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "absenc/os/error.hpp"
+#include "absenc/os/serial_settings.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
@@ -114,6 +115,7 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
       continue;
     }
     const ssize_t size = ::read(descriptor, into.data() + filled, into.size() - filled);
+    if (size > 0 && descriptor == master_.get() && !understands_terminal()) continue;
     if (size > 0) {
       filled += static_cast<std::size_t>(size);
     } else if (descriptor != master_.get() && (size == 0 || (errno != EAGAIN && errno != EINTR))) {
@@ -121,6 +123,13 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
     }
   }
   return filled;
+}
+
+bool EmulatorPort::understands_terminal() const {
+  constexpr std::uint32_t unset = 38'400;
+  if (device_rate_ == 0) return true;
+  const std::uint32_t rate = terminal_rate(slave_.get());
+  return rate == unset || rates_agree(device_rate_, rate);
 }
 
 void EmulatorPort::drop_client(int descriptor) {

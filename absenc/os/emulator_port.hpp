@@ -14,6 +14,9 @@ namespace absenc::os {
 
 /// All ends are one line: the device hears what comes from any of them, and each gets what the device sends. Like a
 /// wire, the line keeps nothing: what nobody reads is lost. Latency is 2 ms at first: a pause that long is a gap.
+///
+/// A device that configures the line hears a terminal only at its own rate. A terminal that nobody has set (the
+/// kernel's 38400 baud) and TCP have none: they are heard at every rate.
 class EmulatorPort final : public StreamPort {
  public:
   /// `link`: path of a symbolic link to the pseudo-terminal, removed at the end; empty: none. It replaces a link to a
@@ -33,12 +36,13 @@ class EmulatorPort final : public StreamPort {
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;
   void drive(Line, bool) override {}
-  void apply(const LineSettings&) override {}  // a line without a rate suits every rate
+  void apply(const LineSettings& settings) override { device_rate_ = settings.rate; }
 
   void open_terminal();
   void listen_on(std::uint16_t port);
   void make_link() const;
   void users_changed();
+  [[nodiscard]] bool understands_terminal() const;
   void accept_client();
   void drop_client(int descriptor);
   void write_terminal(Bytes bytes);
@@ -52,6 +56,7 @@ class EmulatorPort final : public StreamPort {
   std::string link_;
   std::uint16_t tcp_port_ = 0;
   std::uint64_t dropped_ = 0;
+  std::uint32_t device_rate_ = 0;  // 0: the device did not say
 };
 
 }  // namespace absenc::os

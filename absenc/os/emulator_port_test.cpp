@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/emulator_port.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <memory>
@@ -47,6 +49,36 @@ TEST(EmulatorPort, TalksToASerialPort) {
   EXPECT_EQ(receive(host), reply);
   expect_quiet(device);  // no echo
   EXPECT_EQ(device.dropped(), 0u);
+}
+
+TEST(EmulatorPort, ADeviceWithARateHearsOnlyThat) {
+  EmulatorPort device({}, 0);
+  SerialPort at_9600(device.path(), {.rate = 9600});
+  TcpPort without_rate("127.0.0.1", device.tcp_port());
+  const auto set = [](StreamPort& port, std::uint32_t rate) {
+    port.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = rate}});
+  };
+  at_9600.begin(transfer(request));
+  EXPECT_EQ(receive(device), request) << "it has not said which";
+  set(device, 19'200);
+  at_9600.begin(transfer(request));
+  expect_quiet(device);
+  without_rate.begin(transfer(request));
+  EXPECT_EQ(receive(device), request);
+  set(at_9600, 19'200);
+  at_9600.begin(transfer(request));
+  EXPECT_EQ(receive(device), request);
+  set(device, 9600);
+  at_9600.begin(transfer(request));
+  expect_quiet(device);
+}
+
+TEST(EmulatorPort, ATerminalThatNobodySetIsHeardAtEveryRate) {
+  EmulatorPort device;
+  device.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 19'200}});
+  const Descriptor plain(::open(device.path().c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
+  ASSERT_EQ(::write(plain.get(), request.data(), request.size()), static_cast<ssize_t>(request.size()));
+  EXPECT_EQ(receive(device), request);
 }
 
 TEST(EmulatorPort, IsOneLineForAllItsEnds) {

@@ -46,6 +46,11 @@ std::optional<TerminalState> terminal_state(int descriptor) {
   return std::bit_cast<TerminalState>(state);
 }
 
+std::uint32_t terminal_rate(int descriptor) {
+  termios2 state{};
+  return ::ioctl(descriptor, TCGETS2, &state) < 0 ? 0 : read_line(state).rate;
+}
+
 void restore_terminal(int descriptor, const TerminalState& state) { ::ioctl(descriptor, TCSETSW2, &state); }
 
 LineSettings set_terminal(int descriptor, const LineSettings& settings) {

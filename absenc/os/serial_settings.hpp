@@ -18,6 +18,9 @@ using TerminalState = std::array<std::byte, 44>;
 /// Empty when the descriptor is no terminal.
 [[nodiscard]] std::optional<TerminalState> terminal_state(int descriptor);
 
+/// What somebody set it to, in bits a second; 0 when the descriptor is no terminal.
+[[nodiscard]] std::uint32_t terminal_rate(int descriptor);
+
 /// After what was written has left. Errors are ignored: the port may be gone.
 void restore_terminal(int descriptor, const TerminalState& state);
 

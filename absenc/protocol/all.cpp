@@ -8,6 +8,7 @@
 #include "absenc/protocol/e201/unit.hpp"
 #include "absenc/protocol/encolink/unit.hpp"
 #include "absenc/protocol/esl/unit.hpp"
+#include "absenc/protocol/raa38/unit.hpp"
 #include "absenc/protocol/ssi/unit.hpp"
 #include "absenc/protocol/tformat/unit.hpp"
 
@@ -15,7 +16,8 @@ namespace absenc {
 
 namespace {
 constexpr std::array units{
-    &tformat::unit, &esl::unit, &encolink::unit, &encolink::spi_unit, &biss::unit, &ssi::unit, &e201::unit,
+    &tformat::unit, &esl::unit, &encolink::unit, &encolink::spi_unit,
+    &biss::unit,    &ssi::unit, &e201::unit,     &raa38::modbus_unit,
 };
 }  // namespace
 

@@ -51,8 +51,9 @@ struct Command {
   std::string_view meaning;
   std::span<const Argument> arguments{};
   bool changes_encoder = false;
-  bool repeatable = true;         // whether the same request may be sent again after an error
-  std::string_view reads_back{};  // config_set: the name of the config_get command that reads this setting
+  bool repeatable = true;             // whether the same request may be sent again after an error
+  std::string_view reads_back{};      // config_set: the name of the config_get command that reads this setting
+  std::string_view changes_option{};  // config_set: the option that must follow its first argument
 };
 
 /// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments named

@@ -63,6 +63,11 @@ class EncoderOn final : public Encoder {
     }));
   }
 
+  void set_options(const Options& options) override {
+    Encoder::set_options(options);
+    session_.set_options(options);
+  }
+
   void report(FieldSink& sink) const override { last_->report(sink); }
   void report_left(FieldSink& sink) const override { session_.report_left(sink); }
   bool confirmed() const override { return session_.confirmed(); }

@@ -84,6 +84,9 @@ class Encoder {
   /// The clock of the readings.
   [[nodiscard]] virtual Time now() = 0;
 
+  /// From now on, without opening it again: it was set to something else itself.
+  virtual void set_options(const Options& options) { uri_.options = options; }
+
   [[nodiscard]] const EncoderUri& uri() const { return uri_; }
   [[nodiscard]] const Unit& unit() const { return *uri_.unit; }
 

@@ -77,13 +77,23 @@ bool allowed(const LinkParameter& parameter, Place place) {
   return parameter.sim;
 }
 
-// Takes what is a link parameter; the rest are options of the unit.
+const Option* find_option(const Unit& unit, std::string_view name) {
+  const auto found =
+      std::find_if(unit.options.begin(), unit.options.end(), [&](const Option& option) { return option.name == name; });
+  return found == unit.options.end() ? nullptr : &*found;
+}
+
+// Takes what is a link parameter; the rest are options of the unit. A unit that has the parameter among its options,
+// because its conversations depend on it, is told of it too.
 void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   for (const OptionText& setting : settings) {
     const LinkParameter* parameter = find_link_parameter(setting.name);
-    if (parameter == nullptr) {
-      options.push_back(setting);
+    const bool of_unit = find_option(*uri.unit, setting.name) != nullptr;
+    if (parameter == nullptr || of_unit) options.push_back(setting);
+    if (parameter == nullptr) continue;
+    if (of_unit) {
+      set_link_parameter(uri, setting);
     } else if (!allowed(*parameter, uri.place)) {
       throw UsageError(fmt::format("{} cannot be set here, it is for: {}", setting.name, parameter->places));
     } else {
@@ -190,10 +200,9 @@ bool is_name(std::string_view address) {
 }
 
 bool fits(const EncoderUri& uri, std::string_view setting) {
+  if (find_option(*uri.unit, setting) != nullptr) return true;
   if (const LinkParameter* parameter = find_link_parameter(setting)) return allowed(*parameter, uri.place);
-  if (setting == word_option_name) return takes_word(*uri.unit);
-  return std::any_of(uri.unit->options.begin(), uri.unit->options.end(),
-                     [&](const Option& option) { return option.name == setting; });
+  return setting == word_option_name && takes_word(*uri.unit);
 }
 
 // So that what is wrong can be said of the last of them. A virtual encoder wants all of its options first.

@@ -21,8 +21,9 @@ namespace {
 int run_run(const Invocation& invocation) {
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const Command& command = require_command(*uri.unit, invocation.text("command"));
-  if (command.verb == Verb::scan) return run_scan_command(invocation, uri, command);
-  return run_command(invocation, uri, command, require_arguments(command, invocation.texts("arguments")));
+  const std::vector<std::int64_t> arguments = require_arguments(command, invocation.texts("arguments"));
+  if (command.verb == Verb::scan) return run_scan_command(invocation, uri, command, arguments);
+  return run_command(invocation, uri, command, arguments);
 }
 
 // The newest of what is known so far.

@@ -21,7 +21,7 @@ struct CommandFailure : std::runtime_error {
 int run_command(const Invocation& invocation, const EncoderUri& uri, const Command& command, Arguments arguments);
 
 /// A command of Verb::scan, whose report is a list.
-int run_scan_command(const Invocation& invocation, const EncoderUri& uri, const Command& command);
+int run_scan_command(const Invocation& invocation, const EncoderUri& uri, const Command& command, Arguments arguments);
 
 /// Only the command; `sink` gets its fields. Throws CommandFailure.
 void run_into(Encoder& encoder, const Command& command, Arguments arguments, FieldSink& sink);

@@ -54,11 +54,11 @@ struct Records final : FieldSink {
 
 }  // namespace
 
-int run_scan_command(const Invocation& invocation, const EncoderUri& uri, const Command& command) {
+int run_scan_command(const Invocation& invocation, const EncoderUri& uri, const Command& command, Arguments arguments) {
   os::catch_interrupts();
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
   Records records;
-  run_into(*encoder, command, {}, records);
+  run_into(*encoder, command, arguments, records);
   std::size_t good = 0;
   Json list = Json::array();
   for (const Records::Record& record : records.all) {
@@ -80,7 +80,9 @@ namespace {
 
 int run_scan(const Invocation& invocation) {
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
-  if (const Command* command = find_command(*uri.unit, Verb::scan)) return run_scan_command(invocation, uri, *command);
+  if (const Command* command = find_command(*uri.unit, Verb::scan)) {
+    return run_scan_command(invocation, uri, *command, require_arguments(*command, {}));
+  }
   throw UsageError(fmt::format("{} has no addresses to scan: there is one encoder on its line", uri.unit->id));
 }
 

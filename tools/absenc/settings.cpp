@@ -107,12 +107,42 @@ void show_change(std::string_view name, const Setting& old, const Setting& now) 
   print_line(table(rows));
 }
 
+// With --force the setter's argument of that name is 1.
+std::vector<std::int64_t> setter_arguments(const Invocation& invocation, const Unit& unit, const Command& setter) {
+  std::vector<std::int64_t> values = require_arguments(setter, invocation.texts("values"));
+  if (!invocation.has("--force")) return values;
+  const auto force = std::find_if(setter.arguments.begin(), setter.arguments.end(),
+                                  [](const Argument& argument) { return argument.name == "force"; });
+  if (force == setter.arguments.end()) {
+    throw UsageError(fmt::format("{} of {} knows no --force", setter.name, unit.id));
+  }
+  values[static_cast<std::size_t>(force - setter.arguments.begin())] = 1;
+  return values;
+}
+
+// What the encoder was set to may be what it is reached with.
+void follow(Encoder& encoder, const Command& setter, std::int64_t value) {
+  const std::span<const Option> options = encoder.unit().options;
+  const auto option = std::find_if(options.begin(), options.end(),
+                                   [&](const Option& one) { return one.name == setter.changes_option; });
+  if (option == options.end()) return;
+  const std::string text = fmt::format("{}", value);
+  if (!option->choices.empty()) {
+    value = std::find(option->choices.begin(), option->choices.end(), text) - option->choices.begin();
+  }
+  Options changed = encoder.uri().options;
+  std::int64_t& present = changed.values[static_cast<std::size_t>(option - options.begin())];
+  if (std::exchange(present, value) == value) return;
+  encoder.set_options(changed);
+  print_message(fmt::format("note: from now on it is reached with {}={}", option->name, text));
+}
+
 int run_set(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const Command& getter = require_setting(*uri.unit, invocation.text("name"));
   const Command& setter = require_setter(*uri.unit, getter);
-  const std::vector<std::int64_t> values = require_arguments(setter, invocation.texts("values"));
+  const std::vector<std::int64_t> values = setter_arguments(invocation, *uri.unit, setter);
   const bool asks = must_ask(invocation, uri, getter.name, setter.meaning);
 
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
@@ -128,11 +158,13 @@ int run_set(const Invocation& invocation) {
   }
   try {
     run_into(*encoder, setter, values, written);
+    follow(*encoder, setter, values.front());
     run_into(*encoder, getter, {}, now);
   } catch (const os::Interrupted&) {
     throw ToolFailure(fmt::format("interrupted: `absenc config get` says what {} is now", getter.name));
   }
   require_same(now, written, getter.name);
+  if (written.text("written") == "no") print_message("note: nothing was sent, because it is so already");
   if (invocation.has("--json")) {
     print_line(Json::object()
                    .set("ok", true)
@@ -157,11 +189,12 @@ constexpr std::array<Example, 2> get_examples{{
     {"absenc config get sim:tformat overheat-threshold --json", "one of them, for programs"},
 }};
 
-constexpr std::array<Parameter, 6> set_parameters{{
+constexpr std::array<Parameter, 7> set_parameters{{
     parameter::encoder,
     {"name", "", "of the setting", "", true},
     {"values", "", "numbers: decimal, or hexadecimal with 0x", "", true, true},
     parameter::yes,
+    {"--force", "", "write also what is so already: each time may wear the encoder's memory"},
     parameter::json,
     parameter::option,
 }};

@@ -7,6 +7,7 @@
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/run.hpp"
+#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -20,7 +21,7 @@ int run_verb(const Invocation& invocation) {
     throw UsageError(
         fmt::format("{} has no command for this: `absenc list {}` shows those it has", uri.unit->id, uri.unit->id));
   }
-  return run_command(invocation, uri, *command, {});
+  return run_command(invocation, uri, *command, require_arguments(*command, {}));
 }
 
 constexpr std::array<Parameter, 3> reading{{parameter::encoder, parameter::json, parameter::option}};

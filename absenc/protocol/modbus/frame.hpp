@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// Modbus RTU frames: address, function, data, CRC. What a server refuses is in words here.
+// Sources: MODBUS over Serial Line V1.02 (S), MODBUS Application Protocol V1.1b3 (A).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/crc.hpp"
+#include "absenc/protocol/conversation.hpp"
+
+namespace absenc::modbus {
+
+inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};  // S 6.2.2
+
+inline constexpr std::size_t frame_capacity = 256;  // S 2.5.1
+inline constexpr std::size_t shortest_frame = 4;    // address, function, CRC
+inline constexpr std::size_t crc_size = 2;
+using FrameBytes = ByteBuffer<frame_capacity>;
+
+inline constexpr std::uint8_t broadcast_address = 0;  // never answered
+inline constexpr std::uint8_t first_address = 1;
+inline constexpr std::uint8_t last_address = 247;  // S 2.2
+
+inline constexpr std::uint8_t read_holding_registers = 0x03;
+inline constexpr std::uint16_t most_registers = 125;  // A 6.3
+/// Of the function code of a refusal; functions of the standard are below.
+inline constexpr std::uint8_t refusal_bit = 0x80;
+
+/// In which order the two bytes of a CRC came. A CRC of two equal bytes counts as `low_first`, which is Modbus.
+enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
+
+[[nodiscard]] constexpr CrcOrder crc_order(Bytes frame) {
+  if (frame.size() < shortest_frame) return CrcOrder::wrong;
+  const Bytes crc = frame.last(crc_size);
+  const std::uint16_t right = Crc<crc_parameters, CrcTable::nibble>::of(frame.first(frame.size() - crc_size));
+  if (right == (crc[0] | crc[1] << 8)) return CrcOrder::low_first;
+  return right == (crc[1] | crc[0] << 8) ? CrcOrder::high_first : CrcOrder::wrong;
+}
+
+/// Appends the CRC, low byte first. The buffer must have room for it.
+template <std::size_t Capacity>
+constexpr void append_crc(ByteBuffer<Capacity>& frame) {
+  const std::uint16_t crc = Crc<crc_parameters, CrcTable::nibble>::of(frame.view());
+  frame.push_back(static_cast<std::uint8_t>(crc));
+  frame.push_back(static_cast<std::uint8_t>(crc >> 8));
+}
+
+/// Why a server refuses (A 7).
+enum class Exception : std::uint8_t {
+  none = 0,
+  illegal_function = 1,
+  illegal_data_address = 2,
+  illegal_data_value = 3,
+};
+
+/// The code of a refusal of `function`; none when this is no refusal. The CRC is not looked at.
+[[nodiscard]] constexpr std::optional<std::uint8_t> refusal_code(Bytes frame, std::uint8_t function) {
+  if (frame.size() != shortest_frame + 1 || frame[1] != (function | refusal_bit)) return std::nullopt;
+  return frame[2];
+}
+
+/// The words for a code (A 7).
+[[nodiscard]] constexpr Explanation explain_refusal(std::uint8_t code) {
+  switch (code) {
+    case 0x01:
+      return {"exception 01, illegal function: the slave does not have this function",
+              "check the address: another kind of slave may have it"};
+    case 0x02:
+      return {"exception 02, illegal data address: the slave does not have these registers",
+              "ask for another number of registers, and check the address: another kind of slave may have it"};
+    case 0x03:
+      return {"exception 03, illegal data value: the slave does not take this number or value",
+              "ask for another number of registers"};
+    case 0x04:
+      return {"exception 04, server device failure: the slave failed while it did it",
+              "switch the slave off and on; if it stays, it is broken"};
+    case 0x05:
+      return {"exception 05, acknowledge: the slave has begun and needs longer", "wait, then read what became of it"};
+    case 0x06:
+      return {"exception 06, server device busy: the slave is occupied", "wait and try again"};
+    case 0x08:
+      return {"exception 08, memory parity error: the slave's memory is damaged", "the slave needs service"};
+    case 0x0A:
+      return {"exception 0A, gateway path unavailable: the gateway has no way to the slave",
+              "check the settings of the gateway"};
+    case 0x0B:
+      return {"exception 0B, gateway target device failed to respond: nobody answers behind the gateway",
+              "check wiring and supply behind the gateway, and the address"};
+    default:
+      return {"an exception with a code that the standard does not have", "look it up in the slave's manual"};
+  }
+}
+
+static_assert(crc_bitwise(crc_parameters, std::to_array<std::uint8_t>({'1', '2', '3', '4', '5', '6', '7', '8', '9'})) ==
+              0x4B37);
+
+}  // namespace absenc::modbus

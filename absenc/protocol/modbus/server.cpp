@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/modbus/server.hpp"
+
+namespace absenc::modbus {
+
+namespace {
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+constexpr Time answer_time = 200us;  // behind the silence that ends a request; the standard gives none
+
+}  // namespace
+
+void Server::power_on(Time now, PowerOn) {
+  on_ = true;
+  heard_ = transmitting_ = reply_pending_ = false;
+  quiet_since_ = now;
+  forget_frame();
+  started();
+}
+
+void Server::power_off(Time) { on_ = false; }
+
+void Server::set_rate(std::uint32_t rate) {
+  next_rate_ = rate;
+  setting_rate_ = true;
+}
+
+ByteStep Server::next(Time) {
+  if (setting_rate_ && !transmitting_) {
+    setting_rate_ = false;
+    line_.rate = next_rate_;
+    return {.kind = ByteStep::Kind::configure, .settings = line_};
+  }
+  if (reply_pending_) {
+    reply_pending_ = false;
+    return {.kind = ByteStep::Kind::transfer, .out = reply_, .at = reply_at_};
+  }
+  ByteStep step{.at = never};
+  if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
+  return step;
+}
+
+void Server::feed(const ByteEvent& event) {
+  switch (event.kind) {
+    case ByteEvent::Kind::received:
+      if (on_) hear(event);
+      break;
+    case ByteEvent::Kind::line_error:
+      damaged_ = on_ && !transmitting_;
+      quiet_since_ = event.at;
+      heard_ = true;
+      break;
+    case ByteEvent::Kind::sent:
+      transmitting_ = false;
+      quiet_since_ = event.at;
+      heard_ = true;
+      break;
+    case ByteEvent::Kind::silence:
+      if (on_ && !transmitting_) frame_ended(event.at);
+      break;
+    default:
+      break;
+  }
+}
+
+void Server::hear(const ByteEvent& event) {
+  if (transmitting_) {
+    if (!company_) violate("something was sent during the encoder's transmission", event.at);
+    return;
+  }
+  // A pseudo-terminal brings whole frames in no time.
+  const Time begun = event.items.size() == 1 ? event.at - line_.character() : event.at;
+  const Time idle = begun - quiet_since_;
+  if (frame_.empty()) {
+    early_ = heard_ && idle < line_.character() * 7 / 2;
+  } else if (idle > character_gap(line_)) {
+    gappy_ = true;
+  }
+  heard_ = true;
+  quiet_since_ = event.at;
+  if (!frame_.append(event.items)) damaged_ = true;
+}
+
+void Server::frame_ended(Time at) {
+  if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
+    reply_.clear();
+    company_ = false;
+    request(frame_.view().first(frame_.size() - crc_size), at, reply_);
+    if (!reply_.empty()) {
+      append_crc(reply_);
+      reply_at_ = at + answer_time;
+      reply_pending_ = transmitting_ = true;
+      ++answered_;
+    }
+  }
+  forget_frame();
+}
+
+void Server::forget_frame() {
+  frame_.clear();
+  damaged_ = early_ = gappy_ = false;
+}
+
+void Server::heed_line(Time at) {
+  if (early_) violate("less than 3.5 characters of silence before a request", at);
+  if (gappy_) violate("more than 1.5 characters of silence inside a request", at);
+}
+
+void Server::violate(std::string_view rule, Time at) {
+  violations_.push_back({rule, at});
+  ++violation_count_;
+}
+
+void Server::refuse(FrameBytes& reply, std::uint8_t address, std::uint8_t function, Exception exception) {
+  reply.push_back(address);
+  reply.push_back(function | refusal_bit);
+  reply.push_back(static_cast<std::uint8_t>(exception));
+}
+
+}  // namespace absenc::modbus

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an RAA38S6 says over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encoded, decoded, checked.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/protocol/modbus/frame.hpp"
+#include "absenc/protocol/modbus/timing.hpp"
+
+namespace absenc::raa38::rtu {
+
+using modbus::CrcOrder;
+
+namespace function {
+inline constexpr std::uint8_t read = modbus::read_holding_registers;
+inline constexpr std::uint8_t ask_address = 0xA0;  // these three are the maker's own
+inline constexpr std::uint8_t set_address = 0xA1;
+inline constexpr std::uint8_t set_parameter = 0xCC;
+
+[[nodiscard]] constexpr bool is_known(std::uint8_t code) {
+  return code == read || code == ask_address || code == set_address || code == set_parameter;
+}
+}  // namespace function
+
+inline constexpr std::uint8_t any_address = 0xFF;  // who asks for the address
+
+namespace parameter {
+inline constexpr std::uint8_t zero = 0x00;
+inline constexpr std::uint8_t positive = 0x01;
+inline constexpr std::uint8_t negative = 0x02;
+}  // namespace parameter
+
+inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57'600};
+inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
+inline constexpr std::size_t baud_at_shipping = 3;
+
+/// The index of a baud rate; empty when the encoder does not have it.
+[[nodiscard]] constexpr std::optional<std::size_t> baud_index(std::uint64_t baud) {
+  for (std::size_t i = 0; i < bauds.size(); ++i) {
+    if (bauds[i] == baud) return i;
+  }
+  return std::nullopt;
+}
+
+inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
+
+struct Format {
+  std::uint8_t address = 1;
+  unsigned bits = 14;      // 10 to 21
+  unsigned registers = 0;  // to ask for: 1, 2; 0: as many as the bits need
+  std::size_t baud = baud_at_shipping;
+
+  [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
+  [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
+};
+
+struct Request {
+  std::uint8_t function = function::read;
+  std::uint8_t address = 1;
+  std::uint8_t value = 0;            // set_address: the new one; set_parameter: the parameter
+  std::uint16_t first_register = 0;  // read
+  std::uint16_t registers = 1;
+};
+
+using RequestBytes = ByteBuffer<8>;
+
+[[nodiscard]] constexpr std::size_t request_length(std::uint8_t code) {
+  if (code == function::read) return 8;
+  return code == function::ask_address ? 4 : 5;
+}
+
+[[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
+  RequestBytes bytes;
+  bytes.push_back(request.address);
+  bytes.push_back(request.function);
+  if (request.function == function::read) {
+    for (const std::uint16_t number : {request.first_register, request.registers}) {
+      bytes.push_back(static_cast<std::uint8_t>(number >> 8));
+      bytes.push_back(static_cast<std::uint8_t>(number));
+    }
+  } else if (request.function != function::ask_address) {
+    bytes.push_back(request.value);
+  }
+  modbus::append_crc(bytes);
+  return bytes;
+}
+
+[[nodiscard]] constexpr Request read_request(const Format& format) {
+  return {.address = format.address, .registers = static_cast<std::uint16_t>(format.asked())};
+}
+
+/// Errors: wrong_length, bad_checksum, unsupported (another function), unexpected_reply (the address is asked of a
+/// single one).
+[[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
+  if (bytes.size() < modbus::shortest_frame) return Error::wrong_length;
+  const std::uint8_t code = bytes[1];
+  const bool known = function::is_known(code);
+  if (known && bytes.size() != request_length(code)) return Error::wrong_length;
+  if (modbus::crc_order(bytes) != CrcOrder::low_first) return Error::bad_checksum;
+  if (!known) return Error::unsupported;
+  Request request{.function = code, .address = bytes[0]};
+  if (code == function::ask_address && request.address != any_address) return Error::unexpected_reply;
+  if (code == function::read) {
+    request.first_register = static_cast<std::uint16_t>(bytes[2] << 8 | bytes[3]);
+    request.registers = static_cast<std::uint16_t>(bytes[4] << 8 | bytes[5]);
+  } else if (code != function::ask_address) {
+    request.value = bytes[2];
+  }
+  return request;
+}
+
+struct Reply {
+  std::uint8_t function = function::read;
+  std::uint8_t address = 1;      // ask_address: the one that is told; set_address: the new one
+  std::uint32_t singleturn = 0;  // read
+  std::uint8_t value = 0;        // set_parameter
+  CrcOrder order = CrcOrder::low_first;
+};
+
+namespace detail {
+
+// A refusal of a function of the maker's looks like its reply; only that of set_address has another length.
+constexpr std::optional<std::uint8_t> refusal_of(const Request& request, Bytes reply) {
+  if (request.function != function::read && request.function != function::set_address) return std::nullopt;
+  return modbus::refusal_code(reply, request.function);
+}
+
+// Header, byte count, data, CRC. Two registers may come with two, three or four bytes of data: the text of 3.1.7 says
+// two or three, its table counts four and shows three.
+constexpr bool read_length_is_right(const Request& request, Bytes reply) {
+  if (reply.size() < modbus::shortest_frame) return false;
+  const std::size_t count = reply[2];
+  if (request.registers != 2) return reply.size() == 5u + 2u * request.registers && count == 2u * request.registers;
+  return (reply.size() == 9 && count == 4) || (reply.size() == 8 && (count == 3 || count == 4));
+}
+
+constexpr bool length_is_right(const Request& request, Bytes reply) {
+  switch (request.function) {
+    case function::read:
+      return read_length_is_right(request, reply);
+    case function::set_address:
+      return reply.size() == 4;
+    default:
+      return reply.size() == 5;
+  }
+}
+
+constexpr Error check_header(const Request& request, Bytes reply) {
+  if (reply[1] != request.function) return Error::unexpected_reply;
+  switch (request.function) {
+    case function::ask_address:
+      return reply[0] == any_address ? Error::none : Error::unexpected_reply;
+    case function::set_address:
+      return reply[0] == request.value ? Error::none : Error::unexpected_reply;
+    case function::set_parameter:
+      return reply[0] == request.address && reply[2] == request.value ? Error::none : Error::unexpected_reply;
+    default:
+      return reply[0] == request.address ? Error::none : Error::unexpected_reply;
+  }
+}
+
+}  // namespace detail
+
+/// Errors: wrong_length, bad_checksum, unexpected_reply, request_rejected, unsupported (a reading of other registers),
+/// out_of_range.
+[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+  const std::optional<std::uint8_t> refusal = detail::refusal_of(request, bytes);
+  if (!refusal && !detail::length_is_right(request, bytes)) return Error::wrong_length;
+  Reply reply{.function = request.function, .address = bytes[0], .order = modbus::crc_order(bytes)};
+  const bool either = request.function == function::ask_address;  // labelled "MSB first", unlike all others
+  if (reply.order == CrcOrder::wrong || (reply.order == CrcOrder::high_first && !either)) return Error::bad_checksum;
+  if (refusal) return bytes[0] == request.address ? Error::request_rejected : Error::unexpected_reply;
+  if (const Error error = detail::check_header(request, bytes); error != Error::none) return error;
+  if (request.function == function::read) {
+    if (request.first_register != 0 || request.registers == 0 || request.registers > 2) return Error::unsupported;
+    const Bytes data = bytes.subspan(3, bytes.size() - 3 - modbus::crc_size);
+    for (const std::uint8_t byte : data) reply.singleturn = reply.singleturn << 8 | byte;
+    if (reply.singleturn >> format.bits != 0) return Error::out_of_range;
+  } else if (request.function == function::ask_address) {
+    reply.address = bytes[2];
+    if (reply.address < modbus::first_address || reply.address > modbus::last_address) return Error::out_of_range;
+  } else if (request.function == function::set_parameter) {
+    reply.value = bytes[2];
+  }
+  return reply;
+}
+
+/// The request that a reply by itself seems to answer.
+[[nodiscard]] constexpr Request assumed_request(const Format& format, Bytes reply) {
+  Request request = read_request(format);
+  if (reply.size() < modbus::shortest_frame) return request;
+  if (reply[1] == function::read) request.registers = reply[2] == 2 ? 1 : 2;
+  if (reply[1] == function::read || !function::is_known(reply[1])) return request;
+  request.function = reply[1];
+  request.value = reply[1] == function::set_address ? reply[0] : reply[2];
+  return request;
+}
+
+/// How many bytes a reply has that begins so; two registers counted as four bytes may come one byte shorter.
+[[nodiscard]] constexpr std::size_t reply_length(const Request& request, Bytes begun) {
+  if (request.function == function::set_address) return 4;
+  if (request.function != function::read) return 5;
+  if (begun.size() > 1 && begun[1] == (function::read | modbus::refusal_bit)) return 5;
+  if (request.registers != 2) return 5u + 2u * request.registers;
+  return begun.size() > 2 && begun[2] == 3 ? 8 : 9;
+}
+
+/// Whether a good reply to a reading would also be good with its last byte lost, or with a 00 behind it: then the CRC
+/// does not tell whether it has three bytes of data or four.
+[[nodiscard]] constexpr bool length_is_doubtful(Bytes reply) {
+  return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
+}
+
+}  // namespace absenc::raa38::rtu

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+// The RAA38S6 as the neutral layers see it: a unit for each line it is made for.
+#pragma once
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::raa38 {
+
+extern constinit const Unit modbus_unit;
+
+}  // namespace absenc::raa38
