@@ -93,6 +93,18 @@ class Places(Case):
         self.assert_failed(absenc("read", "encolink:spi:/dev/spidev255.255"), "there is no SPI device")
         self.assert_failed(absenc("read", "biss:spi:/dev/null"), "/dev/null is not an SPI device", "/dev/spidevB.C")
 
+    def test_what_is_emulated_behind_an_spi_controller(self):
+        for arguments, words in [(["ssi"], ["does not go over a serial line: use --spidev NAME, or sim:ssi"]),
+                                 (["encolink-spi"], ["use --spidev NAME, or sim:encolink-spi"]),
+                                 (["tformat", "--spidev", "spidev9.0"], ["does not go over an SPI controller: use --pty"]),
+                                 (["ssi", "--spidev", "spidev9.0", "--tcp", "0"], ["not with --pty or --tcp"]),
+                                 (["encolink", "--spidev", "spidev9.0", "--pty", "x"], ["not with --pty or --tcp"]),
+                                 (["biss", "--spidev", "spidev9.0", "--also", "seed=2"], ["one encoder on a line"])]:
+            with self.subTest(arguments):
+                self.assert_wrong_usage(absenc("emulate", *arguments), *words)
+        self.assert_failed(absenc("emulate", "ssi", "--spidev", "a/b", "--for", "1"), "is no name for a device")
+        self.assert_failed(absenc("emulate", "ssi", "--spidev", "null", "--for", "1"), "/dev/null exists")
+
     def test_named_in_absenc_toml(self):
         config = self.file("absenc.toml", '[encoder.drum]\nprotocol = "ssi"\nport = "spi:/dev/spidev255.255"\n'
                                           'speed = 150000\nspi_mode = 2\nbits = 13\n')

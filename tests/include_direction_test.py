@@ -29,7 +29,7 @@ FREESTANDING_HEADERS = set(
 HEAVY = ("CLI/", "toml++/", "nlohmann/")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
-    r"^(sys|linux|asm|asm-generic|net|netinet|arpa)/|"
+    r"^(sys|linux|asm|asm-generic|net|netinet|arpa|fuse3)/|"
     r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal)\.h(pp)?$"
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
@@ -163,6 +163,7 @@ class TheCheckItself(unittest.TestCase):
             ("absenc/os/serial.cpp", '#include "absenc/protocol/unit.hpp"'),
             ("tools/absenc/main.cpp", '#include "absenc/protocol/one/unit.hpp"'),
             ("tools/absenc/main.cpp", "#include <linux/spi/spidev.h>"),
+            ("tools/absenc/main.cpp", "#include <fuse3/cuse_lowlevel.h>"),
             ("tools/absenc/text.hpp", "#include <CLI/CLI.hpp>"),
             ("tools/absenc/text.hpp", "#include <nlohmann/json.hpp>"),
         ):

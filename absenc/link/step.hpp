@@ -56,8 +56,8 @@ struct Event {
   std::span<const Item> items{};  // received: valid during the call
   std::size_t bits = 0;           // sent, device side of a clocked link: number of clocks seen
   Line line{};                    // triggered
-  Time width{};                   // triggered: how long the pulse lasts; selected on a clocked link: the period of the
-                                  // clock; 0: not known yet
+  Time width{};                   // triggered: how long the pulse lasts; device side, selected on a clocked link and
+                                  // sent on an exchange: the period of the clock; 0: not known
 };
 
 /// After each `feed`, call `next` until it returns `wait` or `done`. Both in one context: interrupts queue events.

@@ -24,6 +24,9 @@ class Descriptor {
     if (number_ >= 0) ::close(std::exchange(number_, -1));
   }
 
+  /// Whoever gets it closes it.
+  [[nodiscard]] int release() { return std::exchange(number_, -1); }
+
   [[nodiscard]] int get() const { return number_; }
   [[nodiscard]] explicit operator bool() const { return number_ >= 0; }
 

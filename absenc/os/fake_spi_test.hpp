@@ -7,23 +7,36 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <fstream>
-#include <functional>
 #include <map>
-#include <span>
+#include <memory>
 #include <string>
 
+#include "absenc/os/signals.hpp"
 #include "absenc/os/spi_port.hpp"
+#include "absenc/os/spidev.hpp"
 #include "absenc/os/testing.hpp"
 
 namespace absenc::os::testing {
 
-/// One controller with one chip select, /dev/spidev0.0.
+/// One controller with one chip select, /dev/spidev0.0. Its messages are answered by a Spidev.
 class FakeSpi final : public SpiKernel {
  public:
   static constexpr const char* path = "/dev/spidev0.0";
 
-  FakeSpi() { std::ofstream{file_}; }
+  FakeSpi() {
+    std::ofstream{file_};
+    connect(LinkKind::exchange, {.rate = 500'000, .spi_mode = 1}, nobody_);
+  }
+
+  /// What stands at the far side, instead of nothing.
+  void connect(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device) {
+    const SpidevSettings before = spidev_ ? spidev_->settings() : SpidevSettings{0, 16, 500'000, ~0u};
+    device_ = std::make_unique<SpiDevice>(kind, settings, device);
+    spidev_ = std::make_unique<Spidev>(*device_);
+    spidev_->settings() = before;
+  }
 
   // Every call gives a file description of its own, as of a device: locks work.
   int open(const std::string& name) override {
@@ -37,77 +50,91 @@ class FakeSpi final : public SpiKernel {
       errno = refused->second;
       return -1;
     }
-    switch (request) {
-      case SPI_IOC_RD_MODE32:
-        return read(argument, mode);
-      case SPI_IOC_WR_MODE32:
-        return write("mode", argument, mode, mode_mask);
-      case SPI_IOC_RD_BITS_PER_WORD:
-        return read(argument, bits);
-      case SPI_IOC_WR_BITS_PER_WORD:
-        return write("bits", argument, bits, std::uint8_t{0xFF});
-      case SPI_IOC_RD_MAX_SPEED_HZ:
-        *static_cast<std::uint32_t*>(argument) = std::min(speed, highest_speed);
-        return 0;
-      case SPI_IOC_WR_MAX_SPEED_HZ:
-        return write("speed", argument, speed, ~0u);
-      case SPI_IOC_MESSAGE(1):
-        return message({static_cast<spi_ioc_transfer*>(argument), 1});
-      case SPI_IOC_MESSAGE(2):
-        return message({static_cast<spi_ioc_transfer*>(argument), 2});
-      default:
-        errno = ENOTTY;
-        return -1;
+    int result = carry(request, argument);
+    settings().mode &= mode_mask;
+    if (request == SPI_IOC_RD_MAX_SPEED_HZ) {
+      auto* const speed = static_cast<std::uint32_t*>(argument);
+      *speed = std::min(*speed, highest_speed);
     }
+    write_down(request, static_cast<const spi_ioc_transfer*>(argument));
+    if (_IOC_NR(request) == 0) result -= missing;
+    return result;
   }
 
-  /// What the far side puts on MISO while it sees these bytes on MOSI; empty: nothing.
-  std::function<void(Bytes mosi, MutableBytes miso)> far_side;
+  [[nodiscard]] SpidevSettings& settings() { return spidev_->settings(); }
+  [[nodiscard]] SpiDevice& device() { return *device_; }
+
   std::map<unsigned long, int> refusals;  // request -> errno
   int open_error = 0;
-  std::uint32_t mode_mask = ~0u;  // the bits that the controller can set
+  std::uint32_t mode_mask = ~0u;  // the others are taken, but not done
   std::uint32_t highest_speed = ~0u;
   int missing = 0;  // bytes that a message falls short of
-
-  std::uint32_t mode = SPI_MODE_0;
-  std::uint8_t bits = 16;
-  std::uint32_t speed = 500'000;
   std::string log;
 
  private:
-  template <class Value>
-  static int read(void* argument, Value value) {
-    *static_cast<Value*>(argument) = value;
-    return 0;
-  }
-  template <class Value>
-  int write(const char* what, void* argument, Value& value, Value mask) {
-    value = *static_cast<Value*>(argument) & mask;
-    log += std::string(what) + ' ' + std::to_string(value) + ", ";
-    return 0;
-  }
-  int message(std::span<const spi_ioc_transfer> transfers) {
-    std::uint32_t size = 0;
-    for (const spi_ioc_transfer& transfer : transfers) {
-      size += transfer.len;
-      log += std::to_string(transfer.len) + " bytes";
-      if (transfer.tx_buf == 0) log += " in";
-      if (transfer.delay_usecs != 0) log += " then " + std::to_string(transfer.delay_usecs) + " us";
-      log += ", ";
-      if (transfer.len == 0) continue;
-      const Data zeros(transfer.len, 0);
-      const Bytes mosi = transfer.tx_buf == 0
-                             ? Bytes(zeros)
-                             : Bytes(reinterpret_cast<const std::uint8_t*>(transfer.tx_buf), transfer.len);
-      const MutableBytes miso(reinterpret_cast<std::uint8_t*>(transfer.rx_buf), transfer.len);
-      std::fill(miso.begin(), miso.end(), std::uint8_t{0xFF});
-      if (far_side) far_side(mosi, miso);
+  struct Nobody final : Machine<std::uint8_t> {
+    void feed(const ByteEvent&) override {}
+    ByteStep next(Time) override { return {.at = never}; }
+  };
+
+  static void* at(const UserMemory& memory) { return reinterpret_cast<void*>(memory.address); }
+
+  // As the kernel serves CUSE: it fetches and stores what it is told to.
+  int carry(unsigned long request, void* argument) {
+    Data in;
+    std::vector<UserMemory> out;
+    std::size_t room = 0;
+    SpidevReply reply;
+    for (;;) {
+      reply = spidev_->control(request, reinterpret_cast<std::uintptr_t>(argument), in, room, os::now());
+      if (!reply.again) break;
+      in.clear();
+      for (const UserMemory& one : reply.in) {
+        in.resize(in.size() + one.size);
+        std::memcpy(in.data() + in.size() - one.size, at(one), one.size);
+      }
+      room = 0;
+      for (const UserMemory& one : reply.out) room += one.size;
+      out = reply.out;
     }
-    return static_cast<int>(size) - missing;
+    reach(reply.at);
+    std::size_t done = 0;
+    for (const UserMemory& one : out) {
+      std::memcpy(at(one), reply.bytes.data() + done, one.size);
+      done += one.size;
+    }
+    if (reply.result >= 0) return reply.result;
+    errno = -reply.result;
+    return -1;
+  }
+
+  void write_down(unsigned long request, const spi_ioc_transfer* transfers) {
+    switch (request) {
+      case SPI_IOC_WR_MODE32:
+        log += "mode " + std::to_string(settings().mode) + ", ";
+        break;
+      case SPI_IOC_WR_BITS_PER_WORD:
+        log += "bits " + std::to_string(settings().word_bits) + ", ";
+        break;
+      case SPI_IOC_WR_MAX_SPEED_HZ:
+        log += "speed " + std::to_string(settings().speed) + ", ";
+        break;
+      default:
+        if (_IOC_NR(request) != 0) return;
+        for (std::size_t i = 0; i < _IOC_SIZE(request) / sizeof *transfers; ++i) {
+          log += std::to_string(transfers[i].len) + " bytes";
+          if (transfers[i].tx_buf == 0) log += " in";
+          if (transfers[i].delay_usecs != 0) log += " then " + std::to_string(transfers[i].delay_usecs) + " us";
+          log += ", ";
+        }
+    }
   }
 
   TemporaryDirectory directory_;
   std::filesystem::path file_ = directory_.path() / "spidev0.0";
+  Nobody nobody_;
+  std::unique_ptr<SpiDevice> device_;
+  std::unique_ptr<Spidev> spidev_;
 };
 
 }  // namespace absenc::os::testing

@@ -4,54 +4,17 @@
 
 #include "absenc/host/drive.hpp"
 #include "absenc/os/fake_spi_test.hpp"
-#include "absenc/os/signals.hpp"
 #include "absenc/protocol/biss/bench_test.hpp"
+#include "absenc/protocol/encolink/device.hpp"
+#include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/ssi/device.hpp"
 #include "absenc/protocol/ssi/host.hpp"
-#include "absenc/sim/sim_port.hpp"
 #include "tests/shape_toys.hpp"
 
 namespace absenc::os {
 namespace {
 
 using namespace testing;
-
-// A simulated line behind the controller, in the controller's time.
-class FarSide {
- public:
-  FarSide(LinkKind kind, FakeSpi& kernel, Machine<std::uint8_t>& device)
-      : kind_(kind),
-        kernel_(&kernel),
-        port_(kind, {.rate = kernel.speed}, device, {.now = os::now, .sleep_until = os::sleep_until}) {
-    kernel.far_side = [this](Bytes mosi, MutableBytes miso) { answer(mosi, miso); };
-  }
-
-  /// The encoder's first bit comes with the first rising edge. The controller has taken its first sample then: at the
-  /// falling edge before (mode 2), or at this one (mode 3), when the line still shows what was there.
-  bool shifts_after_sample = false;
-
- private:
-  void answer(Bytes mosi, MutableBytes miso) {
-    // The clock of a clocked link idles high; 8 clocks come for each byte.
-    EXPECT_EQ((kernel_->mode & SPI_CPOL) != 0, kind_ == LinkKind::clocked);
-    EXPECT_EQ(kernel_->bits, 8);
-    port_.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = kernel_->speed}});
-    port_.begin({.kind = ByteStep::Kind::transfer, .out = mosi, .bits = 8 * miso.size()});
-    ByteEvent event{};
-    while (event.kind != ByteEvent::Kind::received) event = port_.wait({.at = never});
-    ASSERT_EQ(event.items.size(), miso.size());
-    std::uint8_t before = 0xFF;  // the idle line
-    for (std::size_t i = 0; i < miso.size(); ++i) {
-      const std::uint8_t now = event.items[i];
-      miso[i] = shifts_after_sample ? static_cast<std::uint8_t>(before << 7 | now >> 1) : now;
-      before = now;
-    }
-  }
-
-  LinkKind kind_;
-  FakeSpi* kernel_;
-  sim::SimPort<std::uint8_t> port_;
-};
 
 bool run(Machine<std::uint8_t>& host, SpiPort& port) {
   return host::drive(host, port, [] { return true; });
@@ -70,8 +33,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
     ssi::VirtualEncoder encoder(format, shaft);
     encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
     FakeSpi controller;
-    FarSide far(LinkKind::clocked, controller, encoder);
-    far.shifts_after_sample = true;
+    controller.connect(LinkKind::clocked, ssi::line_settings, encoder);
     SpiPort port(FakeSpi::path, LinkKind::clocked, ssi::line_settings, {}, controller);
     for (const std::int64_t position : {0x95C6'1234L, 0x3A59'8DE1L, 0xFFFF'FFFEL}) {
       shaft.state.position = position;
@@ -89,8 +51,7 @@ TEST_F(SpiEncoder, SsiReadTwice) {
   const ssi::Format format{.word = word, .extra_clocks = 13};
   ssi::VirtualEncoder encoder(format, shaft);
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-  FarSide far(LinkKind::clocked, kernel, encoder);
-  far.shifts_after_sample = true;
+  kernel.connect(LinkKind::clocked, ssi::line_settings, encoder);
   SpiPort port(FakeSpi::path, LinkKind::clocked, ssi::line_settings, {}, kernel);
   shaft.state.position = 0x95C6'1234;
   ssi::ReadPosition read(format);
@@ -103,7 +64,7 @@ TEST_F(SpiEncoder, Biss) {
   const biss::Format format{.word = "multiturn:16 position:19 error:1! warning:1!"_word};
   biss::VirtualEncoder encoder(format, shaft);
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-  const FarSide far(LinkKind::clocked, kernel, encoder);
+  kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
   for (const std::uint32_t rate : {200'000u, 1'000'000u, 4'000'000u}) {
     shaft.state.position += 0x1'8673'2468;
@@ -111,9 +72,39 @@ TEST_F(SpiEncoder, Biss) {
     ASSERT_TRUE(run(read, port));
     ASSERT_EQ(read.error(), Error::none) << rate;
     EXPECT_EQ(read.reply().word, encoder.encoder().word({})) << rate;
-    EXPECT_EQ(kernel.speed, rate);
+    EXPECT_EQ(kernel.settings().speed, rate);
   }
   EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
+}
+
+TEST_F(SpiEncoder, Encolink) {
+  const encolink::Format format{.resolution = 20, .multiturn_bits = 16};
+  const auto read = [&](encolink::VirtualEncoder& encoder, const SpiChoice& choice) {
+    FakeSpi controller;
+    encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);
+    controller.connect(LinkKind::exchange, encolink::spi_settings, encoder);
+    SpiPort port(FakeSpi::path, LinkKind::exchange, encolink::spi_settings, choice, controller);
+    encolink::ReadPosition conversation(format, encolink::Wire::spi);
+    EXPECT_TRUE(run(conversation, port));
+    if (conversation.error() == Error::none) {
+      EXPECT_EQ(conversation.reading()->singleturn, encoder.measure({}).singleturn);
+      EXPECT_EQ(conversation.reading()->multiturn, encoder.measure({}).multiturn);
+    }
+    return conversation.error();
+  };
+  shaft.state.position = 0x7'95C6'1234;
+  encolink::VirtualEncoder good(format, encolink::Wire::spi, shaft);
+  EXPECT_EQ(read(good, {4'000'000, {}}), Error::none);
+  EXPECT_EQ(good.violation_count(), 0u) << good.violations()[0].rule;
+  for (const std::uint8_t mode : {std::uint8_t{0}, std::uint8_t{2}, std::uint8_t{3}}) {
+    encolink::VirtualEncoder shifted(format, encolink::Wire::spi, shaft);
+    EXPECT_EQ(read(shifted, {{}, mode}), Error::bad_checksum) << int{mode};
+  }
+  // The time between chip select and clock does not make it slower.
+  encolink::VirtualEncoder hurried(format, encolink::Wire::spi, shaft);
+  EXPECT_EQ(read(hurried, {4'100'000, {}}), Error::none);
+  ASSERT_GT(hurried.violation_count(), 0u);
+  EXPECT_EQ(hurried.violations()[0].rule, "clock faster than 4 MHz");
 }
 
 TEST_F(SpiEncoder, NobodyThere) {
@@ -127,7 +118,7 @@ TEST_F(SpiEncoder, Exchange) {
   toy::Toy<std::uint8_t> device([](auto& self, const ByteEvent& event) {
     if (event.kind == ByteEvent::Kind::selected) self.send({0xA1, 0xB2, 0xC3});
   });
-  const FarSide far(LinkKind::exchange, kernel, device);
+  kernel.connect(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1}, device);
   SpiPort port(FakeSpi::path, LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1}, {}, kernel);
   Data heard;
   toy::Toy<std::uint8_t> host([&](auto& self, const ByteEvent& event) {

@@ -173,7 +173,8 @@ void SpiPort::send_message(bool with_output) {
   const int result = lead > 0 ? control(SPI_IOC_MESSAGE(2), transfers.data()) : control(SPI_IOC_MESSAGE(1), &bytes);
   if (result == static_cast<int>(in_.size())) return;
   const int error = result < 0 ? errno : EIO;
-  if (error == ENODEV || error == ESHUTDOWN) {
+  // The last two: it was served by a program (CUSE), which has ended.
+  if (error == ENODEV || error == ESHUTDOWN || error == ENOTCONN || error == ECONNABORTED) {
     throw Failure(Kind::lost, path_ + " went away: was its driver unloaded?");
   }
   const std::string what = path_ + " refused a message of " + std::to_string(in_.size()) + " bytes at " +

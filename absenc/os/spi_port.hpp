@@ -14,8 +14,8 @@
 
 namespace absenc::os {
 
-/// The system calls of SpiPort. Machines that build and test this rarely have an SPI controller, and no kernel offers a
-/// virtual one: a test overrides these two, and sees exactly what is asked of the kernel.
+/// The system calls of SpiPort. Machines that build and test this rarely have an SPI controller or the right to make a
+/// virtual one (os/cuse): a test overrides these two, and sees exactly what is asked of the kernel.
 struct SpiKernel {
   virtual ~SpiKernel() = default;
   /// As open(2) with O_RDWR: negative, with errno, when refused.

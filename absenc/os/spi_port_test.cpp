@@ -10,6 +10,7 @@
 
 #include "absenc/os/fake_spi_test.hpp"
 #include "absenc/os/signals.hpp"
+#include "tests/shape_toys.hpp"
 
 namespace absenc::os {
 namespace {
@@ -26,20 +27,15 @@ constexpr LineSettings biss_settings{.rate = 1'000'000, .spi_mode = 3};
 ByteStep clocks(std::size_t bits) { return {.kind = ByteStep::Kind::transfer, .bits = bits}; }
 
 struct SpiPortTest : ::testing::Test {
-  SpiPort open(LinkKind kind = LinkKind::exchange, const LineSettings& settings = encoder_settings,
+  SpiPort open(LinkKind link = LinkKind::exchange, const LineSettings& settings = encoder_settings,
                const SpiChoice& choice = {}) {
-    return SpiPort(FakeSpi::path, kind, settings, choice, kernel);
+    if (link == LinkKind::exchange || link == LinkKind::clocked) kernel.connect(link, settings, device);
+    return SpiPort(FakeSpi::path, link, settings, choice, kernel);
   }
   std::string refusal(Kind kind, LinkKind link = LinkKind::exchange, const LineSettings& settings = encoder_settings) {
     const Failure failure = failure_of([&] { open(link, settings); });
     EXPECT_EQ(failure.kind(), kind) << failure.what();
     return failure.what();
-  }
-  // The bytes 0x12 0x34 ... in each message.
-  void count_up() {
-    kernel.far_side = [](Bytes, MutableBytes miso) {
-      for (std::size_t i = 0; i < miso.size(); ++i) miso[i] = static_cast<std::uint8_t>(0x12 + 0x22 * i);
-    };
   }
   static Data received(SpiPort& port) {
     EXPECT_EQ(port.wait({.at = never}).kind, ByteEvent::Kind::sent);
@@ -47,6 +43,10 @@ struct SpiPortTest : ::testing::Test {
     EXPECT_EQ(event.kind, ByteEvent::Kind::received);
     return data(event.items);
   }
+  // At the far side, always the same bytes.
+  toy::Toy<std::uint8_t> device{[](auto& self, const ByteEvent& event) {
+    if (event.kind == ByteEvent::Kind::selected) self.send({0x12, 0x34, 0x56});
+  }};
   FakeSpi kernel;
 };
 
@@ -57,9 +57,9 @@ TEST_F(SpiPortTest, SetsWordModeAndSpeed) {
 }
 
 TEST_F(SpiPortTest, LeavesHowTheBoardSelectsTheChip) {
-  kernel.mode = SPI_MODE_2 | SPI_CS_HIGH | SPI_LSB_FIRST;
+  kernel.settings().mode = SPI_MODE_2 | SPI_CS_HIGH | SPI_LSB_FIRST;
   open();
-  EXPECT_EQ(kernel.mode, static_cast<std::uint32_t>(SPI_MODE_1 | SPI_CS_HIGH));
+  EXPECT_EQ(kernel.settings().mode, static_cast<std::uint32_t>(SPI_MODE_1 | SPI_CS_HIGH));
 }
 
 TEST_F(SpiPortTest, WhatTheUserSaysGoesBeforeTheProtocol) {
@@ -87,19 +87,14 @@ TEST_F(SpiPortTest, ConfigureSetsOnlyWhatChanges) {
 }
 
 TEST_F(SpiPortTest, ExchangesAsManyBytesAsAreSentOrExpected) {
-  Data seen;
-  kernel.far_side = [&](Bytes mosi, MutableBytes miso) {
-    seen = data(mosi);
-    for (std::size_t i = 0; i < miso.size(); ++i) miso[i] = static_cast<std::uint8_t>(~mosi[i]);
-  };
   SpiPort port = open();
   kernel.log.clear();
   const Data out{0xA5, 0x01};
   port.begin({.kind = ByteStep::Kind::transfer, .out = out, .expect = 4});
-  EXPECT_EQ(seen, (Data{0xA5, 0x01, 0, 0}));
-  EXPECT_EQ(received(port), (Data{0x5A, 0xFE, 0xFF, 0xFF}));
+  EXPECT_THAT(device.log, HasSubstr("received A5 01 00 00,"));
+  EXPECT_EQ(received(port), (Data{0x12, 0x34, 0x56, 0xFF}));
   port.begin({.kind = ByteStep::Kind::transfer, .out = out, .expect = 1});
-  EXPECT_EQ(received(port), (Data{0x5A, 0xFE}));
+  EXPECT_EQ(received(port), (Data{0x12, 0x34}));
   EXPECT_EQ(kernel.log, "4 bytes, 2 bytes, ");
 }
 
@@ -114,7 +109,6 @@ TEST_F(SpiPortTest, WaitsBetweenChipSelectAndClock) {
 }
 
 TEST_F(SpiPortTest, ClocksWholeBytesAndHandsOutTheFirstBits) {
-  count_up();
   SpiPort port = open(LinkKind::clocked, biss_settings);
   kernel.log.clear();
   port.begin(clocks(13));
@@ -125,13 +119,12 @@ TEST_F(SpiPortTest, ClocksWholeBytesAndHandsOutTheFirstBits) {
 }
 
 TEST_F(SpiPortTest, ClocksOnceMoreForTheIdleLine) {
-  count_up();
   SpiPort port = open(LinkKind::clocked, ssi_settings);
   kernel.log.clear();
-  port.begin(clocks(13));  // 0[0010010 001101]00
-  EXPECT_EQ(received(port), (Data{0x24, 0x68}));
-  port.begin(clocks(16));  // 0[0010010 00110100 0]1010110
-  EXPECT_EQ(received(port), (Data{0x24, 0x68}));
+  port.begin(clocks(13));
+  EXPECT_EQ(received(port), (Data{0x12, 0x30}));
+  port.begin(clocks(16));
+  EXPECT_EQ(received(port), (Data{0x12, 0x34}));
   EXPECT_EQ(kernel.log, "2 bytes in, 3 bytes in, ");
 }
 
@@ -139,7 +132,9 @@ TEST_F(SpiPortTest, BeginsNotBeforeItsTimeAndStampsTheEnd) {
   SpiPort port = open();
   const Time at = port.now() + 3ms;
   Time begun{};
-  kernel.far_side = [&](Bytes, MutableBytes) { begun = os::now(); };
+  device = toy::Toy<std::uint8_t>([&](auto&, const ByteEvent& event) {
+    if (event.kind == ByteEvent::Kind::selected) begun = event.at;
+  });
   port.begin({.kind = ByteStep::Kind::transfer, .expect = 1, .at = at});
   EXPECT_GE(begun, at);
   EXPECT_LT(begun, at + 1s);
@@ -220,6 +215,8 @@ TEST_F(SpiPortTest, SaysThatAMessageIsRefused) {
   EXPECT_THAT(failure(EINVAL).what(), HasSubstr("(Invalid argument): try another speed=HZ"));
   EXPECT_EQ(failure(ESHUTDOWN).kind(), Kind::lost);
   EXPECT_EQ(failure(ENODEV).kind(), Kind::lost);
+  EXPECT_EQ(failure(ENOTCONN).kind(), Kind::lost);
+  EXPECT_EQ(failure(ECONNABORTED).kind(), Kind::lost);
   kernel.refusals.clear();
   kernel.missing = 1;
   EXPECT_THAT(failure_of([&] { port.begin({.kind = ByteStep::Kind::transfer, .expect = 2}); }).what(),

@@ -168,7 +168,8 @@ void Line<Item>::end_exchange(Node node) {
       if (kind_ == LinkKind::exchange) {
         feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});
       }
-      feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits});
+      const Time period = kind_ == LinkKind::exchange ? host.settings.bits(1) : Time{};
+      feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period});
     }
     finish(node);
     host.heard = true;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absenc/host/drive.hpp"
+#include "absenc/os/cuse/spidev_node.hpp"
 #include "absenc/os/emulator_port.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -71,15 +72,6 @@ void summarize(const VirtualDevice& device, std::string_view name, Time start) {
   if (encoder.violation_count() > encoder.violations().size()) print_note("    ...");
 }
 
-// Until a signal or the end of the time.
-void serve(Machine<std::uint8_t>& machine, os::EmulatorPort& port) {
-  try {
-    host::drive(machine, port, [] { return true; });
-  } catch (const os::Interrupted&) {
-  } catch (const os::Ended&) {
-  }
-}
-
 std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
   if (!invocation.has("--tcp")) return std::nullopt;
   return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
@@ -113,12 +105,11 @@ class VirtualLine {
     for (const auto& device : devices_) device->power_on(now);
   }
 
-  void summarize_all(const os::EmulatorPort& port, Time start) const {
+  void summarize_all(Time start) const {
     for (std::size_t i = 0; i < devices_.size(); ++i) {
       const std::string name = i > 0 ? further_[i - 1] + ": " : devices_.size() > 1 ? "the first: " : "";
       summarize(*devices_[i], name, start);
     }
-    if (port.dropped() != 0) print_note(fmt::format("  bytes that nobody read: {}", port.dropped()));
   }
 
  private:
@@ -127,8 +118,56 @@ class VirtualLine {
   std::unique_ptr<sim::Bus> bus_;
 };
 
+// Until a signal or the end of the time. Returns what is to be noted of the line.
+std::string serve_serial(Machine<std::uint8_t>& machine, const Invocation& invocation, Time end) {
+  const std::optional<std::uint16_t> listen = tcp_port(invocation);
+  os::EmulatorPort port(std::string(invocation.text("--pty")), listen);
+  port.set_send_slack(send_slack);
+  if (end != never) port.set_end(end);
+  print_line(fmt::format("ready: {}", port.path()));
+  if (listen) print_line(fmt::format("ready: tcp:127.0.0.1:{}", port.tcp_port()));
+  try {
+    host::drive(machine, port, [] { return true; });
+  } catch (const os::Interrupted&) {
+  } catch (const os::Ended&) {
+  }
+  if (port.dropped() == 0) return {};
+  return fmt::format("bytes that nobody read: {}", port.dropped());
+}
+
+std::string serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const Invocation& invocation, Time end) {
+  os::SpiDevice device(unit.link, unit.line, machine);
+  os::Spidev spidev(device);
+  os::SpidevNode node(std::string(invocation.text("--spidev")), spidev);
+  print_line(fmt::format("ready: {}", node.path()));
+  try {
+    node.serve(end);
+  } catch (const os::Interrupted&) {
+  }
+  if (device.wrong_modes() == 0) return {};
+  return fmt::format("messages in another SPI mode than the encoder's, which is {}: {}", unit.line.spi_mode,
+                     device.wrong_modes());
+}
+
+// The unit of what --spidev asks for is that of the SPI controller.
+const Unit& emulated_unit(const Invocation& invocation) {
+  const Unit& unit = require_unit(invocation.text("protocol"));
+  return invocation.has("--spidev") && unit.over_spi != nullptr ? *unit.over_spi : unit;
+}
+
 void check_line(const Unit& unit, const Invocation& invocation) {
-  if (unit.link != LinkKind::half_duplex && unit.link != LinkKind::full_duplex) {
+  const bool goes_over_spi = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
+  const bool goes_over_serial = unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
+  if (invocation.has("--spidev")) {
+    if (!goes_over_spi) {
+      throw UsageError(fmt::format("{} ({}) does not go over an SPI controller: use --pty", unit.id, line_of(unit)));
+    }
+    if (invocation.has("--pty") || invocation.has("--tcp")) {
+      throw UsageError("--spidev is a line of its own: not with --pty or --tcp");
+    }
+  } else if (goes_over_spi) {
+    throw UsageError(fmt::format("{0} does not go over a serial line: use --spidev NAME, or sim:{0}", unit.id));
+  } else if (!goes_over_serial) {
     throw UsageError(fmt::format("{} does not go over a serial line: use sim:{}", unit.id, unit.id));
   }
   if (!invocation.has("--also")) return;
@@ -138,10 +177,9 @@ void check_line(const Unit& unit, const Invocation& invocation) {
 
 int run_emulate(const Invocation& invocation) {
   os::catch_interrupts();
-  const Unit& unit = require_unit(invocation.text("protocol"));
+  const Unit& unit = emulated_unit(invocation);
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
   const double seconds = invocation.real("--for", 0, 0.001, 1e9);
-  const std::optional<std::uint16_t> listen = tcp_port(invocation);
   check_line(unit, invocation);
   VirtualLine line(unit, options, invocation);
   Device<std::uint8_t>& encoder = *line.first().device().bytes;
@@ -150,24 +188,23 @@ int run_emulate(const Invocation& invocation) {
   const bool keeps_memory = invocation.has("--memory");
   if (keeps_memory) file.load(encoder.memory());
 
-  os::EmulatorPort port(std::string(invocation.text("--pty")), listen);
-  port.set_send_slack(send_slack);
-  const Time start = port.now();
-  if (seconds > 0) port.set_end(start + Time(static_cast<std::int64_t>(seconds * 1e9)));
+  const Time start = os::now();
+  const Time end = seconds > 0 ? start + Time(static_cast<std::int64_t>(seconds * 1e9)) : never;
   line.power_on(start);
-  print_line(fmt::format("ready: {}", port.path()));
-  if (listen) print_line(fmt::format("ready: tcp:127.0.0.1:{}", port.tcp_port()));
-
   MemoryKeeper<std::uint8_t> keeper(line.machine(), encoder, file);
-  serve(keeps_memory ? static_cast<Machine<std::uint8_t>&>(keeper) : line.machine(), port);
+  Machine<std::uint8_t>& machine = keeps_memory ? static_cast<Machine<std::uint8_t>&>(keeper) : line.machine();
+  const std::string note =
+      invocation.has("--spidev") ? serve_spi(machine, unit, invocation, end) : serve_serial(machine, invocation, end);
   const bool saved = !keeps_memory || keeper.finish();
-  line.summarize_all(port, start);
+  line.summarize_all(start);
+  if (!note.empty()) print_note("  " + note);
   return saved ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 15> parameters{{
+constexpr std::array<Parameter, 16> parameters{{
     parameter::protocol,
     {"--pty", "PATH", "where to put the link to the pseudo-terminal", "only the pseudo-terminal itself"},
+    {"--spidev", "NAME", "instead: be an SPI device /dev/NAME, which the kernel's module cuse makes"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
     parameter::model,
     parameter::protocol_option,
@@ -188,19 +225,20 @@ constexpr std::array<Parameter, 15> parameters{{
     {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
 }};
 
-constexpr std::array<Example, 3> examples{{
+constexpr std::array<Example, 4> examples{{
     {"absenc emulate tformat --pty /tmp/encoder --motion rpm=60", "a turning encoder; read it as tformat:/tmp/encoder"},
     {"absenc emulate tformat --tcp 4001 --alarm battery_alarm --fault corrupt=0.01 --memory encoder.txt",
      "one that misbehaves, for whoever connects, and remembers what was written"},
     {"absenc emulate esl --pty /tmp/line --also address=3 --also \"address=5&singleturn=1000&motion=rpm=60\"",
      "three on one line; `absenc scan esl:/tmp/line` finds them"},
+    {"sudo absenc emulate encolink --spidev spidev9.0", "one behind an SPI controller: encolink:spi:/dev/spidev9.0"},
 }};
 
 }  // namespace
 
 const Subcommand emulate_subcommand{
     "emulate",
-    "be a virtual encoder on a pseudo-terminal or TCP port",
+    "be a virtual encoder on a pseudo-terminal, TCP port or SPI device",
     "Prints \"ready: PATH\" when it can be opened, and with --tcp also \"ready: tcp:127.0.0.1:PORT\".\n"
     "At the end, a summary goes to standard error: requests, faults, and the rules that the host broke.",
     parameters,

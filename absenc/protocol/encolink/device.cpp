@@ -105,7 +105,6 @@ void VirtualEncoder::selected(Time at) {
   update(at);
   if (was_selected_ && at - pause_since_ < spi_pause) violate("NCS high for less than 5 us", at);
   was_selected_ = true;
-  selected_at_ = at;
   if (power_ == Power::off) return;
   make_frame(at);
   frame_at_ = at;
@@ -113,8 +112,7 @@ void VirtualEncoder::selected(Time at) {
 
 void VirtualEncoder::stopped_clocking(const ByteEvent& event) {
   pause_since_ = event.at;
-  const auto bits = static_cast<std::int64_t>(event.bits);
-  if (bits > 0 && (event.at - selected_at_) < bits * shortest_clock) violate("clock faster than 4 MHz", event.at);
+  if (event.width > Time{} && event.width < shortest_clock) violate("clock faster than 4 MHz", event.at);
 }
 
 void VirtualEncoder::make_frame(Time now) {

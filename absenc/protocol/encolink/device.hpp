@@ -119,7 +119,6 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   bool transmitting_ = false;
   Time frame_at_{};
   Time next_frame_{};  // of those it sends by itself
-  Time selected_at_{};
   Time pause_since_{};
   bool was_selected_ = false;
   Buffer<Violation, 16> violations_;

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/spi_device.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "absenc/core/bit_view.hpp"
+
+namespace absenc::os {
+
+namespace {
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+constexpr Time deselected_time = std::chrono::microseconds(10);  // the kernel's own between two transfers
+
+constexpr std::size_t most_heard = 4096;  // bytes of a chip that stays selected: no device listens longer
+
+constexpr bool idles_high(std::uint8_t mode) { return (mode & 2) != 0; }
+constexpr bool samples_at_trailing_edge(std::uint8_t mode) { return (mode & 1) != 0; }
+
+std::uint8_t mask_of(std::size_t bit, bool lsb_first) {
+  return static_cast<std::uint8_t>(lsb_first ? 0x01u << bit % 8 : 0x80u >> bit % 8);
+}
+
+}  // namespace
+
+SpiDevice::SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device)
+    : kind_(kind), settings_(settings), device_(&device) {
+  if (kind != LinkKind::exchange && kind != LinkKind::clocked) {
+    throw std::invalid_argument("behind an SPI controller bytes are exchanged or bits clocked");
+  }
+}
+
+Time SpiDevice::message(std::span<const SpiTransfer> transfers, Time start) {
+  const bool chip_select = kind_ == LinkKind::exchange;
+  Time at = start;
+  bool suited = true;
+  if (chip_select && !selected_) select(at, {});
+  for (const SpiTransfer& transfer : transfers) {
+    const bool clocks = transfer.size > 0 && !(transfer.out.empty() && transfer.in.empty());
+    if (clocks) {
+      suited = suited && suits(transfer.mode);
+      at = clock(transfer, at);
+    }
+    const bool pauses = transfer.delay > Time{} || transfer.deselect;
+    if (!chip_select && pauses) deselect(at);
+    at += transfer.delay;
+    if (!transfer.deselect || &transfer == &transfers.back()) continue;
+    if (chip_select) deselect(at);
+    at += deselected_time;
+    if (chip_select) select(at, {});
+  }
+  if (!chip_select || transfers.empty() || !transfers.back().deselect) deselect(at);
+  if (!suited) ++wrong_modes_;
+  return at;
+}
+
+void SpiDevice::wake(Time now) {
+  if (now < timer_) return;
+  timer_ = never;
+  feed({.kind = ByteEvent::Kind::timer, .at = now});
+}
+
+void SpiDevice::select(Time at, Time period) {
+  selected_ = true;
+  driven_.clear();
+  heard_.clear();
+  clocks_ = 0;
+  last_out_ = false;
+  period_ = {};
+  feed({.kind = ByteEvent::Kind::selected, .at = at, .width = period});
+}
+
+void SpiDevice::deselect(Time at) {
+  if (!selected_) return;
+  selected_ = false;
+  if (kind_ == LinkKind::clocked) return feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_});
+  feed({.kind = ByteEvent::Kind::received, .at = at, .items = heard_});
+  feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_, .width = period_});
+}
+
+Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
+  const LineSettings clock{.rate = transfer.rate};
+  const Time period = clock.bits(1);
+  if (!selected_) select(at, period);
+  period_ = period_ == Time{} ? period : std::min(period_, period);
+  heard_.resize(std::min(heard_.size() + transfer.size, most_heard));
+  std::fill(transfer.in.begin(), transfer.in.end(), std::uint8_t{0});
+  // Both sides then change and sample at the same edge: the device samples what was there before.
+  const bool heard_late = samples_at_trailing_edge(transfer.mode) && !shifts_at_leading_edge(transfer.mode);
+  for (std::size_t bit = 0; bit < 8 * transfer.size; ++bit, ++clocks_) {
+    const std::uint8_t mask = mask_of(bit, transfer.lsb_first);
+    const bool out = !transfer.out.empty() && (transfer.out[bit / 8] & mask) != 0;
+    const bool heard = heard_late ? last_out_ : out;
+    if (heard && clocks_ / 8 < heard_.size()) heard_[clocks_ / 8] |= mask_of(clocks_, false);
+    last_out_ = out;
+    if (!transfer.in.empty() && driven(clocks_, transfer.mode)) transfer.in[bit / 8] |= mask;
+  }
+  return at + clock.bits(8 * transfer.size);
+}
+
+void SpiDevice::feed(const ByteEvent& event) {
+  device_->feed(event);
+  for (;;) {
+    const ByteStep step = device_->next(event.at);
+    switch (step.kind) {
+      case ByteStep::Kind::transfer:
+        driven_.assign(step.out.begin(), step.out.end());
+        break;
+      case ByteStep::Kind::wait:
+        timer_ = step.at > event.at ? step.at : never;
+        return;
+      case ByteStep::Kind::done:
+        timer_ = never;
+        return;
+      case ByteStep::Kind::pulse:
+      case ByteStep::Kind::configure:
+      case ByteStep::Kind::emit:
+        break;
+    }
+  }
+}
+
+// Mode 2 and 3 show a clocked device the same edges.
+bool SpiDevice::suits(std::uint8_t mode) const {
+  return kind_ == LinkKind::clocked ? idles_high(mode) : mode == settings_.spi_mode;
+}
+
+bool SpiDevice::shifts_at_leading_edge(std::uint8_t mode) const {
+  const bool shifts_at_rising_edge =
+      kind_ == LinkKind::clocked || idles_high(settings_.spi_mode) != samples_at_trailing_edge(settings_.spi_mode);
+  return shifts_at_rising_edge != idles_high(mode);
+}
+
+// What the controller samples with this clock: how often has the device shifted by then?
+bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
+  std::size_t shifts = clock;
+  if (samples_at_trailing_edge(mode) && shifts_at_leading_edge(mode)) ++shifts;
+  std::size_t before_first_bit = settings_.idle_clocks;
+  if (kind_ == LinkKind::exchange) {
+    before_first_bit = samples_at_trailing_edge(settings_.spi_mode) ? 1 : 0;
+  } else if (!idles_high(mode) && shifts > 0) {
+    --shifts;  // a rising edge before the first falling one, which latches
+  }
+  if (shifts < before_first_bit) return true;
+  const std::size_t bit = shifts - before_first_bit;
+  return bit >= 8 * driven_.size() || BitView{driven_, 8 * driven_.size()}[bit];
+}
+
+}  // namespace absenc::os
