@@ -47,9 +47,9 @@ def end(process, number=signal.SIGTERM):
 class Emulator:
     """`absenc emulate`, ready to be opened."""
 
-    def __init__(self, directory, *arguments, protocol="tformat", name="encoder"):
+    def __init__(self, directory, *arguments, protocol="tformat", name="encoder", line="--pty"):
         self.path = os.path.join(directory, name)
-        command = [ABSENC, "emulate", protocol, "--pty", self.path, *arguments]
+        command = [ABSENC, "emulate", protocol, line, self.path, *arguments]
         self.process = subprocess.Popen(command, bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE)
         self.ready = self.line()

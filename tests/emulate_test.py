@@ -304,6 +304,93 @@ class Behaviour(EmulateCase):
         self.assert_failed(in_use, f"TCP port {port} is in use")
 
 
+class Port(EmulateCase):
+    """On a serial port that is there already; here it is one end of a pseudo-terminal."""
+
+    def port(self, settings="", *arguments):
+        ours, terminal = os.openpty()
+        self.addCleanup(os.close, ours)
+        tty.setraw(terminal)
+        path = os.ttyname(terminal)
+        emulator = self.emulator(*arguments, name=path + settings, line="--port")
+        os.close(terminal)
+        self.assertEqual(emulator.ready, f"ready: {path}\n")
+        return emulator, Client(ours), path
+
+    def test_serves_it(self):
+        emulator, client, path = self.port("?baud=115200", "--singleturn", "1000", "--multiturn", "7")
+        self.assert_reply(client.exchange(3), 3, 0, [0xE8, 0x03, 0, 0x11, 7, 0, 0, 0])
+        result = absenc("emulate", "tformat", "--port", path, "--for", "60")
+        self.assert_failed(result, f"the port {path} is in use by absenc")
+        status, out, err = emulator.end()
+        self.assertEqual((status, out), (0, ""))
+        self.assertRegex(err, r"^absenc: 1 requests answered in ")
+
+    def test_several_encoders_on_it(self):
+        ours, terminal = os.openpty()
+        self.addCleanup(os.close, ours)
+        emulator = Emulator("/dev", "--also", "address=3&singleturn=1000", protocol="esl", name=os.ttyname(terminal),
+                            line="--port")
+        os.close(terminal)
+        _, _, err = emulator.end()
+        self.assertIn("address=3&singleturn=1000: 0 requests", err)
+
+    def test_an_adapter_that_hears_itself(self):
+        emulator, client, _ = self.port("?echo=on", "--singleturn", "1000")
+        for _ in range(4):
+            reply = client.exchange(0)
+            self.assert_reply(reply, 0, 0, [0xE8, 0x03, 0])
+            client.send(reply)  # which begins as a request
+        _, _, err = emulator.end()
+        self.assertIn("4 requests answered", err)
+        self.assertNotIn("rules", err)
+
+    def test_it_ends_by_itself(self):
+        ours, terminal = os.openpty()
+        self.addCleanup(os.close, ours)
+        self.addCleanup(os.close, terminal)
+        result = absenc("emulate", "tformat", "--port", os.ttyname(terminal), "--for", "0.1")
+        self.assert_good(result)
+
+    def test_one_that_goes_away_is_waited_for(self):
+        link = os.path.join(self.directory, "port")
+        ours, terminal = os.openpty()
+        os.symlink(os.ttyname(terminal), link)
+        # The reply is late, so that the port goes away while it is due.
+        emulator = self.emulator("--fault", "delay=1", "--singleturn", "1000", name=link, line="--port")
+        os.close(terminal)
+        client = Client(ours)
+        client.send([control_field(0)])
+        self.assertEqual(client.receive(1, patience=0.02), b"")
+        os.close(ours)
+        deadline = time.monotonic() + PATIENCE
+        self.assertRegex(read_line(emulator.process.stderr, deadline), f"the port {link} went away: unplugged")
+        self.assertIn("Waiting for it to come back", read_line(emulator.process.stderr, deadline))
+        ours, terminal = os.openpty()
+        self.addCleanup(os.close, ours)
+        self.addCleanup(os.close, terminal)
+        os.symlink(os.ttyname(terminal), link + "-new")
+        os.replace(link + "-new", link)
+        self.assertIn(f"the port {link} is back", read_line(emulator.process.stderr, deadline))
+        self.assert_reply(Client(ours).exchange(0), 0, 0, [0xE8, 0x03, 0])
+        self.assertEqual(emulator.end()[0], 0)
+
+    def test_wrong_usage(self):
+        for more, words in (
+            (["--pty", "/tmp/x"], "not with --pty or --tcp"),
+            (["--tcp", "0"], "not with --pty or --tcp"),
+        ):
+            self.assert_wrong_usage(absenc("emulate", "tformat", "--port", "/dev/x", *more), words)
+        for port, words in (
+            ("tcp:localhost:1", "must be a serial port"),
+            ("/dev/x?model=23-bit", "model is no setting of a port"),
+            ("/dev/x?baud=115200&singleturn_bits=23", "singleturn_bits is no setting of a port"),
+            ("/dev/x?baud=fast", "baud"),
+        ):
+            self.assert_wrong_usage(absenc("emulate", "tformat", "--port", port), words)
+        self.assert_failed(absenc("emulate", "tformat", "--port", "/dev/nothing"), "there is no port /dev/nothing")
+
+
 class Life(EmulateCase):
     def test_ready_line(self):
         emulator = self.emulator()

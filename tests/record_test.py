@@ -41,6 +41,11 @@ def read_csv(path):
     return header, rows
 
 
+def rows_so_far(path):
+    """Of a recording that may not have begun yet."""
+    return read_csv(path)[1] if os.path.exists(path) and os.path.getsize(path) > 0 else []
+
+
 def read_json_lines(path):
     with open(path, encoding="utf-8") as file:
         first, *rest = [json.loads(line) for line in file.read().splitlines()]
@@ -186,7 +191,7 @@ class Trouble(RecordCase):
         process = None
         with Emulator(self.directory, "--singleturn", "1000") as first:
             process = self.start("record", f"tformat:{first.path}?latency=300", "--output", self.output(), "--rate", "200")
-            wait_until(lambda: os.path.exists(self.output()) and len(read_csv(self.output())[1]) > 20, "readings")
+            wait_until(lambda: len(rows_so_far(self.output())) > 20, "readings")
             first.end(signal.SIGKILL)
         wait_until(lambda: read_csv(self.output())[1][-1]["event"] == "lost", "the loss in the file")
         with Emulator(self.directory, "--singleturn", "2000", "--alarm", "battery_alarm"):
@@ -253,7 +258,7 @@ class Trouble(RecordCase):
                        "FAKETIME_NO_CACHE": "1", "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
         process = self.start("record", "sim:tformat", "--output", self.output(), "--part-time", "0.2", env=environment)
         part = self.output("log-0001.csv")
-        wait_until(lambda: os.path.exists(part) and len(read_csv(part)[1]) > 5, "readings")
+        wait_until(lambda: len(rows_so_far(part)) > 5, "readings")
         self.file("shift", "-3600")
         wait_until(lambda: os.path.exists(self.output("log-0003.csv")), "two parts more")
         status, _, messages = end(process, signal.SIGINT)
@@ -269,7 +274,7 @@ class Trouble(RecordCase):
             with self.subTest(number):
                 path = self.output(f"{number}.csv")
                 process = self.start("record", "sim:tformat", "--output", path)
-                wait_until(lambda p=path: os.path.exists(p) and len(read_csv(p)[1]) > 2, "readings")
+                wait_until(lambda p=path: len(rows_so_far(p)) > 2, "readings")
                 status, _, messages = end(process, number)
                 self.assertEqual(status, 0)
                 self.assertIn(f"{len(read_csv(path)[1])} readings", messages)

@@ -25,7 +25,7 @@ Descriptor open_terminal(const std::string& path) {
   Descriptor descriptor(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) throw open_failure(path, errno);
   // Before anything waits for it: epoll refuses plain files.
-  if (!terminal_state(descriptor.get())) throw open_failure(path, ENOTTY);
+  if (!terminal_state(descriptor.get())) throw open_failure(path, errno);
   return descriptor;
 }
 
@@ -33,6 +33,12 @@ bool is_pseudo_terminal(int descriptor) {
   struct stat status {};
   // 136 to 143: slaves of Unix98 pseudo-terminals (Documentation/admin-guide/devices.txt).
   return ::fstat(descriptor, &status) == 0 && major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143;
+}
+
+// The device's end of a USB cable (u_serial.c of the kernel) has no line, and keeps whatever rate it had.
+bool is_gadget(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::canonical(path, ignored).filename().native().starts_with("ttyGS");
 }
 
 std::string_view name_of(Parity parity) {
@@ -52,7 +58,7 @@ std::string_view name_of(Parity parity) {
 SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485)
     : DescriptorPort(open_terminal(path), "the port " + path), path_(path), pseudo_(is_pseudo_terminal(descriptor())) {
   const auto before = terminal_state(descriptor());
-  if (!before) throw open_failure(path, ENOTTY);
+  if (!before) throw open_failure(path, errno);
   before_ = *before;
   lock();
   ::tcflush(descriptor(), TCOFLUSH);  // what another program left unsent must not hold us up
@@ -83,6 +89,7 @@ void SerialPort::lock() const {
 void SerialPort::apply(const LineSettings& settings) {
   if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
   const LineSettings given = set_terminal(descriptor(), settings);
+  if (is_gadget(path_)) return;
   if (!rates_agree(settings.rate, given.rate)) {
     throw Failure(Failure::Kind::bad_rate,
                   "the port " + path_ + " cannot do " + std::to_string(settings.rate) + " baud, its nearest rate is " +

@@ -132,6 +132,10 @@ Failure open_failure(const std::string& path, int error) {
     case ENXIO:
     case ENODEV:
       return not_found(path);
+    case EIO:  // from the terminal's ioctl: a 16550 that is only listed, or a line that was hung up since it was opened
+      return {Failure::Kind::not_found, "the port " + path +
+                                            " is there, but no hardware is behind it, or not any more: check the name, "
+                                            "or plug it in again"};
     case EACCES:
     case EPERM:
       return no_permission(path);

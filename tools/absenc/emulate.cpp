@@ -19,6 +19,7 @@
 #include "tools/absenc/memory_keeper.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/served_port.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/virtual_device.hpp"
@@ -162,13 +163,16 @@ void check_line(const Unit& unit, const Invocation& invocation) {
     if (!goes_over_spi) {
       throw UsageError(fmt::format("{} ({}) does not go over an SPI controller: use --pty", unit.id, line_of(unit)));
     }
-    if (invocation.has("--pty") || invocation.has("--tcp")) {
-      throw UsageError("--spidev is a line of its own: not with --pty or --tcp");
+    if (invocation.has("--pty") || invocation.has("--tcp") || invocation.has("--port")) {
+      throw UsageError("--spidev is a line of its own: not with --pty, --tcp or --port");
     }
   } else if (goes_over_spi) {
     throw UsageError(fmt::format("{0} does not go over a serial line: use --spidev NAME, or sim:{0}", unit.id));
   } else if (!goes_over_serial) {
     throw UsageError(fmt::format("{} does not go over a serial line: use sim:{}", unit.id, unit.id));
+  }
+  if (invocation.has("--port") && (invocation.has("--pty") || invocation.has("--tcp"))) {
+    throw UsageError("--port is a line of its own: not with --pty or --tcp");
   }
   if (!invocation.has("--also")) return;
   if (unit.link != LinkKind::half_duplex) throw UsageError(fmt::format("{} has one encoder on a line", unit.id));
@@ -181,6 +185,8 @@ int run_emulate(const Invocation& invocation) {
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
   const double seconds = invocation.real("--for", 0, 0.001, 1e9);
   check_line(unit, invocation);
+  std::optional<EncoderUri> served;
+  if (invocation.has("--port")) served = parse_served_port(unit, invocation.text("--port"));
   VirtualLine line(unit, options, invocation);
   Device<std::uint8_t>& encoder = *line.first().device().bytes;
   const MemoryFile file(std::string(invocation.text("--memory")), unit.id,
@@ -193,18 +199,25 @@ int run_emulate(const Invocation& invocation) {
   line.power_on(start);
   MemoryKeeper<std::uint8_t> keeper(line.machine(), encoder, file);
   Machine<std::uint8_t>& machine = keeps_memory ? static_cast<Machine<std::uint8_t>&>(keeper) : line.machine();
-  const std::string note =
-      invocation.has("--spidev") ? serve_spi(machine, unit, invocation, end) : serve_serial(machine, invocation, end);
+  std::string note;
+  if (served) {
+    serve_port(machine, *served, send_slack, end);
+  } else if (invocation.has("--spidev")) {
+    note = serve_spi(machine, unit, invocation, end);
+  } else {
+    note = serve_serial(machine, invocation, end);
+  }
   const bool saved = !keeps_memory || keeper.finish();
   line.summarize_all(start);
   if (!note.empty()) print_note("  " + note);
   return saved ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 16> parameters{{
+constexpr std::array<Parameter, 17> parameters{{
     parameter::protocol,
     {"--pty", "PATH", "where to put the link to the pseudo-terminal", "only the pseudo-terminal itself"},
     {"--spidev", "NAME", "instead: be an SPI device /dev/NAME, which the kernel's module cuse makes"},
+    {"--port", "PATH", "instead: a serial port that is there already, with ?baud=RATE and more as behind an encoder"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
     parameter::model,
     parameter::protocol_option,
@@ -225,20 +238,21 @@ constexpr std::array<Parameter, 16> parameters{{
     {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
 }};
 
-constexpr std::array<Example, 4> examples{{
+constexpr std::array<Example, 5> examples{{
     {"absenc emulate tformat --pty /tmp/encoder --motion rpm=60", "a turning encoder; read it as tformat:/tmp/encoder"},
     {"absenc emulate tformat --tcp 4001 --alarm battery_alarm --fault corrupt=0.01 --memory encoder.txt",
      "one that misbehaves, for whoever connects, and remembers what was written"},
     {"absenc emulate esl --pty /tmp/line --also address=3 --also \"address=5&singleturn=1000&motion=rpm=60\"",
      "three on one line; `absenc scan esl:/tmp/line` finds them"},
     {"sudo absenc emulate encolink --spidev spidev9.0", "one behind an SPI controller: encolink:spi:/dev/spidev9.0"},
+    {"absenc emulate e201 --port /dev/ttyUSB1", "for whoever is at the other end of a cable"},
 }};
 
 }  // namespace
 
 const Subcommand emulate_subcommand{
     "emulate",
-    "be a virtual encoder on a pseudo-terminal, TCP port or SPI device",
+    "be a virtual encoder on a pseudo-terminal, serial or TCP port, or SPI device",
     "Prints \"ready: PATH\" when it can be opened, and with --tcp also \"ready: tcp:127.0.0.1:PORT\".\n"
     "At the end, a summary goes to standard error: requests, faults, and the rules that the host broke.",
     parameters,

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the kernel's own interfaces, in a virtual machine: run.py [part of a test's name...]
+
+The last line says how many passed. Exit status: 0 all tests passed, 1 one failed or the machine did not reach its end,
+77 the machine cannot be built here.
+"""
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import image
+
+ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
+PATIENCE = 600  # seconds; all tests take far less
+SKIPPED = 77
+BUSY = "no_timer_check"  # a busy computer holds the timer up for so long that the kernel would give it up and panic
+
+
+def boot(kernel, initramfs, folder):
+    """Runs the machine to its end. Returns what it said on its console, and why that is not all if so."""
+    line = os.path.join(folder, "line")
+    command = [
+        image.program("qemu-system-x86_64"), "-accel", "tcg", "-m", "512", "-no-reboot", "-nodefaults", "-display",
+        "none",
+        "-kernel", kernel, "-initrd", initramfs, "-append", f"console=ttyS0 quiet panic=-1 {BUSY}",
+        "-serial", "stdio",
+        # ttyS1 and ttyS2 are two ends of one line.
+        "-chardev", f"socket,id=one,path={line},server=on,wait=off", "-chardev", f"socket,id=two,path={line}",
+        "-serial", "chardev:one", "-serial", "chardev:two",
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT) as machine:
+        try:
+            said, _ = machine.communicate(timeout=PATIENCE)
+            trouble = f"qemu ended with status {machine.returncode}" if machine.returncode else None
+        except subprocess.TimeoutExpired:
+            machine.kill()
+            said, _ = machine.communicate()
+            trouble = f"the machine did not end within {PATIENCE} s"
+        finally:
+            machine.kill()  # what is over is not harmed
+    return said.decode(errors="replace").replace("\r", ""), trouble
+
+
+def judge(said, trouble):
+    """Shows what went wrong; how many tests passed and failed."""
+    good = re.findall(r"^ok (.*)$", said, re.MULTILINE)
+    bad = re.findall(r"^not ok .*\n(?:#.*\n)*", said, re.MULTILINE)
+    for report in bad:
+        print(report, end="")
+    end = re.search(r"^end of (\d+) tests$", said, re.MULTILINE)
+    failed = len(bad)
+    if end is None or int(end[1]) != len(good) + len(bad) or int(end[1]) == 0:
+        trouble = trouble or "the tests did not reach their end"
+        failed += 1
+    if trouble:
+        print(f"{trouble}; the machine said at last:")
+        print("\n".join(said.splitlines()[-60:]))
+    return len(good), max(failed, 1 if trouble else 0)
+
+
+def main(patterns):
+    start = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="absenc-vm-") as folder:
+        try:
+            kernel, initramfs = image.build(ABSENC, patterns, folder)
+            built = time.monotonic()
+            said, trouble = boot(kernel, initramfs, folder)
+        except image.Missing as missing:
+            print(f"skipped: {missing}")
+            return SKIPPED
+    good, failed = judge(said, trouble)
+    now = time.monotonic()
+    print(f"{good} passed, {failed} failed in {now - start:.0f} s: "
+          f"image {built - start:.1f} s, machine {now - built:.1f} s")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the machine is ended too
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two 16550 UARTs, /dev/ttyS1 and /dev/ttyS2, at the two ends of one line."""
+import errno
+import fcntl
+import json
+import os
+import signal
+import struct
+import subprocess
+import termios
+
+from command_support import Emulator, EncoderCase, absenc, end
+
+PORT, OTHER = "/dev/ttyS1", "/dev/ttyS2"
+REGISTERS = 0x2F8  # of PORT
+CLOCK = 115200     # a divisor of 1
+NOBODY = 65534
+
+# <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h>, <linux/tty_flags.h>
+TCGETS2, BOTHER, BAUD_MASK = 0x802C542A, 0o010000, 0o010017
+TIOCGSERIAL, TIOCSSERIAL, ASYNC_LOW_LATENCY = 0x541E, 0x541F, 1 << 13
+SERIAL_STRUCT = struct.Struct("iiIiiiiiHcciPHIL")
+FLAGS = 4  # the place in it
+
+
+def settings(path):
+    """struct termios2: flags of input, output, control and local, line discipline, characters, both rates."""
+    descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        return struct.unpack("IIIIB19sII", fcntl.ioctl(descriptor, TCGETS2, bytes(44)))
+    finally:
+        os.close(descriptor)
+
+
+def serial_struct(path, change=None):
+    descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        fields = list(SERIAL_STRUCT.unpack(fcntl.ioctl(descriptor, TIOCGSERIAL, bytes(SERIAL_STRUCT.size))))
+        if change is not None:
+            change(fields)
+            fcntl.ioctl(descriptor, TIOCSSERIAL, SERIAL_STRUCT.pack(*fields))
+        return fields
+    finally:
+        os.close(descriptor)
+
+
+def divisor():
+    """What stands in the UART itself: the latch behind its data registers."""
+    with open("/dev/port", "r+b", buffering=0) as registers:
+        def get(number):
+            registers.seek(REGISTERS + number)
+            return registers.read(1)[0]
+
+        def put(number, value):
+            registers.seek(REGISTERS + number)
+            registers.write(bytes([value]))
+
+        line_control = get(3)
+        put(3, line_control | 0x80)
+        latch = get(0) | get(1) << 8
+        put(3, line_control)
+        return latch
+
+
+class Uart(EncoderCase):
+    def emulator(self, *arguments, baud, protocol="tformat"):
+        emulator = Emulator("/dev", *arguments, protocol=protocol, name=f"{OTHER}?baud={baud}", line="--port")
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def read(self, more, *arguments):
+        return absenc("read", f"tformat:{PORT}?latency=2000&{more}", *arguments)
+
+    def reader(self, more):
+        """`read` that goes on, after its first reading."""
+        process = self.start("read", f"tformat:{PORT}?latency=2000&{more}", "--count", "0", "--rate", "10")
+        self.first_line(process)
+        return process
+
+    def test_rates(self):
+        """One with a name in <termios.h>, which the kernel gives back to it, and two without."""
+        for baud, name in ((38400, termios.B38400), (23040, BOTHER), (14400, BOTHER)):
+            with self.subTest(baud):
+                emulator = self.emulator("--singleturn", "1000", baud=baud)
+                reader = self.reader(f"baud={baud}")
+                _, _, control, _, _, _, _, rate = settings(PORT)
+                self.assertEqual((control & BAUD_MASK, rate), (name, baud))
+                self.assertEqual(divisor(), CLOCK // baud)
+                self.assertEqual(end(reader, signal.SIGINT)[0], 0)
+                emulator.end()
+
+    def test_a_rate_that_the_uart_cannot_do(self):
+        result = self.read("baud=2500000")
+        self.assert_failed(result, f"the port {PORT} cannot do 2500000 baud", "nearest rate is 115200")
+        result = absenc("emulate", "tformat", "--port", PORT, "--for", "5")
+        self.assert_failed(result, "cannot do 2500000 baud")
+
+    def test_a_uart_that_is_only_listed(self):
+        self.assert_failed(absenc("read", "tformat:/dev/ttyS3"), "the port /dev/ttyS3 is there", "no hardware")
+
+    def test_settings_come_back(self):
+        subprocess.run(["stty", "-F", PORT, "1200", "parenb", "parodd", "cs7", "echo"], check=True)
+        before = settings(PORT)
+        self.emulator(baud=57600)
+        reader = self.reader("baud=57600")
+        self.assertNotEqual(settings(PORT), before)
+        self.assertEqual(end(reader, signal.SIGINT)[0], 0)
+        self.assertEqual(settings(PORT), before)
+
+    def test_rs485(self):
+        """The 16550 has no RS-485: who asks for it must hear so, who leaves it to absenc must be able to read."""
+        self.emulator("--singleturn", "1000", baud=115200)
+        for choice in ("auto", "off"):
+            result = self.read(f"baud=115200&rs485={choice}", "--json")
+            self.assert_good(result)
+            self.assertEqual(json.loads(result.stdout)["singleturn"], 1000)
+        result = self.read("baud=115200&rs485=on")
+        self.assert_failed(result, f"the driver of the port {PORT} cannot switch the direction")
+
+    def test_low_latency(self):
+        def clear(fields):
+            fields[FLAGS] &= ~ASYNC_LOW_LATENCY
+        serial_struct(PORT, clear)
+        self.assertFalse(serial_struct(PORT)[FLAGS] & ASYNC_LOW_LATENCY)
+        self.emulator(baud=115200)
+        self.assert_good(self.read("baud=115200"))
+        self.assertTrue(serial_struct(PORT)[FLAGS] & ASYNC_LOW_LATENCY)
+
+    def test_two_absencs_and_one_port(self):
+        self.emulator(baud=115200)
+        reader = self.reader("baud=115200")
+        self.assert_failed(self.read("baud=115200"), f"the port {PORT} is in use by absenc", str(reader.pid))
+        result = absenc("emulate", "tformat", "--port", f"{PORT}?baud=115200", "--for", "5")
+        self.assert_failed(result, "is in use by absenc")
+        self.assertEqual(end(reader, signal.SIGINT)[0], 0)
+        self.assert_good(self.read("baud=115200"))
+
+    def test_programs_that_do_not_ask(self):
+        """Root may open a port in any case; others are kept out, as long as absenc has it and no longer."""
+        os.chmod(PORT, 0o666)
+        self.addCleanup(os.chmod, PORT, 0o600)
+        self.emulator(baud=115200)
+        reader = self.reader("baud=115200")
+        self.assertEqual(self.error_of_nobody(), errno.EBUSY)
+        self.assertEqual(end(reader, signal.SIGINT)[0], 0)
+        self.assertEqual(self.error_of_nobody(), 0)
+
+    def error_of_nobody(self):
+        child = os.fork()
+        if child == 0:
+            os.setuid(NOBODY)
+            try:
+                os.open(PORT, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+            except OSError as error:
+                os._exit(error.errno)
+            os._exit(0)
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// A virtual encoder on a serial port that is there already: of a cable to another computer, or of a USB gadget.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/core/time.hpp"
+#include "absenc/link/step.hpp"
+#include "tools/absenc/encoder_uri.hpp"
+
+namespace absenc::tool {
+
+/// "/dev/ttyUSB1", with settings of the port behind it as behind an encoder. Throws UsageError.
+[[nodiscard]] EncoderUri parse_served_port(const Unit& unit, std::string_view text);
+
+/// Says that it is ready, and serves until a signal or `end`. A port that goes away is waited for: whoever plugs it in
+/// again finds the encoder as it was. A transfer due within `send_slack` is sent at once.
+/// Throws os::Failure when it cannot be opened at first.
+void serve_port(Machine<std::uint8_t>& device, const EncoderUri& uri, Time send_slack, Time end);
+
+}  // namespace absenc::tool
