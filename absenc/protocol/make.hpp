@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <new>
 #include <span>
+#include <type_traits>
 
 #include "absenc/protocol/unit.hpp"
 
@@ -15,18 +16,28 @@ template <class Machine, class... Parameters>
 Machine* make_in(std::span<std::byte> storage, const Parameters&... parameters) {
   return storage.size() < sizeof(Machine) ? nullptr : new (storage.data()) Machine(parameters...);
 }
+
+// Of whichever item the machine is.
+template <template <class> class Role, class Made>
+Any<Role> any_of(Made* machine) {
+  if constexpr (std::is_base_of_v<Machine<CanFrame>, Made>) {
+    return {.frames = machine};
+  } else {
+    return {.bytes = machine};
+  }
+}
 }  // namespace detail
 
 /// A host machine; none when the storage is too small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Conversation> make_host(std::span<std::byte> storage, const Parameters&... parameters) {
-  return {.bytes = detail::make_in<Machine>(storage, parameters...)};
+  return detail::any_of<Conversation>(detail::make_in<Machine>(storage, parameters...));
 }
 
 /// A virtual encoder; none when the storage is too small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Device> make_device(std::span<std::byte> storage, const Parameters&... parameters) {
-  return {.bytes = detail::make_in<Machine>(storage, parameters...)};
+  return detail::any_of<Device>(detail::make_in<Machine>(storage, parameters...));
 }
 
 }  // namespace absenc

@@ -29,7 +29,7 @@ enum class Verb : std::uint8_t {
   memory_write,
   config_get,
   config_set,
-  scan,  // who answers on a line: for each, a record that begins with its `encoder_address`
+  scan,  // who answers on a line: for each, a record that begins with its address
   run,   // a procedure only this unit has
 };
 
@@ -52,7 +52,8 @@ struct Command {
   std::span<const Argument> arguments{};
   bool changes_encoder = false;
   bool repeatable = true;             // whether the same request may be sent again after an error
-  std::string_view reads_back{};      // config_set: the name of the config_get command that reads this setting
+  std::string_view reads_back{};      // config_set: the name of the config_get command that reads this setting; "": none
+                                      // can, and the setting has the name of this command
   std::string_view changes_option{};  // config_set: the option that must follow its first argument
 };
 
@@ -102,7 +103,7 @@ struct Expected {
 };
 
 /// A frame with what it must decode to. `options` is "name=value name=value". Clocked links: request and reply are
-/// texts of 0 and 1.
+/// texts of 0 and 1; CAN links: texts as "1ff:022b000000000000".
 struct Vector {
   std::string_view id;
   std::string_view meaning;
@@ -183,7 +184,7 @@ struct Unit {
 
   /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
-  /// The request of a command. Errors: invalid_argument, buffer_too_small.
+  /// The request of a command; on CAN links its text, as in vectors. Errors: invalid_argument, buffer_too_small.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
   Delimit (*delimit)(const Options& options, Direction direction, Bytes bytes);
@@ -197,6 +198,8 @@ struct Unit {
   bool (*covered)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// About a reply that `decode` refuses with `error`, what the document says; null: nothing.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
+  /// The line as the options describe it; null: always `line`.
+  LineSettings (*settings)(const Options& options) = nullptr;
   /// The unit of the same encoder behind an SPI controller, where that is another one.
   const Unit* over_spi = nullptr;
   /// Puts every value of the probeable options; null: frames do not tell. Captures are in the order of time. Whether

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "absenc/core/bit_view.hpp"
+#include "absenc/core/hex.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc {
@@ -39,6 +40,22 @@ struct VectorCheck final : FieldSink {
   BitBuffer<256> bits;
   for (const std::uint8_t c : text) bits.append(c == '1' ? 1 : 0, 1);
   return bits;
+}
+
+/// The frame behind the text of a vector on a CAN link: "1ff:022b", an identifier of more than three digits is one of
+/// 29 bits. A text that is none gives an empty frame.
+[[nodiscard]] constexpr CanFrame can_frame_of_text(Bytes text) {
+  CanFrame frame;
+  std::size_t at = 0;
+  for (; at < text.size() && text[at] != ':'; ++at) {
+    frame.id = frame.id << 4 | static_cast<std::uint32_t>(hex_digit(static_cast<char>(text[at])) & 15);
+  }
+  frame.extended = at > 3;
+  for (++at; at + 1 < text.size() && frame.size < frame.data.size(); at += 2) {
+    frame.data[frame.size++] = static_cast<std::uint8_t>(hex_digit(static_cast<char>(text[at])) << 4 |
+                                                         hex_digit(static_cast<char>(text[at + 1])));
+  }
+  return frame;
 }
 
 }  // namespace absenc

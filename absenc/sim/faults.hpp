@@ -28,6 +28,9 @@ enum class FaultKind : std::uint8_t {
 inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt", "truncate", "delay",          "echo",
                                                              "garbage", "silence", "repeat",   "request_corrupt"};
 
+/// How often each fault was injected, by FaultKind.
+using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
+
 /// How often each fault is injected: 0 to 1, per reply, `request_corrupt` per byte received.
 struct FaultRates {
   std::array<double, fault_names.size()> rates{};
@@ -61,6 +64,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// How many faults of this kind were injected.
   [[nodiscard]] std::uint64_t count(FaultKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
+  [[nodiscard]] const FaultCounts& counts() const { return counts_; }
   /// Replies with at least one fault.
   [[nodiscard]] std::uint64_t damaged_replies() const { return damaged_replies_; }
 
@@ -73,7 +77,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   Machine<std::uint8_t>& device_;
   FaultRates rates_;
   Random random_;
-  std::array<std::uint64_t, fault_names.size()> counts_{};
+  FaultCounts counts_{};
   std::uint64_t damaged_replies_ = 0;
 
   std::vector<std::uint8_t> request_;  // since the last reply

@@ -12,8 +12,10 @@
 #include "absenc/os/emulator_port.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/sim/bus.hpp"
-#include "tools/absenc/encoder_uri.hpp"
+#include "absenc/os/slcan_port.hpp"
+#include "absenc/os/socketcan.hpp"
+#include "absenc/os/spi_device.hpp"
+#include "absenc/os/spidev.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/memory_file.hpp"
 #include "tools/absenc/memory_keeper.hpp"
@@ -22,7 +24,7 @@
 #include "tools/absenc/served_port.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
-#include "tools/absenc/virtual_device.hpp"
+#include "tools/absenc/virtual_line.hpp"
 
 namespace absenc::tool {
 
@@ -34,34 +36,16 @@ using namespace std::chrono_literals;
 constexpr Time send_slack = 500us;
 constexpr Time late_reply = 50ms;
 
-DeviceSettings device_settings(const Invocation& invocation) {
-  DeviceSettings settings;
-  if (invocation.has("--singleturn")) settings.singleturn = invocation.number("--singleturn", 0, 0, INT64_MAX);
-  if (invocation.has("--multiturn")) settings.multiturn = invocation.number("--multiturn", 0, 0, INT64_MAX);
-  settings.motion = invocation.text("--motion", "still");
-  for (const std::string& alarm : invocation.texts("--alarm")) settings.alarms.push_back(alarm);
-  for (const std::string& fault : invocation.texts("--fault")) settings.faults.push_back(fault);
-  settings.seed = static_cast<std::uint64_t>(invocation.number("--seed", 1, 0, INT64_MAX));
-  settings.delay = late_reply;
-  const std::string_view power_on = invocation.text("--power-on", "skip");
-  if (power_on != "real" && power_on != "skip") {
-    throw UsageError(fmt::format("--power-on is \"{}\", but must be real or skip", power_on));
-  }
-  settings.real_power_on = power_on == "real";
-  return settings;
-}
-
-std::string fault_counts(const sim::FaultyDevice& faults) {
+std::string fault_counts(const sim::FaultCounts& faults) {
   std::vector<std::string> counts;
-  for (std::size_t i = 0; i < sim::fault_names.size(); ++i) {
-    const std::uint64_t count = faults.count(static_cast<sim::FaultKind>(i));
-    if (count != 0) counts.push_back(fmt::format("{} {}", count, sim::fault_names[i]));
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    if (faults[i] != 0) counts.push_back(fmt::format("{} {}", faults[i], sim::fault_names[i]));
   }
   return counts.empty() ? "none" : fmt::format("{}", fmt::join(counts, ", "));
 }
 
-void summarize(const VirtualDevice& device, std::string_view name, Time start) {
-  const Device<std::uint8_t>& encoder = *device.device().bytes;
+template <class Item>
+void print_rules(const Device<Item>& encoder, const VirtualDevice& device, std::string_view name, Time start) {
   print_message(fmt::format("{}{} requests answered in {}", name, encoder.answered(), to_text(os::now() - start)));
   if (device.faults() != nullptr) print_note(fmt::format("  faults injected: {}", fault_counts(*device.faults())));
   if (encoder.violation_count() == 0) return;
@@ -73,81 +57,19 @@ void summarize(const VirtualDevice& device, std::string_view name, Time start) {
   if (encoder.violation_count() > encoder.violations().size()) print_note("    ...");
 }
 
-std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
-  if (!invocation.has("--tcp")) return std::nullopt;
-  return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
-}
-
-/// All encoders on the line: the one of the other options, and those of --also.
-class VirtualLine {
- public:
-  VirtualLine(const Unit& unit, const Options& options, const Invocation& invocation)
-      : further_(invocation.texts("--also")) {
-    const DeviceSettings settings = device_settings(invocation);
-    devices_.push_back(std::make_unique<VirtualDevice>(unit, options, settings));
-    std::string base = fmt::format("sim:{}?", unit.id);
-    if (invocation.has("--model")) base += fmt::format("model={}&", invocation.text("--model"));
-    for (const std::string& option : invocation.texts("--option")) base += option + '&';
-    for (const std::string& further : further_) {
-      EncoderUri uri = parse_encoder(base + further);
-      uri.device.delay = settings.delay;
-      uri.device.real_power_on = settings.real_power_on;
-      devices_.push_back(std::make_unique<VirtualDevice>(unit, uri.options, uri.device));
-    }
-    std::vector<Machine<std::uint8_t>*> machines;
-    for (const auto& device : devices_) machines.push_back(device->bytes());
-    if (machines.size() > 1) bus_ = std::make_unique<sim::Bus>(machines, unit.line.character());
-  }
-
-  [[nodiscard]] VirtualDevice& first() { return *devices_.front(); }
-  [[nodiscard]] Machine<std::uint8_t>& machine() { return bus_ != nullptr ? *bus_ : *first().bytes(); }
-
-  void power_on(Time now) {
-    for (const auto& device : devices_) device->power_on(now);
-  }
-
-  void summarize_all(Time start) const {
-    for (std::size_t i = 0; i < devices_.size(); ++i) {
-      const std::string name = i > 0 ? further_[i - 1] + ": " : devices_.size() > 1 ? "the first: " : "";
-      summarize(*devices_[i], name, start);
-    }
-  }
-
- private:
-  std::span<const std::string> further_;
-  std::vector<std::unique_ptr<VirtualDevice>> devices_;
-  std::unique_ptr<sim::Bus> bus_;
-};
-
-// Until a signal or the end of the time. Returns what is to be noted of the line.
-std::string serve_serial(Machine<std::uint8_t>& machine, const Invocation& invocation, Time end) {
-  const std::optional<std::uint16_t> listen = tcp_port(invocation);
-  os::EmulatorPort port(std::string(invocation.text("--pty")), listen);
-  port.set_send_slack(send_slack);
-  if (end != never) port.set_end(end);
-  print_line(fmt::format("ready: {}", port.path()));
-  if (listen) print_line(fmt::format("ready: tcp:127.0.0.1:{}", port.tcp_port()));
+// Until a signal or the end of the time.
+template <class Item>
+void serve(Machine<Item>& machine, Port<Item>& port) {
   try {
     host::drive(machine, port, [] { return true; });
   } catch (const os::Interrupted&) {
   } catch (const os::Ended&) {
   }
-  if (port.dropped() == 0) return {};
-  return fmt::format("bytes that nobody read: {}", port.dropped());
 }
 
-std::string serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const Invocation& invocation, Time end) {
-  os::SpiDevice device(unit.link, unit.line, machine);
-  os::Spidev spidev(device);
-  os::SpidevNode node(std::string(invocation.text("--spidev")), spidev);
-  print_line(fmt::format("ready: {}", node.path()));
-  try {
-    node.serve(end);
-  } catch (const os::Interrupted&) {
-  }
-  if (device.wrong_modes() == 0) return {};
-  return fmt::format("messages in another SPI mode than the encoder's, which is {}: {}", unit.line.spi_mode,
-                     device.wrong_modes());
+std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
+  if (!invocation.has("--tcp")) return std::nullopt;
+  return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
 }
 
 // The unit of what --spidev asks for is that of the SPI controller.
@@ -156,69 +78,175 @@ const Unit& emulated_unit(const Invocation& invocation) {
   return invocation.has("--spidev") && unit.over_spi != nullptr ? *unit.over_spi : unit;
 }
 
+LineSettings line_settings(const Unit& unit, const Options& options) {
+  return unit.settings != nullptr ? unit.settings(options) : unit.line;
+}
+
+/// Where an encoder may be, and where nothing else may be given.
+struct Place {
+  std::string_view option;
+  bool fits;
+};
+
 void check_line(const Unit& unit, const Invocation& invocation) {
-  const bool goes_over_spi = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
-  const bool goes_over_serial = unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
-  if (invocation.has("--spidev")) {
-    if (!goes_over_spi) {
-      throw UsageError(fmt::format("{} ({}) does not go over an SPI controller: use --pty", unit.id, line_of(unit)));
+  const bool is_spi = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
+  const bool is_can = unit.link == LinkKind::can;
+  const std::array<Place, 5> places{{{"--pty", !is_spi},
+                                     {"--tcp", !is_spi},
+                                     {"--port", !is_spi && !is_can},
+                                     {"--spidev", is_spi},
+                                     {"--can", is_can}}};
+  std::string_view chosen;
+  for (const Place& place : places) {
+    if (!invocation.has(place.option)) continue;
+    if (!place.fits) throw UsageError(fmt::format("{} ({}) is not for {}", unit.id, line_of(unit), place.option));
+    if (!chosen.empty() && place.option != "--tcp") {
+      throw UsageError(fmt::format("{} and {} exclude each other", chosen, place.option));
     }
-    if (invocation.has("--pty") || invocation.has("--tcp") || invocation.has("--port")) {
-      throw UsageError("--spidev is a line of its own: not with --pty, --tcp or --port");
-    }
-  } else if (goes_over_spi) {
-    throw UsageError(fmt::format("{0} does not go over a serial line: use --spidev NAME, or sim:{0}", unit.id));
-  } else if (!goes_over_serial) {
-    throw UsageError(fmt::format("{} does not go over a serial line: use sim:{}", unit.id, unit.id));
+    if (chosen.empty() || place.option != "--tcp") chosen = place.option;
   }
-  if (invocation.has("--port") && (invocation.has("--pty") || invocation.has("--tcp"))) {
-    throw UsageError("--port is a line of its own: not with --pty or --tcp");
+  if (is_spi && chosen.empty()) {
+    throw UsageError(fmt::format("{0} does not go over a serial line: use --spidev NAME, or sim:{0}", unit.id));
   }
   if (!invocation.has("--also")) return;
-  if (unit.link != LinkKind::half_duplex) throw UsageError(fmt::format("{} has one encoder on a line", unit.id));
+  if (unit.link != LinkKind::half_duplex && !is_can) {
+    throw UsageError(fmt::format("{} has one encoder on a line", unit.id));
+  }
   if (invocation.has("--memory")) throw UsageError("--memory keeps the memory of one encoder: not with --also");
+}
+
+/// The line, its memory file and its time.
+template <class Item>
+struct Emulation {
+  Emulation(const Unit& unit, const Options& options, const Invocation& invocation)
+      : line(unit, options, invocation),
+        file(std::string(invocation.text("--memory")), unit.id,
+             options.model != nullptr ? options.model->name : "none"),
+        keeps_memory(invocation.has("--memory")),
+        seconds(invocation.real("--for", 0, 0.001, 1e9)) {
+    if (keeps_memory) file.load(line.first().memory());
+  }
+
+  /// `serve(machine)` holds it on its line until a signal or the end, and returns what is to be noted of the line.
+  template <class Serve>
+  int run(const Serve& serve) {
+    const Time start = os::now();
+    line.power_on(start);
+    MemoryKeeper<Item> keeper(line.machine(), line.first(), file);
+    const std::vector<std::string> notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : line.machine());
+    const bool saved = !keeps_memory || keeper.finish();
+    line.summarize(start);
+    for (const std::string& note : notes) print_note("  " + note);
+    return saved ? exit_good : exit_failed;
+  }
+
+  // `never`: at a signal.
+  [[nodiscard]] Time end() const {
+    return seconds > 0 ? os::now() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never;
+  }
+
+  VirtualLine<Item> line;
+  MemoryFile file;
+  bool keeps_memory;
+  double seconds;
+};
+
+using Notes = std::vector<std::string>;
+
+void note_count(Notes& notes, std::string_view what, std::uint64_t count) {
+  if (count != 0) notes.push_back(fmt::format("{}: {}", what, count));
+}
+
+void print_ready(const os::EmulatorPort& port) {
+  print_line(fmt::format("ready: {}", port.path()));
+  if (port.tcp_port() != 0) print_line(fmt::format("ready: tcp:127.0.0.1:{}", port.tcp_port()));
+}
+
+Notes serve_terminal(Machine<std::uint8_t>& machine, const Invocation& invocation, Time end) {
+  os::EmulatorPort port(std::string(invocation.text("--pty")), tcp_port(invocation));
+  port.set_send_slack(send_slack);
+  port.set_end(end);
+  print_ready(port);
+  serve(machine, port);
+  Notes notes;
+  note_count(notes, "bytes that nobody read", port.dropped());
+  return notes;
+}
+
+Notes serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const Invocation& invocation, Time end) {
+  os::SpiDevice device(unit.link, unit.line, machine);
+  os::Spidev spidev(device);
+  os::SpidevNode node(std::string(invocation.text("--spidev")), spidev);
+  print_line(fmt::format("ready: {}", node.path()));
+  try {
+    node.serve(end);
+  } catch (const os::Interrupted&) {
+  }
+  Notes notes;
+  note_count(notes, fmt::format("messages in another SPI mode than the encoder's, which is {}", unit.line.spi_mode),
+             device.wrong_modes());
+  return notes;
+}
+
+int emulate_bytes(const Unit& unit, const Options& options, const Invocation& invocation) {
+  std::optional<EncoderUri> served;
+  if (invocation.has("--port")) served = parse_served_port(unit, invocation.text("--port"));
+  Emulation<std::uint8_t> emulation(unit, options, invocation);
+  const Time end = emulation.end();
+  return emulation.run([&](Machine<std::uint8_t>& machine) -> Notes {
+    if (invocation.has("--spidev")) return serve_spi(machine, unit, invocation, end);
+    if (!served) return serve_terminal(machine, invocation, end);
+    serve_port(machine, *served, send_slack, end);
+    return {};
+  });
+}
+
+// Behind an adapter on a pseudo-terminal.
+Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const Invocation& invocation, Time end) {
+  const auto bytes = std::make_shared<os::EmulatorPort>(std::string(invocation.text("--pty")), tcp_port(invocation));
+  bytes->set_end(end);
+  os::SlcanAdapter port(bytes, line);
+  print_ready(*bytes);
+  serve(machine, port);
+  Notes notes;
+  note_count(notes, "frames lost while the adapter was closed or at another bit rate", port.lost());
+  note_count(notes, "lines that are no command of the adapter", port.garbage());
+  note_count(notes, "bytes that nobody read", bytes->dropped());
+  return notes;
+}
+
+int emulate_frames(const Unit& unit, const Options& options, const Invocation& invocation) {
+  Emulation<CanFrame> emulation(unit, options, invocation);
+  const Time end = emulation.end();
+  const LineSettings line = line_settings(unit, options);
+  return emulation.run([&](Machine<CanFrame>& machine) -> Notes {
+    if (!invocation.has("--can")) return serve_adapter(machine, line, invocation, end);
+    const std::string interface(invocation.text("--can"));
+    os::SocketCan port(interface, line);
+    port.set_end(end);
+    print_line(fmt::format("ready: {}", interface));
+    serve(machine, port);
+    return {};
+  });
 }
 
 int run_emulate(const Invocation& invocation) {
   os::catch_interrupts();
   const Unit& unit = emulated_unit(invocation);
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
-  const double seconds = invocation.real("--for", 0, 0.001, 1e9);
   check_line(unit, invocation);
-  std::optional<EncoderUri> served;
-  if (invocation.has("--port")) served = parse_served_port(unit, invocation.text("--port"));
-  VirtualLine line(unit, options, invocation);
-  Device<std::uint8_t>& encoder = *line.first().device().bytes;
-  const MemoryFile file(std::string(invocation.text("--memory")), unit.id,
-                        options.model != nullptr ? options.model->name : "none");
-  const bool keeps_memory = invocation.has("--memory");
-  if (keeps_memory) file.load(encoder.memory());
-
-  const Time start = os::now();
-  const Time end = seconds > 0 ? start + Time(static_cast<std::int64_t>(seconds * 1e9)) : never;
-  line.power_on(start);
-  MemoryKeeper<std::uint8_t> keeper(line.machine(), encoder, file);
-  Machine<std::uint8_t>& machine = keeps_memory ? static_cast<Machine<std::uint8_t>&>(keeper) : line.machine();
-  std::string note;
-  if (served) {
-    serve_port(machine, *served, send_slack, end);
-  } else if (invocation.has("--spidev")) {
-    note = serve_spi(machine, unit, invocation, end);
-  } else {
-    note = serve_serial(machine, invocation, end);
-  }
-  const bool saved = !keeps_memory || keeper.finish();
-  line.summarize_all(start);
-  if (!note.empty()) print_note("  " + note);
-  return saved ? exit_good : exit_failed;
+  return unit.link == LinkKind::can ? emulate_frames(unit, options, invocation)
+                                    : emulate_bytes(unit, options, invocation);
 }
 
-constexpr std::array<Parameter, 17> parameters{{
+constexpr std::array<Parameter, 18> parameters{{
     parameter::protocol,
-    {"--pty", "PATH", "where to put the link to the pseudo-terminal", "only the pseudo-terminal itself"},
-    {"--spidev", "NAME", "instead: be an SPI device /dev/NAME, which the kernel's module cuse makes"},
-    {"--port", "PATH", "instead: a serial port that is there already, with ?baud=RATE and more as behind an encoder"},
+    {"--pty", "PATH", "where to put the link to the pseudo-terminal; CAN: that of an slcan adapter",
+     "only the pseudo-terminal itself"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
+    {"--port", "PATH", "instead: a serial port that is there already, with ?baud=RATE and more as behind an encoder"},
+    {"--spidev", "NAME", "SPI: be a device /dev/NAME, which the kernel's module cuse makes"},
+    {"--can", "INTERFACE", "CAN: be on this interface, as vcan0"},
     parameter::model,
     parameter::protocol_option,
     {"--singleturn", "COUNTS", "position within the turn at the start", "0"},
@@ -238,21 +266,55 @@ constexpr std::array<Parameter, 17> parameters{{
     {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
 }};
 
-constexpr std::array<Example, 5> examples{{
+constexpr std::array<Example, 6> examples{{
     {"absenc emulate tformat --pty /tmp/encoder --motion rpm=60", "a turning encoder; read it as tformat:/tmp/encoder"},
     {"absenc emulate tformat --tcp 4001 --alarm battery_alarm --fault corrupt=0.01 --memory encoder.txt",
      "one that misbehaves, for whoever connects, and remembers what was written"},
     {"absenc emulate esl --pty /tmp/line --also address=3 --also \"address=5&singleturn=1000&motion=rpm=60\"",
      "three on one line; `absenc scan esl:/tmp/line` finds them"},
-    {"sudo absenc emulate encolink --spidev spidev9.0", "one behind an SPI controller: encolink:spi:/dev/spidev9.0"},
     {"absenc emulate e201 --port /dev/ttyUSB1", "for whoever is at the other end of a cable"},
+    {"sudo absenc emulate encolink --spidev spidev9.0", "one behind an SPI controller: encolink:spi:/dev/spidev9.0"},
+    {"absenc emulate raa38-can --pty /tmp/adapter --also node=0x21", "two on a CAN bus: raa38-can:slcan:/tmp/adapter"},
 }};
 
 }  // namespace
 
+DeviceSettings device_settings(const Invocation& invocation) {
+  DeviceSettings settings;
+  if (invocation.has("--singleturn")) settings.singleturn = invocation.number("--singleturn", 0, 0, INT64_MAX);
+  if (invocation.has("--multiturn")) settings.multiturn = invocation.number("--multiturn", 0, 0, INT64_MAX);
+  settings.motion = invocation.text("--motion", "still");
+  for (const std::string& alarm : invocation.texts("--alarm")) settings.alarms.push_back(alarm);
+  for (const std::string& fault : invocation.texts("--fault")) settings.faults.push_back(fault);
+  settings.seed = static_cast<std::uint64_t>(invocation.number("--seed", 1, 0, INT64_MAX));
+  settings.delay = late_reply;
+  const std::string_view power_on = invocation.text("--power-on", "skip");
+  if (power_on != "real" && power_on != "skip") {
+    throw UsageError(fmt::format("--power-on is \"{}\", but must be real or skip", power_on));
+  }
+  settings.real_power_on = power_on == "real";
+  return settings;
+}
+
+EncoderUri further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
+                           const DeviceSettings& settings) {
+  std::string base = fmt::format("sim:{}?", unit.id);
+  if (invocation.has("--model")) base += fmt::format("model={}&", invocation.text("--model"));
+  for (const std::string& option : invocation.texts("--option")) base += option + '&';
+  EncoderUri uri = parse_encoder(base + further);
+  uri.device.delay = settings.delay;
+  uri.device.real_power_on = settings.real_power_on;
+  return uri;
+}
+
+void print_summary(const VirtualDevice& device, std::string_view name, Time start) {
+  if (device.device().bytes != nullptr) print_rules(*device.device().bytes, device, name, start);
+  if (device.device().frames != nullptr) print_rules(*device.device().frames, device, name, start);
+}
+
 const Subcommand emulate_subcommand{
     "emulate",
-    "be a virtual encoder on a pseudo-terminal, serial or TCP port, or SPI device",
+    "be a virtual encoder on a pseudo-terminal, a serial or TCP port, an SPI device or a CAN interface",
     "Prints \"ready: PATH\" when it can be opened, and with --tcp also \"ready: tcp:127.0.0.1:PORT\".\n"
     "At the end, a summary goes to standard error: requests, faults, and the rules that the host broke.",
     parameters,

@@ -27,7 +27,11 @@ int run_encode(const Invocation& invocation) {
     throw UsageError(fmt::format("{} cannot be encoded: {}. Try: {}", command.name, text_of(size.error()).description,
                                  text_of(size.error()).advice));
   }
-  const std::string request = to_wire_text(unit.link, {.bytes = Bytes(bytes).first(*size)});
+  const Bytes encoded = Bytes(bytes).first(*size);
+  const WireFrame frame = unit.link == LinkKind::can
+                              ? parse_wire_text(unit.link, command.name, std::string(encoded.begin(), encoded.end()))
+                              : WireFrame{.bytes = {encoded.begin(), encoded.end()}, .bits = 0, .can = {}};
+  const std::string request = to_wire_text(unit.link, frame.frame());
   if (invocation.has("--json")) {
     print_line(Json::object().set("protocol", unit.id).set("command", command.name).set("request", request).line());
   } else {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absenc/os/serial_ports.hpp"
+#include "absenc/os/socketcan.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/named_encoder.hpp"
@@ -35,7 +36,11 @@ std::size_t switch_of(const OptionText& setting) {
 void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
   const std::string value(setting.value);
   if (setting.name == "baud") {
-    uri.line.rate = static_cast<std::uint32_t>(number_of(setting, 1, 100'000'000));
+    std::uint32_t& rate = uri.place == Place::slcan ? uri.adapter_rate : uri.line.rate;
+    rate = static_cast<std::uint32_t>(number_of(setting, 1, 100'000'000));
+  } else if (setting.name == "log") {
+    if (uri.unit->link != LinkKind::can) throw UsageError("log cannot be set here: it takes down frames of a CAN bus");
+    uri.log = value;
   } else if (setting.name == "rs485") {
     constexpr std::array modes{os::Rs485::automatic, os::Rs485::on, os::Rs485::off};
     uri.rs485 = modes[switch_of(setting)];
@@ -71,6 +76,10 @@ bool allowed(const LinkParameter& parameter, Place place) {
       return parameter.tcp;
     case Place::spi:
       return parameter.spi;
+    case Place::can:
+      return parameter.can;
+    case Place::slcan:
+      return parameter.slcan;
     case Place::sim:
       break;
   }
@@ -105,6 +114,7 @@ void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
     if (allowed(parameter, uri.place)) names.push_back(parameter.name);
   }
   uri.options = require_options(*uri.unit, {}, options, names);
+  if (uri.unit->settings != nullptr) uri.line = uri.unit->settings(uri.options);
 }
 
 bool goes_over_serial(const Unit& unit) {
@@ -119,15 +129,21 @@ std::string examples(const Unit& unit) {
   if (goes_over_serial(unit)) {
     return fmt::format("{0}:{1}, {0}:tcp:HOST:PORT or sim:{0}", unit.id, first(os::serial_ports(), "/dev/ttyUSB0"));
   }
-  if (!goes_over_spi(unit)) return fmt::format("sim:{}", unit.id);
+  if (unit.link == LinkKind::can) {
+    return fmt::format("{0}:{1}, {0}:slcan:/dev/ttyACM0 or sim:{0}", unit.id, first(os::can_interfaces(), "can0"));
+  }
   return fmt::format("{0}:spi:{1} or sim:{0}", unit.id, first(os::spi_devices(), "/dev/spidev0.0"));
 }
 
 // What a place carries, and what the unit speaks.
 void check_place(const EncoderUri& uri, std::string_view address) {
-  const bool fits = uri.place == Place::spi ? goes_over_spi(*uri.unit) : goes_over_serial(*uri.unit);
+  const bool is_can = uri.place == Place::can || uri.place == Place::slcan;
+  const bool fits = is_can                    ? uri.unit->link == LinkKind::can
+                    : uri.place == Place::spi ? goes_over_spi(*uri.unit)
+                                              : goes_over_serial(*uri.unit);
   if (fits) return;
-  const std::string_view place = uri.place == Place::spi   ? "an SPI controller"
+  const std::string_view place = is_can                    ? "a CAN adapter"
+                                 : uri.place == Place::spi ? "an SPI controller"
                                  : uri.place == Place::tcp ? "TCP"
                                                            : "a serial port";
   throw UsageError(fmt::format("\"{}\": {} ({}) does not go over {}: write {}", address, uri.unit->id,
@@ -174,12 +190,17 @@ void parse_where(EncoderUri& uri, std::string_view address) {
   } else if (where.starts_with("spi:")) {
     uri.place = Place::spi;
     if (uri.unit->over_spi != nullptr) uri.unit = uri.unit->over_spi;
+  } else if (where.starts_with("slcan:")) {
+    uri.place = Place::slcan;
+  } else if (uri.unit->link == LinkKind::can && where.find('/') == std::string_view::npos) {
+    uri.place = Place::can;
   }
   check_place(uri, address);
   if (uri.place == Place::tcp) return parse_tcp(uri, where.substr(4));
-  uri.path = uri.place == Place::spi ? where.substr(4) : where;
+  uri.path = uri.place == Place::spi || uri.place == Place::slcan ? where.substr(where.find(':') + 1) : where;
   if (uri.path.empty()) {
-    throw UsageError(fmt::format("\"{}\" does not say which SPI device: write {}", address, examples(*uri.unit)));
+    const std::string_view what = uri.place == Place::spi ? "SPI device" : "serial port of the adapter";
+    throw UsageError(fmt::format("\"{}\" does not say which {}: write {}", address, what, examples(*uri.unit)));
   }
 }
 
@@ -266,6 +287,7 @@ std::string address_of(const EncoderUri& uri) {
   if (uri.place == Place::sim) return fmt::format("sim:{}", uri.unit->id);
   if (uri.place == Place::spi) return fmt::format("{}:spi:{}", uri.unit->id, uri.path);
   if (uri.place == Place::tcp) return fmt::format("{}:tcp:{}:{}", uri.unit->id, uri.host, uri.port);
+  if (uri.place == Place::slcan) return fmt::format("{}:slcan:{}", uri.unit->id, uri.path);
   return fmt::format("{}:{}", uri.unit->id, uri.path);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // An encoder as the user writes it: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001,
-// ssi:spi:/dev/spidev0.0, sim:tformat, or a name of absenc.toml.
+// ssi:spi:/dev/spidev0.0, raa38-can:can0, raa38-can:slcan:/dev/ttyACM0, sim:tformat, or a name of absenc.toml.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace absenc::tool {
 
-enum class Place : std::uint8_t { serial, tcp, spi, sim };
+enum class Place : std::uint8_t { serial, tcp, spi, can, slcan, sim };
 
 /// A setting of the way to the encoder, beside the options of its protocol.
 struct LinkParameter {
@@ -28,13 +28,18 @@ struct LinkParameter {
   std::string_view places;     // for people
   bool serial, tcp, spi, sim;  // where it may be given
   bool repeatable = false;
+  bool can = false, slcan = false;
 };
 
-inline constexpr std::array<LinkParameter, 12> link_parameters{{
-    {"baud", "RATE", "bits a second, instead of the protocol's own", "serial", true, false, false, false},
+inline constexpr std::array<LinkParameter, 13> link_parameters{{
+    {"baud", "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
+     "serial, slcan", true, false, false, false, false, false, true},
     {"rs485", "auto|on|off", "whether the kernel switches the direction of the transceiver", "serial", true, false,
      false, false},
-    {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp", true, true, false, false},
+    {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp, can, slcan", true, true, false,
+     false, false, true, true},
+    {"log", "FILE", "write every CAN frame sent and received to it, as candump -l does; it must not exist yet",
+     "can, slcan, sim", false, false, false, true, false, true, true},
     {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi", false, false, true, false},
     {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi", false, false, true, false},
     {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim", true, true, false, true},
@@ -54,7 +59,7 @@ struct EncoderUri {
   const Unit* unit = nullptr;
   Options options;
   Place place = Place::serial;
-  std::string path;  // serial, spi
+  std::string path;  // serial, spi, slcan; can: the interface
   std::string host;  // tcp
   std::uint16_t port = 0;
 
@@ -62,6 +67,8 @@ struct EncoderUri {
   os::Rs485 rs485 = os::Rs485::automatic;
   std::optional<Time> latency;
   os::SpiChoice spi;
+  std::uint32_t adapter_rate = 115'200;  // slcan: of the serial port, not of the bus
+  std::string log;                       // "": none
   host::EchoMode echo = host::EchoMode::off;
   DeviceSettings device;
 };

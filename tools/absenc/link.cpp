@@ -3,11 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
+#include "absenc/os/slcan_port.hpp"
+#include "absenc/os/socketcan.hpp"
 #include "absenc/os/spi_port.hpp"
 #include "absenc/os/tcp.hpp"
 #include "absenc/sim/sim_port.hpp"
+#include "tools/absenc/can_log.hpp"
 
 namespace absenc::tool {
 
@@ -45,6 +50,41 @@ Link open_spi(const EncoderUri& uri) {
   return link;
 }
 
+void take(Link& link, std::shared_ptr<os::FramePort> port, const EncoderUri& uri) {
+  if (uri.latency) port->set_latency(*uri.latency);
+  link.latency = port->latency();
+  link.frames = port.get();
+  link.owner = std::move(port);
+}
+
+Link open_can(const EncoderUri& uri) {
+  Link link;
+  link.place = uri.path;  // its bit rate is not ours
+  take(link, std::make_shared<os::SocketCan>(uri.path, uri.line), uri);
+  return link;
+}
+
+Link open_slcan(const EncoderUri& uri) {
+  Link link;
+  link.place = fmt::format("the CAN adapter at {} at {} bit/s", uri.path, uri.line.rate);
+  const LineSettings serial{.rate = uri.adapter_rate};
+  const auto bytes = std::make_shared<os::SerialPort>(uri.path, serial, os::Rs485::off);
+  link.notes = bytes->notes();
+  const auto port = std::make_shared<os::SlcanPort>(bytes, uri.path, uri.line);
+  link.notes.insert(link.notes.end(), port->notes().begin(), port->notes().end());
+  port->set_latency(bytes->latency());
+  take(link, port, uri);
+  return link;
+}
+
+// Puts the log in front of the port.
+void keep_log(Link& link, const EncoderUri& uri) {
+  const std::string name = uri.place == Place::sim ? "sim" : std::filesystem::path(uri.path).filename().string();
+  auto log = std::make_shared<CanLog>(*link.frames, link.owner, uri.log, name);
+  link.frames = log.get();
+  link.owner = std::move(log);
+}
+
 // Virtual time keeps pace with ours, so that a moving shaft moves.
 Link open_sim(const EncoderUri& uri) {
   Link link;
@@ -68,17 +108,26 @@ Link open_sim(const EncoderUri& uri) {
 }  // namespace
 
 Link open_link(const EncoderUri& uri) {
-  switch (uri.place) {
-    case Place::serial:
-      return open_serial(uri);
-    case Place::tcp:
-      return open_tcp(uri);
-    case Place::spi:
-      return open_spi(uri);
-    case Place::sim:
-      break;
-  }
-  return open_sim(uri);
+  const auto open = [&] {
+    switch (uri.place) {
+      case Place::serial:
+        return open_serial(uri);
+      case Place::tcp:
+        return open_tcp(uri);
+      case Place::spi:
+        return open_spi(uri);
+      case Place::can:
+        return open_can(uri);
+      case Place::slcan:
+        return open_slcan(uri);
+      case Place::sim:
+        break;
+    }
+    return open_sim(uri);
+  };
+  Link link = open();
+  if (!uri.log.empty()) keep_log(link, uri);
+  return link;
 }
 
 }  // namespace absenc::tool

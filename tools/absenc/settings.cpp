@@ -62,6 +62,35 @@ const Command& require_setter(const Unit& unit, const Command& setting) {
   throw UsageError(fmt::format("{} of {} can only be read", setting.name, unit.id));
 }
 
+/// What `config set` changes, and how it is read: null when no command reads it.
+struct Change {
+  const Command* setter;
+  const Command* getter;
+};
+
+Change require_change(const Unit& unit, std::string_view name) {
+  for (const Command& command : unit.commands) {
+    if (command.verb == Verb::config_set && command.reads_back.empty() && command.name == name) {
+      return {&command, nullptr};
+    }
+  }
+  const Command& getter = require_setting(unit, name);
+  return {&require_setter(unit, getter), &getter};
+}
+
+// What the encoder is left with when the port is lost in the middle.
+void write_setting(Encoder& encoder, const Command& setter, Arguments values, FieldSink& written) {
+  try {
+    run_into(encoder, setter, values, written);
+  } catch (const os::Failure& failure) {
+    FieldTable left;
+    encoder.report_left(left);
+    if (left.rows.empty()) throw;
+    throw ToolFailure(fmt::format("{}\n{} was written, but what became of it could not be seen:\n{}", failure.what(),
+                                  setter.name, table(left.rows)));
+  }
+}
+
 int run_get(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
@@ -140,40 +169,43 @@ void follow(Encoder& encoder, const Command& setter, std::int64_t value) {
 int run_set(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
-  const Command& getter = require_setting(*uri.unit, invocation.text("name"));
-  const Command& setter = require_setter(*uri.unit, getter);
-  const std::vector<std::int64_t> values = setter_arguments(invocation, *uri.unit, setter);
-  const bool asks = must_ask(invocation, uri, getter.name, setter.meaning);
+  const auto [setter, getter] = require_change(*uri.unit, invocation.text("name"));
+  const std::string_view name = getter != nullptr ? getter->name : setter->name;
+  const std::vector<std::int64_t> values = setter_arguments(invocation, *uri.unit, *setter);
+  const bool asks = must_ask(invocation, uri, name, setter->meaning);
 
   const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
   Setting old, written, now;
-  run_into(*encoder, getter, {}, old);
+  if (getter != nullptr) run_into(*encoder, *getter, {}, old);
   if (asks) {
     std::string is;
     for (const auto& row : old.shown.rows) is += fmt::format("{}{} is {}", is.empty() ? "" : ", ", row[0], row[1]);
-    if (!confirmed(uri, fmt::format("{} ({})", setter.meaning, is))) {
+    if (getter == nullptr) is = "what it is now cannot be read";
+    if (!confirmed(uri, fmt::format("{} ({})", setter->meaning, is))) {
       print_message("nothing was changed");
       return exit_failed;
     }
   }
   try {
-    run_into(*encoder, setter, values, written);
-    follow(*encoder, setter, values.front());
-    run_into(*encoder, getter, {}, now);
+    write_setting(*encoder, *setter, values, written);
+    follow(*encoder, *setter, values.front());
+    if (getter != nullptr) run_into(*encoder, *getter, {}, now);
   } catch (const os::Interrupted&) {
-    throw ToolFailure(fmt::format("interrupted: `absenc config get` says what {} is now", getter.name));
+    throw ToolFailure(getter != nullptr ? fmt::format("interrupted: `absenc config get` says what {} is now", name)
+                                        : fmt::format("interrupted: whether {} was written is not known", name));
   }
-  require_same(now, written, getter.name);
+  if (getter != nullptr) require_same(now, written, name);
   if (written.text("written") == "no") print_message("note: nothing was sent, because it is so already");
+  const Setting& shown = getter != nullptr ? now : written;
   if (invocation.has("--json")) {
     print_line(Json::object()
                    .set("ok", true)
-                   .set("setting", getter.name)
-                   .set("old", old.json.fields)
-                   .set("new", now.json.fields)
+                   .set("setting", name)
+                   .set("old", getter != nullptr ? old.json.fields : Json())
+                   .set("new", shown.json.fields)
                    .line());
   } else {
-    show_change(getter.name, old, now);
+    show_change(name, old, shown);
   }
   return exit_good;
 }
@@ -210,7 +242,8 @@ const Subcommand config_get_subcommand{
 const Subcommand config_set_subcommand{
     "config set",
     "change a setting of the encoder",
-    "Asks first; without a terminal it needs --yes. The new value is read back and shown beside the old one.",
+    "Asks first; without a terminal it needs --yes. The new value is read back and shown beside the old one; of what\n"
+    "cannot be read, its effect is looked at.",
     set_parameters,
     set_examples,
     run_set};

@@ -23,7 +23,8 @@ fs::path device(const std::string& path) {
 
 bool same_place(const EncoderUri& one, const EncoderUri& other) {
   if (one.place != other.place) return false;
-  if (one.place == Place::serial) return device(one.path) == device(other.path);
+  if (one.place == Place::serial || one.place == Place::slcan) return device(one.path) == device(other.path);
+  if (one.place == Place::can) return one.path == other.path;
   return one.place == Place::tcp && one.host == other.host && one.port == other.port;
 }
 
@@ -67,9 +68,12 @@ bool share_line(const EncoderUri& one, const EncoderUri& other) {
     throw UsageError(fmt::format("{} and {} are on one line, so {}", address_of(one), address_of(other), why));
   };
   if (one.line.rate != other.line.rate) {
-    refuse(fmt::format("they must have the same baud, not {} and {}", one.line.rate, other.line.rate));
+    refuse(fmt::format("they must have the same {}, not {} and {}",
+                       one.unit->link == LinkKind::can ? "bitrate" : "baud", one.line.rate, other.line.rate));
   }
   if (one.line != other.line) refuse("their protocols must have the same characters");
+  if (one.adapter_rate != other.adapter_rate) refuse("they must have the same baud");
+  if (one.log != other.log) refuse("they must have the same log");
   if (one.rs485 != other.rs485) refuse("they must have the same rs485");
   if (one.latency != other.latency) {
     refuse(fmt::format("they must have the same latency, not {} and {}", latency_text(one.latency),

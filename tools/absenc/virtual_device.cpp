@@ -71,12 +71,22 @@ VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const Dev
   if (unit.alarms != nullptr) alarms_ = require_flags(*unit.alarms, settings.alarms);
   if (settings.faults.empty()) return;
   const sim::FaultRates rates = fault_rates(settings);
-  if (device_.bytes == nullptr) throw UsageError(fmt::format("faults cannot be injected on the line of {}", unit.id));
-  faulty_ = std::make_unique<sim::FaultyDevice>(*device_.bytes, rates, settings.seed);
+  if (device_.bytes != nullptr) faulty_ = std::make_unique<sim::FaultyDevice>(*device_.bytes, rates, settings.seed);
+  if (device_.frames != nullptr)
+    faulty_node_ = std::make_unique<sim::FaultyNode>(*device_.frames, rates, settings.seed);
 }
 
 Machine<std::uint8_t>* VirtualDevice::bytes() const {
   return faulty_ ? static_cast<Machine<std::uint8_t>*>(faulty_.get()) : device_.bytes;
+}
+
+Machine<CanFrame>* VirtualDevice::frames() const {
+  return faulty_node_ ? static_cast<Machine<CanFrame>*>(faulty_node_.get()) : device_.frames;
+}
+
+const sim::FaultCounts* VirtualDevice::faults() const {
+  if (faulty_) return &faulty_->counts();
+  return faulty_node_ ? &faulty_node_->counts() : nullptr;
 }
 
 void VirtualDevice::power_on(Time now) {

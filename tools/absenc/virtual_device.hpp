@@ -11,6 +11,7 @@
 
 #include "absenc/protocol/unit.hpp"
 #include "absenc/sim/faults.hpp"
+#include "absenc/sim/faulty_node.hpp"
 #include "absenc/sim/motion.hpp"
 
 namespace absenc::tool {
@@ -40,15 +41,16 @@ class VirtualDevice {
   [[nodiscard]] const Any<Device>& device() const { return device_; }
   /// What stands on the line: the device, or the device with its faults. Exactly one is set.
   [[nodiscard]] Machine<std::uint8_t>* bytes() const;
-  [[nodiscard]] Machine<CanFrame>* frames() const { return device_.frames; }
-  /// Null without faults.
-  [[nodiscard]] const sim::FaultyDevice* faults() const { return faulty_.get(); }
+  [[nodiscard]] Machine<CanFrame>* frames() const;
+  /// What was injected; null without faults.
+  [[nodiscard]] const sim::FaultCounts* faults() const;
 
  private:
   sim::Motion motion_;
   std::unique_ptr<std::byte[]> storage_;
   Any<Device> device_;
   std::unique_ptr<sim::FaultyDevice> faulty_;
+  std::unique_ptr<sim::FaultyNode> faulty_node_;
   std::uint32_t alarms_ = 0;
   bool real_power_on_;
 };

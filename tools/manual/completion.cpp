@@ -32,7 +32,7 @@ _absenc_encoder() {
         _absenc_file "$place"
       else
         compopt -o nospace
-        _absenc_words '/ spi: tcp:' "$place"
+        _absenc_words '/ slcan: spi: tcp:' "$place"
       fi
       COMPREPLY=("${COMPREPLY[@]/#/"${1%%:*}:"}")
       ;;

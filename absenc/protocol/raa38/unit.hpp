@@ -7,5 +7,6 @@
 namespace absenc::raa38 {
 
 extern constinit const Unit modbus_unit;
+extern constinit const Unit can_unit;
 
 }  // namespace absenc::raa38

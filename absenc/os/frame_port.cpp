@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/frame_port.hpp"
+
+#include <algorithm>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::os {
+
+using namespace std::chrono_literals;
+
+namespace {
+constexpr std::size_t most_kept = 4096;  // frames that nobody waits for
+}
+
+void FramePort::push(const CanFrame& frame, Time at) { push_happened({EventKind::received, at, frame}); }
+
+void FramePort::push_error(Time at) { push_happened({EventKind::line_error, at}); }
+
+void FramePort::push_happened(const Happened& happened) {
+  if (happened_.size() == most_kept) happened_.pop_front();
+  happened_.push_back(happened);
+}
+
+Time FramePort::now() {
+  collect(Time{});
+  told_ = os::now();
+  return told_;
+}
+
+void FramePort::begin(const Step<CanFrame>& step) {
+  using StepKind = Step<CanFrame>::Kind;
+  switch (step.kind) {
+    case StepKind::transfer:
+      if (interrupted() && take_interrupt()) throw Interrupted{};
+      transfer(step);
+      break;
+    case StepKind::pulse:
+      throw Failure(Failure::Kind::unsupported, "a CAN bus has no trigger and clear lines");
+    case StepKind::configure:
+      apply(step.settings);
+      break;
+    case StepKind::wait:
+    case StepKind::emit:
+    case StepKind::done:
+      break;
+  }
+}
+
+void FramePort::transfer(const Step<CanFrame>& step) {
+  if (step.at > os::now() + send_slack_) {
+    os::reach(std::min(step.at, end_));
+    if (os::now() < step.at) throw Ended{};
+  }
+  collect(Time{});
+  Time at = os::now();
+  for (const CanFrame& frame : step.out) {
+    at = os::now();
+    send(frame);
+  }
+  happened_.push_back({EventKind::sent, at});
+}
+
+Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
+  // A timer stays due when another event came in its moment and the machine asks for it once more.
+  armed_ = step.at > told_ || step.at == armed_ ? step.at : never;
+  for (;;) {
+    if (!happened_.empty()) return tell_first();
+    const Time limit = heard_ ? step.gap : step.answer;
+    const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency_ : never;
+    collect(std::min({armed_, quiet_end, end_}));
+    const Time time = os::now();
+    if (time >= end_) throw Ended{};
+    // Frames go before limits: that we come late to look is not the fault of the other side.
+    if (!happened_.empty()) continue;
+    if (time >= armed_ && armed_ <= quiet_end) {
+      armed_ = never;
+      return tell({.kind = EventKind::timer, .at = time});
+    }
+    if (time >= quiet_end) {
+      silence_told_ = true;
+      return tell({.kind = EventKind::silence, .at = time});
+    }
+  }
+}
+
+Event<CanFrame> FramePort::tell_first() {
+  const Happened first = happened_.front();
+  happened_.pop_front();
+  heard_ = first.kind != EventKind::sent;
+  silence_told_ = false;
+  quiet_since_ = first.at;
+  if (first.kind != EventKind::received) return tell({.kind = first.kind, .at = first.at});
+  told_frame_ = first.frame;
+  return tell({.kind = EventKind::received, .at = first.at, .items = {&told_frame_, 1}});
+}
+
+// The machine's time is that of its last event, also when that was told late: a timer behind it is still to come.
+Event<CanFrame> FramePort::tell(const Event<CanFrame>& event) {
+  told_ = event.at;
+  return event;
+}
+
+}  // namespace absenc::os

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/slcan_port.hpp"
+
+#include <algorithm>
+
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::os {
+
+using namespace std::chrono_literals;
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+using Found = slcan::LineReader::Found;
+using Kind = Failure::Kind;
+
+namespace {
+
+constexpr Time answer_time = 300ms;    // an adapter on USB takes 1 or 2
+constexpr unsigned most_reads = 1024;  // so that a line that is never silent does not hold anybody up
+
+Bytes bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
+
+}  // namespace
+
+// ---- SlcanLine
+
+void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::transfer, .out = text}); }
+
+void SlcanLine::collect(Time deadline) {
+  collected_ = false;
+  // Without a wait everything that is there, however many reads that takes; with one until there is something.
+  const bool everything = deadline <= bytes_->now();
+  for (unsigned reads = 0; reads < most_reads && (everything || !collected_); ++reads) {
+    const Time now = bytes_->now();
+    // A port of bytes reports a timer only when it lies ahead; what is there already comes before it.
+    const ByteEvent event = bytes_->wait({.at = deadline <= now ? now + 1ns : deadline});
+    if (event.kind == ByteEvent::Kind::timer) return;
+    if (event.kind != ByteEvent::Kind::received) continue;
+    for (const std::uint8_t byte : event.items) {
+      const Found found = reader_.feed(byte);
+      if (found == Found::nothing) continue;
+      collected_ = true;
+      take(found, reader_.line(), event.at);
+    }
+  }
+}
+
+// ---- SlcanPort
+
+SlcanPort::SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings)
+    : SlcanLine(std::move(bytes)), name_(std::move(name)) {
+  write(bytes_of("\r\r\r"));  // ends whatever somebody began
+  apply(settings);
+}
+
+SlcanPort::~SlcanPort() {
+  try {
+    write(bytes_of("C\r"));
+  } catch (const Failure&) {  // it is gone
+  } catch (const Interrupted&) {
+  } catch (const Ended&) {
+  }
+}
+
+void SlcanPort::apply(const LineSettings& settings) {
+  const auto code = slcan::rate_code(settings.rate);
+  if (!code) {
+    throw Failure(Kind::bad_rate, name_ + ": the adapter has no bit rate of " + std::to_string(settings.rate) +
+                                      " bit/s: 10, 20, 50, 100, 125, 250, 500, 800 kbit/s and 1 Mbit/s are there");
+  }
+  static_cast<void>(ask("C\r"));  // refused by many that are closed already
+  const std::string set{'S', static_cast<char>(*code), '\r'};
+  const Answer rate = ask(set);
+  if (rate == Answer::refused) {
+    throw Failure(Kind::bad_rate, name_ + ": the adapter refused a bit rate of " + std::to_string(settings.rate) +
+                                      " bit/s (S" + static_cast<char>(*code) +
+                                      "): does another program have it open? Unplug it and plug it in again");
+  }
+  const Answer open = ask("O\r");
+  if (open == Answer::refused) {
+    throw Failure(Kind::system, name_ + ": the adapter refused to open the bus (O): unplug it and plug it in again");
+  }
+  if (rate == Answer::none && open == Answer::none && notes_.empty()) {
+    notes_.push_back(name_ +
+                     " does not acknowledge commands: some adapters never do; if nothing else comes, it may be no "
+                     "slcan adapter, or need another baud");
+  }
+}
+
+SlcanPort::Answer SlcanPort::ask(std::string_view command) {
+  collect(Time{});
+  asking_ = true;
+  answer_ = Answer::none;
+  write(bytes_of(command));
+  const Time limit = os::now() + answer_time + latency();
+  while (answer_ == Answer::none && os::now() < limit) collect(limit);
+  asking_ = false;
+  return answer_;
+}
+
+void SlcanPort::send(const CanFrame& frame) { write(slcan::encode(frame)); }
+
+void SlcanPort::take(Found found, Bytes line, Time at) {
+  if (found == Found::line && !line.empty() && slcan::begins_frame(line[0])) {
+    if (const Result<CanFrame> frame = slcan::decode(line)) {
+      push(*frame, at);
+    } else {
+      ++garbage_;
+    }
+  } else if (found == Found::garbage) {
+    ++garbage_;
+  } else if (asking_ && (found == Found::refused || line.empty())) {
+    answer_ = found == Found::refused ? Answer::refused : Answer::accepted;
+  } else if (found == Found::refused) {
+    push_error(at);  // the adapter could not send the frame
+  }
+}
+
+// ---- SlcanAdapter
+
+void SlcanAdapter::answer(std::string_view text) { write(bytes_of(text)); }
+
+void SlcanAdapter::send(const CanFrame& frame) {
+  if (!connected()) {
+    ++lost_;
+    return;
+  }
+  const auto milliseconds = std::chrono::duration_cast<std::chrono::milliseconds>(os::now()).count() % 60'000;
+  write(with_time_ ? slcan::encode(frame, static_cast<std::uint16_t>(milliseconds)) : slcan::encode(frame));
+}
+
+void SlcanAdapter::take(Found found, Bytes line, Time at) {
+  if (found == Found::garbage || found == Found::refused) {
+    ++garbage_;
+    return;
+  }
+  if (line.empty()) return answer("\r");
+  if (slcan::begins_frame(line[0])) return take_frame(line, at);
+  if (!execute(line)) answer("\a");
+}
+
+void SlcanAdapter::take_frame(Bytes line, Time at) {
+  const Result<CanFrame> frame = slcan::decode(line);
+  if (!frame) ++garbage_;
+  if (!frame || !open_ || listen_only_) return answer("\a");
+  answer(frame->extended ? "Z\r" : "z\r");
+  if (connected()) {
+    push(*frame, at);
+  } else {
+    ++lost_;
+  }
+}
+
+// False for what is no command, or not allowed now.
+bool SlcanAdapter::execute(Bytes line) {
+  const auto letter = static_cast<char>(line[0]);
+  switch (letter) {
+    case 'S': {
+      const std::uint32_t rate = line.size() == 2 ? slcan::rate_of(line[1]) : 0;
+      if (open_ || rate == 0) return false;
+      rate_ = rate;
+      break;
+    }
+    case 'O':
+    case 'L':
+      if (open_ || rate_ == 0) return false;
+      open_ = true;
+      listen_only_ = letter == 'L';
+      break;
+    case 'C':
+      if (!open_) return false;
+      open_ = false;
+      break;
+    case 'Z':
+      if (open_ || line.size() != 2) return false;
+      with_time_ = line[1] == '1';
+      break;
+    case 'V':
+      answer("V1013\r");
+      return true;
+    case 'N':
+      answer("N0001\r");
+      return true;
+    case 'F':
+      if (!open_) return false;
+      answer("F00\r");
+      return true;
+    case 's':  // bit timing registers, acceptance code and mask: taken, and without effect
+    case 'M':
+    case 'm':
+      if (open_) return false;
+      break;
+    default:
+      ++garbage_;
+      return false;
+  }
+  answer("\r");
+  return true;
+}
+
+}  // namespace absenc::os

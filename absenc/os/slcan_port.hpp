@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// CAN through an adapter on a serial port that speaks the ASCII protocol of Lawicel (link/slcan.hpp), and the other end
+// of that: an adapter on a pseudo-terminal, behind which virtual nodes are.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/link/slcan.hpp"
+#include "absenc/os/frame_port.hpp"
+
+namespace absenc::os {
+
+/// Frames and answers as lines over a port of bytes.
+class SlcanLine : public FramePort {
+ protected:
+  explicit SlcanLine(std::shared_ptr<Port<std::uint8_t>> bytes) : bytes_(std::move(bytes)) {}
+
+  void write(Bytes text);
+  void collect(Time deadline) final;
+  /// A line without its CR, a refusal, or garbage came.
+  virtual void take(slcan::LineReader::Found found, Bytes line, Time at) = 0;
+
+ private:
+  std::shared_ptr<Port<std::uint8_t>> bytes_;
+  slcan::LineReader reader_;
+  bool collected_ = false;
+};
+
+/// The adapter is opened at the bit rate of `settings`, and closed at the end.
+class SlcanPort final : public SlcanLine {
+ public:
+  /// `name` as in "/dev/ttyACM0", for messages. Throws Failure: `bad_rate` when the adapter has no such bit rate or
+  /// refuses it, `system` when it refuses to open.
+  SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings);
+  ~SlcanPort() override;
+
+  /// What could be better about the adapter, one sentence each.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  enum class Answer : std::uint8_t { none, accepted, refused };
+
+  void send(const CanFrame& frame) override;
+  void apply(const LineSettings& settings) override;
+  void take(slcan::LineReader::Found found, Bytes line, Time at) override;
+  Answer ask(std::string_view command);
+
+  std::string name_;
+  std::vector<std::string> notes_;
+  bool asking_ = false;  // what comes answers a command, not a frame
+  Answer answer_ = Answer::none;
+  unsigned garbage_ = 0;
+};
+
+/// Plays the adapter: what a host sends reaches the device that is driven on this port, and the other way round, while
+/// the host has opened it at the bit rate that the device has.
+class SlcanAdapter final : public SlcanLine {
+ public:
+  SlcanAdapter(std::shared_ptr<Port<std::uint8_t>> bytes, const LineSettings& settings)
+      : SlcanLine(std::move(bytes)), device_rate_(settings.rate) {}
+
+  /// Frames that were lost because the host had the adapter closed or at another bit rate.
+  [[nodiscard]] std::uint64_t lost() const { return lost_; }
+  /// Lines that are no command.
+  [[nodiscard]] std::uint64_t garbage() const { return garbage_; }
+
+ private:
+  void send(const CanFrame& frame) override;
+  void apply(const LineSettings& settings) override { device_rate_ = settings.rate; }
+  void take(slcan::LineReader::Found found, Bytes line, Time at) override;
+  void take_frame(Bytes line, Time at);
+  bool execute(Bytes line);
+  void answer(std::string_view text);
+  [[nodiscard]] bool connected() const { return open_ && rate_ == device_rate_; }
+
+  std::uint32_t device_rate_;
+  std::uint32_t rate_ = 0;  // as the host has set it; 0: not yet
+  bool open_ = false;
+  bool listen_only_ = false;
+  bool with_time_ = false;
+  std::uint64_t lost_ = 0;
+  std::uint64_t garbage_ = 0;
+};
+
+}  // namespace absenc::os

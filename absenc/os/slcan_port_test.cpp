@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/slcan_port.hpp"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "absenc/host/drive.hpp"
+#include "absenc/os/emulator_port.hpp"
+#include "absenc/os/serial.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/os/testing.hpp"
+
+namespace absenc::os {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace testing;
+using FrameStep = Step<CanFrame>;
+using FrameEvent = Event<CanFrame>;
+using EventKind = FrameEvent::Kind;
+
+constexpr LineSettings bus{.rate = 250'000};
+const CanFrame position{.id = 0x120, .size = 8, .data = {0x47, 0x26}};
+const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
+
+FrameStep sending(const CanFrame& frame) { return {.kind = FrameStep::Kind::transfer, .out = {&frame, 1}}; }
+
+/// A port of bytes in memory: answers commands as an adapter does, unless told otherwise.
+class FakeAdapter final : public Port<std::uint8_t> {
+ public:
+  Time now() override { return os::now(); }
+  void begin(const ByteStep& step) override {
+    const std::string text(step.out.begin(), step.out.end());
+    written += text;
+    for (const auto& [command, answer] : answers) {
+      if (text == command) coming += answer;
+    }
+  }
+  ByteEvent wait(const ByteStep& step) override {
+    if (!coming.empty()) {
+      given.assign(coming.begin(), coming.end());
+      coming.clear();
+      return {.kind = ByteEvent::Kind::received, .at = os::now(), .items = given};
+    }
+    if (step.at == never) throw std::logic_error("a wait without end");
+    os::sleep_until(step.at);
+    return {.kind = ByteEvent::Kind::timer, .at = os::now()};
+  }
+  std::string written;
+  std::string coming;
+  std::vector<std::pair<std::string, std::string>> answers{
+      {"C\r", "\a"}, {"S5\r", "\r"}, {"S6\r", "\r"}, {"O\r", "\r"}};
+
+ private:
+  Data given;
+};
+
+TEST(SlcanPort, OpensTheAdapterAndClosesIt) {
+  const auto adapter = std::make_shared<FakeAdapter>();
+  { const SlcanPort port(adapter, "X", bus); }
+  EXPECT_EQ(adapter->written, "\r\r\rC\rS5\rO\rC\r");
+}
+
+TEST(SlcanPort, SaysWhatAnAdapterRefuses) {
+  const auto adapter = std::make_shared<FakeAdapter>();
+  const auto refusal = [&](const LineSettings& settings) {
+    return failure_of([&] { const SlcanPort port(adapter, "/dev/ttyACM9", settings); });
+  };
+  EXPECT_EQ(refusal({.rate = 123}).kind(), Failure::Kind::bad_rate);
+  adapter->answers = {{"S5\r", "\a"}};
+  EXPECT_NE(std::string(refusal(bus).what()).find("refused a bit rate of 250000 bit/s (S5)"), std::string::npos);
+  adapter->answers = {{"S5\r", "\r"}, {"O\r", "\a"}};
+  EXPECT_NE(std::string(refusal(bus).what()).find("refused to open"), std::string::npos);
+}
+
+TEST(SlcanPort, NotesAnAdapterThatAcknowledgesNothing) {
+  const auto silent = std::make_shared<FakeAdapter>();
+  silent->answers.clear();
+  EXPECT_EQ(SlcanPort(silent, "X", bus).notes().size(), 1u);
+  EXPECT_TRUE(SlcanPort(std::make_shared<FakeAdapter>(), "X", bus).notes().empty());
+}
+
+TEST(SlcanPort, FramesGarbageAndRefusals) {
+  const auto adapter = std::make_shared<FakeAdapter>();
+  SlcanPort port(adapter, "X", bus);
+  adapter->written.clear();
+  port.begin(sending(request));
+  EXPECT_EQ(adapter->written, "t22088020000000000000\r");
+  adapter->coming = "z\rxxt12t12084726000000000000\rV1013\r\aT18DAF110101ABCD\r";
+  EXPECT_EQ(port.wait({.at = never}).kind, EventKind::sent);
+  EXPECT_EQ(port.wait({.at = never}).items[0], position);
+  EXPECT_EQ(port.wait({.at = never}).kind, EventKind::line_error);
+  const FrameEvent last = port.wait({.at = never});
+  EXPECT_EQ(last.items[0], (CanFrame{.id = 0x18DAF110, .extended = true, .size = 1, .data = {1}}));
+}
+
+TEST(SlcanPort, WhatWaitedComesBeforeTheRequest) {
+  const auto adapter = std::make_shared<FakeAdapter>();
+  SlcanPort port(adapter, "X", bus);
+  adapter->coming = "t12084726000000000000\r";
+  port.begin(sending(request));
+  EXPECT_EQ(port.wait({.at = never}).kind, EventKind::received);
+  EXPECT_EQ(port.wait({.at = never}).kind, EventKind::sent);
+}
+
+TEST(SlcanPort, AcknowledgementsAreNoFrames) {
+  const auto adapter = std::make_shared<FakeAdapter>();
+  SlcanPort port(adapter, "X", bus);
+  port.begin(sending(request));
+  EXPECT_EQ(port.wait({.at = never}).kind, EventKind::sent);
+  adapter->coming = "z\r";
+  EXPECT_EQ(port.wait({.at = never, .answer = 5ms}).kind, EventKind::silence);
+}
+
+TEST(SlcanPort, ChangesItsBitRate) {
+  const auto adapter = std::make_shared<FakeAdapter>();
+  SlcanPort port(adapter, "X", bus);
+  adapter->written.clear();
+  port.begin({.kind = FrameStep::Kind::configure, .settings = {.rate = 500'000}});
+  EXPECT_EQ(adapter->written, "C\rS6\rO\r");
+}
+
+/// The adapter with a program in front of it that is only bytes.
+struct Adapter : ::testing::Test {
+  std::shared_ptr<FakeAdapter> host = std::make_shared<FakeAdapter>();
+  SlcanAdapter port{host, bus};
+
+  std::string say(const std::string& text) {
+    host->answers.clear();
+    host->written.clear();
+    host->coming = text;
+    heard.clear();
+    const Time until = os::now() + 1ms;
+    for (;;) {
+      const FrameEvent event = port.wait({.at = until});
+      if (event.kind == EventKind::timer) return host->written;
+      if (event.kind == EventKind::received) heard.push_back(event.items[0]);
+    }
+  }
+  std::vector<CanFrame> heard;
+};
+
+TEST_F(Adapter, AnswersAsAdaptersDo) {
+  EXPECT_EQ(say("\r\r"), "\r\r");
+  EXPECT_EQ(say("O\r"), "\a");  // no bit rate yet
+  EXPECT_EQ(say("S5\r"), "\r");
+  EXPECT_EQ(say("S9\r"), "\a");
+  EXPECT_EQ(say("C\r"), "\a");
+  EXPECT_EQ(say("t1200\r"), "\a");
+  EXPECT_EQ(say("V\rN\r"), "V1013\rN0001\r");
+  EXPECT_EQ(say("F\r"), "\a");
+  EXPECT_EQ(say("M00000000\rmFFFFFFFF\r"), "\r\r");
+  EXPECT_EQ(say("O\r"), "\r");
+  EXPECT_EQ(say("S6\r"), "\a");
+  EXPECT_EQ(say("F\r"), "F00\r");
+  EXPECT_EQ(say("t22088020000000000000\r"), "z\r");
+  EXPECT_EQ(heard, std::vector<CanFrame>{request});
+  EXPECT_EQ(say("T000002208\r"), "\a");  // 8 bytes that are not there
+  EXPECT_EQ(say("T000002200\r"), "Z\r");
+  EXPECT_EQ(say("r2208\r"), "z\r");
+  EXPECT_TRUE(heard[0].remote);
+  EXPECT_EQ(say("what\r"), "\a");
+  EXPECT_EQ(say("C\r"), "\r");
+  EXPECT_EQ(port.garbage(), 3u);
+}
+
+TEST_F(Adapter, SendsOnlyWhileItIsOpen) {
+  port.begin(sending(position));
+  EXPECT_EQ(host->written, "");
+  say("S5\rO\r");
+  port.begin(sending(position));
+  EXPECT_EQ(host->written, "\r\rt12084726000000000000\r");
+  say("C\rZ1\rO\r");
+  port.begin(sending(position));
+  EXPECT_EQ(host->written.size(), std::string("\r\r\rt120847260000000000001234\r").size());
+  EXPECT_EQ(port.lost(), 1u);
+}
+
+TEST_F(Adapter, NothingPassesAtAnotherBitRate) {
+  say("S6\rO\r");
+  port.begin(sending(position));
+  EXPECT_EQ(host->written, "\r\r");
+  EXPECT_EQ(say("t22088020000000000000\r"), "z\r");
+  EXPECT_TRUE(heard.empty());
+  port.begin({.kind = FrameStep::Kind::configure, .settings = {.rate = 500'000}});
+  say("t22088020000000000000\r");
+  EXPECT_EQ(heard.size(), 1u);
+  EXPECT_EQ(port.lost(), 2u);
+}
+
+TEST_F(Adapter, ListensOnly) {
+  say("S5\rL\r");
+  EXPECT_EQ(say("t22088020000000000000\r"), "\a");
+  port.begin(sending(position));
+  EXPECT_NE(host->written.find("t1208"), std::string::npos);
+}
+
+// Both ends over a real pseudo-terminal, each in its own thread.
+TEST(Slcan, BothEndsOfAPseudoTerminal) {
+  const auto terminal = std::make_shared<EmulatorPort>();
+  terminal->set_end(now() + 60s);
+  std::thread device([&] {
+    SlcanAdapter port(terminal, bus);
+    struct Echo final : Machine<CanFrame> {
+      void feed(const FrameEvent& event) override {
+        if (event.kind == EventKind::sent) over = true;
+        if (event.kind != EventKind::received) return;
+        due = true;
+      }
+      FrameStep next(Time) override {
+        if (over) return {.kind = FrameStep::Kind::done};
+        if (!std::exchange(due, false)) return {.at = never};
+        return sending(position);
+      }
+      bool due = false;
+      bool over = false;
+    } echo;
+    host::drive(echo, port, [] { return true; });
+  });
+  {
+    const auto serial = std::make_shared<SerialPort>(terminal->path(), LineSettings{.rate = 115'200}, Rs485::off);
+    SlcanPort port(serial, terminal->path(), bus);
+    EXPECT_TRUE(port.notes().empty());
+    port.begin(sending(request));
+    EXPECT_EQ(port.wait({.at = never, .answer = 30s}).kind, EventKind::sent);
+    const FrameEvent answer = port.wait({.at = never, .answer = 30s});
+    ASSERT_EQ(answer.kind, EventKind::received);
+    EXPECT_EQ(answer.items[0], position);
+  }
+  device.join();
+}
+
+}  // namespace
+}  // namespace absenc::os

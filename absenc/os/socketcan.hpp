@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// A CAN interface of Linux (SocketCAN): can0 of an adapter or a controller, or a virtual one, vcan0.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "absenc/os/descriptor.hpp"
+#include "absenc/os/frame_port.hpp"
+#include "absenc/os/poller.hpp"
+
+struct can_frame;
+
+namespace absenc::os {
+
+/// The system calls of SocketCan: a test overrides them where the kernel has no CAN. All but `received` as the call
+/// they are named after: negative, with errno, when refused.
+struct CanKernel {
+  virtual ~CanKernel() = default;
+  /// socket(PF_CAN, SOCK_RAW, CAN_RAW), not blocking.
+  virtual int open();
+  virtual int control(int descriptor, unsigned long request, void* argument);
+  /// setsockopt(2).
+  virtual int set(int descriptor, int level, int name, const void* value, std::size_t size);
+  /// To an interface, by its index.
+  virtual int bind(int descriptor, int index);
+  virtual ssize_t write(int descriptor, const can_frame& frame);
+  /// `at`: when the kernel had it, on the clock of os::now.
+  virtual ssize_t read(int descriptor, can_frame& frame, Time& at);
+};
+[[nodiscard]] CanKernel& system_can_kernel();
+
+/// The bit rate is that of the interface: `ip link` sets it, and nothing here; virtual ones have none. Own frames do
+/// not come back; those of other programs on the same interface do.
+class SocketCan final : public FramePort {
+ public:
+  /// Throws Failure, which says what to type. `kernel` must outlive the port.
+  explicit SocketCan(const std::string& interface, const LineSettings& settings,
+                     CanKernel& kernel = system_can_kernel());
+
+ private:
+  void collect(Time deadline) override;
+  void send(const CanFrame& frame) override;
+  void apply(const LineSettings& settings) override;
+
+  [[nodiscard]] int find_interface();
+  void set_options();
+  void take(const can_frame& frame, Time at);
+  void take_error(const can_frame& frame, Time at);
+  // Such an interface has no bit rate: any suits it.
+  [[nodiscard]] bool is_virtual() const { return interface_.starts_with("vcan") || interface_.starts_with("vxcan"); }
+  [[nodiscard]] std::string up_command(std::uint32_t rate) const;
+  [[noreturn]] void fail(const std::string& what, int error) const;
+
+  std::string interface_;
+  LineSettings settings_;
+  CanKernel* kernel_;
+  Descriptor socket_;
+  Poller poller_;
+};
+
+/// "can0", "vcan0" and so on, sorted. `sys` is a parameter for tests.
+[[nodiscard]] std::vector<std::string> can_interfaces(const std::filesystem::path& sys = "/sys/class/net");
+
+}  // namespace absenc::os

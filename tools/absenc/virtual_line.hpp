@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// All virtual encoders that `emulate` puts on one line: the one of its own options, and those of --also.
+#pragma once
+
+#include <memory>
+#include <type_traits>
+#include <vector>
+
+#include "absenc/sim/bus.hpp"
+#include "absenc/sim/frame_bus.hpp"
+#include "tools/absenc/encoder_uri.hpp"
+#include "tools/absenc/subcommand.hpp"
+
+namespace absenc::tool {
+
+/// As the options of the verb say. Throws UsageError.
+[[nodiscard]] DeviceSettings device_settings(const Invocation& invocation);
+/// What stands behind sim: for one more encoder of the line. Throws UsageError.
+[[nodiscard]] EncoderUri further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
+                                         const DeviceSettings& settings);
+/// Requests, faults and broken rules of one device since `start`.
+void print_summary(const VirtualDevice& device, std::string_view name, Time start);
+
+template <class Item>
+class VirtualLine {
+ public:
+  VirtualLine(const Unit& unit, const Options& options, const Invocation& invocation)
+      : further_(invocation.texts("--also")) {
+    const DeviceSettings settings = device_settings(invocation);
+    devices_.push_back(std::make_unique<VirtualDevice>(unit, options, settings));
+    for (const std::string& further : further_) {
+      const EncoderUri uri = further_encoder(unit, invocation, further, settings);
+      devices_.push_back(std::make_unique<VirtualDevice>(unit, uri.options, uri.device));
+    }
+    std::vector<Machine<Item>*> machines;
+    for (const auto& device : devices_) machines.push_back(machine_of(*device));
+    if constexpr (is_can) {
+      const LineSettings line = unit.settings != nullptr ? unit.settings(options) : unit.line;
+      bus_ = std::make_unique<sim::FrameBus>(machines, line.rate);
+    } else if (machines.size() > 1) {
+      bus_ = std::make_unique<sim::Bus>(machines, unit.line.character());
+    }
+  }
+
+  /// The memory of this one can be kept.
+  [[nodiscard]] Device<Item>& first() {
+    if constexpr (is_can) {
+      return *devices_.front()->device().frames;
+    } else {
+      return *devices_.front()->device().bytes;
+    }
+  }
+  [[nodiscard]] Machine<Item>& machine() { return bus_ != nullptr ? *bus_ : *machine_of(*devices_.front()); }
+
+  void power_on(Time now) {
+    for (const auto& device : devices_) device->power_on(now);
+  }
+
+  void summarize(Time start) const {
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      const std::string name = i > 0 ? further_[i - 1] + ": " : devices_.size() > 1 ? "the first: " : "";
+      print_summary(*devices_[i], name, start);
+    }
+  }
+
+ private:
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
+
+  static Machine<Item>* machine_of(const VirtualDevice& device) {
+    if constexpr (is_can) {
+      return device.frames();
+    } else {
+      return device.bytes();
+    }
+  }
+
+  std::span<const std::string> further_;
+  std::vector<std::unique_ptr<VirtualDevice>> devices_;
+  std::unique_ptr<std::conditional_t<is_can, sim::FrameBus, sim::Bus>> bus_;
+};
+
+}  // namespace absenc::tool
