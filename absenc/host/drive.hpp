@@ -34,4 +34,24 @@ bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
   }
 }
 
+/// Feeds a machine that streams all that is waiting for it, and drops what it emits: what comes next is new.
+template <class Item>
+void catch_up(Machine<Item>& machine, Port<Item>& port) {
+  for (Time now = port.now();;) {
+    Step<Item> step = machine.next(now);
+    if (step.kind == Step<Item>::Kind::emit) continue;
+    if (step.kind != Step<Item>::Kind::wait) return;  // for `drive` to carry out
+    const Time due = step.at;
+    step.at = port.now() + Time{1};  // bytes that are there go before it
+    const Event<Item> event = port.wait(step);
+    now = event.at;
+    if (event.kind != Event<Item>::Kind::timer) {
+      machine.feed(event);
+    } else {
+      if (due != Time{} && now >= due) machine.feed(event);
+      return;
+    }
+  }
+}
+
 }  // namespace absenc::host

@@ -53,6 +53,7 @@ void EchoFilter::feed(const ByteEvent& event) {
 }
 
 void EchoFilter::received(const ByteEvent& event) {
+  if (sent_.empty()) return inner_->feed(event);  // nothing was sent, so nothing is echoed
   switch (working_mode()) {
     case EchoMode::off:
       inner_->feed(event);

@@ -22,7 +22,11 @@ class EchoFilter final : public Machine<std::uint8_t> {
   explicit EchoFilter(EchoMode mode) : mode_(mode) {}
 
   /// The conversation to serve from now on.
-  void attach(Machine<std::uint8_t>& inner) { inner_ = &inner; }
+  void attach(Machine<std::uint8_t>& inner) {
+    inner_ = &inner;
+    sent_.clear();
+    held_.clear();
+  }
   /// How the conversation ended. In automatic mode only a good one makes what was found final.
   void conclude(bool good);
 

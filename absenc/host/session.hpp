@@ -28,6 +28,12 @@ struct Counters {
   }
 };
 
+/// Of an encoder that transmits by itself.
+enum class Take : std::uint8_t {
+  newest,  // the first that comes from now on
+  every,   // the one after the last, however long ago it came
+};
+
 template <class Item>
 class Session {
  public:
@@ -47,23 +53,8 @@ class Session {
   /// the unit cannot run the command, and valid until the next call.
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
-    const unsigned attempts = command.repeatable ? attempts_ : 1;
-    for (unsigned attempt = 1;; ++attempt) {
-      Conversation<Item>* conversation = make(command, arguments);
-      if (conversation == nullptr) return nullptr;
-      drive_one(*conversation, on_emit);
-      const Error error = conversation->error();
-      echo_.conclude(error == Error::none);
-      if (statistics_ != nullptr) statistics_->add(*conversation);
-      if (error == Error::none) {
-        ++counters_.good;
-        return conversation;
-      }
-      ++counters_.errors[static_cast<std::size_t>(error)];
-      if (error == Error::timeout) doubt();  // it may have been switched off
-      if (attempt >= attempts || error == Error::invalid_argument) return conversation;
-      ++counters_.repeated;
-    }
+    streaming_ = false;
+    return attempt(command, arguments, on_emit);
   }
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
@@ -71,15 +62,17 @@ class Session {
 
   /// The position. After opening and after silence it is read until two readings in a row agree; when none of ten
   /// does, the last one is returned and `confirmed` is false.
-  const Conversation<Item>* read(const Command& command) {
-    const Conversation<Item>* conversation = run(command);
+  /// A conversation that streams goes on where it stopped; `take` says whether with what came meanwhile.
+  const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
+    if (streaming_ && take == Take::newest) catch_up(machine(), *port_);
+    const Conversation<Item>* conversation = read_once(command);
     if (confirmed_ || conversation == nullptr) return conversation;
     first_.start_again();
     for (unsigned i = 0; i < 10; ++i) {
       if (conversation->error() != Error::none || conversation->reading() == nullptr) return conversation;
       confirmed_ = first_.confirms(*conversation->reading());
       if (confirmed_) return conversation;
-      conversation = run(command);
+      conversation = read_once(command);
     }
     return conversation;
   }
@@ -98,12 +91,42 @@ class Session {
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
   /// The encoder may be another one now: what it says next has to be confirmed.
-  void doubt() { confirmed_ = false; }
+  void doubt() {
+    confirmed_ = false;
+    streaming_ = false;
+  }
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   [[nodiscard]] const Counters& counters() const { return counters_; }
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
+  const Conversation<Item>* read_once(const Command& command) {
+    return attempt(command, {}, [](const Conversation<Item>&) { return true; });
+  }
+
+  template <class OnEmit>
+  const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
+    const unsigned attempts = command.repeatable ? attempts_ : 1;
+    for (unsigned number = 1;; ++number) {
+      Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
+      if (conversation == nullptr) return nullptr;
+      const bool again = streaming_;
+      streaming_ = false;  // unless it comes to its next result
+      streaming_ = !drive_one(*conversation, on_emit, again) && conversation->streams();
+      const Error error = conversation->error();
+      echo_.conclude(error == Error::none);
+      if (statistics_ != nullptr) statistics_->add(*conversation);
+      if (error == Error::none) {
+        ++counters_.good;
+        return conversation;
+      }
+      ++counters_.errors[static_cast<std::size_t>(error)];
+      if (error == Error::timeout) doubt();  // it may have been switched off
+      if (number >= attempts || error == Error::invalid_argument) return conversation;
+      ++counters_.repeated;
+    }
+  }
+
   Conversation<Item>* make(const Command& command, Arguments arguments) {
     const Any<Conversation> made = unit_->host(options_, command, arguments, storage_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -114,17 +137,21 @@ class Session {
     return current_;
   }
 
-  template <class OnEmit>
-  void drive_one(Conversation<Item>& conversation, OnEmit&& on_emit) {
-    const auto emit = [&] { return on_emit(conversation); };
+  // What the port carries: the conversation, behind the removal of echo where there is any.
+  Machine<Item>& machine() {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
-      if (echo_.mode() != EchoMode::off) {
-        echo_.attach(conversation);
-        drive(echo_, *port_, emit);
-        return;
-      }
+      if (echo_.mode() != EchoMode::off) return echo_;
     }
-    drive(conversation, *port_, emit);
+    return *current_;
+  }
+
+  // Whether it came to its end; a conversation that streams stops at its next result.
+  template <class OnEmit>
+  bool drive_one(Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
+    if constexpr (std::is_same_v<Item, std::uint8_t>) {
+      if (!again) echo_.attach(conversation);
+    }
+    return drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
   }
 
   const Unit* unit_;
@@ -136,6 +163,7 @@ class Session {
   unsigned attempts_;
   FirstReading first_;
   bool confirmed_ = false;
+  bool streaming_ = false;  // `current_` has stopped at a result and can go on
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;
 };

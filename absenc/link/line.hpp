@@ -23,6 +23,9 @@ enum class Parity : std::uint8_t { none, odd, even };
 /// Wires beside the data, each driven by the host.
 enum class Line : std::uint8_t { trigger, clear };
 
+/// The rate of virtual encoders whose protocol leaves it open.
+inline constexpr std::uint32_t assumed_rate = 115'200;
+
 struct LineSettings {
   std::uint32_t rate = 0;  // bits a second: baud, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;
@@ -30,6 +33,13 @@ struct LineSettings {
   std::uint8_t spi_mode = 0;     // exchange, clocked: 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  // clocked: clocks that show the idle line before the first bit
   Time select_lead{};            // exchange: from chip select to the first clock, at least
+
+  /// The same; with `assumed_rate` where there is none.
+  [[nodiscard]] constexpr LineSettings with_some_rate() const {
+    LineSettings settings = *this;
+    if (rate == 0) settings.rate = assumed_rate;
+    return settings;
+  }
 
   friend constexpr bool operator==(const LineSettings&, const LineSettings&) = default;
 

@@ -29,10 +29,16 @@ Descriptor open_terminal(const std::string& path) {
   return descriptor;
 }
 
+// 136 to 143: slaves of Unix98 pseudo-terminals (Documentation/admin-guide/devices.txt).
+bool is_pseudo(const struct stat& status) { return major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143; }
+
 bool is_pseudo_terminal(int descriptor) {
   struct stat status {};
-  // 136 to 143: slaves of Unix98 pseudo-terminals (Documentation/admin-guide/devices.txt).
-  return ::fstat(descriptor, &status) == 0 && major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143;
+  return ::fstat(descriptor, &status) == 0 && is_pseudo(status);
+}
+
+bool uses_rts(const PulseWires& wires) {
+  return wires.trigger.kind == PulseWire::Kind::rts || wires.clear.kind == PulseWire::Kind::rts;
 }
 
 // The device's end of a USB cable (u_serial.c of the kernel) has no line, and keeps whatever rate it had.
@@ -55,7 +61,13 @@ std::string_view name_of(Parity parity) {
 
 }  // namespace
 
-SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485)
+bool is_pseudo_terminal(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 && is_pseudo(status);
+}
+
+SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485, const PulseWires& wires,
+                       WireKernel& kernel)
     : DescriptorPort(open_terminal(path), "the port " + path), path_(path), pseudo_(is_pseudo_terminal(descriptor())) {
   const auto before = terminal_state(descriptor());
   if (!before) throw open_failure(path, errno);
@@ -64,7 +76,12 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
   ::tcflush(descriptor(), TCOFLUSH);  // what another program left unsent must not hold us up
   try {
     apply(settings);
-    set_direction(rs485);
+    if (uses_rts(wires) && rs485 == Rs485::on) {
+      throw Failure(Failure::Kind::unsupported,
+                    "RTS cannot switch the direction of RS-485 and carry pulses: use DTR or a GPIO line for them");
+    }
+    set_direction(uses_rts(wires) ? Rs485::off : rs485);
+    take_wires(wires, kernel);
   } catch (...) {
     restore_terminal(descriptor(), before_);
     throw;
@@ -154,13 +171,22 @@ void SerialPort::shorten_latency() {
   }
 }
 
+void SerialPort::take_wires(const PulseWires& wires, WireKernel& kernel) {
+  if (wires.trigger.kind != PulseWire::Kind::none) trigger_.emplace(wires.trigger, descriptor(), path_, kernel);
+  if (wires.clear.kind != PulseWire::Kind::none) clear_.emplace(wires.clear, descriptor(), path_, kernel);
+}
+
 void SerialPort::drive(Line line, bool active) {
-  const int wire = line == Line::trigger ? TIOCM_RTS : TIOCM_DTR;
-  if (::ioctl(descriptor(), active ? TIOCMBIS : TIOCMBIC, &wire) < 0) {
-    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " has no " +
-                                                  (line == Line::trigger ? "RTS" : "DTR") +
-                                                  " line for the pulse: use an adapter that brings it out");
-  }
+  std::optional<PulseLine>& wire = line == Line::trigger ? trigger_ : clear_;
+  if (wire) return wire->drive(active);
+  const std::string name = line == Line::trigger ? "trigger" : "clear";
+  throw Failure(Failure::Kind::unsupported, "nothing says which wire carries the pulse: set " + name + "=rts, " + name +
+                                                "=dtr or " + name + "=gpio:NAME");
+}
+
+Time SerialPort::pulse_width(Line line, Time asked) const {
+  const std::optional<PulseLine>& wire = pulse_line(line);
+  return wire ? wire->wire().width.value_or(asked) : asked;
 }
 
 }  // namespace absenc::os

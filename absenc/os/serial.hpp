@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absenc/link/line.hpp"
+#include "absenc/os/pulse_wire.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/os/serial_settings.hpp"
 #include "absenc/os/stream_port.hpp"
@@ -15,18 +17,21 @@ namespace absenc::os {
 
 /// Who switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
-  automatic,  // the kernel with RTS where the port can, otherwise the adapter by itself; for half-duplex lines
+  automatic,  // the kernel with RTS where the port can and RTS is free, otherwise the adapter; for half-duplex lines
   on,         // the kernel; a port that cannot is an error
   off,        // not the kernel; for full-duplex lines
 };
 
+/// Whether characters take no time there, and any rate does.
+[[nodiscard]] bool is_pseudo_terminal(const std::string& path);
+
 /// Raw, 8 data bits. Locked against other programs; the previous settings come back when it is closed.
-/// The lines: `trigger` is RTS, `clear` is DTR.
 class SerialPort final : public DescriptorPort {
  public:
   /// What came before is discarded. Throws Failure of every kind but `lost`; `bad_rate` when the port's nearest rate
-  /// is more than 1 % away.
-  SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485 = Rs485::automatic);
+  /// is more than 1 % away. A pulse without its wire in `wires` is `unsupported`. `kernel` must outlive the port.
+  SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485 = Rs485::automatic,
+             const PulseWires& wires = {}, WireKernel& kernel = system_wires());
   ~SerialPort() override;
 
   /// What could be better about this port, one sentence each, with the remedy.
@@ -36,10 +41,15 @@ class SerialPort final : public DescriptorPort {
 
  private:
   void drive(Line line, bool active) override;
+  [[nodiscard]] Time pulse_width(Line line, Time asked) const override;
   void apply(const LineSettings& settings) override;
 
+  [[nodiscard]] const std::optional<PulseLine>& pulse_line(Line line) const {
+    return line == Line::trigger ? trigger_ : clear_;
+  }
   void lock() const;
   void set_direction(Rs485 rs485);
+  void take_wires(const PulseWires& wires, WireKernel& kernel);
   void shorten_latency();
   [[nodiscard]] std::uint32_t clock_of_rates() const;
 
@@ -47,6 +57,8 @@ class SerialPort final : public DescriptorPort {
   bool pseudo_ = false;
   bool kernel_direction_ = false;
   TerminalState before_{};
+  std::optional<PulseLine> trigger_;
+  std::optional<PulseLine> clear_;
   std::vector<std::string> notes_;
 };
 

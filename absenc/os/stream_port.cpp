@@ -92,7 +92,7 @@ void StreamPort::reach(Time time) {
 void StreamPort::pulse(const ByteStep& step) {
   drive(step.line, true);
   try {
-    reach(os::now() + step.width);
+    reach(os::now() + pulse_width(step.line, step.width));
   } catch (...) {
     drive(step.line, false);
     throw;
@@ -112,6 +112,8 @@ void StreamPort::mark_sent(Time at) {
 void StreamPort::drive(Line, bool) {
   throw Failure(Failure::Kind::unsupported, "this kind of port has no trigger and clear lines: use a serial port");
 }
+
+Time StreamPort::pulse_width(Line, Time asked) const { return asked; }
 
 void StreamPort::apply(const LineSettings& settings) {
   throw Failure(Failure::Kind::unsupported,

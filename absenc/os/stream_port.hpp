@@ -58,6 +58,8 @@ class StreamPort : public Port<std::uint8_t> {
   /// Both throw `unsupported` unless overridden.
   virtual void drive(Line line, bool active);
   virtual void apply(const LineSettings& settings);
+  /// How long a pulse lasts: as asked, unless overridden.
+  [[nodiscard]] virtual Time pulse_width(Line line, Time asked) const;
 
  private:
   Event<std::uint8_t> tell(const Event<std::uint8_t>& event);

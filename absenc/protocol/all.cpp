@@ -17,7 +17,7 @@ namespace absenc {
 namespace {
 constexpr std::array units{
     &tformat::unit, &esl::unit,  &encolink::unit,     &encolink::spi_unit, &biss::unit,
-    &ssi::unit,     &e201::unit, &raa38::modbus_unit, &raa38::can_unit,
+    &ssi::unit,     &e201::unit, &raa38::serial_unit, &raa38::modbus_unit, &raa38::can_unit,
 };
 }  // namespace
 

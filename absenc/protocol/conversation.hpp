@@ -39,6 +39,8 @@ struct Conversation : Machine<Item> {
   [[nodiscard]] virtual std::string_view advice() const { return {}; }
   /// The position, when the result is one and there was no error; otherwise null.
   [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
+  /// Whether each `emit` is a result like that of `done`, and the next one follows for as long as this is driven.
+  [[nodiscard]] virtual bool streams() const { return false; }
   /// Every named value of the result. Nothing is put when there was an error.
   virtual void report(FieldSink& sink) const = 0;
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;

@@ -164,12 +164,18 @@ struct Resolution {
   double unit_um = 0;  // linear encoders: micrometres a count; 0: a rotation
 };
 
+/// Wires beside the data on which a host's pulses ask for something.
+struct ExtraLines {
+  bool trigger = false;  // each frame
+  bool clear = false;    // the zero
+};
+
 struct Unit {
   std::string_view id;
   std::string_view name;      // maker and protocol, for people
   std::string_view document;  // the source
   LinkKind link;
-  LineSettings line;
+  LineSettings line;  // rate 0: the document states none, the user must
   std::span<const Option> options;
   std::span<const Model> models;
   std::span<const FieldInfo> fields;
@@ -206,6 +212,8 @@ struct Unit {
   /// any values explain them all: then `options`, which give what is not probed, become such values, defaults where the
   /// captures do not tell.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
+  /// What these options need beside the data; null: nothing.
+  ExtraLines (*extra_lines)(const Options& options) = nullptr;
 };
 
 /// Whether a word format may stand in for some of its options.

@@ -36,7 +36,7 @@ Measurement measure(Encoder& encoder, double seconds) {
   Time before = start;
   try {
     while (before < end && !os::interrupted()) {
-      const Outcome outcome = encoder.read();
+      const Outcome outcome = encoder.read(host::Take::every);
       const Time after = os::now();
       if (outcome.error == Error::none) {
         measurement.latencies.push_back(after - before);

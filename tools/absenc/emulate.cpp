@@ -83,21 +83,21 @@ LineSettings line_settings(const Unit& unit, const Options& options) {
 }
 
 /// Where an encoder may be, and where nothing else may be given.
-struct Place {
+struct Where {
   std::string_view option;
   bool fits;
 };
 
-void check_line(const Unit& unit, const Invocation& invocation) {
+void check_line(const Unit& unit, const Options& options, const Invocation& invocation) {
   const bool is_spi = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
   const bool is_can = unit.link == LinkKind::can;
-  const std::array<Place, 5> places{{{"--pty", !is_spi},
+  const std::array<Where, 5> places{{{"--pty", !is_spi},
                                      {"--tcp", !is_spi},
                                      {"--port", !is_spi && !is_can},
                                      {"--spidev", is_spi},
                                      {"--can", is_can}}};
   std::string_view chosen;
-  for (const Place& place : places) {
+  for (const Where& place : places) {
     if (!invocation.has(place.option)) continue;
     if (!place.fits) throw UsageError(fmt::format("{} ({}) is not for {}", unit.id, line_of(unit), place.option));
     if (!chosen.empty() && place.option != "--tcp") {
@@ -107,6 +107,16 @@ void check_line(const Unit& unit, const Invocation& invocation) {
   }
   if (is_spi && chosen.empty()) {
     throw UsageError(fmt::format("{0} does not go over a serial line: use --spidev NAME, or sim:{0}", unit.id));
+  }
+  const ExtraLines lines = unit.extra_lines == nullptr ? ExtraLines{} : unit.extra_lines(options);
+  if (lines.trigger) {
+    throw UsageError(
+        fmt::format("with these options a pulse asks {0} for each frame, and neither a pseudo-terminal nor TCP carries "
+                    "pulses: use sim:{0} in place of a port, as in `absenc read \"sim:{0}?{1}\"`",
+                    unit.id, fmt::join(invocation.texts("--option"), "&")));
+  }
+  if (lines.clear) {
+    print_message(fmt::format("note: nothing here carries the pulse that sets the zero: sim:{} does", unit.id));
   }
   if (!invocation.has("--also")) return;
   if (unit.link != LinkKind::half_duplex && !is_can) {
@@ -234,7 +244,7 @@ int run_emulate(const Invocation& invocation) {
   os::catch_interrupts();
   const Unit& unit = emulated_unit(invocation);
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
-  check_line(unit, invocation);
+  check_line(unit, options, invocation);
   return unit.link == LinkKind::can ? emulate_frames(unit, options, invocation)
                                     : emulate_bytes(unit, options, invocation);
 }

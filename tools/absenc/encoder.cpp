@@ -47,10 +47,10 @@ class EncoderOn final : public Encoder {
   bool connected() const override { return link_ != nullptr; }
   const std::vector<std::string>& notes() const override { return link_->link().notes; }
 
-  Outcome read() override {
+  Outcome read(host::Take take) override {
     const Command* command = find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
-    return outcome(*command, link_->take_turn([&] { return session_.read(*command); }));
+    return outcome(*command, link_->take_turn([&] { return session_.read(*command, take); }));
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
@@ -91,11 +91,12 @@ class EncoderOn final : public Encoder {
   Trouble trouble(const Outcome& outcome) const override {
     Trouble trouble{.error = outcome.error};
     const bool callers_fault = outcome.error <= Error::buffer_too_small;
-    if (callers_fault || (port_.sent.empty() && port_.clocks == 0)) {
+    if (callers_fault) {
       trouble.message = describe(outcome.error, outcome.detail, {});
       trouble.advice = outcome.advice;
       return trouble;
     }
+    if (port_.sent.empty() && port_.clocks == 0) return unasked_trouble(outcome);
     const Diagnosis diagnosis = diagnose_last();
     trouble.message = describe(outcome.error, outcome.detail, diagnosis.finding);
     trouble.sent = wire_text(port_.sent);
@@ -114,6 +115,18 @@ class EncoderOn final : public Encoder {
     last_ = conversation;
     return {conversation->error(), conversation->detail(), conversation->advice(), aborting_.take_aborted(),
             conversation->reading()};
+  }
+
+  // Of a conversation that sent nothing.
+  [[nodiscard]] Trouble unasked_trouble(const Outcome& outcome) const {
+    const std::span<const Item> damaged = last_->exchange().received;
+    const std::span<const Item> received = damaged.empty() ? std::span<const Item>(port_.received) : damaged;
+    Trouble trouble{.error = outcome.error, .message = describe(outcome.error, outcome.detail, {})};
+    trouble.received = wire_text(received);
+    trouble.exchange = received.empty() ? fmt::format("nothing came from {}", link_->link().place)
+                                        : fmt::format("received {} from {}", trouble.received, link_->link().place);
+    trouble.advice = outcome.advice.empty() ? text_of(outcome.error).advice : outcome.advice;
+    return trouble;
   }
 
   [[nodiscard]] Diagnosis diagnose_last() const {

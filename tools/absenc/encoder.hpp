@@ -63,8 +63,9 @@ class Encoder {
 
   // All of the following only while it is connected, but for counters and statistics.
 
-  /// The position, with all the alarms the unit can tell. Throws UsageError when the unit has none.
-  virtual Outcome read() = 0;
+  /// The position, with all the alarms the unit can tell; of those that an encoder transmits by itself, which. Throws
+  /// UsageError when the unit has none.
+  virtual Outcome read(host::Take take = host::Take::newest) = 0;
   /// `on_emit` is called for each result but the last; `report` then tells of it.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// The fields of the last outcome.

@@ -25,25 +25,56 @@ std::int64_t number_of(const OptionText& setting, std::int64_t minimum, std::int
                                minimum, maximum));
 }
 
-// The index of auto, on or off.
-std::size_t switch_of(const OptionText& setting) {
-  constexpr std::array<std::string_view, 3> words{"auto", "on", "off"};
-  const auto found = std::find(words.begin(), words.end(), setting.value);
+// The index of one of `words`.
+std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words) {
+  const auto* const found = std::find(words.begin(), words.end(), setting.value);
   if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-  throw UsageError(fmt::format("{} is \"{}\", but must be auto, on or off", setting.name, setting.value));
+  const std::span<const std::string_view> all(words.begin(), words.size());
+  throw UsageError(fmt::format("{} is \"{}\", but must be {} or {}", setting.name, setting.value,
+                               fmt::join(all.first(all.size() - 1), ", "), all.back()));
+}
+
+// What stands behind the name of the line: "", "_us" or "_active".
+void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText& setting) {
+  using Kind = os::PulseWire::Kind;
+  constexpr std::string_view gpio = "gpio:";
+  if (what == "_us") {
+    wire.width = std::chrono::microseconds(number_of(setting, 1, 10'000'000));
+  } else if (what == "_active") {
+    wire.active_high = choice_of(setting, {"low", "high"}) == 1;
+  } else if (setting.value.starts_with(gpio) && setting.value.size() > gpio.size()) {
+    wire.kind = Kind::gpio;
+    wire.name = setting.value.substr(gpio.size());
+  } else if (setting.value == "rts" || setting.value == "dtr") {
+    wire.kind = setting.value == "rts" ? Kind::rts : Kind::dtr;
+  } else {
+    throw UsageError(fmt::format("{} is \"{}\", but must be rts, dtr or gpio:NAME, as `gpioinfo` lists it",
+                                 setting.name, setting.value));
+  }
 }
 
 void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
   const std::string value(setting.value);
+  constexpr std::string_view trigger = "trigger";
+  constexpr std::string_view clear = "clear";
+  if (setting.name.starts_with(trigger)) {
+    return set_pulse_wire(uri.wires.trigger, setting.name.substr(trigger.size()), setting);
+  }
+  if (setting.name.starts_with(clear)) {
+    return set_pulse_wire(uri.wires.clear, setting.name.substr(clear.size()), setting);
+  }
   if (setting.name == "baud") {
     std::uint32_t& rate = uri.place == Place::slcan ? uri.adapter_rate : uri.line.rate;
     rate = static_cast<std::uint32_t>(number_of(setting, 1, 100'000'000));
   } else if (setting.name == "log") {
     if (uri.unit->link != LinkKind::can) throw UsageError("log cannot be set here: it takes down frames of a CAN bus");
     uri.log = value;
+  } else if (setting.name == "parity") {
+    constexpr std::array parities{Parity::none, Parity::odd, Parity::even};
+    uri.line.parity = parities[choice_of(setting, {"none", "odd", "even"})];
   } else if (setting.name == "rs485") {
     constexpr std::array modes{os::Rs485::automatic, os::Rs485::on, os::Rs485::off};
-    uri.rs485 = modes[switch_of(setting)];
+    uri.rs485 = modes[choice_of(setting, {"auto", "on", "off"})];
   } else if (setting.name == "latency") {
     uri.latency = std::chrono::milliseconds(number_of(setting, 0, 60'000));
   } else if (setting.name == "speed") {
@@ -52,7 +83,7 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
     uri.spi.mode = static_cast<std::uint8_t>(number_of(setting, 0, 3));
   } else if (setting.name == "echo") {
     constexpr std::array modes{host::EchoMode::automatic, host::EchoMode::on, host::EchoMode::off};
-    uri.echo = modes[switch_of(setting)];
+    uri.echo = modes[choice_of(setting, {"auto", "on", "off"})];
   } else if (setting.name == "motion") {
     uri.device.motion = value;
   } else if (setting.name == "singleturn") {
@@ -115,6 +146,9 @@ void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
   }
   uri.options = require_options(*uri.unit, {}, options, names);
   if (uri.unit->settings != nullptr) uri.line = uri.unit->settings(uri.options);
+  const bool any_rate_does =
+      uri.place == Place::sim || (uri.place == Place::serial && os::is_pseudo_terminal(uri.path));
+  if (any_rate_does) uri.line = uri.line.with_some_rate();
 }
 
 bool goes_over_serial(const Unit& unit) {

@@ -31,9 +31,20 @@ struct LinkParameter {
   bool can = false, slcan = false;
 };
 
-inline constexpr std::array<LinkParameter, 13> link_parameters{{
+inline constexpr std::array<LinkParameter, 20> link_parameters{{
     {"baud", "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan", true, false, false, false, false, false, true},
+    {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim", true, false, false,
+     true},
+    {"trigger", "rts|dtr|gpio:NAME", "the wire whose pulse asks for a frame", "serial", true, false, false, false},
+    {"trigger_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial", true, false, false,
+     false},
+    {"trigger_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial", true,
+     false, false, false},
+    {"clear", "rts|dtr|gpio:NAME", "the wire whose pulse sets the zero", "serial", true, false, false, false},
+    {"clear_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial", true, false, false, false},
+    {"clear_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial", true, false,
+     false, false},
     {"rs485", "auto|on|off", "whether the kernel switches the direction of the transceiver", "serial", true, false,
      false, false},
     {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp, can, slcan", true, true, false,
@@ -65,6 +76,7 @@ struct EncoderUri {
 
   LineSettings line;
   os::Rs485 rs485 = os::Rs485::automatic;
+  os::PulseWires wires;
   std::optional<Time> latency;
   os::SpiChoice spi;
   std::uint32_t adapter_rate = 115'200;  // slcan: of the serial port, not of the bus

@@ -78,7 +78,7 @@ Json identity_json(const EncoderUri& uri) {
       .set("protocol", unit.id)
       .set("model", uri.options.model == nullptr ? Json() : Json(uri.options.model->name))
       .set("link", name_of(unit.link))
-      .set("rate", uri.line.rate)
+      .set("rate", uri.line.rate == 0 ? Json() : Json(uri.line.rate))
       .set("resolution", bits)
       .set("options", options_to_json(unit, uri.options));
 }

@@ -13,6 +13,7 @@
 #include "absenc/os/tcp.hpp"
 #include "absenc/sim/sim_port.hpp"
 #include "tools/absenc/can_log.hpp"
+#include "tools/absenc/error.hpp"
 
 namespace absenc::tool {
 
@@ -25,16 +26,42 @@ void take(Link& link, std::shared_ptr<os::StreamPort> port, const EncoderUri& ur
   link.owner = std::move(port);
 }
 
+ExtraLines extra_lines(const EncoderUri& uri) {
+  return uri.unit->extra_lines == nullptr ? ExtraLines{} : uri.unit->extra_lines(uri.options);
+}
+
+// A port that was not there when its address was looked at may turn out to be a pseudo-terminal.
+LineSettings line_of_serial(const EncoderUri& uri) {
+  if (uri.line.rate != 0 || os::is_pseudo_terminal(uri.path)) return uri.line.with_some_rate();
+  throw UsageError(
+      fmt::format("the document of {0} states no baud rate: say what yours was ordered with, as in "
+                  "\"{0}:{1}?baud=9600\"",
+                  uri.unit->id, uri.path));
+}
+
 Link open_serial(const EncoderUri& uri) {
+  if (extra_lines(uri).trigger && uri.wires.trigger.kind == os::PulseWire::Kind::none) {
+    throw UsageError(
+        fmt::format("with these options a pulse asks {} for each frame: say which wire carries it, trigger=rts, "
+                    "trigger=dtr or trigger=gpio:NAME",
+                    uri.unit->id));
+  }
   Link link;
-  const auto port = std::make_shared<os::SerialPort>(uri.path, uri.line, uri.rs485);
-  link.place = fmt::format("{} at {} baud", uri.path, uri.line.rate);
+  const LineSettings line = line_of_serial(uri);
+  const auto port = std::make_shared<os::SerialPort>(uri.path, line, uri.rs485, uri.wires);
+  link.place = fmt::format("{} at {} baud", uri.path, line.rate);
   link.notes = port->notes();
   take(link, port, uri);
   return link;
 }
 
 Link open_tcp(const EncoderUri& uri) {
+  if (extra_lines(uri).trigger) {
+    throw UsageError(
+        fmt::format("with these options a pulse asks {} for each frame, which TCP does not carry: use a "
+                    "serial port",
+                    uri.unit->id));
+  }
   Link link;
   link.place = fmt::format("{}:{}", uri.host, uri.port);
   take(link, std::make_shared<os::TcpPort>(uri.host, uri.port), uri);

@@ -41,6 +41,9 @@ class WatchedPort final : public Port<Item> {
       answer = step.answer;
       items_sent += step.out.size();
       first_received_at = Time{};
+    } else if (step.kind == Step<Item>::Kind::pulse) {
+      sent.clear();
+      received.clear();
     }
     port_->begin(step);
   }

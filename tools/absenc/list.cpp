@@ -274,7 +274,7 @@ Json unit_json(const Unit& unit) {
       .set("document", unit.document)
       .set("link", name_of(unit.link))
       .set("line", Json::object()
-                       .set("rate", unit.line.rate)
+                       .set("rate", unit.line.rate == 0 ? Json() : Json(unit.line.rate))
                        .set("parity", parities[static_cast<std::size_t>(unit.line.parity)])
                        .set("stop_bits", unit.line.stop_bits))
       .set("models", models_json(unit))

@@ -55,7 +55,7 @@ void LiveEncoder::forget_position() {
 Sample LiveEncoder::next() {
   if (!encoder_->connected()) return search();
   try {
-    const Outcome outcome = encoder_->read();
+    const Outcome outcome = encoder_->read(period_ == Time{} ? host::Take::every : host::Take::newest);
     if (outcome.error != Error::none) {
       return {.kind = Sample::Kind::failed, .at = os::now(), .trouble = encoder_->trouble(outcome)};
     }

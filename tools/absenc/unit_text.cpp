@@ -283,7 +283,7 @@ std::string line_of(LinkKind link, const LineSettings& line) {
                                                          "clocked bits", "CAN"};
   const double rate = line.rate;
   const std::string_view kind = words[static_cast<std::size_t>(link)];
-  if (line.rate == 0) return std::string(kind);
+  if (line.rate == 0) return fmt::format("{}, baud to be given", kind);
   if (line.rate >= 1'000'000) return fmt::format("{}, {} Mbit/s", kind, rate / 1e6);
   return fmt::format("{}, {} kbit/s", kind, rate / 1e3);
 }

@@ -38,7 +38,7 @@ class VirtualLine {
       const LineSettings line = unit.settings != nullptr ? unit.settings(options) : unit.line;
       bus_ = std::make_unique<sim::FrameBus>(machines, line.rate);
     } else if (machines.size() > 1) {
-      bus_ = std::make_unique<sim::Bus>(machines, unit.line.character());
+      bus_ = std::make_unique<sim::Bus>(machines, unit.line.with_some_rate().character());
     }
   }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// The RAA38S6 as the neutral layers see it: one unit for each of its protocols.
 // The RAA38S6 as the neutral layers see it: a unit for each line it is made for.
 #pragma once
 
@@ -6,6 +7,7 @@
 
 namespace absenc::raa38 {
 
+extern constinit const Unit serial_unit;  // RS-485, RS-232, RS-422
 extern constinit const Unit modbus_unit;
 extern constinit const Unit can_unit;
 

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/pulse_wire.hpp"
+
+#include <gpiod.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+
+#include <cerrno>
+#include <utility>
+
+#include "absenc/os/error.hpp"
+
+namespace absenc::os {
+
+int WireKernel::set_modem_lines(int descriptor, unsigned long request, int lines) {
+  return ::ioctl(descriptor, request, &lines);
+}
+
+gpiod_line* WireKernel::find_gpio(const std::string& name) { return ::gpiod_line_find(name.c_str()); }
+
+int WireKernel::request_gpio(gpiod_line* line, bool active_low) {
+  return ::gpiod_line_request_output_flags(line, "absenc", active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0, 0);
+}
+
+int WireKernel::set_gpio(gpiod_line* line, int value) { return ::gpiod_line_set_value(line, value); }
+
+void WireKernel::release_gpio(gpiod_line* line) { ::gpiod_line_close_chip(line); }
+
+WireKernel& system_wires() {
+  static WireKernel kernel;
+  return kernel;
+}
+
+PulseLine::PulseLine(PulseWire wire, int descriptor, std::string path, WireKernel& kernel)
+    : wire_(std::move(wire)), descriptor_(descriptor), path_(std::move(path)), kernel_(&kernel) {
+  if (wire_.kind == PulseWire::Kind::gpio) {
+    open_gpio();
+  } else {
+    drive(false);  // opening a port sets both
+  }
+}
+
+PulseLine::~PulseLine() {
+  if (line_ != nullptr) kernel_->release_gpio(line_);
+}
+
+void PulseLine::open_gpio() {
+  const std::string what = "the GPIO line " + wire_.name;
+  const auto refused = [&](int error) {
+    if (error == EACCES || error == EPERM) {
+      return Failure(Failure::Kind::no_permission,
+                     what + " may not be used by you: become a member of the group of /dev/gpiochip*, often gpio");
+    }
+    if (error == EBUSY) {
+      return Failure(Failure::Kind::in_use, what + " is in use: `gpioinfo` shows by whom");
+    }
+    return system_failure("using " + what, error);
+  };
+  line_ = kernel_->find_gpio(wire_.name);
+  if (line_ == nullptr) {
+    if (errno == EACCES || errno == EPERM) throw refused(errno);
+    throw Failure(Failure::Kind::not_found,
+                  "no GPIO line of this machine is named " + wire_.name + ": `gpioinfo` lists the names");
+  }
+  if (kernel_->request_gpio(line_, !wire_.active_high) == 0) return;
+  const int error = errno;
+  kernel_->release_gpio(line_);
+  throw refused(error);
+}
+
+void PulseLine::drive(bool active) {
+  if (line_ != nullptr) {
+    if (kernel_->set_gpio(line_, active ? 1 : 0) < 0)
+      throw system_failure("setting the GPIO line " + wire_.name, errno);
+    return;
+  }
+  const bool is_rts = wire_.kind == PulseWire::Kind::rts;
+  const bool low = active != wire_.active_high;
+  if (kernel_->set_modem_lines(descriptor_, low ? TIOCMBIS : TIOCMBIC, is_rts ? TIOCM_RTS : TIOCM_DTR) < 0) {
+    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " has no " + (is_rts ? "RTS" : "DTR") +
+                                                  " line for the pulse: use an adapter that brings it out, or a GPIO "
+                                                  "line");
+  }
+}
+
+}  // namespace absenc::os

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames of the RAA38S6 on asynchronous lines (RS-485, RS-232, RS-422 carry the same bytes): encode, decode and every
+// check they allow. README.md draws them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/result.hpp"
+
+namespace absenc::raa38::serial {
+
+/// What starts a frame.
+enum class Mode : std::uint8_t {
+  timing,     // nothing: the encoder transmits at its refresh rate
+  handshake,  // a falling edge on CLK
+  bus,        // a request with the encoder's number
+};
+
+/// Second byte of a frame: the tables say 81, the text of the bus the encoder's number.
+enum class SecondByte : std::uint8_t { automatic, fixed, echo };
+
+/// How the zero is set, of encoders that were ordered so.
+enum class Zeroing : std::uint8_t {
+  none,
+  line,     // a pulse on CLR
+  command,  // BC AA Cx, on a bus
+};
+
+inline constexpr std::uint8_t header = 0xFF;
+inline constexpr std::uint8_t fixed_second_byte = 0x81;
+inline constexpr std::uint8_t number_mark = 0xB0;  // Bx: unit x
+inline constexpr std::uint8_t clear_mark = 0xC0;   // Cx: its zero
+inline constexpr unsigned unit_count = 16;         // x is one hexadecimal digit
+inline constexpr unsigned least_bits = 10;
+inline constexpr unsigned most_bits = 32;  // the encoders have up to 21; the tables draw a fourth data byte
+inline constexpr std::size_t request_bytes = 3;
+inline constexpr std::size_t frame_capacity = 7;
+
+struct Format {
+  unsigned bits = 14;  // of a turn
+  SecondByte second_byte = SecondByte::automatic;
+
+  [[nodiscard]] constexpr std::size_t data_bytes() const { return bits <= 16 ? 2 : bits <= 24 ? 3 : 4; }
+  [[nodiscard]] constexpr std::size_t frame_bytes() const { return data_bytes() + 3; }
+};
+
+struct Position {
+  std::uint32_t singleturn = 0;
+  std::uint8_t second_byte = fixed_second_byte;
+
+  friend constexpr bool operator==(const Position&, const Position&) = default;
+};
+
+using FrameBytes = ByteBuffer<frame_capacity>;
+using RequestBytes = ByteBuffer<request_bytes>;
+
+/// "Sum of the first n bytes, the bottom eight bits". The order of the bytes is lost in it.
+[[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
+  unsigned sum = 0;
+  for (const std::uint8_t byte : bytes) sum += byte;
+  return static_cast<std::uint8_t>(sum);
+}
+
+[[nodiscard]] constexpr FrameBytes encode_position(const Format& format, const Position& position) {
+  FrameBytes bytes;
+  bytes.push_back(header);
+  bytes.push_back(position.second_byte);
+  for (std::size_t i = format.data_bytes(); i > 0; --i) {
+    bytes.push_back(static_cast<std::uint8_t>(position.singleturn >> 8 * (i - 1)));
+  }
+  bytes.push_back(checksum(bytes));
+  return bytes;
+}
+
+/// Whose answer a frame may be. Without a request the frame itself tells.
+inline constexpr int anybody = -1;
+
+[[nodiscard]] constexpr bool second_byte_fits(const Format& format, int unit, std::uint8_t second_byte) {
+  const bool numbered = unit == anybody ? (second_byte & 0xF0) == number_mark : second_byte == (number_mark | unit);
+  if (format.second_byte == SecondByte::fixed) return second_byte == fixed_second_byte;
+  return numbered || (format.second_byte == SecondByte::automatic && second_byte == fixed_second_byte);
+}
+
+/// `unit` 0 to 15, or `anybody`. Errors: wrong_length, bad_checksum, unexpected_reply, out_of_range.
+[[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = anybody) {
+  if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
+  if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
+  if (bytes[0] != header || !second_byte_fits(format, unit, bytes[1])) return Error::unexpected_reply;
+  const auto value = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(2, format.data_bytes())));
+  if (value > low_mask(format.bits)) return Error::out_of_range;
+  return Position{value, bytes[1]};
+}
+
+struct Request {
+  enum class Kind : std::uint8_t { read, zero_clear } kind = Kind::read;
+  std::uint8_t unit = 0;  // 0 to 15
+};
+
+[[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
+  RequestBytes bytes;
+  bytes.push_back(0xBC);
+  bytes.push_back(0xAA);
+  const unsigned mark = request.kind == Request::Kind::read ? number_mark : clear_mark;
+  bytes.push_back(static_cast<std::uint8_t>(mark | (request.unit & 0x0Fu)));
+  return bytes;
+}
+
+/// Errors: wrong_length, unexpected_reply.
+[[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
+  if (bytes.size() != request_bytes) return Error::wrong_length;
+  const unsigned mark = bytes[2] & 0xF0u;
+  if (bytes[0] != 0xBC || bytes[1] != 0xAA || (mark != number_mark && mark != clear_mark)) {
+    return Error::unexpected_reply;
+  }
+  return Request{mark == number_mark ? Request::Kind::read : Request::Kind::zero_clear,
+                 static_cast<std::uint8_t>(bytes[2] & 0x0Fu)};
+}
+
+[[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position, Time latched,
+                                           Time received) {
+  return {.singleturn = position.singleturn,
+          .singleturn_bits = format.bits,
+          .singleturn_valid_bits = format.bits,
+          .latched = latched,
+          .received = received};
+}
+
+}  // namespace absenc::raa38::serial
