@@ -54,6 +54,7 @@ struct Burst {
   std::size_t bits = 0;           // clocks seen
   std::vector<std::uint8_t> in;   // what the encoder sent, packed MSB first, the last byte left-aligned
   std::vector<std::uint8_t> out;  // SPI: what the host sent
+  bool cut = false;               // its beginning or its end was not seen: bits may be missing there
 };
 
 struct CanRecord {
