@@ -45,7 +45,23 @@ struct Collector final : FieldSink {
   void put(const FieldValue& value) override {
     fields[std::string(value.info->name)] = comparable(value.number, value.real);
   }
+  void put_reading(const Reading& reading) override {
+    EXPECT_FALSE(has_reading);
+    has_reading = true;
+    const auto is = [this](const char* name, std::uint64_t counts) {
+      const auto field = fields.find(name);
+      return field != fields.end() && static_cast<std::uint64_t>(field->second.first) == counts;
+    };
+    EXPECT_TRUE(reading.singleturn_bits == 0 || is("singleturn", reading.singleturn) ||
+                is("position", reading.singleturn));
+    EXPECT_TRUE(reading.multiturn_bits == 0 || is("multiturn", reading.multiturn));
+  }
+  /// A position among the fields, of which there must be a reading.
+  [[nodiscard]] bool has_position() const {
+    return fields.contains("singleturn") || fields.contains("multiturn") || fields.contains("position");
+  }
   std::map<std::string, Value> fields;
+  bool has_reading = false;
 };
 
 Options options_of(const Case& test) {
@@ -98,6 +114,7 @@ TEST_P(Battery, Whole) {
   Collector collector;
   ASSERT_EQ(text_of(decode(vector.reply, collector)).name, text_of(vector.error).name);
   EXPECT_EQ(collector.fields, expected_fields(vector));
+  EXPECT_EQ(collector.has_reading, collector.has_position());
 }
 
 class GoodReply : public Battery {};

@@ -175,7 +175,7 @@ std::string metadata(const Drawing& drawing, std::uint64_t rate, std::size_t uni
 void write_vcd(std::ostream& out, const Drawing& drawing) {
   out << "$version absenc $end\n$timescale 1 ns $end\n";
   // Not among the changes, where the standard allows them too: sigrok's reader stops at the first.
-  for (const Remark& remark : drawing.remarks) out << "$comment #" << remark.at << ' ' << remark.words << " $end\n";
+  for (const Label& label : drawing.labels) out << "$comment #" << label.at << ' ' << label.words << " $end\n";
   out << "$scope module " << drawing.title << " $end\n";
   for (std::size_t i = 0; i < drawing.traces.size(); ++i) {
     out << "$var wire 1 " << identifier(i) << ' ' << drawing.traces[i].name << " $end\n";

@@ -18,7 +18,7 @@ struct Trace {
   Changes changes;
 };
 
-struct Remark {
+struct Label {
   Tick at;
   std::string words;
 };
@@ -27,7 +27,7 @@ struct Remark {
 struct Drawing {
   std::string title;  // one word
   std::vector<Trace> traces;
-  std::vector<Remark> remarks;  // what the levels mean, in the order of time
+  std::vector<Label> labels;  // what the levels mean, in the order of time
   Tick end = 0;
 };
 
@@ -36,19 +36,19 @@ struct Drawing {
 template <class Waveform>
 [[nodiscard]] Drawing drawing_of(std::string title, const Waveform& waveform) {
   constexpr Tick margin = 10'000;
-  Drawing drawing{.title = std::move(title), .traces = {}, .remarks = {}, .end = 0};
+  Drawing drawing{.title = std::move(title), .traces = {}, .labels = {}, .end = 0};
   for (const auto& wire : waveform.wires()) {
     Trace& trace = drawing.traces.emplace_back(Trace{std::string(wire.name), {wire.before, {}}});
     for (const Time change : wire.changes) trace.changes.at.push_back(static_cast<Tick>(change.count()));
   }
   for (const auto& comment : waveform.comments()) {
-    drawing.remarks.push_back({static_cast<Tick>(comment.at.count()), comment.words});
+    drawing.labels.push_back({static_cast<Tick>(comment.at.count()), comment.words});
   }
   drawing.end = static_cast<Tick>(waveform.end().count()) + margin;
   return drawing;
 }
 
-/// A value change dump (IEEE 1364, clause 18), exact to the nanosecond; the remarks are comments before the changes.
+/// A value change dump (IEEE 1364, clause 18), exact to the nanosecond; the labels are comments before the changes.
 void write_vcd(std::ostream& out, const Drawing& drawing);
 
 /// As Saleae Logic 2 exports digital channels: a line for each time at which one changes, exact to the nanosecond.

@@ -17,7 +17,7 @@ namespace {
 Drawing three_traces() {
   return {.title = "test",
           .traces = {{"a", {true, {1000, 3000, 3500}}}, {"b", {false, {3000}}}, {"c", {false, {}}}},
-          .remarks = {{1000, "begins"}},
+          .labels = {{1000, "begins"}},
           .end = 8000};
 }
 
@@ -71,7 +71,7 @@ TEST_F(SigrokSession, HasTheLevelsAtEverySample) {
 }
 
 TEST_F(SigrokSession, OfMoreThanOnePartAndManyTraces) {
-  Drawing drawing{.title = "many", .traces = {}, .remarks = {}, .end = 10'000'000};
+  Drawing drawing{.title = "many", .traces = {}, .labels = {}, .end = 10'000'000};
   for (Tick i = 0; i < 20; ++i) drawing.traces.push_back({"t" + std::to_string(i), {i % 2 == 0, {9'000'000 + i}}});
   write_sigrok(path, drawing, 1'000'000'000);
   const std::string text = read("-O vcd");

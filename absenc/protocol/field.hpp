@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "absenc/core/angle.hpp"
 #include "absenc/core/bytes.hpp"
 
 namespace absenc {
@@ -43,6 +44,8 @@ struct FieldValue {
 
 struct FieldSink {
   constexpr virtual void put(const FieldValue& value) = 0;
+  /// The position in a good reply that carries one, or only its turns, and what of it holds; without times.
+  constexpr virtual void put_reading(const Reading&) {}
 
  protected:
   constexpr ~FieldSink() = default;

@@ -170,6 +170,13 @@ struct ExtraLines {
   bool clear = false;    // the zero
 };
 
+/// The times of an asynchronous line by which its captures are read.
+struct LineTiming {
+  unsigned pause_bits = 15;  // a line silent for so many bits has ended the frame; shorter, the frame goes on
+  Time turnaround{};         // from the end of a request to the begin of its reply, as the document has it; 0: not told
+  Time turnaround_limit = std::chrono::milliseconds(100);  // no host waits longer for the reply to begin
+};
+
 struct Unit {
   std::string_view id;
   std::string_view name;      // maker and protocol, for people
@@ -214,6 +221,11 @@ struct Unit {
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// What these options need beside the data; null: nothing.
   ExtraLines (*extra_lines)(const Options& options) = nullptr;
+  LineTiming timing{};
+  /// Whether the encoder sends replies that nobody asks for; null: never. On clocked and CAN links it always may.
+  bool (*streams)(const Options& options) = nullptr;
+  /// Whether this request, a good one, is answered; null: every one is.
+  bool (*answered)(const Options& options, Frame request) = nullptr;
 };
 
 /// Whether a word format may stand in for some of its options.

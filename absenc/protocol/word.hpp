@@ -199,6 +199,12 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
   return reading;
 }
 
+/// Every field of the word and its reading.
+constexpr void put_position(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
+  put_word(sink, format, word, scale);
+  sink.put_reading(to_reading(format, word, scale));
+}
+
 /// What a virtual encoder shows of a shaft. A linear one goes along its whole scale in one revolution.
 [[nodiscard]] constexpr Word word_of(const WordFormat& format, const ShaftState& state, std::uint32_t alarms) {
   const unsigned bits = format.bits_of(Meaning::position);

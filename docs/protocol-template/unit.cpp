@@ -16,8 +16,10 @@ constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position
 
 Error decode(const Options&, Frame, Frame reply, FieldSink& sink) {
   const Result<Reply> result = decode_reply(reply.bytes);
-  if (result) sink.put({&fields[0], result->singleturn});
-  return result.error();
+  if (!result) return result.error();
+  sink.put({&fields[0], result->singleturn});
+  // Give sink.put_reading the position too: captures take it from there.
+  return Error::none;
 }
 
 Result<std::size_t> encode(const Options&, const Command&, Arguments, MutableBytes) { return Error::unsupported; }

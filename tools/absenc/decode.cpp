@@ -3,10 +3,14 @@
 
 #include <array>
 
+#include "tools/absenc/annotation_text.hpp"
+#include "tools/absenc/capture_run.hpp"
+#include "tools/absenc/capture_statistics.hpp"
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/progress.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
@@ -20,13 +24,13 @@ WireFrame frame_of(const Unit& unit, const Invocation& invocation, std::string_v
   return parse_wire_text(unit.link, option, invocation.text(option));
 }
 
-int run_decode(const Invocation& invocation) {
-  const Unit& unit = require_unit(invocation.text("protocol"));
-  const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
+int decode_one(const Invocation& invocation, const Unit& unit, const Options& options) {
   const WireFrame request = frame_of(unit, invocation, "--request");
   const WireFrame reply = frame_of(unit, invocation, "--hex");
   if (request.frame().empty() && reply.frame().empty()) {
-    throw UsageError("there is nothing to decode: give the frame with --hex, and what was asked with --request");
+    throw UsageError(
+        "there is nothing to decode: name a capture, or give one frame with --hex, and what was asked "
+        "with --request");
   }
 
   const bool json = invocation.has("--json");
@@ -63,30 +67,137 @@ int run_decode(const Invocation& invocation) {
   return exit_failed;
 }
 
-constexpr std::array<Parameter, 6> parameters{{
+// ---- A whole capture
+
+constexpr std::array<std::string_view, 6> capture_options{"--channel", "--baud", "--raw-channels",
+                                                          "--rate",    "--csv",  "--stats"};
+
+// Counts, and hands on what is to be printed.
+struct Counted final : capture::AnnotationSink {
+  Counted(CaptureStatistics& all, AnnotationPrinter* some) : statistics(all), printer(some) {}
+  void put(const capture::Annotation& annotation) override {
+    statistics.put(annotation);
+    if (printer != nullptr) printer->put(annotation);
+  }
+  CaptureStatistics& statistics;
+  AnnotationPrinter* printer;
+};
+
+CaptureChoices choices_of(const Invocation& invocation) {
+  constexpr std::int64_t fastest = 1'000'000'000'000;
+  CaptureChoices choices;
+  choices.path = invocation.text("file");
+  choices.channels.assign(invocation.texts("--channel").begin(), invocation.texts("--channel").end());
+  choices.raw_channels = static_cast<unsigned>(invocation.number("--raw-channels", 0, 1, 64));
+  choices.samples_per_second = static_cast<std::uint64_t>(invocation.number("--rate", 0, 1, fastest));
+  choices.baud = invocation.real("--baud", 0, 1, 1e9);
+  if (choices.raw_channels != 0 && choices.samples_per_second == 0) {
+    throw UsageError("raw samples have no rate: give the samples a second with --rate");
+  }
+  return choices;
+}
+
+// Returns whether anything is missing because of them.
+bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
+  bool damaged = false;
+  for (const capture::Damage& damage : outcome.damages) {
+    print_message(fmt::format("{}byte {}, {} {}: {}", damage.note ? "note: " : "the capture is damaged at ",
+                              damage.offset, clock.has_time() ? "second" : "tick", clock.text(damage.tick),
+                              damage.what));
+    damaged = damaged || !damage.note;
+  }
+  return damaged;
+}
+
+int decode_capture(const Invocation& invocation, const Unit& unit, const Options& options) {
+  const bool statistics_only = invocation.has("--stats");
+  const bool json = invocation.has("--json");
+  if (json && invocation.has("--csv")) throw UsageError("--json and --csv cannot be given together");
+  if (statistics_only && invocation.has("--csv")) throw UsageError("--stats is text or, with --json, an object");
+
+  CaptureRun run(unit, options, choices_of(invocation));
+  const TickClock clock(run.ticks_per_second());
+  CaptureStatistics statistics(unit, options, clock);
+  const AnnotationFormat format = json                      ? AnnotationFormat::json
+                                  : invocation.has("--csv") ? AnnotationFormat::csv
+                                                            : AnnotationFormat::text;
+  AnnotationPrinter printer(unit, options, clock, format);
+  Counted counted(statistics, statistics_only ? nullptr : &printer);
+  Progress progress;
+  const bool live = invocation.text("file") == "-";
+  const CaptureOutcome outcome = run.run(counted, [&](capture::Tick tick) {
+    if (live && !statistics_only) printer.flush();
+    if (statistics_only && progress.visible()) {
+      progress.show(
+          fmt::format("{} {}, {} errors", clock.has_time() ? "second" : "tick", clock.text(tick), statistics.errors()));
+    }
+  });
+  progress.clear();
+  if (!statistics_only) printer.flush();
+  if (statistics_only) print_line(json ? statistics.json(outcome).line() : statistics.text(outcome));
+  const bool damaged = tell_damages(outcome, clock);
+  if (statistics.good() == 0) {
+    print_message(
+        fmt::format("no good frame of {} is in the capture: check the channel, the protocol{} and its options", unit.id,
+                    outcome.baud.empty() ? "" : ", --baud"));
+    return exit_failed;
+  }
+  return damaged || statistics.errors() != 0 ? exit_failed : exit_good;
+}
+
+int run_decode(const Invocation& invocation) {
+  const Unit& unit = require_unit(invocation.text("protocol"));
+  const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
+  const bool one = invocation.has("--hex") || invocation.has("--request");
+  if (invocation.has("file")) {
+    if (one) throw UsageError("a capture and --hex or --request cannot be given together");
+    return decode_capture(invocation, unit, options);
+  }
+  for (const std::string_view option : capture_options) {
+    if (invocation.has(option)) throw UsageError(fmt::format("{} is about a capture: name its file", option));
+  }
+  return decode_one(invocation, unit, options);
+}
+
+constexpr std::array<Parameter, 13> parameters{{
     parameter::protocol,
+    {"file", "",
+     "a capture: a sigrok session, VCD, CSV or binary export of a logic analyser, a log of candump, bytes "
+     "as text; - for text from standard input"},
     {"--hex", "FRAME",
-     "the reply: hexadecimal bytes with or without spaces, commas and 0x; a CAN frame as ID:DATA; "
+     "one reply instead: hexadecimal bytes with or without spaces, commas and 0x; a CAN frame as ID:DATA; "
      "a clocked word as a string of 0 and 1"},
     {"--request", "FRAME", "the request it answers; without --hex the request itself is decoded"},
+    {"--channel", "[WIRE=]NAME",
+     "which channel is which wire: line; host and device; clock and data; clock, miso, mosi and cs; also with commas "
+     "between",
+     "by their names", false, true},
+    {"--baud", "RATE", "of the line", "the protocol's own, or found from the capture"},
+    {"--raw-channels", "COUNT", "the file is raw samples of so many channels, channel 0 in bit 0"},
+    {"--rate", "HZ", "samples a second, where the file does not tell"},
+    {"--stats", "", "only what it comes to: counts, errors, turn-around times, the way of the position"},
+    {"--csv", "", "a line for each exchange"},
     parameter::model,
     parameter::protocol_option,
-    parameter::json,
+    {"--json", "", "one JSON object; of a capture one a line"},
 }};
 
-constexpr std::array<Example, 2> examples{{
+constexpr std::array<Example, 4> examples{{
     {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"",
      "a position, its turns and alarms"},
     {"absenc decode tformat --hex 0200cdab0165 --option strict=false --json", "without the request, for a program"},
+    {"absenc decode tformat drive.sr --channel D0 --stats", "what an hour of a line under load comes to"},
+    {"absenc decode ssi probe.vcd --channel clock=D0,data=D1 --option bits=17", "each word of a clocked encoder"},
 }};
 
 }  // namespace
 
 const Subcommand decode_subcommand{
     "decode",
-    "say what a captured frame means, or what is wrong with it",
+    "say what a captured frame or a whole capture means, or what is wrong with it",
     "Every check that the protocol allows is made: the first that fails names the error.\n"
-    "Exit status 1 for a bad frame.",
+    "In a capture, requests are paired with their replies; who speaks is found by what is said.\n"
+    "Exit status 1 for a bad frame, a damaged file, or a capture without any good frame.",
     parameters,
     examples,
     run_decode};

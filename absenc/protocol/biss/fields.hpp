@@ -20,7 +20,7 @@ inline constexpr std::array<FieldInfo, 3> own_fields{{
 /// Every field that a reply carries, in the order of the wire.
 constexpr void put_fields(FieldSink& sink, const Format& format, const Reply& reply) {
   sink.put({&own_fields[field_ack_bits], reply.ack_bits});
-  put_word(sink, format.word, reply.word, format.scale);
+  put_position(sink, format.word, reply.word, format.scale);
   if (format.check == Check::crc16) sink.put({&own_fields[field_life_counter], reply.life_counter});
   sink.put({&own_fields[field_crc], reply.crc});
 }

@@ -70,7 +70,7 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
   if (format.carries == Carries::biss) {
     biss::put_fields(sink, format.biss, {position.ack_bits, position.word, position.life_counter, position.crc});
   } else {
-    put_word(sink, format.word(), position.word, format.scale());
+    put_position(sink, format.word(), position.word, format.scale());
   }
 }
 

@@ -8,6 +8,7 @@
 #include "absenc/protocol/e201/device.hpp"
 #include "absenc/protocol/e201/fields.hpp"
 #include "absenc/protocol/e201/host.hpp"
+#include "absenc/protocol/e201/timing.hpp"
 #include "absenc/protocol/e201/vectors.hpp"
 #include "absenc/protocol/make.hpp"
 #include "absenc/protocol/word_options.hpp"
@@ -174,6 +175,12 @@ Explanation explain_frame(const Options& values, Error error, Frame request, Fra
   return explain(to_format(values), error, letter, reply.bytes);
 }
 
+// No document says whether the others have a reply.
+bool answered(const Options&, Frame request) {
+  constexpr std::string_view lines = "4vse?>mb";
+  return index_of(lines, static_cast<char>(request.bytes[0])) < lines.size();
+}
+
 // What follows the CRC is ignored, capitals are the same digits, and SSI has no checksum.
 bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = to_format(values);
@@ -231,6 +238,8 @@ constinit const Unit unit{
     .resolution = resolution,
     .covered = covered,
     .explain = explain_frame,
+    .timing = {.turnaround_limit = answer_limit},
+    .answered = answered,
 };
 
 }  // namespace absenc::e201

@@ -142,6 +142,7 @@ constexpr void put_fields(FieldSink& sink, const Format& format, const Position&
   put(sink, field_error, position.error ? 1 : 0);
   put(sink, field_warning, position.warning ? 1 : 0);
   if (format.has_ch2) put(sink, field_channel2, position.channel2);
+  sink.put_reading(to_reading(format, position));
 }
 
 constexpr void put_fields(FieldSink& sink, const Format& format, const Cycle& cycle) {
@@ -152,6 +153,9 @@ constexpr void put_fields(FieldSink& sink, const Format& format, const Cycle& cy
   put(sink, field_status, cycle.status);
   put(sink, field_alarms, cycle.status);
   put(sink, field_channel3, cycle.channel3);
+  Reading reading = to_reading(format, cycle.position);
+  add_status(reading, cycle.status);
+  sink.put_reading(reading);
 }
 
 constexpr void put_fields(FieldSink& sink, const Identity& identity) {

@@ -8,6 +8,7 @@
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
 #include "absenc/protocol/encolink/procedures.hpp"
+#include "absenc/protocol/encolink/timing.hpp"
 #include "absenc/protocol/encolink/vectors.hpp"
 #include "absenc/protocol/make.hpp"
 
@@ -226,6 +227,8 @@ bool covered(const Options& values, Frame request, Frame, std::size_t bit) {
   return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
 }
 
+bool streams(const Options& values) { return to_build(values).stream_rate > 0; }
+
 // ---- Machines
 
 template <Wire wire>
@@ -319,6 +322,8 @@ constexpr Unit make_unit(std::string_view id, std::string_view name, Wire wire, 
       .resolution = resolution,
       .covered = covered,
       .over_spi = spi ? nullptr : &spi_unit,
+      .timing = {.turnaround_limit = answer_limit},
+      .streams = streams,
   };
 }
 

@@ -201,8 +201,11 @@ constexpr Error decode(const Profile& profile, Bytes request, Bytes reply, Field
     return Error::none;
   }
   const Result<Reply> result = decode_reply(profile, asked, reply);
-  if (result) put_fields(sink, *result);
-  return result.error();
+  if (!result) return result.error();
+  put_fields(sink, *result);
+  const Reading reading = to_reading(*result);
+  if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
+  return Error::none;
 }
 
 }  // namespace absenc::esl

@@ -214,6 +214,7 @@ constinit const Unit unit{
     .device = device,
     .resolution = resolution,
     .probe = probe_captures,
+    .timing = {.pause_bits = 1, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 
 }  // namespace absenc::esl

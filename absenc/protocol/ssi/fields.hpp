@@ -8,7 +8,7 @@ namespace absenc::ssi {
 
 constexpr Error decode(const Format& format, BitView bits, FieldSink& sink) {
   const Result<Word> word = decode(format, bits);
-  if (word) put_word(sink, format.word, *word, format.scale);
+  if (word) put_position(sink, format.word, *word, format.scale);
   return word.error();
 }
 

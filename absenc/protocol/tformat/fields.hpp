@@ -139,8 +139,11 @@ constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSi
     return Error::none;
   }
   const Result<Reply> result = decode_reply(format, asked, reply);
-  if (result) put_fields(sink, *result);
-  return result.error();
+  if (!result) return result.error();
+  put_fields(sink, *result);
+  const Reading reading = to_reading(format, *result);
+  if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
+  return Error::none;
 }
 
 }  // namespace absenc::tformat

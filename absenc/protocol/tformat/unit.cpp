@@ -206,6 +206,8 @@ constinit const Unit unit{
     .host = host,
     .device = device,
     .resolution = resolution,
+    // Any pause ends a frame; some encoders may forgive one that is shorter than their own answer time.
+    .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 
 }  // namespace absenc::tformat

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests: random conversations of a unit's own host and virtual encoder in virtual time, as they would be captured,
+// and who said what in them.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absenc/capture/signal.hpp"
+#include "absenc/protocol/unit.hpp"
+#include "absenc/sim/bench_test.hpp"
+#include "absenc/sim/faults.hpp"
+#include "absenc/sim/line.hpp"
+#include "absenc/sim/random.hpp"
+#include "absenc/sim/vcd.hpp"
+
+namespace absenc::capture::testing {
+
+inline Options options_of(const Unit& unit, const std::vector<OptionText>& settings = {}) {
+  Options options;
+  if (resolve_options(unit, {}, settings, options).kind != OptionError::Kind::none) std::abort();
+  return options;
+}
+
+/// What one side sent without a pause.
+struct Said {
+  sim::Role by;
+  std::vector<std::uint8_t> bytes;
+  Tick begin;
+  Tick end;
+};
+
+struct Talk {
+  std::vector<Character> characters;
+  std::vector<Said> said;
+  std::vector<Burst> bursts;
+  bool collided = false;
+};
+
+/// Ticks are nanoseconds.
+class Talker {
+ public:
+  Talker(const Unit& unit, const Options& options, const sim::FaultRates& rates, std::uint64_t seed)
+      : unit_(unit),
+        options_(options),
+        random_(seed),
+        device_storage_(unit.device_storage),
+        host_storage_(unit.host_storage),
+        device_(unit.device(options, shaft_, device_storage_).bytes),
+        faulty_(*device_, rates, seed),
+        line_(unit.link, unit.line) {
+    device_->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    line_.attach(sim::Role::device, faulty_);
+    line_.observe([this](std::size_t sender, Time start, Time end, std::uint8_t byte) {
+      if (waveform_ != nullptr) waveform_->character(line_.role(sender), start, end, byte);
+      hear(line_.role(sender), static_cast<Tick>(start.count()), static_cast<Tick>(end.count()), byte);
+    });
+    line_.observe_exchanges([this](const auto& exchange) {
+      if (waveform_ != nullptr) waveform_->exchange(exchange);
+      hear(exchange);
+    });
+    for (const Command& command : unit.commands) {
+      if (!command.changes_encoder && command.repeatable) commands_.push_back(&command);
+    }
+  }
+
+  /// One command, up to its end and a pause behind it.
+  Talk talk() {
+    talk_ = {};
+    shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));
+    const Command& command = *commands_[random_.below(commands_.size())];
+    std::vector<std::int64_t> arguments;
+    for (const Argument& argument : command.arguments) {
+      const std::int64_t minimum = argument.minimum;
+      arguments.push_back(argument.required ? minimum + static_cast<std::int64_t>(random_.below(4))
+                                            : argument.default_value);
+    }
+    Conversation<std::uint8_t>* conversation = unit_.host(options_, command, arguments, host_storage_).bytes;
+    if (conversation != nullptr) {
+      if (host_) {
+        line_.replace(*host_, *conversation);
+      } else {
+        host_ = line_.attach(sim::Role::host, *conversation);
+      }
+      line_.run(*host_, line_.now() + std::chrono::seconds(30));
+    }
+    line_.run_until(line_.now() + unit_.timing.turnaround_limit + std::chrono::milliseconds(1));
+    return std::move(talk_);
+  }
+
+  /// From now on, everything is drawn there too.
+  void draw(sim::Waveform& waveform) { waveform_ = &waveform; }
+
+  [[nodiscard]] Tick now() const { return static_cast<Tick>(line_.now().count()); }
+  [[nodiscard]] sim::Random& random() { return random_; }
+  [[nodiscard]] const sim::FaultyDevice& faulty() const { return faulty_; }
+
+ private:
+  void hear(sim::Role by, Tick begin, Tick end, std::uint8_t byte) {
+    const bool is_other_wire = unit_.link == LinkKind::full_duplex && by == sim::Role::device;
+    talk_.characters.push_back(
+        {.begin = begin, .end = end, .value = byte, .channel = static_cast<std::uint8_t>(is_other_wire ? 1 : 0)});
+    const auto last =
+        std::find_if(talk_.said.rbegin(), talk_.said.rend(), [&](const Said& one) { return one.by == by; });
+    if (unit_.link == LinkKind::half_duplex) {
+      for (const Said& one : talk_.said) talk_.collided = talk_.collided || (one.by != by && one.end > begin);
+    }
+    if (last != talk_.said.rend() && last->end == begin) {
+      last->bytes.push_back(byte);
+      last->end = end;
+    } else {
+      talk_.said.push_back({by, {byte}, begin, end});
+    }
+  }
+
+  void hear(const sim::Line<std::uint8_t>::Exchange& exchange) {
+    const std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
+    Burst burst{.begin = static_cast<Tick>(exchange.start.count()),
+                .end = static_cast<Tick>(exchange.end.count()),
+                .bits = exchange.bits + idle,
+                .in = std::vector<std::uint8_t>((exchange.bits + idle + 7) / 8),
+                .out = {}};
+    if (unit_.link == LinkKind::exchange) burst.out.assign(exchange.out.begin(), exchange.out.end());
+    for (std::size_t i = 0; i < burst.bits; ++i) {
+      const bool bit = i < idle || (exchange.in[(i - idle) / 8] >> (7 - (i - idle) % 8) & 1) != 0;
+      if (bit) burst.in[i / 8] = static_cast<std::uint8_t>(burst.in[i / 8] | 0x80u >> i % 8);
+    }
+    talk_.bursts.push_back(std::move(burst));
+  }
+
+  const Unit& unit_;
+  Options options_;
+  sim::Random random_;
+  sim::testing::TestShaft<12> shaft_;
+  std::vector<std::byte> device_storage_;
+  std::vector<std::byte> host_storage_;
+  Device<std::uint8_t>* device_;
+  sim::FaultyDevice faulty_;
+  sim::Line<std::uint8_t> line_;
+  sim::Waveform* waveform_ = nullptr;
+  std::optional<std::size_t> host_;
+  std::vector<const Command*> commands_;
+  Talk talk_;
+};
+
+}  // namespace absenc::capture::testing

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the wires to the annotations: conversations of every unit drawn as a waveform, read, decoded to characters or
+// bursts, and annotated as if nobody had drawn them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/capture/annotate.hpp"
+#include "absenc/capture/annotate_frames.hpp"
+#include "absenc/capture/conversation_test.hpp"
+#include "absenc/capture/open.hpp"
+#include "absenc/capture/pipeline.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::capture {
+namespace {
+
+using testing::Talk;
+using testing::Talker;
+
+/// What an annotation says, and its time apart: a waveform rounds it.
+struct Lines final : AnnotationSink {
+  void put(const Annotation& one) override {
+    std::string line = std::to_string(static_cast<int>(one.kind)) + " " + std::string(text_of(one.error).name) + " ";
+    for (const Bytes bytes : {one.request.bytes, one.reply.bytes}) {
+      for (const std::uint8_t byte : bytes) {
+        line += "0123456789ABCDEF"[byte >> 4];
+        line += "0123456789ABCDEF"[byte & 15];
+      }
+      line += '|';
+    }
+    if (one.reading != nullptr) line += std::to_string(one.reading->singleturn);
+    lines.push_back(line);
+    times.push_back(one.begin);
+  }
+  std::vector<std::string> lines;
+  std::vector<Tick> times;
+};
+
+std::vector<const Unit*> units_with_wires() {
+  std::vector<const Unit*> units;
+  for (const Unit* unit : all_units()) {
+    if (unit->link != LinkKind::can) units.push_back(unit);
+  }
+  return units;
+}
+
+class WholeWay : public ::testing::TestWithParam<const Unit*> {
+ protected:
+  const Unit& unit = *GetParam();
+  const Options options = testing::options_of(unit);
+  const bool clocked = unit.link == LinkKind::clocked || unit.link == LinkKind::exchange;
+  Annotator::Settings settings;
+
+  void SetUp() override {
+    settings.ticks = line_ticks(unit, 1e9 / unit.line.rate, 1'000'000'000);
+    if (unit.link != LinkKind::full_duplex) return;
+    settings.channels = {Carries::requests, Carries::replies};
+    settings.channel_count = 2;
+  }
+
+  void decode(Reader& reader, Lines& lines) const {
+    const auto channel = [&](std::string_view name) {
+      const auto& channels = reader.layout().channels;
+      const auto found = std::find(channels.begin(), channels.end(), name);
+      EXPECT_NE(found, channels.end()) << name;
+      return static_cast<unsigned>(found - channels.begin());
+    };
+    BurstAnnotator bursts(unit, options, lines);
+    const auto characters = std::make_unique<Annotator>(unit, options, settings, lines);
+    Tick end = 0;
+    const Sink sink = [&](const Part& part) {
+      for (const Burst& burst : part.bursts) bursts.put(burst);
+      for (const Character& character : part.characters) characters->put(character);
+      end = part.end;
+      return true;
+    };
+    if (clocked) {
+      ClockedLine line{.rising = unit.line.spi_mode == 0 || unit.line.spi_mode == 3};
+      const bool spi = unit.link == LinkKind::exchange;
+      line.clock = channel(spi ? "sck" : "clock");
+      line.in = channel(spi ? "miso" : "data");
+      if (spi) line.out = channel("mosi");
+      if (spi) line.select = channel("cs");
+      EXPECT_EQ(decode_clocked(reader, line, 1, sink).problem, "");
+      return;
+    }
+    const AsyncSettings each{
+        .baud = static_cast<double>(unit.line.rate), .parity = unit.line.parity, .stop_bits = unit.line.stop_bits};
+    std::vector<AsyncLine> wires;
+    if (unit.link == LinkKind::half_duplex) {
+      wires = {{channel("line"), each}};
+    } else {
+      wires = {{channel("host"), each}, {channel("device"), each}};
+    }
+    EXPECT_EQ(decode_async(reader, wires, 1, sink).problem, "");
+    characters->finish(end);
+  }
+};
+
+TEST_P(WholeWay, IsTheShortWay) {
+  sim::FaultRates faults = sim::testing::damaged_replies(0.02);
+  faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these make two speak at once
+  Talker talker(unit, options, faults, 7);
+  sim::Waveform waveform(unit.link, unit.line);
+  Lines expected;
+  BurstAnnotator bursts(unit, options, expected);
+  const auto characters = std::make_unique<Annotator>(unit, options, settings, expected);
+  static_cast<void>(talker.talk());  // so that the waveform begins with a silent line
+  talker.draw(waveform);
+  std::vector<Character> all;
+  for (int i = 0; i < 300; ++i) {
+    const Talk talk = talker.talk();
+    ASSERT_FALSE(talk.collided);
+    for (const Burst& burst : talk.bursts) bursts.put(burst);
+    all.insert(all.end(), talk.characters.begin(), talk.characters.end());
+  }
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.begin < b.begin; });
+  for (const Character& character : all) characters->put(character);
+  characters->finish(talker.now());
+  ASSERT_GE(expected.lines.size(), 300u);
+
+  const std::string text = waveform.vcd("capture");
+  const auto reader = open_capture(memory_source({text.begin(), text.end()}), "capture.vcd", {});
+  ASSERT_EQ(reader->layout().ticks_per_second, 1'000'000'000u);
+  Lines found;
+  decode(*reader, found);
+  ASSERT_EQ(found.lines, expected.lines);
+  const Tick bit = 1'000'000'000 / unit.line.rate;
+  for (std::size_t i = 0; i < found.times.size(); ++i) {
+    // A burst begins with the first edge of its clock, or with chip select before it.
+    const Tick difference = std::max(found.times[i], expected.times[i]) - std::min(found.times[i], expected.times[i]);
+    EXPECT_LE(difference, bit) << expected.lines[i];
+  }
+  EXPECT_TRUE(reader->damages().empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, WholeWay, ::testing::ValuesIn(units_with_wires()), [](const auto& one) {
+  std::string name(one.param->id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
+
+}  // namespace
+}  // namespace absenc::capture

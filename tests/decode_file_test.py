@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc decode` of whole captures, as a user types it: files of every kind made here from the same conversation."""
+import csv
+import functools
+import io
+import os
+import shutil
+import subprocess
+import unittest
+
+from command_support import ABSENC, PATIENCE, Case, absenc, json_lines
+
+BIT = 400  # ns, of 2.5 Mbit/s
+
+
+def exchange(position, turns=0, alarms=0):
+    """Request and reply of tformat's ID 3."""
+    status = 0x20 if alarms & 0xF0 else 0
+    reply = [0x1A, status, *position.to_bytes(3, "little"), 0x11, *turns.to_bytes(3, "little"), alarms]
+    reply.append(functools.reduce(lambda a, b: a ^ b, reply))
+    return [0x1A], reply
+
+
+class Wave:
+    """Wires with their changes; times are ns."""
+
+    def __init__(self, **idle):
+        self.changes = {name: [(0, level)] for name, level in idle.items()}
+        self.now = 20_000
+
+    def level(self, wire, value, at):
+        if self.changes[wire][-1][1] != value:
+            self.changes[wire].append((at, value))
+
+    def send(self, wire, data, bit=BIT):
+        """Asynchronous characters from now on."""
+        for byte in data:
+            for level in [0, *((byte >> i) & 1 for i in range(8)), 1]:
+                self.level(wire, level, self.now)
+                self.now += bit
+
+    def word(self, bits, half=2500):
+        """A clocked word: an edge that latches, then each rising edge brings a bit."""
+        self.level("clock", 0, self.now)
+        for bit in bits:
+            self.now += half
+            self.level("clock", 1, self.now)
+            self.level("data", bit, self.now)
+            self.now += half
+            self.level("clock", 0, self.now)
+        self.now += half
+        self.level("clock", 1, self.now)
+        self.level("data", 1, self.now)
+        self.now += 600_000
+
+    def wait(self, time):
+        self.now += time
+
+    def vcd(self):
+        text = "$timescale 1 ns $end\n$scope module test $end\n"
+        names = {name: chr(ord("!") + i) for i, name in enumerate(self.changes)}
+        for name, letter in names.items():
+            text += f"$var wire 1 {letter} {name} $end\n"
+        text += "$upscope $end\n$enddefinitions $end\n"
+        every = sorted((at, f"{level}{names[name]}") for name, changes in self.changes.items() for at, level in changes)
+        last = None
+        for at, change in every:
+            if at != last:
+                text += f"#{at}\n"
+            last = at
+            text += f"{change}\n"
+        return text + f"#{self.now + 20_000}\n"
+
+    def samples(self, wire, period):
+        """One byte a sample."""
+        changes = [*self.changes[wire], (self.now + 20_000, None)]
+        return b"".join(bytes([level]) * (end // period - begin // period)
+                        for (begin, level), (end, _) in zip(changes, changes[1:]))
+
+
+def conversation(count=50, bad=(), silent=()):
+    wave = Wave(D0=1)
+    for i in range(count):
+        request, reply = exchange(i * 100, i)
+        if i in bad:
+            reply[3] ^= 0x04
+        wave.send("D0", request)
+        if i not in silent:
+            wave.wait(3000)
+            wave.send("D0", reply)
+        wave.wait(20_000 if i not in silent else 200_000)
+    return wave
+
+
+def hex_text(data):
+    return " ".join(f"{byte:02X}" for byte in data)
+
+
+class Text(Case):
+    def capture(self, *exchanges):
+        return self.file("capture.txt", "".join(f"{hex_text(a)}\n{hex_text(b)}\n" for a, b in exchanges))
+
+    def test_each_exchange(self):
+        result = absenc("decode", "tformat", self.capture(exchange(74565, 4660), exchange(1, 2, 0x80)))
+        self.assert_good(result)
+        first, second = result.stdout.splitlines()
+        self.assertIn("1A > 1A 00 45 23 01 11 34 12 00 00 4A   204.799 deg    74565 counts    4660 turns", first)
+        self.assertIn("alarms: battery_alarm", second)
+
+    def test_json(self):
+        result = absenc("decode", "tformat", self.capture(exchange(74565, 4660)), "--json")
+        self.assert_good(result)
+        [line] = json_lines(result.stdout)
+        self.assertEqual((line["kind"], line["request"], line["ok"]), ("exchange", "1a", True))
+        self.assertEqual(line["fields"]["singleturn"], 74565)
+        self.assertAlmostEqual(line["angle_deg"], 74565 * 360 / 2**17)
+        self.assertEqual(line["turns"], 4660)
+
+    def test_csv(self):
+        request, reply = exchange(5)
+        result = absenc("decode", "tformat", self.capture(exchange(74565), (request, reply[:-1] + [0])), "--csv")
+        self.assertEqual(result.returncode, 1)
+        good, bad = csv.DictReader(io.StringIO(result.stdout))
+        self.assertEqual((good["singleturn"], good["singleturn_valid"], good["error"]), ("74565", "true", ""))
+        self.assertIn("encoder_id=17", good["fields"])
+        self.assertEqual((bad["angle_deg"], bad["fields"], bad["error"]), ("", "", "bad_checksum"))
+        self.assertIn("checksum", bad["message"])
+
+    def test_times_and_directions(self):
+        request, reply = exchange(7)
+        text = f"12.000100 tx {hex_text(request)}\n12.000250 rx {hex_text(reply)}\n12.5 tx {hex_text(request)}\n"
+        text += f"12.500300 rx {hex_text(request + reply)}\n"
+        result = absenc("decode", "tformat", self.file("log.txt", text), "--json")
+        self.assert_good(result)
+        plain, echoed = json_lines(result.stdout)
+        self.assertAlmostEqual(plain["turnaround_us"], 150)
+        self.assertIn("the request came back", echoed["message"])
+        self.assertEqual(echoed["reply"], bytes(reply).hex())
+
+    def test_a_slow_log_is_no_late_reply(self):
+        request, reply = exchange(7)
+        text = f"1.0 tx {hex_text(request)}\n1.5 rx {hex_text(reply)}\n"
+        self.assert_good(absenc("decode", "tformat", self.file("log.txt", text)))
+
+    def test_standard_input(self):
+        request, reply = exchange(9)
+        text = f"{hex_text(request)}\n{hex_text(reply)}\n"
+        result = absenc("decode", "tformat", "-", "--json", stdin=None, input=text)
+        self.assert_good(result)
+        self.assertEqual(json_lines(result.stdout)[0]["fields"]["singleturn"], 9)
+
+    def test_damaged_text(self):
+        path = self.capture(exchange(1), exchange(2))
+        with open(path, "a", encoding="utf-8") as file:
+            file.write("what is this?\n1A\n")
+        result = absenc("decode", "tformat", path, "--json")
+        self.assert_failed(result, "damaged at byte 72")
+        self.assertEqual(len(json_lines(result.stdout)), 2)
+
+    def test_nothing_found(self):
+        result = absenc("decode", "tformat", self.file("noise.txt", "55 AA 55 AA 77 77 77\n"))
+        self.assert_failed(result, "no good frame of tformat", "check the channel")
+
+    def test_what_an_encoder_says_that_cannot_be_asked(self):
+        frames = [bytes.fromhex("003e83c500")] * 20
+        path = self.file("stream.txt", "".join(f"{hex_text(frame)}\n" for frame in frames))
+        options = ["--option", "resolution=20", "--option", "multiturn_bits=0"]
+        result = absenc("decode", "encolink", path, *options, "--json")
+        self.assert_good(result)
+        lines = json_lines(result.stdout)
+        self.assertEqual([line["kind"] for line in lines], ["reply"] * 20)
+        self.assertEqual({line["fields"]["singleturn"] for line in lines}, {1000})
+
+
+class Levels(Case):
+    def vcd(self, wave):
+        return self.file("capture.vcd", wave.vcd())
+
+    def test_an_rs485_line(self):
+        result = absenc("decode", "tformat", self.vcd(conversation()), "--json")
+        self.assert_good(result)
+        lines = json_lines(result.stdout)
+        self.assertEqual([line["fields"]["singleturn"] for line in lines], [100 * i for i in range(50)])
+        self.assertEqual([line["turns"] for line in lines], list(range(50)))
+        for i, line in enumerate(lines):
+            self.assertAlmostEqual(line["turnaround_us"], 3, delta=0.05)
+            self.assertAlmostEqual(line["time_s"], (20_000 + i * (12 * 10 * BIT + 23_000)) * 1e-9, delta=1e-7)
+
+    def test_another_baud_rate(self):
+        wave = Wave(D0=1)
+        for i in range(20):
+            request, reply = exchange(i)
+            wave.send("D0", request, 1000)
+            wave.wait(10_000)
+            wave.send("D0", reply, 1000)
+            wave.wait(100_000)
+        result = absenc("decode", "tformat", self.vcd(wave), "--baud", "1000000", "--json")
+        self.assert_good(result)
+        self.assertEqual([line["fields"]["singleturn"] for line in json_lines(result.stdout)], list(range(20)))
+
+    def test_errors_where_they_are(self):
+        result = absenc("decode", "tformat", self.vcd(conversation(bad={7}, silent={20})), "--json")
+        self.assertEqual(result.returncode, 1)
+        lines = json_lines(result.stdout)
+        self.assertEqual({i: line["error"] for i, line in enumerate(lines) if not line["ok"]},
+                         {7: "bad_checksum", 20: "timeout"})
+        self.assertNotIn("fields", lines[7])
+        self.assertNotIn("angle_deg", lines[7])
+
+    def test_statistics(self):
+        path = self.vcd(conversation(bad={7, 8}, silent={20}))
+        result = absenc("decode", "tformat", path, "--stats")
+        self.assertEqual(result.returncode, 1)
+        for words in ("exchanges       49", "bad_checksum  2", "timeout       1", "baud rate measured: 2500000",
+                      "median 3 us", "the document: 3 us", "turns |", "first errors:", "worst: 2 in a row"):
+            self.assertIn(words, result.stdout)
+        statistics = json_lines(absenc("decode", "tformat", path, "--stats", "--json").stdout)[0]
+        self.assertEqual((statistics["exchanges"], statistics["good"], statistics["bad"]), (49, 47, 3))
+        self.assertEqual(statistics["errors"], {"timeout": 1, "bad_checksum": 2})
+        self.assertAlmostEqual(statistics["turnaround_us"]["median"], 3, delta=0.1)
+        self.assertEqual(statistics["first_errors"][0]["kind"], "exchange")
+
+    def test_another_file_of_the_same(self):
+        wave = conversation()
+        expected = [line["fields"] for line in json_lines(absenc("decode", "tformat", self.vcd(wave), "--json").stdout)]
+        raw = self.file("capture.bin")
+        with open(raw, "wb") as file:
+            file.write(wave.samples("D0", 50))
+        result = absenc("decode", "tformat", raw, "--raw-channels", "1", "--rate", "20000000", "--json")
+        self.assert_good(result)
+        self.assertEqual([line["fields"] for line in json_lines(result.stdout)], expected)
+        session = self.file("capture.sr")
+        subprocess.run(["sigrok-cli", "-I", "binary:numchannels=1:samplerate=20000000", "-i", raw, "-o", session],
+                       check=True, timeout=PATIENCE, capture_output=True)
+        result = absenc("decode", "tformat", session, "--json")
+        self.assert_good(result)
+        self.assertEqual([line["fields"] for line in json_lines(result.stdout)], expected)
+
+    def test_two_pairs(self):
+        wave = Wave(A=1, B=1)
+        for _ in range(30):
+            wave.send("A", [0, 0], 1000)
+            wave.wait(5000)
+            wave.send("B", bytes.fromhex("003e83c500"), 1000)
+            wave.wait(50_000)
+        options = ["--option", "resolution=20", "--option", "multiturn_bits=0", "--json"]
+        for channels in ([], ["--channel", "B,A"], ["--channel", "host=A", "--channel", "device=B"]):
+            result = absenc("decode", "encolink", self.vcd(wave), *options, *channels)
+            self.assert_good(result)
+            lines = json_lines(result.stdout)
+            self.assertEqual({(line["kind"], line["request"], line["angle_deg"]) for line in lines},
+                             {("exchange", "0000", 1000 * 360 / 2**20)})
+            self.assertEqual(len(lines), 30)
+
+    def test_a_clocked_word(self):
+        wave = Wave(clock=1, data=1)
+        for position in (495, 496, 4095):
+            wave.word([position >> (11 - i) & 1 for i in range(12)])
+        result = absenc("decode", "ssi", self.vcd(wave), "--option", "bits=12", "--json")
+        self.assert_good(result)
+        self.assertEqual([line["fields"]["singleturn"] for line in json_lines(result.stdout)], [495, 496, 4095])
+
+    def test_begins_within_a_frame(self):
+        wave = conversation(10)
+        cut = 20_000 + 5 * 10 * BIT + 3000 + 700
+        wave.changes["D0"] = [(0, 1), *((at - cut, level) for at, level in wave.changes["D0"] if at > cut)]
+        wave.now -= cut
+        result = absenc("decode", "tformat", self.vcd(wave), "--json")
+        self.assert_good(result)
+        good = [line for line in json_lines(result.stdout) if line["kind"] == "exchange"]
+        self.assertEqual([line["fields"]["singleturn"] for line in good], [100 * i for i in range(1, 10)])
+
+    def test_a_cut_file(self):
+        text = conversation().vcd()
+        result = absenc("decode", "tformat", self.file("cut.vcd", text[:len(text) // 2] + "?!"), "--json")
+        self.assert_failed(result, "the capture is damaged at byte")
+        self.assertGreater(len(json_lines(result.stdout)), 20)
+
+    def test_a_reader_that_goes_away(self):
+        path = self.vcd(conversation(2000))
+        command = f"{ABSENC} decode tformat {path} --json | head -n 1"
+        result = subprocess.run(["bash", "-c", f"set -o pipefail; {command}"], capture_output=True, text=True,
+                                timeout=PATIENCE, check=False)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertEqual(len(json_lines(result.stdout)), 1)
+
+    def test_memory_does_not_grow_with_the_file(self):
+        wave = conversation(1000)
+        samples = wave.samples("D0", 50)
+
+        def most(name, times):
+            path = self.file(name)
+            with open(path, "wb") as file:
+                for _ in range(times):
+                    file.write(samples)
+            process = subprocess.Popen([ABSENC, "decode", "tformat", path, "--raw-channels", "1", "--rate", "20000000",
+                                        "--stats", "--json"], stdout=subprocess.PIPE)
+            out = process.stdout.read()
+            process.stdout.close()
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            os.remove(path)
+            self.assertEqual(process.returncode, 0)
+            self.assertEqual(json_lines(out.decode())[0]["good"], 1000 * times)
+            return usage.ru_maxrss
+
+        self.assertLess(most("long.bin", 80), most("short.bin", 20) + 8192)
+
+
+class Usage(Case):
+    def test_what_does_not_fit_together(self):
+        text = self.file("capture.txt", "1A\n1A 00 45 23 01 11 34 12 00 00 4A\n")
+        self.assert_wrong_usage(absenc("decode", "tformat", text, "--json", "--csv"), "--json and --csv")
+        self.assert_wrong_usage(absenc("decode", "tformat", text, "--stats", "--csv"), "--stats")
+        self.assert_wrong_usage(absenc("decode", "tformat", text, "--hex", "1A"), "cannot be given together")
+        self.assert_wrong_usage(absenc("decode", "tformat", "--stats"), "name its file")
+        self.assert_wrong_usage(absenc("decode", "tformat"), "name a capture")
+        self.assert_wrong_usage(absenc("decode", "tformat", text, "--raw-channels", "8"), "--rate")
+        self.assert_wrong_usage(absenc("decode", "ssi", text), "holds bytes", "clocked bits")
+        can = self.file("can.log", "(1.000000) can0 121#0102030405060708\n")
+        self.assert_wrong_usage(absenc("decode", "tformat", can), "CAN frames")
+
+    def test_standard_input_is_text(self):
+        raw = ["--raw-channels", "1", "--rate", "1000000"]
+        self.assert_wrong_usage(absenc("decode", "tformat", "-", *raw, stdin=None, input="text"), "only text")
+        self.assert_wrong_usage(absenc("decode", "tformat", "-", stdin=None, input="PK\3\4\0\0"), "only text")
+
+    def test_channels(self):
+        wave = Wave(D0=1, D1=1, D2=1)
+        path = self.file("three.vcd", wave.vcd())
+        self.assert_wrong_usage(absenc("decode", "tformat", path), "--channel line=NAME", "D0, D1, D2")
+        self.assert_wrong_usage(absenc("decode", "tformat", path, "--channel", "D7"), "no channel \"D7\"", "D0, D1, D2")
+        self.assert_wrong_usage(absenc("decode", "tformat", path, "--channel", "moon=D1"), "no wire \"moon\"", "line")
+        self.assert_wrong_usage(absenc("decode", "tformat", path, "--channel", "D0,D1"), "one too many")
+
+    def test_files_that_are_none(self):
+        self.assert_failed(absenc("decode", "tformat", self.file("missing")), "missing")
+        self.assert_failed(absenc("decode", "tformat", self.file("empty", "")), "empty")
+        self.assert_failed(absenc("decode", "tformat", self.file("what.bin", "\0\1\2\3")), "what.bin")
+
+
+if __name__ == "__main__":
+    if shutil.which("sigrok-cli") is None:
+        raise SystemExit("sigrok-cli is missing: apt install sigrok-cli")
+    unittest.main()

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a capture to its annotations: opens it, finds which channel is which, and sends all of it through the decoders.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absenc/capture/annotation.hpp"
+#include "absenc/capture/signal.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::tool {
+
+/// What the user says of a capture.
+struct CaptureChoices {
+  std::string path;                      // "-": standard input
+  std::vector<std::string> channels;     // "D0", "clock=D0", or several of them with commas between
+  unsigned raw_channels = 0;             // 0: it is no raw file
+  std::uint64_t samples_per_second = 0;  // 0: the file tells
+  double baud = 0;                       // 0: found from the capture
+};
+
+struct CaptureOutcome {
+  std::string problem;               // why nothing could be decoded; "": it could
+  capture::Tick end = 0;             // of what was decoded
+  std::vector<double> baud;          // measured, of each asynchronous line
+  std::vector<std::string> carries;  // "D0 carries requests", where it was found out
+  std::vector<capture::Damage> damages;
+};
+
+class CaptureRun {
+ public:
+  /// Opens it. Throws UsageError, ToolFailure.
+  CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
+  ~CaptureRun();
+
+  /// 0: the capture has no times.
+  [[nodiscard]] std::uint64_t ticks_per_second() const;
+  /// Decodes all of it into `sink`; `progress` is called now and then with how far it is. Throws UsageError,
+  /// ToolFailure and what `sink` throws.
+  CaptureOutcome run(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+
+ private:
+  struct Lines;
+
+  [[nodiscard]] Lines find_lines() const;
+  [[nodiscard]] double likely_baud(const Lines& lines) const;
+  /// At most so many characters.
+  CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, double baud, std::size_t characters,
+                              capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
+  CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_bursts(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_bytes(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_frames(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+
+  const Unit& unit_;
+  Options options_;
+  CaptureChoices choices_;
+  std::unique_ptr<capture::Reader> reader_;
+};
+
+}  // namespace absenc::tool
