@@ -123,21 +123,18 @@ const Option* find_option(const Unit& unit, std::string_view name) {
   return found == unit.options.end() ? nullptr : &*found;
 }
 
-// Takes what is a link parameter; the rest are options of the unit. A unit that has the parameter among its options,
-// because its conversations depend on it, is told of it too.
+// Takes what is a link parameter; the rest are options of the unit, also `baud` where its conversations depend on it.
 void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
+  std::vector<OptionText> of_link;
   for (const OptionText& setting : settings) {
     const LinkParameter* parameter = find_link_parameter(setting.name);
-    const bool of_unit = find_option(*uri.unit, setting.name) != nullptr;
-    if (parameter == nullptr || of_unit) options.push_back(setting);
-    if (parameter == nullptr) continue;
-    if (of_unit) {
-      set_link_parameter(uri, setting);
-    } else if (!allowed(*parameter, uri.place)) {
-      throw UsageError(fmt::format("{} cannot be set here, it is for: {}", setting.name, parameter->places));
+    if (parameter == nullptr || find_option(*uri.unit, setting.name) != nullptr) {
+      options.push_back(setting);
+    } else if (allowed(*parameter, uri.place)) {
+      of_link.push_back(setting);
     } else {
-      set_link_parameter(uri, setting);
+      throw UsageError(fmt::format("{} cannot be set here, it is for: {}", setting.name, parameter->places));
     }
   }
   std::vector<std::string_view> names;
@@ -146,6 +143,7 @@ void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
   }
   uri.options = require_options(*uri.unit, {}, options, names);
   if (uri.unit->settings != nullptr) uri.line = uri.unit->settings(uri.options);
+  for (const OptionText& setting : of_link) set_link_parameter(uri, setting);
   const bool any_rate_does =
       uri.place == Place::sim || (uri.place == Place::serial && os::is_pseudo_terminal(uri.path));
   if (any_rate_does) uri.line = uri.line.with_some_rate();

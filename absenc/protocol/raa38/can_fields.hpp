@@ -56,6 +56,7 @@ constexpr void put_text(FieldSink& sink, FieldIndex field, Bytes text) { sink.pu
 constexpr void put_position(FieldSink& sink, const Format& format, std::uint32_t counts) {
   put(sink, field_singleturn, counts);
   sink.put({&fields[field_angle_deg], 0, degrees(counts, format.bits)});
+  sink.put_reading({.singleturn = counts, .singleturn_bits = format.bits, .singleturn_valid_bits = format.bits});
 }
 
 /// The name of a command; empty for none.

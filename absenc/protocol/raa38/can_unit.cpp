@@ -187,6 +187,13 @@ bool covered(const Options& values, Frame request, Frame reply, std::size_t bit)
   return fixed || bit >= to_format(values).bits;
 }
 
+// Nothing answers NMT, SYNC and emergencies, nor the command that enters the configuration.
+bool answered(const Options&, Frame request) {
+  const Function function = function_of(*request.can);
+  if (function == Function::configuration) return request.can->data[0] != configuration::enter;
+  return function == Function::command || function == Function::sdo_request;
+}
+
 LineSettings settings(const Options& values) { return {.rate = to_format(values).rate}; }
 
 Explanation explain(const Options&, Error error, Frame request, Frame reply) {
@@ -221,6 +228,8 @@ constinit const Unit can_unit{
     .covered = can::covered,
     .explain = can::explain,
     .settings = can::settings,
+    .timing = {.turnaround_limit = can::answer_limit},
+    .answered = can::answered,
 };
 
 }  // namespace absenc::raa38

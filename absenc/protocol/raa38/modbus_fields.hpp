@@ -93,6 +93,7 @@ constexpr void put_setting(FieldSink& sink, std::uint8_t value) {
 constexpr void put_position(FieldSink& sink, const Format& format, std::uint32_t singleturn) {
   put(sink, field_singleturn, singleturn);
   sink.put({&fields[field_angle], 0, degrees(singleturn, format.bits)});
+  sink.put_reading({.singleturn = singleturn, .singleturn_bits = format.bits, .singleturn_valid_bits = format.bits});
 }
 
 constexpr void put_fields(FieldSink& sink, const Request& request) {

@@ -144,6 +144,8 @@ Explanation explain_frame(const Options& values, Error error, Frame request, Fra
   return asked ? explain(*asked, error, reply.bytes) : explain_request(error, request.bytes);
 }
 
+LineSettings settings(const Options& values) { return to_format(values).line(); }
+
 }  // namespace
 
 constinit const Unit modbus_unit{
@@ -169,7 +171,10 @@ constinit const Unit modbus_unit{
     .device = device,
     .resolution = resolution,
     .explain = explain_frame,
+    .settings = settings,
     .probe = probe,
+    // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.
+    .timing = {.pause_bits = 25, .turnaround_limit = answer_limit},
 };
 
 }  // namespace absenc::raa38

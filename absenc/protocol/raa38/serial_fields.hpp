@@ -41,6 +41,7 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
   put(sink, field_singleturn, position.singleturn);
   put(sink, field_second_byte, position.second_byte);
   sink.put({.info = &fields[field_angle_deg], .real = degrees(position.singleturn, format.bits)});
+  sink.put_reading(to_reading(format, position, {}, {}));
 }
 
 namespace detail {

@@ -140,6 +140,14 @@ Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byt
 
 Resolution resolution(const Options& values) { return {to_settings(values).format.bits, 0}; }
 
+// A pulse is no byte either.
+bool streams(const Options& values) { return to_settings(values).mode != Mode::bus; }
+
+bool answered(const Options&, Frame request) {
+  const Result<Request> asked = decode_request(request.bytes);
+  return asked && asked->kind == Request::Kind::read;
+}
+
 ExtraLines extra_lines(const Options& values) {
   const Settings settings = to_settings(values);
   return {.trigger = settings.mode == Mode::handshake, .clear = settings.zeroing == Zeroing::line};
@@ -267,6 +275,9 @@ constinit const Unit serial_unit{
     .explain = serial::explain,
     .probe = serial::probe,
     .extra_lines = serial::extra_lines,
+    .timing = {.turnaround_limit = serial::answer_limit},
+    .streams = serial::streams,
+    .answered = serial::answered,
 };
 
 }  // namespace absenc::raa38
