@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/capture/mended_zip.hpp"
 #include "absenc/capture/parsed_reader.hpp"
 #include "absenc/capture/raw.hpp"
 #include "absenc/capture/text_lines.hpp"
@@ -25,6 +26,7 @@ namespace {
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes 4 MiB, PulseView 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
+constexpr const char* copy_again = "copy the file again from where it came";
 
 struct Metadata {
   std::string capture_file;
@@ -68,19 +70,6 @@ Metadata parse_metadata(std::string_view text) {
   return found;
 }
 
-std::string read_entry(ZipArchive& archive, const std::string& entry_name, std::string_view name) {
-  ZipArchive::Entry entry;
-  if (!archive.find(entry_name, entry)) {
-    throw OpenError(std::string(name) + " is a zip archive, but no session of sigrok: it holds no " + entry_name);
-  }
-  std::vector<std::uint8_t> text(static_cast<std::size_t>(std::min(entry.size, longest_metadata)));
-  if (entry.size > longest_metadata || !archive.open(entry) || archive.read(text) != text.size() ||
-      !archive.at_good_end()) {
-    throw OpenError(std::string(name) + ": " + entry_name + " in it is damaged");
-  }
-  return {text.begin(), text.end()};
-}
-
 // Spreads samples of 3, 5, 6 or 7 bytes, which stand at the beginning, in place.
 void widen(std::vector<std::uint8_t>& samples, std::size_t count, std::size_t from, std::size_t to) {
   for (std::size_t i = count; i-- > 0;) {
@@ -93,11 +82,7 @@ class SigrokReader final : public Reader {
  public:
   SigrokReader(std::unique_ptr<Source> source, std::string_view name, std::uint64_t samples_per_second)
       : source_(std::move(source)) {
-    try {
-      idle_.push_back(std::make_unique<ZipArchive>(*source_));
-    } catch (const OpenError& error) {
-      throw OpenError(std::string(name) + " is a zip archive that cannot be opened, perhaps cut off: " + error.what());
-    }
+    open_archive(name);
     ZipArchive& archive = *idle_.front();
     const std::string version = read_entry(archive, "version", name);
     if (trim(version) != "1" && trim(version) != "2") {
@@ -107,7 +92,8 @@ class SigrokReader final : public Reader {
     const Metadata metadata = parse_metadata(read_entry(archive, "metadata", name));
     describe(metadata, name, samples_per_second);
     list_pieces(archive, metadata.capture_file);
-    if (pieces_.empty()) throw OpenError(std::string(name) + " holds no logic samples");
+    if (pieces_.empty()) refuse(name, has_lost_entries(), "its first sample", " holds no logic samples");
+    describe_end(archive);
   }
 
   [[nodiscard]] const Layout& layout() const override { return layout_; }
@@ -138,15 +124,19 @@ class SigrokReader final : public Reader {
         std::max(static_cast<std::size_t>(block.end - block.first) * bytes_per_sample_, size + piece.tail));
     const std::span<std::uint8_t> into(block.samples);
     std::unique_ptr<ZipArchive> archive = take();
-    if (archive == nullptr || !archive->open(piece.entry) || archive->read(into.first(size)) != size ||
-        !archive->at_good_end()) {
-      finish(block, 0);  // some of it is wrong, and nobody knows what
+    const bool opened = archive != nullptr && archive->open(piece.entry);
+    std::size_t count = opened ? archive->read(into.first(size)) : 0;
+    const bool whole = opened && count == size && archive->at_good_end();
+    if (whole) {
+      count += read_tail(*archive, index, into.subspan(size, piece.tail));
+    } else if (!ends_at_cut(piece, archive.get())) {
+      count = 0;  // some of it is wrong, and nobody knows what
       report(piece, block.first, archive.get());
-    } else {
-      const std::size_t tail = read_tail(*archive, index, into.subspan(size, piece.tail));
-      if (piece.skip != 0) std::memmove(into.data(), into.data() + piece.skip, size + tail - piece.skip);
-      finish(block, (size + tail - piece.skip) / unit_size_);
     }
+    count -= std::min<std::size_t>(count, piece.skip);
+    if (piece.skip != 0) std::memmove(into.data(), into.data() + piece.skip, count);
+    finish(block, count / unit_size_);
+    if (is_cut(piece)) report_cut(piece, block.end, whole);
     give_back(std::move(archive));
   }
 
@@ -159,6 +149,42 @@ class SigrokReader final : public Reader {
     unsigned skip = 0;  // bytes at the beginning that belong to a sample of the piece before
     unsigned tail = 0;  // bytes of its last sample that stand in the next piece
   };
+
+  // A file without a directory at its end gets one.
+  void open_archive(std::string_view name) {
+    std::unique_ptr<ZipArchive> archive = take();
+    if (archive == nullptr) {
+      cut_ = mend_zip(std::move(source_));
+      source_ = std::move(cut_->archive);
+      archive = take();
+    }
+    if (archive == nullptr) {
+      throw OpenError(std::string(name) + " is a zip archive that is too damaged to be read: " + copy_again);
+    }
+    give_back(std::move(archive));
+  }
+
+  [[nodiscard]] bool has_lost_entries() const { return cut_ && !cut_->complete; }
+
+  [[noreturn]] void refuse(std::string_view name, bool cut, const std::string& before, const std::string& else_) const {
+    throw OpenError(std::string(name) + (cut ? " is a zip archive that is cut off at byte " +
+                                                   std::to_string(cut_->end) + ", before " + before + ": " + copy_again
+                                             : else_));
+  }
+
+  std::string read_entry(ZipArchive& archive, const std::string& entry_name, std::string_view name) const {
+    const std::string end = "the end of its " + entry_name;
+    ZipArchive::Entry entry;
+    if (!archive.find(entry_name, entry)) {
+      refuse(name, has_lost_entries(), end, " is a zip archive, but no session of sigrok: it holds no " + entry_name);
+    }
+    std::vector<std::uint8_t> text(static_cast<std::size_t>(std::min(entry.size, longest_metadata)));
+    if (entry.size > longest_metadata || !archive.open(entry) || archive.read(text) != text.size() ||
+        !archive.at_good_end()) {
+      refuse(name, cut_ && cut_->cut_entry == entry.index, end, ": " + entry_name + " in it is damaged");
+    }
+    return {text.begin(), text.end()};
+  }
 
   void describe(const Metadata& metadata, std::string_view name, std::uint64_t samples_per_second) {
     if (metadata.capture_file.empty()) throw OpenError(std::string(name) + " holds no logic samples, only other ones");
@@ -198,11 +224,38 @@ class SigrokReader final : public Reader {
       for (std::size_t i = 1; add(name + "-" + std::to_string(i)); ++i) continue;
     }
     layout_.ticks = bytes / unit_size_;
-    if (pieces_.empty() || pieces_.back().tail == 0) return;
-    pieces_.back().tail = 0;
-    static_cast<void>(archive.open(pieces_.back().entry));
-    damages_.add(
-        {.offset = archive.offset(), .tick = layout_.ticks, .what = pieces_.back().name + " ends within a sample"});
+  }
+
+  void describe_end(ZipArchive& archive) {
+    Piece& last = pieces_.back();
+    if (has_lost_entries()) {
+      last.tail = 0;
+      if (std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) { return is_cut(piece); })) {
+        layout_.ticks = 0;  // shows when it is read
+      } else {
+        damages_.add({.offset = cut_->end,
+                      .tick = layout_.ticks,
+                      .what = std::string("the file is cut off: whatever came next is missing; ") + copy_again});
+      }
+      return;
+    }
+    if (cut_) {
+      damages_.add({.offset = cut_->end,
+                    .tick = layout_.ticks,
+                    .what = "the directory of the archive is cut off or damaged; no piece is missing",
+                    .note = true});
+    }
+    if (last.tail == 0) return;
+    last.tail = 0;
+    static_cast<void>(archive.open(last.entry));
+    damages_.add({.offset = archive.offset(), .tick = layout_.ticks, .what = last.name + " ends within a sample"});
+  }
+
+  [[nodiscard]] bool is_cut(const Piece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
+
+  // After it was read: whether all that is wrong with it is that the rest is missing.
+  [[nodiscard]] bool ends_at_cut(const Piece& piece, const ZipArchive* archive) const {
+    return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
   // How many bytes there are from here to the beginning of a sample.
@@ -238,7 +291,8 @@ class SigrokReader final : public Reader {
     std::array<std::uint8_t, 8> skipped{};
     const auto skip = std::span(skipped).first(piece.skip);
     if (stream_ != nullptr && stream_->open(piece.entry) && stream_->read(skip) == skip.size()) return;
-    report(piece, piece.first, stream_.get());
+    if (!ends_at_cut(piece, stream_.get())) report(piece, piece.first, stream_.get());
+    if (is_cut(piece)) report_cut(piece, piece.first, false);
     give_back(std::move(stream_));
   }
 
@@ -253,12 +307,16 @@ class SigrokReader final : public Reader {
     std::size_t got = stream_->read(into.first(wanted));
     const bool whole = got == wanted;
     const bool good = whole && (!last || stream_->at_good_end());
-    if (!good) report(piece, whole ? piece.first : stream_tick_ + got / unit_size_, stream_.get());
+    if (!good && !ends_at_cut(piece, stream_.get())) {
+      report(piece, whole ? piece.first : stream_tick_ + got / unit_size_, stream_.get());
+    }
     if (whole && last) got += read_tail(*stream_, next_ - 1, into.subspan(wanted));
     finish(block, got / unit_size_);
     stream_tick_ = block.end;
     stream_left_ -= wanted;
-    if (!whole || last) give_back(std::move(stream_));
+    if (whole && !last) return;
+    if (is_cut(piece)) report_cut(piece, block.end, good);
+    give_back(std::move(stream_));
   }
 
   void report(const Piece& piece, Tick at, const ZipArchive* archive) {
@@ -268,6 +326,16 @@ class SigrokReader final : public Reader {
                   .what = piece.name + ", which ends at sample " +
                           std::to_string(piece.first + (piece.entry.size + piece.tail - piece.skip) / unit_size_) +
                           ", is damaged: " + why});
+  }
+
+  // What stands before the cut is as it was written: a disk that lost other parts leaves whole pieces with wrong
+  // checksums.
+  void report_cut(const Piece& piece, Tick at, bool checked) {
+    damages_.add({.offset = cut_->end,
+                  .tick = at,
+                  .what = "the file is cut off within " + piece.name +
+                          (checked ? "; " : ", and the checksum of what is left of that cannot be verified; ") +
+                          copy_again});
   }
 
   // A handle of libzip is for one thread at a time.
@@ -294,6 +362,7 @@ class SigrokReader final : public Reader {
   }
 
   std::unique_ptr<Source> source_;
+  std::optional<MendedZip> cut_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<ZipArchive>> idle_;
   std::vector<Piece> pieces_;

@@ -2,12 +2,14 @@
 // What sigrok-cli writes from raw samples, in each of its formats, is what the readers make of the raw samples.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <random>
 #include <string>
 
+#include "absenc/capture/drawing.hpp"
 #include "absenc/capture/test_files.hpp"
 
 namespace absenc::capture {
@@ -79,6 +81,32 @@ TEST_F(SigrokCli, Sessions) {
     const unsigned read = static_cast<unsigned>(contents.samples.size() / 2'500'000);
     for (unsigned channel = 0; channel < channels; ++channel) {
       EXPECT_TRUE(changes_of(contents.samples, read, channel).at == changes_of(samples, bytes, channel).at) << channel;
+    }
+  }
+}
+
+// What two writers of sessions leave when a copy of them breaks off.
+TEST_F(SigrokCli, CutSessions) {
+  make_samples(8, 9'000'000);
+  ASSERT_NO_FATAL_FAILURE(write_session(8));
+  Drawing drawing{.title = "wire", .traces = {{"D0", {}}}, .remarks = {}, .end = 9'000'000};
+  std::mt19937 random(8);
+  for (Tick at = 1; at < drawing.end; at += 1 + random() % 99) drawing.traces[0].changes.at.push_back(at);
+  write_sigrok((folder_ / "drawn").string(), drawing, 1'000'000'000);
+  for (const char* name : {"session", "drawn"}) {
+    const Contents whole = read_all(*open_capture(folder_ / name, {}));
+    ASSERT_EQ(whole.end, 9'000'000u);
+    ASSERT_EQ(whole.blocks, 3u);  // of 4 MiB
+    const std::uintmax_t size = std::filesystem::file_size(folder_ / name);
+    for (const std::uintmax_t percent : {90u, 60u, 20u}) {
+      std::filesystem::resize_file(folder_ / name, size * percent / 100);
+      const auto reader = open_capture(folder_ / name, {});
+      const Contents contents = read_all(*reader);
+      EXPECT_NEAR(static_cast<double>(contents.end), 90'000.0 * static_cast<double>(percent), 200'000) << name;
+      EXPECT_TRUE(std::equal(contents.samples.begin(), contents.samples.end(), whole.samples.begin()));
+      ASSERT_EQ(reader->damages().size(), 1u);
+      EXPECT_EQ(reader->damages()[0].offset, size * percent / 100);
+      EXPECT_EQ(reader->damages()[0].tick, contents.end);
     }
   }
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a session, a good one with some of its bytes changed, and any metadata.
+// Any bytes as a session, a good one and one that is cut off with some of their bytes changed, and any metadata.
 #include "absenc/capture/sigrok.hpp"
+
+#include <algorithm>
 
 #include "absenc/capture/test_files.hpp"
 
@@ -13,6 +15,13 @@ FileBytes session(const FileBytes& metadata, const FileBytes& samples, bool defl
                   deflate);
 }
 
+// Ends within the last piece.
+FileBytes cut_off(FileBytes file) {
+  constexpr std::string_view directory = "PK\x01\x02";
+  file.erase(std::search(file.begin(), file.end(), directory.begin(), directory.end()) - 5, file.end());
+  return file;
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -20,7 +29,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const FileBytes metadata = to_bytes(sigrok_metadata("1 MHz", 24, 3));
   static const FileBytes deflated = session(metadata, samples, true);
   static const FileBytes stored = session(metadata, samples, false);
-  for (const FileBytes& file : {deflated, stored}) {
+  static const FileBytes cut_deflated = cut_off(deflated);
+  static const FileBytes cut_stored = cut_off(stored);
+  for (const FileBytes& file : {deflated, stored, cut_deflated, cut_stored}) {
     fuzz_file(data, size, file, [](FileBytes bytes) { read_or_refuse(std::move(bytes)); });
   }
   fuzz_file(data, size, metadata, [](const FileBytes& text) { read_or_refuse(session(text, samples, false)); });

@@ -100,9 +100,10 @@ struct ZipArchive::State {
   std::unique_ptr<zip_t, Close> archive;
   std::unique_ptr<zip_file_t, Close> file;  // closed before its archive
   std::string trouble;
+  bool ran_out = false;
 };
 
-ZipArchive::ZipArchive(Source& source) : state_(new State{{&source}, nullptr, nullptr, {}}) {
+ZipArchive::ZipArchive(Source& source) : state_(new State{{&source}, nullptr, nullptr, {}, false}) {
   zip_error_t error;
   zip_error_init(&error);
   zip_error_init(&state_->window.error);
@@ -134,6 +135,7 @@ bool ZipArchive::find(const std::string& name, Entry& entry) const {
 
 bool ZipArchive::open(const Entry& entry) {
   state_->file.reset();
+  state_->ran_out = false;
   state_->window.mark = true;
   state_->file.reset(zip_fopen_index(state_->archive.get(), entry.index, 0));
   if (state_->file != nullptr) return true;
@@ -143,9 +145,13 @@ bool ZipArchive::open(const Entry& entry) {
 
 std::size_t ZipArchive::read(std::span<std::uint8_t> into) {
   std::size_t done = 0;
+  state_->ran_out = false;
   while (done < into.size()) {
     const zip_int64_t got = zip_fread(state_->file.get(), into.data() + done, into.size() - done);
     if (got <= 0) {
+      // At its end libzip looks at the checksum and the size of what it was.
+      const int code = zip_error_code_zip(zip_file_get_error(state_->file.get()));
+      state_->ran_out = got == 0 || code == ZIP_ER_CRC || code == ZIP_ER_INCONS;
       state_->trouble = got == 0 ? "it ends early" : zip_error_strerror(zip_file_get_error(state_->file.get()));
       break;
     }
@@ -153,6 +159,8 @@ std::size_t ZipArchive::read(std::span<std::uint8_t> into) {
   }
   return done;
 }
+
+bool ZipArchive::ran_out() const { return state_->ran_out; }
 
 bool ZipArchive::at_good_end() {
   std::uint8_t more = 0;

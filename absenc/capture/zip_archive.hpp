@@ -31,6 +31,8 @@ class ZipArchive {
   [[nodiscard]] bool open(const Entry& entry);
   /// Expands what comes next straight into `into`; fewer bytes: see `trouble`.
   [[nodiscard]] std::size_t read(std::span<std::uint8_t> into);
+  /// Whether `read` gave fewer bytes because there are no more of them, rather than wrong ones.
+  [[nodiscard]] bool ran_out() const;
   /// After the whole entry was read: whether it ends there, and its checksum is right.
   [[nodiscard]] bool at_good_end();
 
