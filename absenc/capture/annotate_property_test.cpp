@@ -234,7 +234,7 @@ sim::FaultRates faults_of(const Unit& unit) {
 
 Annotator::Settings settings_of(const Unit& unit) {
   Annotator::Settings settings;
-  settings.ticks = line_ticks(unit, 1e9 / unit.line.rate, 1'000'000'000);
+  settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
   settings.begins_silent = true;
   if (unit.link == LinkKind::full_duplex) {
     settings.channels = {Carries::one, Carries::one};

@@ -186,7 +186,7 @@ TEST_P(OfUnit, WhichWireIsWhose) {
     settings.channels = {Carries::one, Carries::one};
     settings.channel_count = 2;
     settings.begins_silent = true;
-    settings.ticks = line_ticks(unit, 1e9 / unit.line.rate, 1'000'000'000);
+    settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
     std::size_t exchanges = 0;
     for (const Found& one : annotate(characters, settings)) {
       EXPECT_EQ(one.error, Error::none);
@@ -212,7 +212,7 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
   std::vector<Character> quiet;
   std::vector<Character> noisy;
   std::size_t noises = 0;
-  const Tick each = static_cast<Tick>(unit.line.character().count());
+  const Tick each = static_cast<Tick>(testing::line_of(unit).character().count());
   for (int i = 0; i < 300; ++i) {
     for (const Character& character : talker.talk().characters) {
       quiet.push_back(character);
@@ -231,7 +231,7 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
   }
   Annotator::Settings settings;
   settings.begins_silent = true;
-  settings.ticks = line_ticks(unit, 1e9 / unit.line.rate, 1'000'000'000);
+  settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
   if (unit.link == LinkKind::full_duplex) {
     settings.channels = {Carries::requests, Carries::replies};
     settings.channel_count = 2;

@@ -25,14 +25,24 @@ std::uint16_t crc_of(const std::vector<bool>& bits, std::size_t count) {
 
 }  // namespace
 
-void CanDecoder::decode(const Changes& part, Tick end, std::vector<CanRecord>& frames) {
-  for (const Tick at : part.at) {
-    level_for(level_, since_, at, frames);
-    level_ = !level_;
-    since_ = at;
+void CanDecoder::decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames) {
+  if (first != end_) {
+    finish(frames);
+    since_ = first;
     told_ = 0;
+    recessive_ = 0;
+    doing_ = Doing::waiting;
   }
+  if (part.before != level_) change(first, frames);
+  for (const Tick at : part.at) change(at, frames);
   end_ = end;
+}
+
+void CanDecoder::change(Tick at, std::vector<CanRecord>& frames) {
+  level_for(level_, since_, at, frames);
+  level_ = !level_;
+  since_ = at;
+  told_ = 0;
 }
 
 void CanDecoder::finish(std::vector<CanRecord>& frames) {

@@ -18,14 +18,15 @@ class CanDecoder {
   /// `bit` in ticks, 3 at least; need not be a whole number.
   explicit CanDecoder(double bit) : bit_(bit) {}
 
-  /// The next part, up to `end`.
-  void decode(const Changes& part, Tick end, std::vector<CanRecord>& frames);
+  /// The next part, from `first` to `end`. Where it does not follow the one before, the bus is waited for anew.
+  void decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames);
   /// Nothing follows.
   void finish(std::vector<CanRecord>& frames);
 
  private:
   enum class Doing : std::uint8_t { waiting, idle, stuffed, tail };
 
+  void change(Tick at, std::vector<CanRecord>& frames);
   void level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames);
   void take(bool bit, Tick at, std::vector<CanRecord>& frames);
   void take_stuffed(bool bit, std::vector<CanRecord>& frames);

@@ -35,7 +35,7 @@ struct Bus {
   [[nodiscard]] std::vector<CanRecord> decoded() const {
     CanDecoder decoder(bit);
     std::vector<CanRecord> frames;
-    decoder.decode(changes, end(), frames);
+    decoder.decode(changes, 0, end(), frames);
     decoder.finish(frames);
     return frames;
   }
@@ -82,13 +82,16 @@ RC_GTEST_PROP(CanDecoderProperty, PartsMakeNoDifference, (std::uint32_t seed)) {
   Bus bus(8);
   for (int i = 0; i < 20; ++i) bus.send(any_frame(random));
   CanDecoder decoder(bus.bit);
+  Tick first = 0;
   std::vector<CanRecord> frames;
   for (std::size_t from = 0; from < bus.changes.at.size();) {
     const std::size_t to = std::min(bus.changes.at.size(), from + random() % 30);
     const auto begin = bus.changes.at.begin();
-    decoder.decode(
-        {from % 2 == 0, {begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(to)}},
-        to == bus.changes.at.size() ? bus.end() : bus.changes.at[to], frames);
+    const Tick end = to == bus.changes.at.size() ? bus.end() : bus.changes.at[to];
+    const Changes part{from % 2 == 0,
+                       {begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(to)}};
+    decoder.decode(part, first, end, frames);
+    first = end;
     from = to;
   }
   decoder.finish(frames);

@@ -17,7 +17,7 @@
 #include "absenc/sim/faults.hpp"
 #include "absenc/sim/line.hpp"
 #include "absenc/sim/random.hpp"
-#include "absenc/sim/vcd.hpp"
+#include "absenc/sim/waveform.hpp"
 
 namespace absenc::capture::testing {
 
@@ -26,6 +26,9 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
   if (resolve_options(unit, {}, settings, options).kind != OptionError::Kind::none) std::abort();
   return options;
 }
+
+/// Of a unit whose document states no rate, some rate.
+inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
 /// What one side sent without a pause.
 struct Said {
@@ -53,7 +56,7 @@ class Talker {
         host_storage_(unit.host_storage),
         device_(unit.device(options, shaft_, device_storage_).bytes),
         faulty_(*device_, rates, seed),
-        line_(unit.link, unit.line) {
+        line_(unit.link, line_of(unit)) {
     device_->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
     line_.attach(sim::Role::device, faulty_);
     line_.observe([this](std::size_t sender, Time start, Time end, std::uint8_t byte) {
@@ -80,12 +83,13 @@ class Talker {
       arguments.push_back(argument.required ? minimum + static_cast<std::int64_t>(random_.below(4))
                                             : argument.default_value);
     }
+    streams_ = command.verb == Verb::read;
     Conversation<std::uint8_t>* conversation = unit_.host(options_, command, arguments, host_storage_).bytes;
     if (conversation != nullptr) {
       if (host_) {
         line_.replace(*host_, *conversation);
       } else {
-        host_ = line_.attach(sim::Role::host, *conversation);
+        host_ = line_.attach(sim::Role::host, *conversation, [this] { return !streams_; });  // one result is enough
       }
       line_.run(*host_, line_.now() + std::chrono::seconds(30));
     }
@@ -135,6 +139,7 @@ class Talker {
 
   const Unit& unit_;
   Options options_;
+  bool streams_ = false;
   sim::Random random_;
   sim::testing::TestShaft<12> shaft_;
   std::vector<std::byte> device_storage_;

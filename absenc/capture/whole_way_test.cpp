@@ -5,14 +5,17 @@
 
 #include <algorithm>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "absenc/capture/annotate.hpp"
 #include "absenc/capture/annotate_frames.hpp"
 #include "absenc/capture/conversation_test.hpp"
+#include "absenc/capture/drawing.hpp"
 #include "absenc/capture/open.hpp"
 #include "absenc/capture/pipeline.hpp"
+#include "absenc/os/testing.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::capture {
@@ -52,11 +55,12 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
  protected:
   const Unit& unit = *GetParam();
   const Options options = testing::options_of(unit);
+  const LineSettings line = testing::line_of(unit);
   const bool clocked = unit.link == LinkKind::clocked || unit.link == LinkKind::exchange;
   Annotator::Settings settings;
 
   void SetUp() override {
-    settings.ticks = line_ticks(unit, 1e9 / unit.line.rate, 1'000'000'000);
+    settings.ticks = line_ticks(unit, 1e9 / line.rate, 1'000'000'000);
     if (unit.link != LinkKind::full_duplex) return;
     settings.channels = {Carries::requests, Carries::replies};
     settings.channel_count = 2;
@@ -79,17 +83,17 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
       return true;
     };
     if (clocked) {
-      ClockedLine line{.rising = unit.line.spi_mode == 0 || unit.line.spi_mode == 3};
+      ClockedLine wires{.rising = line.spi_mode == 0 || line.spi_mode == 3};
       const bool spi = unit.link == LinkKind::exchange;
-      line.clock = channel(spi ? "sck" : "clock");
-      line.in = channel(spi ? "miso" : "data");
-      if (spi) line.out = channel("mosi");
-      if (spi) line.select = channel("cs");
-      EXPECT_EQ(decode_clocked(reader, line, 1, sink).problem, "");
+      wires.clock = channel(spi ? "sck" : "clock");
+      wires.in = channel(spi ? "miso" : "data");
+      if (spi) wires.out = channel("mosi");
+      if (spi) wires.select = channel("cs");
+      EXPECT_EQ(decode_clocked(reader, wires, 1, sink).problem, "");
       return;
     }
     const AsyncSettings each{
-        .baud = static_cast<double>(unit.line.rate), .parity = unit.line.parity, .stop_bits = unit.line.stop_bits};
+        .baud = static_cast<double>(line.rate), .parity = line.parity, .stop_bits = line.stop_bits};
     std::vector<AsyncLine> wires;
     if (unit.link == LinkKind::half_duplex) {
       wires = {{channel("line"), each}};
@@ -99,13 +103,36 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     EXPECT_EQ(decode_async(reader, wires, 1, sink).problem, "");
     characters->finish(end);
   }
+
+  static std::unique_ptr<Source> source(const std::ostringstream& text) {
+    const std::string written = text.str();
+    return memory_source({written.begin(), written.end()});
+  }
+
+  // Every frame with its fields and errors, at its time.
+  void expect_same(Reader& reader, const Lines& expected) {
+    const double ticks_per_ns = static_cast<double>(reader.layout().ticks_per_second) / 1e9;
+    const LineTicks in_ns = settings.ticks;
+    settings.ticks = line_ticks(unit, ticks_per_ns * 1e9 / line.rate, reader.layout().ticks_per_second);
+    Lines found;
+    decode(reader, found);
+    settings.ticks = in_ns;
+    ASSERT_EQ(found.lines, expected.lines);
+    for (std::size_t i = 0; i < found.times.size(); ++i) {
+      // A burst begins with the first edge of its clock, or with chip select before it.
+      EXPECT_NEAR(static_cast<double>(found.times[i]) / ticks_per_ns, static_cast<double>(expected.times[i]),
+                  1e9 / line.rate)
+          << expected.lines[i];
+    }
+    EXPECT_TRUE(reader.damages().empty());
+  }
 };
 
 TEST_P(WholeWay, IsTheShortWay) {
   sim::FaultRates faults = sim::testing::damaged_replies(0.02);
   faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these make two speak at once
   Talker talker(unit, options, faults, 7);
-  sim::Waveform waveform(unit.link, unit.line);
+  sim::Waveform waveform(unit.link, line);
   Lines expected;
   BurstAnnotator bursts(unit, options, expected);
   const auto characters = std::make_unique<Annotator>(unit, options, settings, expected);
@@ -123,19 +150,16 @@ TEST_P(WholeWay, IsTheShortWay) {
   characters->finish(talker.now());
   ASSERT_GE(expected.lines.size(), 300u);
 
-  const std::string text = waveform.vcd("capture");
-  const auto reader = open_capture(memory_source({text.begin(), text.end()}), "capture.vcd", {});
-  ASSERT_EQ(reader->layout().ticks_per_second, 1'000'000'000u);
-  Lines found;
-  decode(*reader, found);
-  ASSERT_EQ(found.lines, expected.lines);
-  const Tick bit = 1'000'000'000 / unit.line.rate;
-  for (std::size_t i = 0; i < found.times.size(); ++i) {
-    // A burst begins with the first edge of its clock, or with chip select before it.
-    const Tick difference = std::max(found.times[i], expected.times[i]) - std::min(found.times[i], expected.times[i]);
-    EXPECT_LE(difference, bit) << expected.lines[i];
-  }
-  EXPECT_TRUE(reader->damages().empty());
+  const Drawing drawing = drawing_of("capture", waveform);
+  std::ostringstream vcd, csv;
+  write_vcd(vcd, drawing);
+  write_saleae_csv(csv, drawing);
+  expect_same(*open_capture(source(vcd), "capture.vcd", {}), expected);
+  expect_same(*open_capture(source(csv), "capture.csv", {}), expected);
+  const os::testing::TemporaryDirectory directory;
+  const std::string session = directory.path() / "capture.sr";
+  write_sigrok(session, drawing, std::uint64_t{32} * line.rate);
+  expect_same(*open_capture(session, {}), expected);
 }
 
 INSTANTIATE_TEST_SUITE_P(Units, WholeWay, ::testing::ValuesIn(units_with_wires()), [](const auto& one) {

@@ -20,11 +20,11 @@ struct WireName {
   std::string_view wire;
   std::string_view name;
 };
-constexpr std::array<WireName, 19> known_names{{
-    {"line", "line"},   {"host", "host"}, {"host", "tx"},   {"device", "device"}, {"device", "rx"},
-    {"clock", "clock"}, {"clock", "clk"}, {"clock", "sck"}, {"clock", "sclk"},    {"clock", "ma"},
-    {"data", "data"},   {"data", "slo"},  {"data", "sdo"},  {"cs", "cs"},         {"cs", "ss"},
-    {"cs", "ncs"},      {"mosi", "mosi"}, {"miso", "miso"}, {"line", "rs485"},
+constexpr std::array<WireName, 22> known_names{{
+    {"line", "line"},  {"host", "host"}, {"host", "tx"},    {"device", "device"}, {"device", "rx"}, {"clock", "clock"},
+    {"clock", "clk"},  {"clock", "sck"}, {"clock", "sclk"}, {"clock", "ma"},      {"data", "data"}, {"data", "slo"},
+    {"data", "sdo"},   {"cs", "cs"},     {"cs", "ss"},      {"cs", "ncs"},        {"mosi", "mosi"}, {"miso", "miso"},
+    {"line", "rs485"}, {"bus", "bus"},   {"bus", "can"},    {"bus", "can_rx"},
 }};
 
 bool same(std::string_view a, std::string_view b) {
@@ -53,6 +53,8 @@ std::vector<std::string_view> split(std::span<const std::string> wanted) {
   }
   return parts;
 }
+
+bool is_clocked(LinkKind link) { return link == LinkKind::clocked || link == LinkKind::exchange; }
 
 bool is_needed(LinkKind link, std::string_view wire) {
   if (link == LinkKind::full_duplex) return false;  // one of them is enough
@@ -88,6 +90,7 @@ std::span<const std::string_view> wires_of(LinkKind link) {
   static constexpr std::array<std::string_view, 2> full_duplex{"host", "device"};
   static constexpr std::array<std::string_view, 4> exchange{"clock", "miso", "mosi", "cs"};
   static constexpr std::array<std::string_view, 2> clocked{"clock", "data"};
+  static constexpr std::array<std::string_view, 1> can{"bus"};
   switch (link) {
     case LinkKind::half_duplex:
       return half_duplex;
@@ -98,7 +101,7 @@ std::span<const std::string_view> wires_of(LinkKind link) {
     case LinkKind::clocked:
       return clocked;
     case LinkKind::can:
-      break;
+      return can;
   }
   return {};
 }
@@ -128,8 +131,7 @@ WireChannels find_wires(LinkKind link, std::span<const std::string> channels, st
     // Where there is no choice, names do not matter.
     const bool any =
         std::any_of(found.wires.begin(), found.wires.end(), [](const auto& one) { return one.has_value(); });
-    const bool is_uart = link == LinkKind::half_duplex || link == LinkKind::full_duplex;
-    if (!any && is_uart && channels.size() <= wires.size()) {
+    if (!any && !is_clocked(link) && channels.size() <= wires.size()) {
       for (unsigned i = 0; i < channels.size(); ++i) found.wires[i] = i;
       found.found = link == LinkKind::full_duplex;
     }

@@ -13,7 +13,7 @@
 
 namespace absenc::tool {
 
-/// The wires of a link, by the names that --channel has for them; none of CAN.
+/// The wires of a link, by the names that --channel has for them.
 [[nodiscard]] std::span<const std::string_view> wires_of(LinkKind link);
 
 /// The channel of each wire of the link, in the order of `wires_of`; nothing where a wire was not recorded.

@@ -11,6 +11,8 @@
 
 #include "absenc/capture/annotate.hpp"
 #include "absenc/capture/annotate_frames.hpp"
+#include "absenc/capture/blocks.hpp"
+#include "absenc/capture/can_line.hpp"
 #include "absenc/capture/open.hpp"
 #include "absenc/capture/pipeline.hpp"
 #include "tools/absenc/capture_channels.hpp"
@@ -86,8 +88,6 @@ void require_link(const Unit& unit, Content content) {
   const bool uart = unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
   if (content == Content::frames && unit.link != LinkKind::can) refuse(unit, "CAN frames", "is it another protocol?");
   if (content == Content::bytes && !uart) refuse(unit, "bytes", "record the levels of its wires, or CAN frames");
-  const bool levels = content == Content::samples || content == Content::changes;
-  if (levels && unit.link == LinkKind::can) refuse(unit, "levels of wires", "record it with candump");
 }
 
 // Reads blocks that need no decoding.
@@ -103,7 +103,11 @@ void read_all(capture::Reader& reader, Take&& take) {
 }  // namespace
 
 CaptureRun::CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices)
-    : unit_(unit), options_(options), choices_(choices), reader_(open(choices)) {
+    : unit_(unit),
+      options_(options),
+      line_(unit.settings != nullptr ? unit.settings(options) : unit.line),
+      choices_(choices),
+      reader_(open(choices)) {
   require_link(unit, reader_->layout().content);
 }
 
@@ -114,10 +118,11 @@ std::uint64_t CaptureRun::ticks_per_second() const { return reader_->layout().ti
 CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const Content content = reader_->layout().content;
   const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange;
-  CaptureOutcome outcome = content == Content::bytes    ? run_bytes(sink, progress)
-                           : content == Content::frames ? run_frames(sink, progress)
-                           : clocked                    ? run_bursts(sink, progress)
-                                                        : run_characters(sink, progress);
+  CaptureOutcome outcome = content == Content::bytes     ? run_bytes(sink, progress)
+                           : content == Content::frames  ? run_frames(sink, progress)
+                           : clocked                     ? run_bursts(sink, progress)
+                           : unit_.link == LinkKind::can ? run_bus(sink, progress)
+                                                         : run_characters(sink, progress);
   outcome.damages = reader_->damages();
   return outcome;
 }
@@ -147,7 +152,7 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, do
                                         const std::function<void(Tick)>& progress) const {
   std::vector<capture::AsyncLine> settings;
   for (const unsigned channel : lines.channels) {
-    settings.push_back({channel, {.baud = baud, .parity = unit_.line.parity, .stop_bits = unit_.line.stop_bits}});
+    settings.push_back({channel, {.baud = baud, .parity = line_.parity, .stop_bits = line_.stop_bits}});
   }
   CaptureOutcome outcome;
   Guard guard;
@@ -184,14 +189,14 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, do
 // latter.
 double CaptureRun::likely_baud(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
-  if (choices_.baud > 0 || choices_.path == "-" || unit_.line.rate == 0) return choices_.baud;
+  if (choices_.baud > 0 || choices_.path == "-" || line_.rate == 0) return choices_.baud;
   const auto good_at = [&](double baud) {
     GoodFrames frames;
     const auto reader = open(choices_);
     static_cast<void>(decode_lines(*reader, lines, baud, enough_characters, frames, [](Tick) {}));
     return frames.count;
   };
-  return good_at(unit_.line.rate) >= std::max<std::uint64_t>(1, good_at(0)) ? unit_.line.rate : 0;
+  return good_at(line_.rate) >= std::max<std::uint64_t>(1, good_at(0)) ? line_.rate : 0;
 }
 
 CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
@@ -208,7 +213,7 @@ CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::
                                   .in = wires.wires[1],
                                   .out = exchange ? wires.wires[2] : std::nullopt,
                                   .select = exchange ? wires.wires[3] : std::nullopt,
-                                  .rising = unit_.line.spi_mode == 0 || unit_.line.spi_mode == 3};
+                                  .rising = line_.spi_mode == 0 || line_.spi_mode == 3};
   CaptureOutcome outcome;
   Guard guard;
   capture::BurstAnnotator annotator(unit_, options_, sink);
@@ -252,13 +257,49 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   return outcome;
 }
 
+// The levels of a bus.
+CaptureOutcome CaptureRun::run_bus(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
+  const double rate = choices_.baud > 0 ? choices_.baud : static_cast<double>(line_.rate);
+  const double bit = static_cast<double>(ticks_per_second()) / rate;
+  if (bit < 3) {
+    throw ToolFailure(
+        fmt::format("{} samples a second are too few for a bus of {:.0f} bit/s: 3 for each bit at least, 8 "
+                    "are better",
+                    ticks_per_second(), rate));
+  }
+  CaptureOutcome outcome;
+  capture::CanDecoder decoder(bit);
+  capture::CanAnnotator annotator(unit_, options_, capture::line_ticks(unit_, bit, ticks_per_second()), sink);
+  std::vector<capture::CanRecord> frames;
+  const auto take = [&] {
+    for (const capture::CanRecord& frame : frames) annotator.put(frame);
+    frames.clear();
+  };
+  capture::LevelReader reader(*reader_, {*wires.wires[0]});
+  if (const std::string problem = reader.problem(); !problem.empty()) throw ToolFailure(problem);
+  capture::Block block;
+  capture::Levels levels;
+  while (reader.claim(block)) {
+    reader.expand(block, levels);
+    decoder.decode(levels.changes[0], levels.first, levels.end, frames);
+    take();
+    outcome.end = std::max(outcome.end, levels.end);
+    progress(levels.end);
+  }
+  decoder.finish(frames);
+  take();
+  annotator.finish(outcome.end);
+  return outcome;
+}
+
 CaptureOutcome CaptureRun::run_frames(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const std::vector<std::string>& channels = reader_->layout().channels;
   std::optional<unsigned> wanted;
   if (choices_.channels.size() > 1) throw UsageError("--channel: a CAN interface is one channel");
   if (!choices_.channels.empty()) wanted = find_channel(channels, choices_.channels[0]);
   const double ticks_per_bit =
-      unit_.line.rate == 0 ? 0 : static_cast<double>(ticks_per_second()) / static_cast<double>(unit_.line.rate);
+      line_.rate == 0 ? 0 : static_cast<double>(ticks_per_second()) / static_cast<double>(line_.rate);
   CaptureOutcome outcome;
   capture::CanAnnotator annotator(unit_, options_, capture::line_ticks(unit_, ticks_per_bit, ticks_per_second()), sink);
   read_all(*reader_, [&](const capture::Block& block) {

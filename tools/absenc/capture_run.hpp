@@ -55,10 +55,12 @@ class CaptureRun {
   CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
   CaptureOutcome run_bursts(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
   CaptureOutcome run_bytes(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_bus(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
   CaptureOutcome run_frames(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
 
   const Unit& unit_;
   Options options_;
+  LineSettings line_;  // as the options describe it
   CaptureChoices choices_;
   std::unique_ptr<capture::Reader> reader_;
 };
