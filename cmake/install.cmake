@@ -4,7 +4,11 @@ include(CMakePackageConfigHelpers)
 
 set(absenc_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/absenc")
 set(absenc_pkgconfig_dir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
-install(TARGETS absenc absenc-os EXPORT absenc FILE_SET HEADERS)
+set(absenc_libraries absenc absenc-os)
+if(TARGET absenc-capture)
+  list(APPEND absenc_libraries absenc-capture)
+endif()
+install(TARGETS ${absenc_libraries} EXPORT absenc FILE_SET HEADERS)
 install(EXPORT absenc NAMESPACE absenc:: FILE absencConfig.cmake DESTINATION "${absenc_package_dir}")
 write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake"
                                  COMPATIBILITY SameMinorVersion)
@@ -13,7 +17,7 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATIO
 # The way from the folder of the .pc files to the prefix, so that the tree may be moved.
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}/${absenc_pkgconfig_dir}"
            OUTPUT_VARIABLE absenc_prefix_from_pkgconfig)
-foreach(library IN ITEMS absenc absenc-os)
+foreach(library IN LISTS absenc_libraries)
   configure_file("cmake/${library}.pc.in" ${library}.pc @ONLY)
   install(FILES "${CMAKE_CURRENT_BINARY_DIR}/${library}.pc" DESTINATION "${absenc_pkgconfig_dir}")
 endforeach()

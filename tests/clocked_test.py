@@ -97,8 +97,8 @@ class Places(Case):
         for arguments, words in [(["ssi"], ["does not go over a serial line: use --spidev NAME, or sim:ssi"]),
                                  (["encolink-spi"], ["use --spidev NAME, or sim:encolink-spi"]),
                                  (["tformat", "--spidev", "spidev9.0"], ["does not go over an SPI controller: use --pty"]),
-                                 (["ssi", "--spidev", "spidev9.0", "--tcp", "0"], ["not with --pty or --tcp"]),
-                                 (["encolink", "--spidev", "spidev9.0", "--pty", "x"], ["not with --pty or --tcp"]),
+                                 (["ssi", "--spidev", "spidev9.0", "--tcp", "0"], ["does not go over a serial line"]),
+                                 (["encolink", "--spidev", "spidev9.0", "--pty", "x"], ["does not go over a serial line"]),
                                  (["biss", "--spidev", "spidev9.0", "--also", "seed=2"], ["one encoder on a line"])]:
             with self.subTest(arguments):
                 self.assert_wrong_usage(absenc("emulate", *arguments), *words)

@@ -377,8 +377,8 @@ class Port(EmulateCase):
 
     def test_wrong_usage(self):
         for more, words in (
-            (["--pty", "/tmp/x"], "not with --pty or --tcp"),
-            (["--tcp", "0"], "not with --pty or --tcp"),
+            (["--pty", "/tmp/x"], "--pty is a line of its own: not with --port"),
+            (["--tcp", "0"], "--tcp is a line of its own: not with --port"),
         ):
             self.assert_wrong_usage(absenc("emulate", "tformat", "--port", "/dev/x", *more), words)
         for port, words in (

@@ -84,7 +84,8 @@ class Installed(Case):
         files = files_below(self.root)
         headers = {path for path in files if path.startswith("include/")}
         self.assertEqual({re.sub(r"^lib/.*/", "lib/", path) for path in files - headers}, {
-            "bin/absenc", "lib/libabsenc.a", "lib/libabsenc-os.a", "lib/absenc.pc", "lib/absenc-os.pc",
+            "bin/absenc", "lib/libabsenc.a", "lib/libabsenc-os.a", "lib/libabsenc-capture.a",
+            "lib/absenc.pc", "lib/absenc-os.pc", "lib/absenc-capture.pc",
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
             "share/doc/absenc/LICENSE"})

@@ -216,7 +216,7 @@ class Usage(Case):
 
     def test_emulate(self):
         for arguments, words in [(["tformat", "--can", "vcan0"], ["CAN bus"]),
-                                 (["raa38-can", "--can", "vcan0", "--pty", "x"], ["exclude each other"]),
+                                 (["raa38-can", "--can", "vcan0", "--pty", "x"], ["--pty is a line of its own: not with --can"]),
                                  (["raa38-can", "--singleturn", "16384"], ["0 to 16383"]),
                                  (["raa38-can", "--also", "node=1", "--memory", "x"], ["not with --also"]),
                                  (["ssi"], ["sim:ssi"])]:

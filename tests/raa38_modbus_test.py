@@ -105,7 +105,7 @@ class Reading(ModbusCase):
         self.assert_good(absenc("record", uri, "--output", recording, "--count", "10", "--rate", "0"))
         with open(recording, encoding="utf-8") as file:
             self.assertEqual(sum("singleturn" in line for line in json_lines(file.read())), 10)
-        shown = absenc("monitor", uri, "--json", "--for", "0.5")
+        shown = absenc("monitor", uri, "--json", "--for", "2")
         self.assert_good(shown)
         self.assertIn("singleturn", shown.stdout)
 

@@ -257,9 +257,9 @@ TEST_F(Can, StartCommandThenCyclicFramesByArbitration) {
   line.attach(Role::device, low);
   line.attach(Role::host, host);
   line.run_until(microseconds(2500));
-  EXPECT_EQ(host.log, "220000 sent, 1440000 received 120:A0, 1660000 received 121:B0, 2440000 received 120:A0");
-  EXPECT_EQ(low.log, "220000 received 200:01, 1440000 sent, 1660000 received 121:B0, 2440000 sent");
-  EXPECT_EQ(high.log, "220000 received 200:01, 1440000 received 120:A0, 1660000 sent, 2440000 received 120:A0");
+  EXPECT_EQ(host.log, "240000 sent, 1472000 received 120:A0, 1696000 received 121:B0, 2472000 received 120:A0");
+  EXPECT_EQ(low.log, "240000 received 200:01, 1472000 sent, 1696000 received 121:B0, 2472000 sent");
+  EXPECT_EQ(high.log, "240000 received 200:01, 1472000 received 120:A0, 1696000 sent, 2472000 received 120:A0");
 }
 
 TEST_F(Can, SameIdentifierWithOtherDataIsALineError) {
@@ -270,8 +270,8 @@ TEST_F(Can, SameIdentifierWithOtherDataIsALineError) {
   for (CanToy* device : {&one, &two}) line.attach(Role::device, *device);
   line.attach(Role::host, host);
   line.run_until(microseconds(2000));
-  EXPECT_EQ(host.log, "220000 sent, 1440000 error");
-  for (CanToy* device : {&one, &two}) EXPECT_EQ(device->log, "220000 received 200:01, 1440000 error, 1440000 sent");
+  EXPECT_EQ(host.log, "240000 sent, 1472000 error");
+  for (CanToy* device : {&one, &two}) EXPECT_EQ(device->log, "240000 received 200:01, 1472000 error, 1472000 sent");
 }
 
 TEST_F(Can, StandardFrameWinsAgainstExtendedOneWithTheSameBeginning) {
@@ -282,7 +282,7 @@ TEST_F(Can, StandardFrameWinsAgainstExtendedOneWithTheSameBeginning) {
   line.attach(Role::device, extended);
   line.attach(Role::device, standard);
   line.run_until(microseconds(1000));
-  EXPECT_EQ(standard.log, "230000 sent, 498000 received 04800000:");
+  EXPECT_EQ(standard.log, "242000 sent, 534000 received 04800000:");
 }
 
 // (f) A pulse on a line of its own asks for each frame: 10 us wide, the answer begins 30 us after its edge.

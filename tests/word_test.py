@@ -70,7 +70,7 @@ class Verbs(Case):
         self.assertTrue(any(line.startswith(f"# options: word={WORD} unit_um=") for line in lines), lines)
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
         self.assertEqual([row["singleturn"] for row in rows], ["77"] * 3)
-        shown = json_lines(absenc("monitor", f"sim:biss?singleturn=77&word={WORD}", "--for", "0.5", "--json").stdout)
+        shown = json_lines(absenc("monitor", f"sim:biss?singleturn=77&word={WORD}", "--for", "2", "--json").stdout)
         self.assertEqual(shown[-1]["reading"]["singleturn"], 77)
 
     def test_emulate(self):

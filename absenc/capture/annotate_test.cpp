@@ -212,6 +212,7 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
   std::vector<Character> quiet;
   std::vector<Character> noisy;
   std::size_t noises = 0;
+  const auto pause = static_cast<Tick>((unit.timing.turnaround_limit + std::chrono::milliseconds(1)).count());
   const Tick each = static_cast<Tick>(testing::line_of(unit).character().count());
   for (int i = 0; i < 300; ++i) {
     for (const Character& character : talker.talk().characters) {
@@ -225,7 +226,7 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
     ++noises;
     const std::uint64_t count = 1 + talker.random().below(3);
     for (std::uint64_t k = 0; k < count; ++k) {
-      const Tick begin = talker.now() - 500'000 + k * each;
+      const Tick begin = talker.now() - pause / 2 + k * each;
       noisy.push_back({.begin = begin, .end = begin + each, .value = byte});
     }
   }

@@ -38,11 +38,16 @@ constexpr std::string_view check_bus =
 
 Time time_of(const timespec& time) { return std::chrono::seconds(time.tv_sec) + Time(time.tv_nsec); }
 
-// The kernel stamps frames with the time of day.
+// The kernel stamps frames with the time of day. Both clocks are read together: again, when something else ran between.
 Time since_boot(const timespec& stamp) {
+  constexpr Time together = std::chrono::microseconds(20);
   timespec day{};
-  ::clock_gettime(CLOCK_REALTIME, &day);
-  const Time now = os::now();
+  Time now = os::now();
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    ::clock_gettime(CLOCK_REALTIME, &day);
+    const Time before = std::exchange(now, os::now());
+    if (now - before < together) break;
+  }
   return std::min(now, now - (time_of(day) - time_of(stamp)));
 }
 

@@ -82,31 +82,38 @@ LineSettings line_settings(const Unit& unit, const Options& options) {
   return unit.settings != nullptr ? unit.settings(options) : unit.line;
 }
 
-/// Where an encoder may be, and where nothing else may be given.
+/// Where an encoder may be.
 struct Where {
   std::string_view option;
+  std::string_view line;
   bool fits;
 };
 
 void check_line(const Unit& unit, const Options& options, const Invocation& invocation) {
   const bool is_spi = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
   const bool is_can = unit.link == LinkKind::can;
-  const std::array<Where, 5> places{{{"--pty", !is_spi},
-                                     {"--tcp", !is_spi},
-                                     {"--port", !is_spi && !is_can},
-                                     {"--spidev", is_spi},
-                                     {"--can", is_can}}};
+  const std::array<Where, 5> places{{{"--pty", "a serial line", !is_spi},
+                                     {"--tcp", "a serial line", !is_spi},
+                                     {"--port", "a serial line", !is_spi && !is_can},
+                                     {"--spidev", "an SPI controller", is_spi},
+                                     {"--can", "a CAN bus", is_can}}};
+  const std::string_view instead = is_spi   ? "--spidev NAME"
+                                   : is_can ? "--can INTERFACE, or --pty for an adapter"
+                                            : "--pty, --tcp or --port";
   std::string_view chosen;
   for (const Where& place : places) {
     if (!invocation.has(place.option)) continue;
-    if (!place.fits) throw UsageError(fmt::format("{} ({}) is not for {}", unit.id, line_of(unit), place.option));
+    if (!place.fits) {
+      throw UsageError(fmt::format("{} ({}) does not go over {}: use {}, or sim:{}", unit.id, line_of(unit), place.line,
+                                   instead, unit.id));
+    }
     if (!chosen.empty() && place.option != "--tcp") {
-      throw UsageError(fmt::format("{} and {} exclude each other", chosen, place.option));
+      throw UsageError(fmt::format("{} is a line of its own: not with {}", chosen, place.option));
     }
     if (chosen.empty() || place.option != "--tcp") chosen = place.option;
   }
   if (is_spi && chosen.empty()) {
-    throw UsageError(fmt::format("{0} does not go over a serial line: use --spidev NAME, or sim:{0}", unit.id));
+    throw UsageError(fmt::format("{0} does not go over a serial line: use {1}, or sim:{0}", unit.id, instead));
   }
   const ExtraLines lines = unit.extra_lines == nullptr ? ExtraLines{} : unit.extra_lines(options);
   if (lines.trigger) {
