@@ -45,6 +45,45 @@ class Wave(Case):
             read = self.sigrok(*input_format, "-i", path, "-P", "uart:rx=line:baudrate=2500000", "-A", "uart=rx-data")
             self.assertEqual(read, "1A 1A 00 34 12 00 11 00 00 00 00 2D".split() * 2)
 
+    def decoded(self, unit, path):
+        result = absenc("decode", unit, path, "--json")
+        self.assert_good(result)
+        return [json.loads(line) for line in result.stdout.splitlines()]
+
+    def test_sigrok_reads_modbus(self):
+        path = self.file("modbus.sr")
+        self.wave("raa38-modbus?motion=rpm=60", path, "--count", "20")
+        read = self.sigrok("-i", path, "-P", "uart:rx=line:baudrate=19200,modbus:scchannel=RX:cschannel=RX", "-A",
+                           "modbus=sc-data")
+        positions = [one["fields"]["singleturn"] for one in self.decoded("raa38-modbus", path)]
+        self.assertEqual(len(set(positions)), 20)
+        self.assertEqual(read, [f"0x{position:04X} / {position}" for position in positions])
+
+    def test_sigrok_reads_an_spi_bus(self):
+        path = self.file("spi.sr")
+        self.wave("encolink-spi?motion=rpm=60", path, "--count", "20")
+        read = self.sigrok("-i", path, "-P", "spi:clk=sck:miso=miso:mosi=mosi:cs=cs:cpol=0:cpha=1", "-A",
+                           "spi=miso-data")
+        # What is clocked behind a reply belongs to none.
+        replies = [one["reply"] for one in self.decoded("encolink-spi", path)]
+        self.assertGreater(len(set(replies)), 20)
+        self.assertRegex("".join(read).lower(), "^" + "(ff)*".join(replies) + "(ff)*$")
+
+    def test_decode_reads_what_wave_wrote(self):
+        for unit in (one["protocol"] for one in UNITS):
+            lines = {}
+            for ending in ("vcd", "sr", "csv"):
+                path = self.file(f"{unit}.{ending}")
+                self.wave(f"{unit}?motion=rpm=60", path, "--count", "20")
+                lines[ending] = [{name: one[name] for name in ("request", "reply", "ok", "fields", "angle_deg")
+                                  if name in one} for one in self.decoded(unit, path)]
+            with self.subTest(unit):
+                self.assertGreaterEqual(len(lines["vcd"]), 20)
+                self.assertTrue(all(one["ok"] for one in lines["vcd"]))
+                self.assertGreaterEqual(len({one.get("angle_deg", one.get("position_um")) for one in lines["vcd"]}), 15)
+                self.assertEqual(lines["vcd"], lines["sr"])
+                self.assertEqual(lines["vcd"], lines["csv"])
+
     def test_commands_with_arguments(self):
         path = self.file("memory.vcd")
         self.wave("tformat", path, "--command", "memory-write 5 0x42", "--command", "memory-read 5")

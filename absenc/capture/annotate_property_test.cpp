@@ -229,7 +229,10 @@ sim::FaultRates faults_of(const Unit& unit, const Options& options) {
   sim::FaultRates rates = sim::testing::damaged_replies(0.05);
   rates[sim::FaultKind::request_corrupt] = 0.005;
   rates.delay = unit.timing.turnaround_limit * 3 / 2;
-  if (unit.streams != nullptr && unit.streams(options)) rates[sim::FaultKind::repeat] = 0;  // just one more frame
+  // Two frames of a stream are two, however they follow each other.
+  if (unit.streams != nullptr && unit.streams(options)) {
+    rates[sim::FaultKind::repeat] = rates[sim::FaultKind::delay] = 0;
+  }
   return rates;
 }
 

@@ -12,6 +12,7 @@ constexpr unsigned integration_bits = 11;  // recessive in a row: the bus is idl
 constexpr unsigned most_equal = 5;         // the sixth bit is of the other kind
 constexpr std::size_t crc_bits = 15;
 constexpr std::uint32_t protocol_error = 0x08, nobody_acknowledged = 0x20;
+constexpr std::uint32_t bus_off = 0x40, arbitration_lost = 0x02, controller = 0x04;
 constexpr std::uint8_t stuffing = 0x04, form = 0x02, in_crc = 0x08, in_end = 0x1A;
 
 std::uint16_t crc_of(const std::vector<bool>& bits, std::size_t count) {
@@ -24,6 +25,20 @@ std::uint16_t crc_of(const std::vector<bool>& bits, std::size_t count) {
 }
 
 }  // namespace
+
+std::string_view text_of_error(const CanFrame& error) {
+  if ((error.id & bus_off) != 0) return "a controller is bus-off: too many of its frames were destroyed";
+  if ((error.id & nobody_acknowledged) != 0) return "nobody acknowledged the frame: is another node on the bus?";
+  if ((error.id & protocol_error) != 0) {
+    if ((error.data[2] & stuffing) != 0)
+      return "six equal bits where five are the most: a destroyed frame, or another bit rate";
+    if (error.data[3] == in_crc) return "the CRC of a frame is wrong";
+    return "a bit of a frame is not what it must be";
+  }
+  if ((error.id & arbitration_lost) != 0) return "a controller lost the arbitration";
+  if ((error.id & controller) != 0) return "a controller has counted many errors, or lost frames";
+  return "an error on the bus";
+}
 
 void CanDecoder::decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames) {
   if (first != end_) {

@@ -3,11 +3,15 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "absenc/capture/signal.hpp"
 
 namespace absenc::capture {
+
+/// What an error frame tells, in words without an end; for frames of controllers too.
+[[nodiscard]] std::string_view text_of_error(const CanFrame& error);
 
 /// Decodes part after part. Each falling edge sets the clock anew, as in a receiver. What breaks the rules becomes an
 /// error frame as the kernel would report it (linux/can/error.h): its identifier says what (0x08 protocol, 0x20 nobody

@@ -127,6 +127,7 @@ TEST(CanDecoder, NobodyAcknowledged) {
   ASSERT_EQ(frames.size(), 1u);
   EXPECT_TRUE(frames[0].error_frame);
   EXPECT_EQ(frames[0].frame.id, 0x20u);
+  EXPECT_EQ(text_of_error(frames[0].frame).substr(0, 19), "nobody acknowledged");
 }
 
 TEST(CanDecoder, SaysWhereAFrameIsWrong) {

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <fstream>
 #include <system_error>
+#include <utility>
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "absenc/capture/can_line.hpp"
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/reading_text.hpp"
@@ -73,7 +74,9 @@ std::string_view name_of(Kind kind) {
 }
 
 std::string message_of(const Unit& unit, const Options& options, const Annotation& annotation) {
-  const std::string_view remark = text_of(annotation.remark);
+  const bool is_bus_error = annotation.remark == Remark::damaged && annotation.reply.can != nullptr;
+  const std::string_view remark =
+      is_bus_error ? capture::text_of_error(*annotation.reply.can) : text_of(annotation.remark);
   if (annotation.error == Error::none) return std::string(remark);
   const bool decoded = annotation.remark == Remark::none && !annotation.reply.empty();
   const Diagnosis diagnosis = decoded ? diagnose(unit, options, annotation.request, annotation.reply) : Diagnosis{};

@@ -100,21 +100,14 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
 }
 
 bool allowed(const LinkParameter& parameter, Place place) {
-  switch (place) {
-    case Place::serial:
-      return parameter.serial;
-    case Place::tcp:
-      return parameter.tcp;
-    case Place::spi:
-      return parameter.spi;
-    case Place::can:
-      return parameter.can;
-    case Place::slcan:
-      return parameter.slcan;
-    case Place::sim:
-      break;
+  constexpr std::string_view separator = ", ";
+  const std::string_view name = place_names[static_cast<std::size_t>(place)];
+  for (std::string_view rest = parameter.places;;) {
+    const std::size_t end = rest.find(separator);
+    if (rest.substr(0, end) == name) return true;
+    if (end == std::string_view::npos) return false;
+    rest.remove_prefix(end + separator.size());
   }
-  return parameter.sim;
 }
 
 const Option* find_option(const Unit& unit, std::string_view name) {

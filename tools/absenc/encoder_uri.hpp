@@ -19,48 +19,40 @@
 namespace absenc::tool {
 
 enum class Place : std::uint8_t { serial, tcp, spi, can, slcan, sim };
+inline constexpr std::array<std::string_view, 6> place_names{"serial", "tcp", "spi", "can", "slcan", "sim"};
 
 /// A setting of the way to the encoder, beside the options of its protocol.
 struct LinkParameter {
   std::string_view name;
   std::string_view value;
   std::string_view meaning;
-  std::string_view places;     // for people
-  bool serial, tcp, spi, sim;  // where it may be given
+  std::string_view places;  // where it may be given, by the names of `place_names`
   bool repeatable = false;
-  bool can = false, slcan = false;
 };
 
 inline constexpr std::array<LinkParameter, 20> link_parameters{{
     {"baud", "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
-     "serial, slcan", true, false, false, false, false, false, true},
-    {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim", true, false, false,
-     true},
-    {"trigger", "rts|dtr|gpio:NAME", "the wire whose pulse asks for a frame", "serial", true, false, false, false},
-    {"trigger_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial", true, false, false,
-     false},
-    {"trigger_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial", true,
-     false, false, false},
-    {"clear", "rts|dtr|gpio:NAME", "the wire whose pulse sets the zero", "serial", true, false, false, false},
-    {"clear_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial", true, false, false, false},
-    {"clear_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial", true, false,
-     false, false},
-    {"rs485", "auto|on|off", "whether the kernel switches the direction of the transceiver", "serial", true, false,
-     false, false},
-    {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp, can, slcan", true, true, false,
-     false, false, true, true},
+     "serial, slcan"},
+    {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
+    {"trigger", "rts|dtr|gpio:NAME", "the wire whose pulse asks for a frame", "serial"},
+    {"trigger_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial"},
+    {"trigger_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial"},
+    {"clear", "rts|dtr|gpio:NAME", "the wire whose pulse sets the zero", "serial"},
+    {"clear_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial"},
+    {"clear_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial"},
+    {"rs485", "auto|on|off", "whether the kernel switches the direction of the transceiver", "serial"},
+    {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp, can, slcan"},
     {"log", "FILE", "write every CAN frame sent and received to it, as candump -l does; it must not exist yet",
-     "can, slcan, sim", false, false, false, true, false, true, true},
-    {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi", false, false, true, false},
-    {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi", false, false, true, false},
-    {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim", true, true, false, true},
-    {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim", false, false, false, true},
-    {"singleturn", "COUNTS", "position within the turn at the start", "sim", false, false, false, true},
-    {"multiturn", "TURNS", "turns at the start", "sim", false, false, false, true},
-    {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", false, false, false, true, true},
-    {"fault", "KIND=RATE", "a fault to inject, with its probability; may be given more than once", "sim", false, false,
-     false, true, true},
-    {"seed", "N", "another series of faults", "sim", false, false, false, true},
+     "can, slcan, sim"},
+    {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi"},
+    {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi"},
+    {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim"},
+    {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
+    {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
+    {"multiturn", "TURNS", "turns at the start", "sim"},
+    {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", true},
+    {"fault", "KIND=RATE", "a fault to inject, with its probability; may be given more than once", "sim", true},
+    {"seed", "N", "another series of faults", "sim"},
 }};
 
 /// Null when there is none with this name.
