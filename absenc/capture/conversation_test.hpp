@@ -93,7 +93,9 @@ class Talker {
       }
       line_.run(*host_, line_.now() + std::chrono::seconds(30));
     }
-    line_.run_until(line_.now() + unit_.timing.turnaround_limit + std::chrono::milliseconds(1));
+    const bool may_come_late = unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex;
+    const Time pause = may_come_late ? unit_.timing.turnaround_limit : Time{};
+    line_.run_until(line_.now() + pause + std::chrono::milliseconds(1));
     return std::move(talk_);
   }
 
