@@ -102,6 +102,20 @@ void read_all(capture::Reader& reader, Take&& take) {
 
 }  // namespace
 
+CaptureChoices capture_choices(const Invocation& invocation, std::string_view path) {
+  constexpr std::int64_t fastest = 1'000'000'000'000;
+  CaptureChoices choices;
+  choices.path = path;
+  choices.channels.assign(invocation.texts("--channel").begin(), invocation.texts("--channel").end());
+  choices.raw_channels = static_cast<unsigned>(invocation.number("--raw-channels", 0, 1, 64));
+  choices.samples_per_second = static_cast<std::uint64_t>(invocation.number("--rate", 0, 1, fastest));
+  choices.baud = invocation.real("--baud", 0, 1, 1e9);
+  if (choices.raw_channels != 0 && choices.samples_per_second == 0) {
+    throw UsageError("raw samples have no rate: give the samples a second with --rate");
+  }
+  return choices;
+}
+
 CaptureRun::CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices)
     : unit_(unit),
       options_(options),

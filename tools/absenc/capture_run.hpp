@@ -7,11 +7,13 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/capture/annotation.hpp"
 #include "absenc/capture/signal.hpp"
 #include "absenc/protocol/unit.hpp"
+#include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
 
@@ -23,6 +25,9 @@ struct CaptureChoices {
   std::uint64_t samples_per_second = 0;  // 0: the file tells
   double baud = 0;                       // 0: found from the capture
 };
+
+/// From --channel, --raw-channels, --rate and --baud. Throws UsageError.
+[[nodiscard]] CaptureChoices capture_choices(const Invocation& invocation, std::string_view path);
 
 struct CaptureOutcome {
   std::string problem;               // why nothing could be decoded; "": it could

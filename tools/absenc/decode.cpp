@@ -83,20 +83,6 @@ struct Counted final : capture::AnnotationSink {
   AnnotationPrinter* printer;
 };
 
-CaptureChoices choices_of(const Invocation& invocation) {
-  constexpr std::int64_t fastest = 1'000'000'000'000;
-  CaptureChoices choices;
-  choices.path = invocation.text("file");
-  choices.channels.assign(invocation.texts("--channel").begin(), invocation.texts("--channel").end());
-  choices.raw_channels = static_cast<unsigned>(invocation.number("--raw-channels", 0, 1, 64));
-  choices.samples_per_second = static_cast<std::uint64_t>(invocation.number("--rate", 0, 1, fastest));
-  choices.baud = invocation.real("--baud", 0, 1, 1e9);
-  if (choices.raw_channels != 0 && choices.samples_per_second == 0) {
-    throw UsageError("raw samples have no rate: give the samples a second with --rate");
-  }
-  return choices;
-}
-
 // Returns whether anything is missing because of them.
 bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   bool damaged = false;
@@ -115,7 +101,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   if (json && invocation.has("--csv")) throw UsageError("--json and --csv cannot be given together");
   if (statistics_only && invocation.has("--csv")) throw UsageError("--stats is text or, with --json, an object");
 
-  CaptureRun run(unit, options, choices_of(invocation));
+  CaptureRun run(unit, options, capture_choices(invocation, invocation.text("file")));
   const TickClock clock(run.ticks_per_second());
   CaptureStatistics statistics(unit, options, clock);
   const AnnotationFormat format = json                      ? AnnotationFormat::json

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc identify`: virtual encoders on pseudo-terminals, lines on which nobody or noise is, captured frames."""
+import concurrent.futures
+import json
+import os
+import random
+import select
+import signal
+import subprocess
+import threading
+import tty
+import unittest
+
+from command_support import ABSENC, Case, Emulator, EncoderCase, absenc, end, json_lines
+
+# Protocol, how it is emulated, and what of the options must be found.
+ENCODERS = [
+    ("tformat", [], {"singleturn_bits": 17}),
+    ("tformat", ["--model", "23-bit", "--multiturn", "7"], {"singleturn_bits": 23, "encoder_id": 23}),
+    ("esl", ["--option", "address=3", "--option", "crc_bit_order=msb"], {"address": 3, "crc_bit_order": "msb"}),
+    ("encolink", ["--motion", "rpm=60"], {"stream_rate": 0}),
+    ("encolink", ["--motion", "rpm=60", "--option", "stream_rate=500", "--option", "resolution=20"], {"resolution": 20}),
+    ("e201", ["--model", "rotary-19-16"], {"singleturn_bits": 19, "multiturn_bits": 16}),
+    ("raa38", ["--motion", "rpm=60", "--option", "bits=17"], {"mode": "timing"}),
+    ("raa38", ["--option", "mode=bus", "--option", "unit=2"], {"mode": "bus", "unit": 2}),
+    ("raa38-modbus", ["--option", "address=9"], {"address": 9}),
+    ("raa38-modbus", ["--option", "baud=9600"], {"baud": "9600"}),
+    ("raa38-can", ["--option", "node=0x21"], {"node": 0x21}),
+]
+
+
+def identify(*arguments):
+    """Exit status and what --json says."""
+    result = absenc("identify", *arguments, "--json")
+    return result, json.loads(result.stdout) if result.stdout else None
+
+
+class OnALine(EncoderCase):
+    def find(self, index, protocol, arguments):
+        with Emulator(self.directory, *arguments, protocol=protocol, name=f"line{index}") as emulator:
+            place = ("slcan:" if protocol == "raa38-can" else "") + emulator.path
+            result, found = identify(place)
+            self.assertEqual(result.returncode, 0, f"{protocol}: {result.stdout}{result.stderr}")
+            best = found["candidates"][0]
+            again = absenc(*best["command"].replace('"', "").split()[1:], "--json")
+            return best, again
+
+    def test_every_encoder_is_the_first_candidate(self):
+        covered = {protocol for protocol, _, _ in ENCODERS}
+        over_lines = {unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout)
+                      if unit["link"] not in ("exchange", "clocked")}
+        self.assertEqual(covered, over_lines)
+        with concurrent.futures.ThreadPoolExecutor(6) as pool:
+            searches = [pool.submit(self.find, i, protocol, arguments)
+                        for i, (protocol, arguments, _) in enumerate(ENCODERS)]
+        for (protocol, arguments, wanted), search in zip(ENCODERS, searches):
+            with self.subTest(protocol, arguments=arguments):
+                best, again = search.result()
+                self.assertEqual(best["protocol"], protocol)
+                self.assertEqual({name: best["options"][name] for name in wanted}, wanted)
+                self.assertTrue(best["found"])
+                self.assertGreater(best["explained"], 0.9 * best["tried"])
+                # The command to go on with does.
+                self.assertEqual(again.returncode, 0, again.stderr)
+                self.assertTrue(json_lines(again.stdout)[0]["ok"])
+
+    def test_people_are_told_how_to_go_on(self):
+        emulator = self.emulator("--model", "23-bit")
+        result = absenc("identify", f"{emulator.path}?baud=2500000")
+        self.assert_good(result)
+        self.assertIn("6 of 6", result.stdout)
+        self.assertRegex(result.stdout, r'go on with: absenc read "tformat:.*\?model=23-bit')
+
+    def test_nothing_that_changes_an_encoder_is_sent(self):
+        memory = self.file("memory")
+        with Emulator(self.directory, "--memory", memory, "--alarm", "battery_alarm") as emulator:
+            identify(f"{emulator.path}?baud=2500000")
+            alarms = json_lines(absenc("read", f"tformat:{emulator.path}?latency=300", "--json").stdout)[0]["alarms"]
+        self.assertEqual(alarms, ["battery_alarm"])
+
+
+class NobodyKnown(Case):
+    def setUp(self):
+        super().setUp()
+        self.master, self.slave = os.openpty()
+        tty.setraw(self.slave)
+        self.path = os.ttyname(self.slave)
+        self.addCleanup(os.close, self.slave)
+        self.addCleanup(os.close, self.master)
+
+    def serve(self, answer):
+        """Answers whatever comes until the test is over."""
+        wake, waker = os.pipe()
+
+        def run():
+            while True:
+                ready, _, _ = select.select([self.master, wake], [], [])
+                if wake in ready:
+                    return
+                os.write(self.master, answer(os.read(self.master, 256)))
+        thread = threading.Thread(target=run)
+        thread.start()
+
+        def stop():
+            os.write(waker, b"x")
+            thread.join()
+            os.close(wake)
+            os.close(waker)
+        self.addCleanup(stop)
+
+    def test_a_silent_line(self):
+        result = absenc("identify", self.path, "--for", "2")
+        self.assert_failed(result, "nothing came back", "A and B", "supply")
+        self.assertEqual(result.stdout, "")
+
+    def test_noise(self):
+        noise = random.Random(1)
+        self.serve(lambda request: noise.randbytes(noise.randrange(4, 24)))
+        result, found = identify(self.path, "--for", "2")
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertFalse(found["ok"])
+        self.assertFalse(any(candidate["found"] for candidate in found["candidates"]))
+
+    def test_only_echo(self):
+        self.serve(lambda request: request)
+        result = absenc("identify", self.path, "--for", "2")
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertNotIn("go on with", result.stdout)
+
+    def test_the_time_is_limited(self):
+        result = absenc("identify", self.path, "--for", "0.3")
+        self.assert_failed(result, "the time is over")
+
+    def test_an_interrupt_ends_it(self):
+        process = subprocess.Popen([ABSENC, "identify", self.path], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE)
+        os.read(self.master, 1)  # it has begun to ask
+        status, _, err = end(process, signal.SIGINT)
+        self.assertEqual(status, 1)
+        self.assertIn("interrupted", err)
+
+
+class WrongUsage(Case):
+    def test_a_wrong_path(self):
+        self.assert_failed(absenc("identify", self.file("nothing")), "there is no port", "nothing")
+
+    def test_not_with_a_protocol(self):
+        self.assert_wrong_usage(absenc("identify", "tformat:/dev/null"), "says which protocol")
+
+    def test_not_with_options_of_a_protocol(self):
+        self.assert_wrong_usage(absenc("identify", "/dev/null?singleturn_bits=23"), "no setting of a port")
+
+    def test_either_a_port_or_frames(self):
+        self.assert_wrong_usage(absenc("identify"), "one of")
+        self.assert_wrong_usage(absenc("identify", "/dev/null", "--hex", "00"), "one of")
+        self.assert_wrong_usage(absenc("identify", "--request", "1A"), "--hex")
+        self.assert_wrong_usage(absenc("identify", "--hex", "00", "--request", "1A", "--request", "1A"), "--request")
+        self.assert_wrong_usage(absenc("identify", "--hex", "xyz"), "--hex", "'x'")
+
+
+class Frames(Case):
+    def test_a_frame_with_its_request(self):
+        result = absenc("identify", "--request", "1A", "--hex", "1A 00 45 23 01 11 34 12 00 00 4A")
+        self.assert_good(result)
+        self.assertIn("go on with: absenc decode tformat --request", result.stdout)
+
+    def test_options_are_found(self):
+        result, found = identify("--hex", "084000efcdab341255277e086000abd57f67")
+        self.assertEqual(result.returncode, 0)
+        self.assertEqual(found["candidates"][0]["options"]["crc_bit_order"], "msb")
+
+    def test_a_damaged_frame(self):
+        result = absenc("identify", "--request", "1A", "--hex", "1A 00 45 23 01 11 34 12 00 00 4B")
+        self.assert_failed(result, "no protocol explains")
+
+    def test_two_that_explain_a_frame(self):
+        # A word that only moves: whether there is an error bit behind it, nobody can tell.
+        moving = [f"{i:012b}" for i in range(100, 108)]
+        arguments = [argument for word in moving for argument in ("--hex", word)]
+        result, found = identify(*arguments)
+        self.assertEqual(result.returncode, 0, result.stdout)
+        self.assertEqual(found["candidates"][0]["protocol"], "ssi")
+        self.assertGreater(len(found["candidates"]), 1)
+        self.assertIn("equally well", absenc("identify", *arguments).stderr)
+
+    def test_what_noise_could_do_as_well(self):
+        self.assert_failed(absenc("identify", "--hex", "0001 0010 0011"), "may be chance", "turn the shaft")
+
+
+class Capture(Case):
+    def check(self, encoder, name, protocol, wanted):
+        path = self.file(name)
+        self.assert_good(absenc("wave", encoder, path, "--count", "20"))
+        result, found = identify(path)
+        self.assertEqual(result.returncode, 0, f"{result.stdout}{result.stderr}")
+        best = found["candidates"][0]
+        self.assertEqual(best["protocol"], protocol)
+        self.assertEqual({name: best["options"][name] for name in wanted}, wanted)
+        self.assert_good(absenc(*best["command"].split()[1:]))
+
+    def test_of_a_line(self):
+        self.check("tformat?model=23-bit&motion=rpm=60", "line.vcd", "tformat", {"singleturn_bits": 23})
+
+    def test_options_are_found(self):
+        self.check("esl?crc_bit_order=msb&motion=rpm=60", "line.sr", "esl", {"crc_bit_order": "msb"})
+
+    def test_nothing_in_it(self):
+        path = self.file("bytes.txt", "00 11 22 33 44 55 66 77\n")
+        self.assert_failed(absenc("identify", path), "no protocol explains")
+
+
+if __name__ == "__main__":
+    unittest.main()

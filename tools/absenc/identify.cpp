@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+#include <filesystem>
+#include <optional>
+
+#include "absenc/os/signals.hpp"
+#include "absenc/protocol/all.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/identify_capture.hpp"
+#include "tools/absenc/identify_line.hpp"
+#include "tools/absenc/identify_text.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/progress.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/unit_text.hpp"
+#include "tools/absenc/wire_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using capture::HeardExchange;
+using capture::HeardFrame;
+
+// ---- Frames from the command line
+
+HeardFrame heard(LinkKind link, std::string_view what, std::string_view text) {
+  if (text.empty()) return {};
+  WireFrame frame = parse_wire_text(link, what, text);
+  return {std::move(frame.bytes), frame.bits, frame.can};
+}
+
+std::vector<HeardExchange> frames_for(const Unit& unit, const Invocation& invocation) {
+  const std::span<const std::string> requests = invocation.texts("--request");
+  const std::span<const std::string> replies = invocation.texts("--hex");
+  std::vector<HeardExchange> exchanges;
+  for (std::size_t i = 0; i < replies.size(); ++i) {
+    const std::string_view request = i < requests.size() ? std::string_view(requests[i]) : std::string_view();
+    exchanges.push_back({heard(unit.link, "--request", request), heard(unit.link, "--hex", replies[i])});
+    if (exchanges.back().reply.frame().empty()) throw UsageError("--hex is empty: a reply has at least one byte");
+  }
+  return exchanges;
+}
+
+int identify_frames(const Invocation& invocation) {
+  const std::size_t requests = invocation.texts("--request").size();
+  const std::size_t replies = invocation.texts("--hex").size();
+  if (requests != 0 && requests != replies) {
+    throw UsageError(
+        fmt::format("{} --request for {} --hex: give one for each in the same order, or none; \"\" where "
+                    "it is not known",
+                    requests, replies));
+  }
+  std::vector<Candidate> candidates;
+  std::optional<UsageError> unreadable;
+  bool readable = false;
+  for (const Unit* unit : all_units()) {
+    try {
+      const std::vector<HeardExchange> exchanges = frames_for(*unit, invocation);
+      readable = true;
+      for (capture::Hypothesis& one : capture::explain(*unit, {}, exchanges)) {
+        candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
+      }
+    } catch (const UsageError& error) {  // of another kind of link, perhaps
+      if (!unreadable) unreadable = error;
+    }
+  }
+  if (!readable) throw UsageError(*unreadable);
+  rank(candidates);
+  const auto command = [&](const Candidate& candidate) {
+    std::string text = decode_command(candidate);
+    if (requests != 0) text += fmt::format(" --request \"{}\"", invocation.texts("--request").front());
+    return text + fmt::format(" --hex \"{}\"", invocation.texts("--hex").front());
+  };
+  const int status = show_candidates(candidates, command, invocation.has("--json"));
+  if (candidates.empty()) {
+    print_message(
+        "no protocol explains any of these frames\n"
+        "  Try: whole frames, each with its request; without the adapter's echo; a frame that is not damaged");
+  }
+  return status;
+}
+
+// ---- A line
+
+std::string advice_for(const LineFindings& findings, const LineSearch& search) {
+  if (findings.heard == 0 && findings.unasked == 0 && findings.only_echo) {
+    return "only what was sent came back (the adapter's echo), and nothing from an encoder\n"
+           "  Try: the encoder's supply and ground; A and B swapped; the wires between adapter and encoder";
+  }
+  if (findings.heard == 0 && findings.unasked == 0) {
+    return fmt::format(
+        "{} requests were sent, and nothing came back\n"
+        "  Try: the encoder's supply and ground; A and B (or TX and RX) swapped; termination; an adapter that can\n"
+        "  send at these rates; more time, as in {}?latency=50",
+        findings.requests, search.place);
+  }
+  return fmt::format(
+      "{} bytes came, but no protocol explains them\n"
+      "  Try: A and B swapped, which makes every byte wrong; the baud rate, as in {}?baud=9600; shielding and\n"
+      "  termination; it may be an encoder that absenc does not know: `absenc crc find` looks into its frames",
+      findings.heard + findings.unasked, search.place);
+}
+
+LineSearch search_of(const Invocation& invocation) {
+  LineSearch search;
+  const std::string_view text = invocation.text("where");
+  const std::size_t question = std::min(text.find('?'), text.size());
+  search.place = text.substr(0, question);
+  std::string_view rest = text.substr(std::min(question + 1, text.size()));
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find('&'), rest.size());
+    search.settings.emplace_back(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  for (const std::string& setting : search.settings) {
+    if (find_link_parameter(split_setting(setting).name) != nullptr) continue;
+    throw UsageError(
+        fmt::format("\"{}\" is no setting of a port: the options of the protocol are what is searched for", setting));
+  }
+  const std::string first = search.place.substr(0, search.place.find(':'));
+  if (first == "sim" || find_unit(first) != nullptr) {
+    throw UsageError(
+        fmt::format("\"{}\" says which protocol: `absenc read {}` reads it; to identify, give the port "
+                    "alone, as /dev/ttyUSB0, tcp:HOST:PORT or spi:/dev/spidev0.0",
+                    search.place, search.place));
+  }
+  search.limit =
+      std::chrono::duration_cast<Time>(std::chrono::duration<double>(invocation.real("--for", 60, 0.1, 86'400)));
+  return search;
+}
+
+int identify_line(const Invocation& invocation) {
+  LineSearch search = search_of(invocation);
+  Progress progress;
+  search.progress = [&](const std::string& text) { progress.show(text); };
+  const LineFindings findings = search_line(search);
+  progress.clear();
+  for (const std::string& note : findings.notes) print_message(fmt::format("note: {}", note));
+  const auto command = [&](const Candidate& candidate) { return read_command(candidate, search.place); };
+  const int status = show_candidates(findings.candidates, command, invocation.has("--json"));
+  if (findings.interrupted) print_message("interrupted: not everything was tried");
+  if (findings.out_of_time) print_message("the time is over, and not everything was tried: give more with --for");
+  if (findings.candidates.empty() && !findings.interrupted) print_message(advice_for(findings, search));
+  return findings.interrupted ? exit_failed : status;
+}
+
+// ---- A capture
+
+int identify_capture(const Invocation& invocation) {
+  const CaptureChoices choices = capture_choices(invocation, invocation.text("where"));
+  Progress progress;
+  const CaptureFindings findings = search_capture(choices, [&](const std::string& text) { progress.show(text); });
+  progress.clear();
+  const auto command = [&](const Candidate& candidate) {
+    std::string text = decode_command(candidate) + " " + choices.path;
+    for (const std::string& channel : choices.channels) text += " --channel " + channel;
+    if (choices.raw_channels != 0) text += fmt::format(" --raw-channels {}", choices.raw_channels);
+    if (choices.samples_per_second != 0) text += fmt::format(" --rate {}", choices.samples_per_second);
+    return choices.baud > 0 ? text + fmt::format(" --baud {}", choices.baud) : text;
+  };
+  const int status = show_candidates(findings.candidates, command, invocation.has("--json"));
+  if (findings.candidates.empty()) {
+    for (const std::string& refusal : findings.refusals) print_message(fmt::format("note: {}", refusal));
+    print_message(
+        "no protocol explains anything in the capture\n"
+        "  Try: which channel is which wire, with --channel; --baud; a capture with at least four samples a bit");
+  }
+  return status;
+}
+
+bool is_capture(std::string_view where) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(where, error);
+}
+
+int run_identify(const Invocation& invocation) {
+  os::catch_interrupts();
+  const bool frames = invocation.has("--hex") || invocation.has("--request");
+  if (frames == invocation.has("where")) {
+    throw UsageError("give one of: a port, as /dev/ttyUSB0; a capture file; captured frames with --hex");
+  }
+  if (frames && !invocation.has("--hex")) throw UsageError("requests alone do not tell: give the replies with --hex");
+  if (frames) return identify_frames(invocation);
+  if (is_capture(invocation.text("where"))) return identify_capture(invocation);
+  for (const std::string_view option : {"--channel", "--baud", "--raw-channels", "--rate"}) {
+    if (invocation.has(option)) throw UsageError(fmt::format("{} is about a capture: name its file", option));
+  }
+  return identify_line(invocation);
+}
+
+constexpr std::array<Parameter, 9> parameters{{
+    {"where", "",
+     "a port: /dev/ttyUSB0, tcp:HOST:PORT, spi:/dev/spidev0.0, can0 or slcan:/dev/ttyACM0, with its settings behind ?; "
+     "or a capture file, as for `absenc decode`"},
+    {"--hex", "FRAME", "instead: a reply that was captured, as for `absenc decode`", "", false, true},
+    {"--request", "FRAME", "what it answers, one for each --hex in the same order; \"\": not known", "", false, true},
+    {"--for", "SECONDS", "end the search on a port after that time", "60"},
+    {"--channel", "[WIRE=]NAME", "of a capture: which channel is which wire", "by their names", false, true},
+    {"--baud", "RATE", "of the line in a capture", "the protocol's own, or found from the capture"},
+    {"--raw-channels", "COUNT", "the file is raw samples of so many channels, channel 0 in bit 0"},
+    {"--rate", "HZ", "samples a second, where the file does not tell"},
+    parameter::json,
+}};
+
+constexpr std::array<Example, 4> examples{{
+    {"absenc identify /dev/ttyUSB0", "asks in every protocol and says how to go on"},
+    {"absenc identify \"tcp:192.168.1.20:4001?latency=50\" --json", "behind a slow serial server, for a program"},
+    {"absenc identify drive.sr --channel D0", "whose frames are in a capture, and how to decode it"},
+    {"absenc identify --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"", "whose frame is this?"},
+}};
+
+}  // namespace
+
+const Subcommand identify_subcommand{
+    "identify",
+    "find out which encoder is on a line, or whose frames were captured",
+    "On a port: listens, then asks in every protocol that fits, at its rates and addresses, only by reads that\n"
+    "change nothing. Candidates are ranked by how unlikely it is that chance explains what came.\n"
+    "Exit status 1 when nothing was found, or nothing that chance could not explain as well.",
+    parameters,
+    examples,
+    run_identify};
+
+}  // namespace absenc::tool

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which protocols explain what is in a capture file.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tools/absenc/capture_run.hpp"
+#include "tools/absenc/identify_line.hpp"
+
+namespace absenc::tool {
+
+struct CaptureFindings {
+  std::vector<Candidate> candidates{};
+  std::vector<std::string> refusals{};  // why a protocol could not be looked for, each once
+};
+
+/// As much of the capture as it takes. Throws UsageError, ToolFailure, os::Interrupted.
+[[nodiscard]] CaptureFindings search_capture(const CaptureChoices& choices,
+                                             const std::function<void(const std::string&)>& progress);
+
+}  // namespace absenc::tool

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/identify_line.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "absenc/capture/stream.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/serial.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/protocol/all.hpp"
+#include "tools/absenc/identify_attempt.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+constexpr Time short_patience = 700ms;  // with a scan that nobody answers,
+constexpr Time long_patience = 5s;      // and at the end, when nothing was found
+constexpr std::size_t busy_line = 32;   // bytes while listening: nobody can be asked
+constexpr double beyond_doubt = -3;     // log10 of chance: then no further rates are tried
+constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
+                                                     230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
+
+/// All attempts, the usual settings of every unit first.
+class Search {
+ public:
+  explicit Search(const LineSearch& search) : search_(search), deadline_(os::now() + search.limit) {}
+
+  LineFindings run() {
+    try {
+      for (const Unit* unit : all_units()) {
+        if (fits(*unit, search_)) attempt(*unit, search_.settings);
+      }
+      for (const Unit* unit : all_units()) {
+        if (fits(*unit, search_)) try_rates(*unit);
+      }
+      if (is_beyond_doubt()) cut_.clear();
+      patience_ = long_patience;
+      for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
+    } catch (const Stop&) {
+      findings_.out_of_time = true;
+    } catch (const os::Interrupted&) {
+      findings_.interrupted = true;
+    }
+    if (!opened_ && failure_) throw os::Failure(*failure_);
+    rank(findings_.candidates);
+    drop_repeated();
+    return std::move(findings_);
+  }
+
+ private:
+  void try_rates(const Unit& unit) {
+    if (has_setting(search_.settings, "baud") || way_of(search_) != Way::serial) return;
+    std::vector<std::string> rates;
+    const Option* baud = find_option(unit, "baud");
+    if (baud != nullptr) {
+      for (std::size_t i = 0; i < baud->choices.size(); ++i) {
+        if (static_cast<std::int64_t>(i) != baud->default_value) rates.emplace_back(baud->choices[i]);
+      }
+    } else if (unit.line.rate == 0 && !os::is_pseudo_terminal(search_.place)) {
+      for (const std::uint32_t rate : common_rates) rates.push_back(fmt::format("{}", rate));
+    }
+    for (const std::string& rate : rates) {
+      if (is_beyond_doubt()) return;
+      Settings settings = search_.settings;
+      settings.push_back("baud=" + rate);
+      attempt(unit, settings);
+    }
+  }
+
+  void attempt(const Unit& unit, const Settings& settings) {
+    if (!takes_rate(unit)) return;
+    if (unit.link == LinkKind::can) return attempt_on<CanFrame>(unit, settings);
+    attempt_on<std::uint8_t>(unit, settings);
+  }
+
+  // Whether the user's rate is one that the unit can have.
+  [[nodiscard]] bool takes_rate(const Unit& unit) const {
+    const Option* baud = find_option(unit, "baud");
+    if (baud == nullptr || baud->choices.empty()) return true;
+    return std::all_of(search_.settings.begin(), search_.settings.end(), [&](const std::string& setting) {
+      const OptionText one = split_setting(setting);
+      return one.name != "baud" ||
+             std::find(baud->choices.begin(), baud->choices.end(), one.value) != baud->choices.end();
+    });
+  }
+
+  template <class Item>
+  void attempt_on(const Unit& unit, const Settings& settings) {
+    if (os::now() >= deadline_) throw Stop::out_of_time;
+    Attempt<Item> one(search_, unit, settings, patience_, deadline_, findings_);
+    if (one.line().rate == 0 && way_of(search_) == Way::serial) return;  // the rates come later
+    const std::string line = line_of(unit.link, one.line());
+    if (search_.progress) {
+      search_.progress(fmt::format("{}, {}: {} found so far", unit.id, line, findings_.candidates.size()));
+    }
+    try {
+      one.open();
+      opened_ = true;
+    } catch (const os::Failure& failure) {
+      if (!failure_) failure_ = failure;
+      if (failure.kind() != os::Failure::Kind::bad_rate && failure.kind() != os::Failure::Kind::unsupported) throw;
+      findings_.notes.push_back(fmt::format("not tried: {}: {}", unit.id, failure.what()));
+      return;
+    }
+    findings_.lines.insert(line);
+    if (way_of(search_) == Way::spi || !listen(one, unit)) one.ask();
+    if (one.cut() && settings == search_.settings) cut_.push_back(&unit);
+  }
+
+  // Once for all units with these settings of the line. Returns whether somebody sends by himself: then nobody would
+  // hear a question.
+  template <class Item>
+  bool listen(Attempt<Item>& attempt, const Unit& unit) {
+    const LineSettings& line = attempt.line();
+    const auto key = std::tuple(line.rate, line.parity, line.stop_bits);
+    const auto known =
+        std::find_if(listened_.begin(), listened_.end(), [&](const auto& one) { return one.first == key; });
+    if (known != listened_.end()) return known->second;
+    const std::size_t before = findings_.candidates.size();
+    const std::vector<Item> items = attempt.listen();
+    findings_.unasked += items.size();
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      explain_frames(items, line_of(unit.link, line));
+    } else {
+      explain_bytes(items, line, unit.link);
+    }
+    const bool busy = !std::is_same_v<Item, CanFrame> && items.size() >= busy_line;
+    if (busy && findings_.candidates.size() == before) {
+      findings_.notes.push_back(fmt::format("nothing was sent at {} baud: somebody sends all the time", line.rate));
+    }
+    listened_.emplace_back(key, busy);
+    return busy;
+  }
+
+  void explain_frames(std::span<const CanFrame> frames, const std::string& line) {
+    std::vector<HeardExchange> exchanges;
+    for (const CanFrame& frame : frames) exchanges.push_back({.reply = {.can = frame}});
+    for (const Unit* unit : all_units()) {
+      if (!fits(*unit, search_) || exchanges.empty()) continue;
+      for (Hypothesis& one : capture::explain(*unit, {}, exchanges)) {
+        findings_.candidates.push_back({unit, std::move(one), search_.settings, true, line});
+      }
+    }
+  }
+
+  void explain_bytes(Bytes bytes, const LineSettings& line, LinkKind link) {
+    for (const Unit* other : all_units()) {
+      const bool same_line = fits(*other, search_) && hears(*other, line.rate, search_) &&
+                             other->line.parity == line.parity && other->line.stop_bits == line.stop_bits;
+      if (!same_line) continue;
+      for (Hypothesis& one : capture::explain_stream(*other, bytes, listening)) {
+        Settings settings = search_.settings;
+        const bool needs_rate = other->line.rate != line.rate && way_of(search_) == Way::serial &&
+                                !has_setting(settings, "baud") && !os::is_pseudo_terminal(search_.place);
+        if (needs_rate) settings.push_back(fmt::format("baud={}", line.rate));
+        findings_.candidates.push_back({other, std::move(one), settings, true, line_of(link, line)});
+      }
+    }
+  }
+
+  // Who answers is better known than who only sends; and one encoder may have been found in several ways.
+  void drop_repeated() {
+    std::vector<Candidate> kept;
+    for (const Candidate& one : findings_.candidates) {
+      const bool repeated = std::any_of(kept.begin(), kept.end(), [&](const Candidate& other) {
+        return other.unit == one.unit && other.hypothesis.options.values == one.hypothesis.options.values;
+      });
+      const bool answers =
+          std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [&](const Candidate& other) {
+            return other.unit == one.unit && !other.unasked && other.hypothesis.evidence.explains_all();
+          });
+      if (!repeated && !(one.unasked && answers)) kept.push_back(one);
+    }
+    findings_.candidates = std::move(kept);
+  }
+
+  [[nodiscard]] bool is_beyond_doubt() const {
+    return std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [](const Candidate& one) {
+      return one.hypothesis.evidence.explains_all() && one.hypothesis.chance() <= beyond_doubt;
+    });
+  }
+
+  const LineSearch& search_;
+  Time deadline_;
+  LineFindings findings_;
+  std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
+  Time patience_ = short_patience;
+  std::vector<const Unit*> cut_;  // those that have more addresses than the time allowed to ask
+  std::optional<os::Failure> failure_;
+  bool opened_ = false;
+};
+
+}  // namespace
+
+void rank(std::vector<Candidate>& candidates) {
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& one, const Candidate& other) {
+    return one.hypothesis.chance() < other.hypothesis.chance();
+  });
+}
+
+LineFindings search_line(const LineSearch& search) { return Search(search).run(); }
+
+}  // namespace absenc::tool

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/identify_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/json.hpp"
+#include "tools/absenc/output.hpp"
+#include "tools/absenc/unit_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+constexpr std::size_t most_shown = 8;
+constexpr double same_likelihood = 0.5;  // a factor of three
+
+bool is_found(const Candidate& candidate) { return candidate.hypothesis.chance() <= capture::is_found; }
+
+// "1 in 16384", "1 in 10^9"
+std::string chance_text(double log10) {
+  if (log10 > -0.05) return "as likely";
+  if (log10 > -6) return fmt::format("1 in {:.0f}", std::pow(10, -log10));
+  return fmt::format("1 in 10^{:.0f}", std::floor(-log10));
+}
+
+bool resolves_to(const Unit& unit, std::string_view model, const std::vector<std::string>& settings,
+                 const Options& wanted) {
+  std::vector<OptionText> texts;
+  for (const std::string& setting : settings) texts.push_back(split_setting(setting));
+  Options options;
+  const OptionError error = resolve_options(unit, model, texts, options);
+  return error.kind == OptionError::Kind::none && options.values == wanted.values;
+}
+
+// What `model` does not say of these options; "": the model that is taken without one.
+std::vector<std::string> differences(const Unit& unit, std::string_view model, const Options& options) {
+  Options usual;
+  static_cast<void>(resolve_options(unit, model, {}, usual));
+  std::vector<std::string> settings;
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    if (options[i] == usual[i]) continue;
+    settings.push_back(fmt::format("{}={}", unit.options[i].name, to_text(unit.options[i], options[i])));
+  }
+  return settings;
+}
+
+std::string settings_text(const Candidate& candidate) {
+  std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
+  if (candidate.unasked) settings.emplace_back("sends by itself");
+  return settings.empty() ? "the defaults" : fmt::format("{}", fmt::join(settings, ", "));
+}
+
+// Settings of the port that are no options of the unit.
+std::vector<std::string> all_settings(const Candidate& candidate) {
+  std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
+  for (const std::string& one : candidate.link_settings) {
+    const std::string_view name = split_setting(one).name;
+    const bool said = std::any_of(settings.begin(), settings.end(),
+                                  [&](const std::string& other) { return split_setting(other).name == name; });
+    if (!said) settings.push_back(one);
+  }
+  return settings;
+}
+
+Json to_json(const Candidate& candidate, const std::string& command) {
+  const capture::Evidence& evidence = candidate.hypothesis.evidence;
+  Json json = Json::object().set("protocol", candidate.unit->id);
+  const Model* model = candidate.hypothesis.options.model;
+  json.set("model", model != nullptr ? Json(model->name) : Json());
+  json.set("options", options_to_json(*candidate.unit, candidate.hypothesis.options));
+  json.set("line", candidate.line).set("unasked", candidate.unasked);
+  json.set("explained", evidence.explained).set("tried", evidence.tried).set("distinct", evidence.distinct);
+  json.set("log10_chance", candidate.hypothesis.chance()).set("found", is_found(candidate));
+  return json.set("more_bits_possible", candidate.hypothesis.at_least).set("command", command);
+}
+
+void show_table(std::span<const Candidate> candidates) {
+  std::vector<std::vector<std::string>> rows{{"", "PROTOCOL", "WITH", "LINE", "EXPLAINED", "BY CHANCE"}};
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate& one = candidates[i];
+    const capture::Evidence& evidence = one.hypothesis.evidence;
+    rows.push_back({fmt::format("{}", i + 1), std::string(one.unit->id), settings_text(one), one.line,
+                    fmt::format("{} of {}", evidence.explained, evidence.tried), chance_text(one.hypothesis.chance())});
+  }
+  print_line(table(rows));
+}
+
+std::string advice(std::span<const Candidate> candidates) {
+  const Candidate& best = candidates.front();
+  if (!is_found(best)) {
+    return "this may be chance: nothing speaks for it that noise could not do as well\n"
+           "  Try: turn the shaft a little while it is asked, so that the frames differ; capture more frames";
+  }
+  const auto equal = std::count_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
+    return one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;
+  });
+  if (equal > 1) {
+    return fmt::format(
+        "note: the first {} explain what came equally well: compare their positions while the shaft turns", equal);
+  }
+  if (best.hypothesis.at_least) {
+    return "note: the position may have more bits: these are the fewest that hold all that came; turn the shaft once";
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> settings_for(const Unit& unit, const Options& options) {
+  std::vector<std::string> settings = differences(unit, {}, options);
+  if (options.model != nullptr && !settings.empty()) {
+    std::vector<std::string> by_model = differences(unit, options.model->name, options);
+    by_model.insert(by_model.begin(), fmt::format("model={}", options.model->name));
+    if (by_model.size() <= settings.size()) return by_model;
+  }
+  if (resolves_to(unit, {}, settings, options)) return settings;
+  // A model agrees with these and says more.
+  return option_texts(unit, options);
+}
+
+std::string read_command(const Candidate& candidate, std::string_view place) {
+  const std::vector<std::string> settings = all_settings(candidate);
+  if (settings.empty()) return fmt::format("absenc read {}:{}", candidate.unit->id, place);
+  return fmt::format("absenc read \"{}:{}?{}\"", candidate.unit->id, place, fmt::join(settings, "&"));
+}
+
+std::string decode_command(const Candidate& candidate) {
+  std::string text = fmt::format("absenc decode {}", candidate.unit->id);
+  for (const std::string& setting : settings_for(*candidate.unit, candidate.hypothesis.options)) {
+    const bool quoted = setting.find(' ') != std::string::npos;
+    text += quoted ? fmt::format(" --option \"{}\"", setting) : fmt::format(" --option {}", setting);
+  }
+  return text;
+}
+
+int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
+                    bool json) {
+  const bool found = !candidates.empty() && is_found(candidates.front());
+  if (json) {
+    Json list = Json::array();
+    for (const Candidate& one : candidates) list.append(to_json(one, command(one)));
+    print_line(Json::object().set("ok", found).set("candidates", list).line());
+    return found ? exit_good : exit_failed;
+  }
+  if (candidates.empty()) return exit_failed;
+  show_table(candidates.first(std::min(candidates.size(), most_shown)));
+  const std::string more = advice(candidates);
+  if (found) print_line(fmt::format("\ngo on with: {}", command(candidates.front())));
+  if (!more.empty()) print_message(more);
+  return found ? exit_good : exit_failed;
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Candidates for people and programs, and the commands to go on with.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tools/absenc/identify_line.hpp"
+
+namespace absenc::tool {
+
+/// The fewest settings by which these options come about: "model=23-bit".
+[[nodiscard]] std::vector<std::string> settings_for(const Unit& unit, const Options& options);
+
+/// absenc read "tformat:/dev/ttyUSB0?model=23-bit"
+[[nodiscard]] std::string read_command(const Candidate& candidate, std::string_view place);
+/// absenc decode tformat --option model=23-bit
+[[nodiscard]] std::string decode_command(const Candidate& candidate);
+
+/// Prints all of them; `command` says how to go on with one. Returns the exit status.
+int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
+                    bool json);
+
+}  // namespace absenc::tool
