@@ -18,7 +18,7 @@ CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.
 # What they depend on comes with them, but for what the kernel asks for by itself: g_serial its functions.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
            "usb_f_obex", "g_serial"]
-PROGRAMS = ["candump", "cansend", "ip", "spi-config", "spi-pipe"]
+PROGRAMS = ["candump", "cangen", "cansend", "ip", "slcand", "spi-config", "spi-pipe"]
 TOOLS = ["apt-cache", "apt-get", "dpkg-deb", "tar", "xz", "modinfo", "ldd", "busybox", "cpio", "qemu-system-x86_64"]
 
 

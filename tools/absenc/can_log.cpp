@@ -16,8 +16,9 @@ std::string candump_line(Time since_1970, const std::string& interface, const Ca
                      frame.id, frame.extended ? 8 : 3, data);
 }
 
-CanLog::CanLog(Port<CanFrame>& port, std::shared_ptr<void> owner, const std::string& file, std::string interface)
-    : port_(&port), owner_(std::move(owner)), file_(file), interface_(std::move(interface)) {
+CanLog::CanLog(Port<CanFrame>& port, std::shared_ptr<void> owner, std::shared_ptr<os::LineFile> file,
+               std::string interface)
+    : port_(&port), owner_(std::move(owner)), file_(std::move(file)), interface_(std::move(interface)) {
   const auto day = std::chrono::system_clock::now().time_since_epoch();
   offset_ = std::chrono::duration_cast<Time>(day) - port.now();
 }
@@ -31,7 +32,7 @@ Event<CanFrame> CanLog::wait(const Step<CanFrame>& step) {
   const Event<CanFrame> event = port_->wait(step);
   const bool sent = event.kind == Event<CanFrame>::Kind::sent;
   const std::span<const CanFrame> frames = sent ? std::span<const CanFrame>(sending_) : event.items;
-  for (const CanFrame& frame : frames) file_.append(candump_line(event.at + offset_, interface_, frame));
+  for (const CanFrame& frame : frames) file_->append(candump_line(event.at + offset_, interface_, frame));
   if (sent) sending_.clear();
   return event;
 }

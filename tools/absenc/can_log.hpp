@@ -16,8 +16,8 @@ namespace absenc::tool {
 
 class CanLog final : public Port<CanFrame> {
  public:
-  /// `owner` keeps `port`. Throws os::Failure when the file is there already, or cannot be made or written.
-  CanLog(Port<CanFrame>& port, std::shared_ptr<void> owner, const std::string& file, std::string interface);
+  /// `owner` keeps `port`. `begin` and `wait` throw os::Failure when the file cannot be written.
+  CanLog(Port<CanFrame>& port, std::shared_ptr<void> owner, std::shared_ptr<os::LineFile> file, std::string interface);
 
   Time now() override { return port_->now(); }
   void begin(const Step<CanFrame>& step) override;
@@ -26,7 +26,7 @@ class CanLog final : public Port<CanFrame> {
  private:
   Port<CanFrame>* port_;
   std::shared_ptr<void> owner_;
-  os::LineFile file_;
+  std::shared_ptr<os::LineFile> file_;
   std::string interface_;
   Time offset_;  // from the port's clock to the time of day
   std::vector<CanFrame> sending_;

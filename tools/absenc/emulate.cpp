@@ -13,7 +13,6 @@
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/slcan_port.hpp"
-#include "absenc/os/socketcan.hpp"
 #include "absenc/os/spi_device.hpp"
 #include "absenc/os/spidev.hpp"
 #include "tools/absenc/error.hpp"
@@ -238,11 +237,7 @@ int emulate_frames(const Unit& unit, const Options& options, const Invocation& i
   const LineSettings line = line_settings(unit, options);
   return emulation.run([&](Machine<CanFrame>& machine) -> Notes {
     if (!invocation.has("--can")) return serve_adapter(machine, line, invocation, end);
-    const std::string interface(invocation.text("--can"));
-    os::SocketCan port(interface, line);
-    port.set_end(end);
-    print_line(fmt::format("ready: {}", interface));
-    serve(machine, port);
+    serve_interface(machine, std::string(invocation.text("--can")), line, end);
     return {};
   });
 }

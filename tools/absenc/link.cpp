@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
 
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
@@ -104,10 +105,19 @@ Link open_slcan(const EncoderUri& uri) {
   return link;
 }
 
+// A line that was lost and is back goes on in the file that it began; a file that is in use is made again, which is
+// refused. Called under the lock of connect_link.
+std::shared_ptr<os::LineFile> log_file(const std::string& path) {
+  static std::map<std::string, std::shared_ptr<os::LineFile>> files;
+  std::shared_ptr<os::LineFile>& file = files[path];
+  if (file == nullptr || file.use_count() > 1) file = std::make_shared<os::LineFile>(path);
+  return file;
+}
+
 // Puts the log in front of the port.
 void keep_log(Link& link, const EncoderUri& uri) {
   const std::string name = uri.place == Place::sim ? "sim" : std::filesystem::path(uri.path).filename().string();
-  auto log = std::make_shared<CanLog>(*link.frames, link.owner, uri.log, name);
+  auto log = std::make_shared<CanLog>(*link.frames, link.owner, log_file(uri.log), name);
   link.frames = log.get();
   link.owner = std::move(log);
 }

@@ -4,12 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
+#include <string>
 
 #include "absenc/host/drive.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
+#include "absenc/os/socketcan.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/unit_text.hpp"
@@ -23,42 +26,58 @@ using namespace std::chrono_literals;
 constexpr Time time_between_tries = 250ms;
 
 /// Goes from one port to the next: the last one may have gone away between a transfer and its `sent`.
-class Movable final : public Machine<std::uint8_t> {
+template <class Item>
+class Movable final : public Machine<Item> {
  public:
-  explicit Movable(Machine<std::uint8_t>& inner) : inner_(&inner) {}
+  explicit Movable(Machine<Item>& inner) : inner_(&inner) {}
 
-  void feed(const Event<std::uint8_t>& event) override {
-    if (event.kind == Event<std::uint8_t>::Kind::sent) sending_ = false;
+  void feed(const Event<Item>& event) override {
+    if (event.kind == Event<Item>::Kind::sent) sending_ = false;
     inner_->feed(event);
   }
 
-  Step<std::uint8_t> next(Time now) override {
-    const Step<std::uint8_t> step = inner_->next(now);
-    if (step.kind == Step<std::uint8_t>::Kind::transfer) sending_ = true;
+  Step<Item> next(Time now) override {
+    const Step<Item> step = inner_->next(now);
+    if (step.kind == Step<Item>::Kind::transfer) sending_ = true;
     return step;
   }
 
   void left(Time now) {
-    if (sending_) feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+    if (sending_) feed({.kind = Event<Item>::Kind::sent, .at = now});
   }
 
  private:
-  Machine<std::uint8_t>* inner_;
+  Machine<Item>* inner_;
   bool sending_ = false;
 };
 
+/// `Open` makes the port.
+template <class Item, class Open>
 class Server {
  public:
-  Server(Movable& machine, const EncoderUri& uri, Time send_slack, Time end)
-      : machine_(&machine), uri_(&uri), send_slack_(send_slack), end_(end) {}
+  Server(Machine<Item>& machine, const std::string& name, Time end, const Open& open)
+      : machine_(machine), name_(name), end_(end), open_(open) {}
 
-  // Until the end of the time, by Ended.
-  [[noreturn]] void run() {
+  // Until a signal or the end of the time.
+  void run() {
+    try {
+      go_on();
+    } catch (const os::Interrupted&) {
+    } catch (const os::Ended&) {
+    }
+  }
+
+ private:
+  enum class State : std::uint8_t { new_here, open, away };
+
+  [[noreturn]] void go_on() {
     for (;;) {
       try {
         serve();
       } catch (const os::Failure& failure) {
-        if (state_ == State::new_here) throw;
+        // What the port cannot do, it cannot do later either.
+        const bool unable = state_ == State::open && failure.kind() == os::Failure::Kind::unsupported;
+        if (state_ == State::new_here || unable) throw;
         if (state_ == State::open) print_message(fmt::format("{}\n  Waiting for it to come back.", failure.what()));
         state_ = State::away;
       }
@@ -67,28 +86,23 @@ class Server {
     }
   }
 
- private:
-  enum class State : std::uint8_t { new_here, open, away };
-
   void serve() {
-    os::SerialPort port(uri_->path, uri_->line, uri_->rs485);
-    if (uri_->latency) port.set_latency(*uri_->latency);
-    port.set_send_slack(send_slack_);
-    port.set_end(end_);
+    const auto port = open_();
+    port->set_end(end_);
     if (state_ == State::away) {
-      machine_->left(port.now());
-      print_message(fmt::format("the port {} is back", uri_->path));
+      machine_.left(port->now());
+      print_message(fmt::format("the port {} is back", name_));
     } else {
-      print_line(fmt::format("ready: {}", uri_->path));
+      print_line(fmt::format("ready: {}", name_));
     }
     state_ = State::open;
-    host::drive(*machine_, port, [] { return true; });
+    host::drive(machine_, *port, [] { return true; });
   }
 
-  Movable* machine_;
-  const EncoderUri* uri_;
-  Time send_slack_;
+  Movable<Item> machine_;
+  std::string name_;
   Time end_;
+  Open open_;
   State state_ = State::new_here;
 };
 
@@ -116,12 +130,16 @@ void serve_port(Machine<std::uint8_t>& device, const EncoderUri& uri, Time send_
   // Only a host can find out by itself whether it hears itself: it speaks first.
   host::EchoFilter line(uri.echo == host::EchoMode::on ? host::EchoMode::on : host::EchoMode::off);
   line.attach(device);
-  Movable machine(line);
-  try {
-    Server(machine, uri, send_slack, end).run();
-  } catch (const os::Interrupted&) {
-  } catch (const os::Ended&) {
-  }
+  Server(static_cast<Machine<std::uint8_t>&>(line), uri.path, end, [&] {
+    auto port = std::make_unique<os::SerialPort>(uri.path, uri.line, uri.rs485);
+    if (uri.latency) port->set_latency(*uri.latency);
+    port->set_send_slack(send_slack);
+    return port;
+  }).run();
+}
+
+void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end) {
+  Server(device, interface, end, [&] { return std::make_unique<os::SocketCan>(interface, line); }).run();
 }
 
 }  // namespace absenc::tool

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder on a serial port that is there already: of a cable to another computer, or of a USB gadget.
+// A virtual encoder on a port that is there already: a serial one of a cable to another computer or of a USB gadget, or
+// a CAN interface.
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "absenc/core/time.hpp"
@@ -18,5 +20,7 @@ namespace absenc::tool {
 /// again finds the encoder as it was. A transfer due within `send_slack` is sent at once.
 /// Throws os::Failure when it cannot be opened at first.
 void serve_port(Machine<std::uint8_t>& device, const EncoderUri& uri, Time send_slack, Time end);
+/// The same on a CAN interface, as "vcan0".
+void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end);
 
 }  // namespace absenc::tool

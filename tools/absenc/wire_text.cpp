@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "absenc/core/hex.hpp"
 #include "tools/absenc/error.hpp"
 
@@ -72,6 +74,12 @@ CanFrame parse_can(std::string_view what, std::string_view text) {
     throw UsageError(fmt::format("{}: {} is no CAN identifier: 11 bits (000 to 7FF) or, with more digits, 29 bits",
                                  what, text.substr(0, colon)));
   }
+  const std::string_view content = text.substr(colon + 1);
+  if (content.size() == 2 && (content[0] == 'R' || content[0] == 'r') && content[1] >= '0' && content[1] <= '8') {
+    frame.remote = true;
+    frame.size = static_cast<std::uint8_t>(content[1] - '0');
+    return frame;
+  }
   const std::vector<std::uint8_t> data = parse_bytes(what, text, colon + 1);
   if (data.size() > frame.data.size()) {
     throw UsageError(fmt::format("{}: a CAN frame carries at most 8 bytes, not {}", what, data.size()));
@@ -89,6 +97,13 @@ void parse_bits(std::string_view what, std::string_view text, WireFrame& frame) 
     if (text[i] == '1') frame.bytes.back() |= static_cast<std::uint8_t>(0x80u >> frame.bits % 8);
     ++frame.bits;
   }
+}
+
+// What a remote frame has is a length and no data.
+std::string can_text(const CanFrame& frame) {
+  const std::string data =
+      frame.remote ? fmt::format("R{}", frame.size) : fmt::format("{:02X}", fmt::join(frame.bytes(), ""));
+  return fmt::format("{:0{}X}:{}", frame.id, frame.extended ? 8 : 3, data);
 }
 
 // `group` bits between spaces; 0: none.
@@ -124,15 +139,16 @@ WireFrame parse_wire_text(LinkKind link, std::string_view what, std::string_view
 std::string to_hex(Bytes bytes) { return fmt::format("{:02X}", fmt::join(bytes, " ")); }
 
 std::string to_wire_text(LinkKind link, const Frame& frame) {
-  if (frame.can != nullptr) {
-    return fmt::format("{:0{}X}:{:02X}", frame.can->id, frame.can->extended ? 8 : 3, fmt::join(frame.can->bytes(), ""));
-  }
+  if (frame.can != nullptr) return can_text(*frame.can);
   return link == LinkKind::clocked ? bits_text(frame, 4) : to_hex(frame.bytes);
 }
 
 std::string to_compact_wire_text(LinkKind link, const Frame& frame) {
   if (frame.can != nullptr) {
-    return fmt::format("{:0{}x}:{:02x}", frame.can->id, frame.can->extended ? 8 : 3, fmt::join(frame.can->bytes(), ""));
+    std::string text = can_text(*frame.can);
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c; });
+    return text;
   }
   return link == LinkKind::clocked ? bits_text(frame, 0) : fmt::format("{:02x}", fmt::join(frame.bytes, ""));
 }

@@ -27,7 +27,7 @@ struct WireFrame {
 /// character at fault and its position (from 1).
 [[nodiscard]] WireFrame parse_wire_text(LinkKind link, std::string_view what, std::string_view text);
 
-/// For people: "1A 00 2B", "1FF:022B", "0001 1110".
+/// For people: "1A 00 2B", "1FF:022B", remote frames "1FF:R8", "0001 1110".
 [[nodiscard]] std::string to_wire_text(LinkKind link, const Frame& frame);
 /// For programs, as in vectors.json: "1a002b", "1ff:022b", "00011110".
 [[nodiscard]] std::string to_compact_wire_text(LinkKind link, const Frame& frame);

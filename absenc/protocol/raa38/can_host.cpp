@@ -31,6 +31,11 @@ Read::Read(const Format& format, Way way) : format_(format), way_(way) {
 }
 
 void Read::heard(const CanFrame& frame, Time at) {
+  // Another device may use that identifier; but when nothing else comes it is what the user looks for.
+  if (frame.extended && frame.id == encode_position(format_.node, 0).id) {
+    keep(frame, at);
+    only_extended_ = true;
+  }
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
@@ -45,6 +50,7 @@ void Read::heard(const CanFrame& frame, Time at) {
 }
 
 void Read::over() {
+  if (only_extended_ && !disturbed()) return fail(Error::unexpected_reply);
   if (way_ != Way::listen || disturbed()) return fail(missing());
   finish(Error::timeout,
          {"the node sends nothing by itself", "let it: `run <encoder> cyclic 10`, or ask it: listen=false"});

@@ -22,6 +22,7 @@ class Read final : public Procedure {
 
   Format format_;
   Way way_;
+  bool only_extended_ = false;  // where the reply should have been
   Reading reading_{};
 };
 
