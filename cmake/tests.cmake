@@ -64,7 +64,12 @@ foreach(source IN LISTS cross_tests)
   absenc_test(${name} "${source}")
 endforeach()
 
-# Every fuzz body as a plain test: over all vectors, what is near them, and noise.
+# Every fuzz body as a plain test: over all vectors, what is near them, and noise. With sanitizers a part of it is enough:
+# the fuzzers themselves have them too.
+set(fuzz_seed_share 1)
+if(ABSENC_SANITIZE)
+  set(fuzz_seed_share 10)
+endif()
 file(GLOB_RECURSE fuzz_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/absenc/*_fuzz.cpp")
 foreach(source IN LISTS fuzz_sources)
   cmake_path(GET source STEM stem)
@@ -73,7 +78,7 @@ foreach(source IN LISTS fuzz_sources)
   absenc_settings(${target})
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/tests")
   target_link_libraries(${target} PRIVATE absenc::absenc absenc::capture)
-  add_test(NAME fuzz_seeds.${stem} COMMAND ${target})
+  add_test(NAME fuzz_seeds.${stem} COMMAND ${target} ${fuzz_seed_share})
 endforeach()
 
 # Tests in Python: of the command as a user types it, and of the sources.
