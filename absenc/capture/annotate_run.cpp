@@ -268,7 +268,7 @@ void Annotator::tell_bad(std::size_t size) {
   if (may_be_request && !cut && exchanges_.has_asked()) {
     return exchanges_.ask(bad, error_of({.bytes = bad.bytes}, {}), remark, false);
   }
-  const Kind kind = channel_->carries == Carries::both ? Kind::noise : Kind::reply;
+  const Kind kind = channel_->carries == Carries::both && !judge_.streams() ? Kind::noise : Kind::reply;
   exchanges_.alone(kind, bad, unless_cut(error_of({}, {.bytes = bad.bytes})), remark);
 }
 
