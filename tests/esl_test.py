@@ -184,10 +184,15 @@ class Command(EslCase):
         self.assertEqual(safe["safe_singleturn"], 0xABCDEF)
 
     def test_what_changes_the_encoder(self):
-        encoder = self.encoder("--singleturn", "1000", "--multiturn", "5", "--alarm", "multiturn_error")
+        encoder = self.encoder("--singleturn", "0x500000", "--multiturn", "5", "--alarm", "multiturn_error")
         self.assert_wrong_usage(absenc("zero", encoder), "--yes")
         for verb in ["zero", "reset-multiturn", "clear-alarms"]:
-            self.assert_good(absenc(verb, encoder, "--yes"))
+            # On a busy machine the eight requests may reach the encoder closer together than it allows: then it does
+            # nothing, and the command says so.
+            results = [absenc(verb, encoder, "--yes")]
+            while results[-1].returncode != 0 and len(results) < 4:
+                results.append(absenc(verb, encoder, "--yes"))
+            self.assert_good(results[-1])
         reading = self.good_json("read", encoder)
         self.assertEqual((reading["singleturn"], reading["multiturn"], reading["alarms"]), (0, 0, []))
 

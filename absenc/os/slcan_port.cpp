@@ -17,7 +17,8 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr Time answer_time = 300ms;    // an adapter on USB takes 1 or 2
+constexpr Time answer_time = 300ms;  // an adapter on USB takes 1 or 2
+constexpr Time settling_time = 20ms;
 constexpr unsigned most_reads = 1024;  // so that a line that is never silent does not hold anybody up
 
 Bytes bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
@@ -47,11 +48,17 @@ void SlcanLine::collect(Time deadline) {
   }
 }
 
+bool SlcanLine::hears_until(Time deadline) {
+  collect(deadline);
+  return collected_;
+}
+
 // ---- SlcanPort
 
 SlcanPort::SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings)
     : SlcanLine(std::move(bytes)), name_(std::move(name)) {
   write(bytes_of("\r\r\r"));  // ends whatever somebody began
+  settle();
   apply(settings);
 }
 
@@ -71,6 +78,7 @@ void SlcanPort::apply(const LineSettings& settings) {
                                       " bit/s: 10, 20, 50, 100, 125, 250, 500, 800 kbit/s and 1 Mbit/s are there");
   }
   static_cast<void>(ask("C\r"));  // refused by many that are closed already
+  settle();
   const std::string set{'S', static_cast<char>(*code), '\r'};
   const Answer rate = ask(set);
   if (rate == Answer::refused) {
@@ -86,6 +94,15 @@ void SlcanPort::apply(const LineSettings& settings) {
     notes_.push_back(name_ +
                      " does not acknowledge commands: some adapters never do; if nothing else comes, it may be no "
                      "slcan adapter, or need another baud");
+  }
+}
+
+// Answers bear no number: those to what nobody waits for must be over before the next question.
+void SlcanPort::settle() {
+  constexpr unsigned most_answers = 64;
+  bool heard = true;
+  for (unsigned answers = 0; heard && answers < most_answers; ++answers) {
+    heard = hears_until(os::now() + settling_time + latency());
   }
 }
 

@@ -19,6 +19,8 @@ class SlcanLine : public FramePort {
 
   void write(Bytes text);
   void collect(Time deadline) final;
+  /// Collects until something came, or the deadline; whether something did.
+  bool hears_until(Time deadline);
   /// A line without its CR, a refusal, or garbage came.
   virtual void take(slcan::LineReader::Found found, Bytes line, Time at) = 0;
 
@@ -46,6 +48,7 @@ class SlcanPort final : public SlcanLine {
   void apply(const LineSettings& settings) override;
   void take(slcan::LineReader::Found found, Bytes line, Time at) override;
   Answer ask(std::string_view command);
+  void settle();
 
   std::string name_;
   std::vector<std::string> notes_;
