@@ -11,6 +11,7 @@
 #include "absenc/host/drive.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/host/first_reading.hpp"
+#include "absenc/host/reply_guard.hpp"
 #include "absenc/host/statistics.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -19,6 +20,7 @@ namespace absenc::host {
 struct Counters {
   std::uint64_t good = 0;                                  // conversations that ended well
   std::uint64_t repeated = 0;                              // attempts after an error
+  std::uint64_t late = 0;                                  // replies that came after their time and were dropped
   std::array<std::uint64_t, error_texts.size()> errors{};  // of each kind, repeated ones included
 
   [[nodiscard]] constexpr std::uint64_t bad() const {
@@ -84,6 +86,12 @@ class Session {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
+  /// What is known of late replies belongs to the line: sessions of encoders on one line share it. It must outlive
+  /// them.
+  void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
+  /// How late a reply came at the most; 0: none did.
+  [[nodiscard]] Time lateness() const { return guard_->lateness(); }
+
   /// From the next command on.
   void set_options(const Options& options) { options_ = options; }
 
@@ -112,7 +120,7 @@ class Session {
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
       streaming_ = false;  // unless it comes to its next result
-      streaming_ = !drive_one(*conversation, on_emit, again) && conversation->streams();
+      streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
       if (statistics_ != nullptr) statistics_->add(*conversation);
@@ -137,21 +145,31 @@ class Session {
     return current_;
   }
 
-  // What the port carries: the conversation, behind the removal of echo where there is any.
+  // On a link whose clock is the host's nothing comes late.
+  [[nodiscard]] bool guarded() const { return unit_->link != LinkKind::exchange && unit_->link != LinkKind::clocked; }
+
+  // What the port carries: the conversation, behind what keeps replies with their requests and what removes echo.
   Machine<Item>& machine() {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (echo_.mode() != EchoMode::off) return echo_;
     }
+    return inner();
+  }
+  Machine<Item>& inner() {
+    if (guarded()) return *guard_;
     return *current_;
   }
 
   // Whether it came to its end; a conversation that streams stops at its next result.
   template <class OnEmit>
-  bool drive_one(Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
-    if constexpr (std::is_same_v<Item, std::uint8_t>) {
-      if (!again) echo_.attach(conversation);
+  bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
+    if (!again) {
+      if (guarded()) guard_->attach(conversation, *unit_, options_, command.repeatable && !command.changes_encoder);
+      if constexpr (std::is_same_v<Item, std::uint8_t>) echo_.attach(inner());
     }
-    return drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
+    const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
+    counters_.late = guard_->late();
+    return ended;
   }
 
   const Unit* unit_;
@@ -159,6 +177,8 @@ class Session {
   Port<Item>* port_;
   std::span<std::byte> storage_;
   Conversation<Item>* current_ = nullptr;  // in `storage_`
+  ReplyGuard<Item> own_guard_;
+  ReplyGuard<Item>* guard_ = &own_guard_;
   EchoFilter echo_;
   unsigned attempts_;
   FirstReading first_;

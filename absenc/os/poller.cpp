@@ -41,10 +41,12 @@ std::span<const int> Poller::wait(Time deadline) {
   if (interrupts_ < 0 && interrupt_descriptor() >= 0) add(interrupts_ = interrupt_descriptor());
   // Deadlines mostly move on with every exchange. The timer stays at an old one, which costs one vain wake-up when it
   // comes, instead of being set for every wait.
-  if (deadline < armed_) arm(deadline);
+  // A deadline that is over only asks what is there: that needs no timer.
+  const bool over = deadline < armed_ && now() >= deadline;
+  if (!over && deadline < armed_) arm(deadline);
   for (;;) {
     std::array<epoll_event, most_ready> events;
-    const int count = ::epoll_wait(epoll_.get(), events.data(), most_ready, -1);
+    const int count = ::epoll_wait(epoll_.get(), events.data(), most_ready, over ? 0 : -1);
     if (count < 0 && errno != EINTR) throw system_failure("epoll_wait", errno);
     std::size_t ready = 0;
     bool rang = false;
@@ -64,6 +66,7 @@ std::span<const int> Poller::wait(Time deadline) {
       armed_ = never;
     }
     if (ready > 0) return {ready_.data(), ready};
+    if (over) return {};
     if (!rang) continue;
     if (now() >= deadline) return {};
     if (deadline != never) arm(deadline);

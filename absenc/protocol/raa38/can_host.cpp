@@ -40,11 +40,11 @@ void Read::heard(const CanFrame& frame, Time at) {
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
   if (!counts) return fail(counts.error());
-  // Nothing tells when the node took the position: some time before it sent it.
+  // Nothing tells when the node took the position: after it was asked, or some time before it sent it by itself.
   reading_ = {.singleturn = *counts,
               .singleturn_bits = format_.bits,
               .singleturn_valid_bits = format_.bits,
-              .latched = at,
+              .latched = way_ == Way::ask ? sent_at() : at,
               .received = at};
   finish();
 }

@@ -73,6 +73,8 @@ class Procedure : public Conversation<CanFrame> {
   /// The time is over. Calls one of them.
   virtual void over() = 0;
 
+  /// When the last frame had left.
+  [[nodiscard]] Time sent_at() const { return sent_at_; }
   /// Whether frames were destroyed on the bus since what was asked last.
   [[nodiscard]] bool disturbed() const { return disturbed_; }
   /// timeout, or bad_framing on a bus with errors.

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/host/reply_guard.hpp"
+
+#include <algorithm>
+
+namespace absenc::host {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int quiet_limits = 4;         // how many limits a line is quiet before a request is repeated
+constexpr Time longest_quiet = 2500ms;  // no reply that is later has been seen but on a line that is always late
+constexpr Time tick{1};
+
+struct Nowhere final : FieldSink {
+  void put(const FieldValue&) override {}
+};
+
+Frame to_frame(Bytes bytes) { return {.bytes = bytes}; }
+Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty() ? nullptr : &frames.front()}; }
+
+template <class Item>
+bool equal(std::span<const Item> one, std::span<const Item> other) {
+  return std::equal(one.begin(), one.end(), other.begin(), other.end());
+}
+
+}  // namespace
+
+template <class Item>
+void ReplyGuard<Item>::attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat) {
+  close();
+  inner_ = &inner;
+  unit_ = &unit;
+  options_ = &options;
+  may_repeat_ = may_repeat;
+  tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
+}
+
+// ---- What is owed
+
+template <class Item>
+void ReplyGuard<Item>::close() {
+  const bool looked_after = phase_ == Phase::asking || phase_ == Phase::holding;  // and the conversation left
+  if (looked_after || (open_ && (!heard_ || doubtful_))) owe(request_, sent_at_);
+  open_ = false;
+  phase_ = Phase::passing;
+}
+
+template <class Item>
+bool ReplyGuard<Item>::is_request(const Step<Item>& step) const {
+  using Kind = typename Step<Item>::Kind;
+  if (step.kind == Kind::pulse) return step.line == Line::trigger;
+  if (step.kind != Kind::transfer || step.out.empty() || step.out.size() > Request::capacity()) return false;
+  return unit_->answered == nullptr || unit_->answered(*options_, to_frame(step.out));
+}
+
+template <class Item>
+bool ReplyGuard<Item>::is_reply(std::span<const Item> request, std::span<const Item> reply) const {
+  Nowhere nowhere;
+  return unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) == Error::none;
+}
+
+template <class Item>
+auto ReplyGuard<Item>::find(std::span<const Item> request) -> Owed* {
+  for (std::size_t i = 0; i < owed_.size(); ++i) {
+    if (equal(owed_[i].request.view(), request)) return &owed_[i];
+  }
+  return nullptr;
+}
+
+template <class Item>
+auto ReplyGuard<Item>::owed_to(std::span<const Item> reply) -> Owed* {
+  for (std::size_t i = 0; i < owed_.size(); ++i) {
+    if (is_reply(owed_[i].request, reply)) return &owed_[i];
+  }
+  return nullptr;
+}
+
+template <class Item>
+void ReplyGuard<Item>::owe(std::span<const Item> request, Time sent_at) {
+  Owed* owed = find(request);
+  if (owed == nullptr) {
+    if (owed_.size() == most_owed)
+      settle(*std::min_element(&owed_[0], &owed_[0] + most_owed,
+                               [](auto& one, auto& other) { return one.newest < other.newest; }));
+    Owed fresh;
+    fresh.oldest = sent_at;
+    fresh.request.append(request);
+    owed_.push_back(fresh);
+    owed = &owed_[owed_.size() - 1];
+  }
+  owed->newest = sent_at;
+  ++owed->count;
+}
+
+template <class Item>
+void ReplyGuard<Item>::settle(Owed& owed) {
+  Buffer<Owed, most_owed> left;
+  for (std::size_t i = 0; i < owed_.size(); ++i) {
+    if (&owed_[i] != &owed) left.push_back(owed_[i]);
+  }
+  owed_ = left;
+}
+
+template <class Item>
+Time ReplyGuard<Item>::quiet_time() const {
+  return std::min(std::max(quiet_limits * std::max(limit_, pending_.answer), lateness_ * 3 / 2), longest_quiet);
+}
+
+// ---- Steps
+
+template <class Item>
+Step<Item> ReplyGuard<Item>::next(Time now) {
+  for (;;) {
+    switch (phase_) {
+      case Phase::passing: {
+        const Step<Item> step = next_passing(now);
+        const bool asks = is_request(step);
+        if (asks || step.kind == Step<Item>::Kind::done) close();
+        if (!asks) return step;
+        begin(step, now);
+        break;
+      }
+      case Phase::before:
+        if (now < until_) return {.at = until_, .gap = pending_.gap};
+        return send(now);
+      case Phase::asking:
+        if (now < until_) {
+          const std::size_t due = pending_.expect - std::min(pending_.expect, reply_.size());
+          return {.expect = due, .at = until_, .answer = pending_.answer, .gap = pending_.gap};
+        }
+        // Something goes on that is no reply.
+        reply_.clear();
+        damaged_ = true;
+        conclude_asking(true);
+        break;
+      case Phase::holding:
+        if (now < until_) return {.at = until_, .gap = pending_.gap};
+        return end_holding(now);
+    }
+  }
+}
+
+// After each event that is told, the conversation is asked for its next step.
+template <class Item>
+Step<Item> ReplyGuard<Item>::next_passing(Time now) {
+  for (;;) {
+    const bool told = deliver();
+    const Step<Item> step = inner_->next(now);
+    if (!told || step.kind != Step<Item>::Kind::wait) return step;
+  }
+}
+
+template <class Item>
+bool ReplyGuard<Item>::deliver() {
+  using Kind = typename Event<Item>::Kind;
+  const auto due = [](bool& tell) { return tell && !(tell = false); };
+  if (due(tell_sent_)) {
+    inner_->feed({.kind = Kind::sent, .at = sent_at_});
+  } else if (due(tell_error_)) {
+    inner_->feed({.kind = Kind::line_error, .at = received_at_});
+  } else if (due(tell_reply_)) {
+    inner_->feed({.kind = Kind::received, .at = received_at_, .items = reply_});
+  } else if (due(tell_silence_)) {
+    inner_->feed({.kind = Kind::silence, .at = std::max(sent_at_, received_at_)});
+  } else {
+    return false;
+  }
+  return true;
+}
+
+template <class Item>
+void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
+  tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
+  pending_ = request;
+  reply_.clear();
+  latest_ = std::max(now, request.at) + 4 * longest_quiet;
+  // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
+  until_ = request.at > now + 1ms ? request.at : now + tick;
+  const Owed* owed = find(request.out);
+  if (owed != nullptr) until_ = std::max(until_, owed->newest + quiet_time());
+  phase_ = Phase::before;
+}
+
+template <class Item>
+Step<Item> ReplyGuard<Item>::send(Time now) {
+  request_.clear();
+  request_.append(pending_.out);
+  reply_.clear();
+  damaged_ = false;
+  sent_at_ = received_at_ = now;
+  if (owed_.empty()) {
+    phase_ = Phase::passing;
+    open_ = true;
+    heard_ = doubtful_ = false;
+  } else {
+    phase_ = Phase::asking;
+    until_ = never;
+  }
+  return pending_;
+}
+
+// ---- Events
+
+template <class Item>
+void ReplyGuard<Item>::feed(const Event<Item>& event) {
+  switch (phase_) {
+    case Phase::passing:
+      return feed_passing(event);
+    case Phase::asking:
+      return feed_asking(event);
+    case Phase::before:
+    case Phase::holding:
+      if (event.kind == Event<Item>::Kind::received) take_late(event.items, event.at);
+      return;
+  }
+}
+
+template <class Item>
+void ReplyGuard<Item>::feed_passing(const Event<Item>& event) {
+  using Kind = typename Event<Item>::Kind;
+  if (event.kind == Kind::sent) sent_at_ = event.at;
+  if (event.kind == Kind::received && open_) {
+    if constexpr (is_can) {
+      heard_ = heard_ || is_reply(request_, event.items);  // others send too
+    } else {
+      heard_ = true;
+    }
+  }
+  if (event.kind == Kind::silence && open_ && !heard_) limit_ = std::max(limit_, event.at - sent_at_);
+  inner_->feed(event);
+}
+
+template <class Item>
+void ReplyGuard<Item>::feed_asking(const Event<Item>& event) {
+  using Kind = typename Event<Item>::Kind;
+  switch (event.kind) {
+    case Kind::sent:
+      sent_at_ = event.at;
+      if (reply_.empty()) received_at_ = event.at;
+      until_ = sent_at_ + quiet_time() + longest_quiet;
+      break;
+    case Kind::received:
+      take(event.items, event.at);
+      break;
+    case Kind::line_error:
+      damaged_ = true;
+      break;
+    case Kind::silence:
+      if (reply_.empty()) limit_ = std::max(limit_, event.at - sent_at_);
+      conclude_asking(true);
+      break;
+    default:
+      break;
+  }
+}
+
+template <class Item>
+void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
+  for (const Item& item : items) {
+    if constexpr (is_can) {
+      const std::span<const Item> one(&item, 1);
+      if (!is_reply(request_, one) && owed_to(one) == nullptr) continue;
+    }
+    if (reply_.empty()) first_at_ = at;
+    reply_.push_back(item);
+  }
+  if (reply_.empty()) return;
+  received_at_ = at;
+  // Where the length is not known silence ends the reply: some begin with what is one already.
+  const std::size_t expected = is_can ? 1 : pending_.expect;
+  if (expected == 0 || reply_.size() < expected) return;
+  if (is_reply(request_, reply_) || owed_to(reply_) != nullptr) conclude_asking(false);
+}
+
+template <class Item>
+void ReplyGuard<Item>::conclude_asking(bool silent) {
+  if (!reply_.empty()) {
+    if (const Owed* owed = owed_to(reply_)) {
+      until_ =
+          std::min(sent_at_ + std::clamp((first_at_ - owed->oldest) * 5 / 4, quiet_time(), longest_quiet), latest_);
+      reply_.clear();
+      phase_ = Phase::holding;
+      return;
+    }
+  }
+  phase_ = Phase::passing;
+  tell_sent_ = true;
+  tell_error_ = damaged_;
+  tell_reply_ = !reply_.empty();
+  tell_silence_ = silent || reply_.empty();
+  open_ = true;
+  heard_ = !reply_.empty();
+  doubtful_ = !(heard_ && !damaged_ && is_reply(request_, reply_));
+  if (!doubtful_) owed_.clear();  // the line keeps the order: whatever was to come before this has come, or is lost
+}
+
+// Of bytes, the last ones that could be a whole reply are looked at: noise may come before them.
+template <class Item>
+void ReplyGuard<Item>::take_late(std::span<const Item> items, Time at) {
+  const std::size_t whole = is_can ? 1 : std::clamp<std::size_t>(pending_.expect, 1, Reply::capacity());
+  for (const Item& item : items) {
+    if (reply_.size() == whole) {
+      for (std::size_t i = 1; i < whole; ++i) reply_[i - 1] = reply_[i];
+      reply_[whole - 1] = item;
+    } else {
+      reply_.push_back(item);
+    }
+    if (reply_.size() == whole) look_at_late(at);
+  }
+}
+
+template <class Item>
+void ReplyGuard<Item>::look_at_late(Time at) {
+  Owed* const owed = owed_to(reply_);
+  if (owed == nullptr && (is_can || request_.empty() || !is_reply(request_, reply_))) return;
+  reply_.clear();
+  ++late_;
+  lateness_ = std::max(lateness_, at - (owed != nullptr ? owed->oldest : sent_at_));
+  if (owed != nullptr && --owed->count == 0) settle(*owed);
+  if (phase_ == Phase::before) {
+    // One too many: what was taken for the reply of the last request may have been another one's.
+    if (owed == nullptr) owe(request_, sent_at_);
+    if (owed_.empty()) {
+      until_ = std::max(at + pending_.gap, pending_.at);
+      return;
+    }
+  }
+  until_ = std::min(std::max(until_, at + quiet_time()), latest_);
+}
+
+template <class Item>
+Step<Item> ReplyGuard<Item>::end_holding(Time now) {
+  owed_.clear();
+  lateness_ /= 2;
+  if (may_repeat_) return send(now);
+  phase_ = Phase::passing;
+  reply_.clear();
+  received_at_ = sent_at_;
+  tell_sent_ = tell_silence_ = true;
+  open_ = false;
+  return next(now);
+}
+
+template class ReplyGuard<std::uint8_t>;
+template class ReplyGuard<CanFrame>;
+
+}  // namespace absenc::host

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keeps replies with their requests on a line where one may come late: no protocol of ours numbers them, so a reply
+// that comes after its host gave up would answer the next request, whose own reply would answer the one after, for
+// ever.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/link/step.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::host {
+
+/// Stands between a conversation and its line. Before each request it takes in what waits, and drops it. A request that
+/// was not answered is owed its reply, until that came, or until a good reply to the present request came that cannot
+/// be one to the owed: a line keeps the order. Where it could be either, time tells:
+///
+/// 1. the same request is sent again only when the line was quiet for four times the limit that was missed, and for
+///    half as much again as the latest reply was late;
+/// 2. what then comes first is not taken: it may be the owed reply;
+/// 3. the line is listened to for as long as that reply would have been late, and a quarter more: if it was, the
+///    present request's own is coming;
+/// 4. the request is sent once more where it may be, and its reply is taken; elsewhere the conversation is told that
+///    none came.
+template <class Item>
+class ReplyGuard final : public Machine<Item> {
+ public:
+  /// Serves this conversation from now on; `unit` and `options` must outlive it. `may_repeat`: whether each of its
+  /// requests may be sent once more.
+  void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
+  /// The conversation has ended, or is not gone on with.
+  void conclude() { close(); }
+
+  void feed(const Event<Item>& event) override;
+  Step<Item> next(Time now) override;
+
+  /// Replies that came after their time and were dropped.
+  [[nodiscard]] std::uint64_t late() const { return late_; }
+  /// From the end of a request to the latest of them, at the most: the oldest request that it can have answered.
+  [[nodiscard]] Time lateness() const { return lateness_; }
+
+ private:
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
+  static constexpr std::size_t most_owed = 8;
+  using Request = Buffer<Item, is_can ? 1 : 16>;
+  using Reply = Buffer<Item, is_can ? 1 : 64>;
+
+  /// Equal requests that were not answered.
+  struct Owed {
+    Request request;
+    Time oldest{};  // when they were sent
+    Time newest{};
+    unsigned count = 0;
+  };
+
+  enum class Phase : std::uint8_t {
+    passing,  // the conversation is on the line itself
+    before,   // its request waits until the line is quiet
+    asking,   // its request is out, and what comes is not passed on before it is known whose it is
+    holding,  // what came may be late: is the request's own still coming?
+  };
+
+  void close();
+  [[nodiscard]] bool is_request(const Step<Item>& step) const;
+  [[nodiscard]] bool is_reply(std::span<const Item> request, std::span<const Item> reply) const;
+  [[nodiscard]] Owed* find(std::span<const Item> request);
+  [[nodiscard]] Owed* owed_to(std::span<const Item> reply);
+  void owe(std::span<const Item> request, Time sent_at);
+  void settle(Owed& owed);
+  [[nodiscard]] Time quiet_time() const;
+
+  Step<Item> next_passing(Time now);
+  bool deliver();
+  void begin(const Step<Item>& request, Time now);
+  Step<Item> send(Time now);
+  void feed_passing(const Event<Item>& event);
+  void feed_asking(const Event<Item>& event);
+  void take(std::span<const Item> items, Time at);
+  void take_late(std::span<const Item> items, Time at);
+  void look_at_late(Time at);
+  void conclude_asking(bool silent);
+  Step<Item> end_holding(Time now);
+
+  Machine<Item>* inner_ = nullptr;
+  const Unit* unit_ = nullptr;
+  const Options* options_ = nullptr;
+  bool may_repeat_ = false;
+
+  Phase phase_ = Phase::passing;
+  Step<Item> pending_{};  // of the conversation, which waits for its `sent`
+  Time until_{};          // before, asking, holding: no longer than that
+  Time latest_{};         // no wait before or after the request is longer
+
+  Request request_{};      // the last one that went out
+  bool open_ = false;      // it may still be answered
+  bool heard_ = false;     // something came that may be its reply
+  bool doubtful_ = false;  // what came was none, while others were owed
+  Time sent_at_{};
+  Time received_at_{};
+  Time first_at_{};
+
+  Reply reply_{};  // asking: what came; before and holding: the end of it
+  bool damaged_ = false;
+  // What the conversation is still to be told.
+  bool tell_sent_ = false;
+  bool tell_error_ = false;
+  bool tell_reply_ = false;
+  bool tell_silence_ = false;
+
+  Buffer<Owed, most_owed> owed_{};
+  Time limit_{};  // the longest that was waited for a reply in vain
+  Time lateness_{};
+  std::uint64_t late_ = 0;
+};
+
+extern template class ReplyGuard<std::uint8_t>;
+extern template class ReplyGuard<CanFrame>;
+
+}  // namespace absenc::host

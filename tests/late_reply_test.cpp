@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+// Replies of any lateness, to any of the requests, on every unit whose replies can be late: no position that is shown is
+// older than its request. The shaft turns, so that its place tells the time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "absenc/host/session.hpp"
+#include "absenc/protocol/all.hpp"
+#include "absenc/sim/late_port_test.hpp"
+#include "absenc/sim/motion.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Kind {
+  const char* unit;
+  std::vector<OptionText> options;
+};
+
+const std::vector<Kind>& kinds() {
+  static const std::vector<Kind> all{
+      {"tformat", {}},
+      {"esl", {}},
+      {"encolink", {}},
+      {"e201", {}},
+      {"raa38", {{"mode", "bus"}, {"bits", "21"}}},
+      {"raa38", {{"mode", "handshake"}, {"bits", "21"}}},
+      {"raa38-modbus", {{"bits", "21"}}},
+      {"raa38-can", {{"bits", "21"}, {"cyclic", "0"}}},
+  };
+  return all;
+}
+
+struct Lateness {
+  const char* name;
+  Time time;
+  double share;  // of the replies
+};
+
+struct Shown {
+  unsigned good = 0;
+  unsigned failed = 0;
+  unsigned stale = 0;
+  Time oldest{};
+};
+
+constexpr double rpm = 6;
+
+template <class Item>
+class Bench {
+ public:
+  Bench(const Kind& kind, std::function<Time()> delay)
+      : unit(*find_unit(kind.unit)), options(resolve(kind)), device(*make_device()), line(unit.link, settings(), device),
+        port(line, std::move(delay)), session(unit, options, port, host_storage, host::EchoMode::automatic) {}
+
+  /// One reading, or what another command says of the position.
+  void read(const Command& command, bool confirmed, Shown& shown) {
+    const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
+    if (ended->error() != Error::none) {
+      ++shown.failed;
+      return;
+    }
+    const Reading* reading = ended->reading();
+    if (reading == nullptr || (confirmed && !session.confirmed())) return;
+    ++shown.good;
+    const Time age = age_of(*reading);
+    shown.oldest = std::max(shown.oldest, age);
+    if (age > 3ms) ++shown.stale;
+  }
+
+  /// How long before its own time, as the host has it, the encoder was where the reading says: by the truth.
+  Time age_of(const Reading& reading) const {
+    const auto fraction = static_cast<std::uint32_t>(reading.singleturn << (32 - reading.singleturn_bits));
+    const auto truth = static_cast<std::uint32_t>(shaft.at(reading.latched).position);
+    const auto behind = static_cast<std::int32_t>(truth - fraction);
+    const double seconds = std::ldexp(behind, -32) * 60 / rpm;
+    const double count = std::ldexp(60 / rpm, -static_cast<int>(reading.singleturn_bits));
+    return Time(static_cast<std::int64_t>(std::max(0.0, std::abs(seconds) - count) * 1e9));
+  }
+
+  LineSettings settings() const {
+    return (unit.settings != nullptr ? unit.settings(options) : unit.line).with_some_rate();
+  }
+
+  static Options resolve(const Kind& kind) {
+    Options options;
+    EXPECT_EQ(resolve_options(*find_unit(kind.unit), {}, kind.options, options).kind, OptionError::Kind::none);
+    return options;
+  }
+
+  Device<Item>* make_device() {
+    device_storage.resize(unit.device_storage);
+    host_storage.resize(unit.host_storage);
+    const Any<Device> made = unit.device(options, shaft, device_storage);
+    Device<Item>* device_made = nullptr;
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      device_made = made.frames;
+    } else {
+      device_made = made.bytes;
+    }
+    device_made->power_on(Time{}, Device<Item>::PowerOn::skip);
+    return device_made;
+  }
+
+  const Unit& unit;
+  Options options;
+  sim::Motion shaft = sim::Motion::constant_speed(0, rpm);
+  std::vector<std::byte> device_storage;
+  std::vector<std::byte> host_storage;
+  Device<Item>& device;
+  sim::SimPort<Item> line;
+  sim::testing::LatePort<Item> port;
+  host::Session<Item> session;
+};
+
+std::string name_of(const Kind& kind) {
+  return std::string(kind.unit) + (kind.options.empty() || kind.options[0].name != "mode"
+                                       ? std::string{}
+                                       : "-" + std::string(kind.options[0].value));
+}
+
+/// Readings at a rate, some of whose replies are late.
+template <class Item>
+Shown run_on(const Kind& kind, const Lateness& lateness, Time period, unsigned count, std::uint64_t seed) {
+  sim::Random random(seed);
+  Bench<Item> bench(kind, [&] { return random.chance(lateness.share) ? lateness.time : Time{}; });
+  const Command& command = *find_command(bench.unit, Verb::read);
+  Shown shown;
+  Time due{};
+  for (unsigned i = 0; i < count; ++i) {
+    bench.read(command, true, shown);
+    due = std::max(due + period, bench.port.now());
+    bench.port.rest(due);
+  }
+  return shown;
+}
+
+Shown run(const Kind& kind, const Lateness& lateness, Time period, unsigned count, std::uint64_t seed) {
+  return find_unit(kind.unit)->link == LinkKind::can ? run_on<CanFrame>(kind, lateness, period, count, seed)
+                                                     : run_on<std::uint8_t>(kind, lateness, period, count, seed);
+}
+
+class LateReply : public ::testing::TestWithParam<std::size_t> {
+ protected:
+  const Kind& kind = kinds()[GetParam()];
+};
+
+// Every lateness from a hiccup to seconds, also such that a reply comes just when the next is expected.
+TEST_P(LateReply, IsNeverShownForALaterRequest) {
+  constexpr unsigned readings = 40;
+  for (const Time period : {Time{}, Time{1ms}, Time{10ms}, Time{100ms}, Time{500ms}, Time{2s}}) {
+    for (const Lateness& lateness : std::initializer_list<Lateness>{{"0", 0ms, 0},
+                                                                    {"1 ms", 1ms, 0.3},
+                                                                    {"20 ms", 20ms, 0.05},
+                                                                    {"20 ms", 20ms, 1},
+                                                                    {"100 ms", 100ms, 0.05},
+                                                                    {"100 ms", 100ms, 0.5},
+                                                                    {"100 ms", 100ms, 1},
+                                                                    {"250 ms", 250ms, 1},
+                                                                    {"500 ms", 500ms, 0.2},
+                                                                    {"1 s", 1s, 1},
+                                                                    {"2 s", 2s, 1},
+                                                                    {"2 s", 2s, 0.1},
+                                                                    {"5 s", 5s, 0.1}}) {
+      const Shown shown = run(kind, lateness, period, readings, 1);
+      std::printf("%-15s every %5lld ms, %3.0f %% of the replies %-6s late: %3u good, %3u failed, %3u stale, oldest %.1f ms\n",
+                  name_of(kind).c_str(), static_cast<long long>(period / 1ms), 100 * lateness.share, lateness.name,
+                  shown.good, shown.failed, shown.stale, static_cast<double>(shown.oldest.count()) / 1e6);
+      EXPECT_EQ(shown.stale, 0u) << lateness.name << " " << lateness.share << " every " << period / 1ms << " ms";
+      if (lateness.share == 0) {
+        EXPECT_EQ(shown.good, readings);
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, LateReply, ::testing::Range<std::size_t>(0, kinds().size()), [](const auto& test) {
+  std::string name = name_of(kinds()[test.param]);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
+
+}  // namespace
+}  // namespace absenc
