@@ -20,6 +20,23 @@ struct Nowhere final : FieldSink {
 Frame to_frame(Bytes bytes) { return {.bytes = bytes}; }
 Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty() ? nullptr : &frames.front()}; }
 
+template <class Buffer>
+void drop_first(Buffer& buffer, std::size_t count = 1) {
+  const Buffer all = buffer;
+  buffer.clear();
+  buffer.append(all.view().subspan(count));
+}
+
+template <class Owed>
+Time newest(const Owed& owed) {
+  return owed.sent_at.empty() ? owed.lost_last : owed.sent_at[owed.sent_at.size() - 1];
+}
+
+template <class Owed>
+Time oldest(const Owed& owed) {
+  return owed.lost != 0 ? owed.lost_first : owed.sent_at[0];
+}
+
 template <class Item>
 bool equal(std::span<const Item> one, std::span<const Item> other) {
   return std::equal(one.begin(), one.end(), other.begin(), other.end());
@@ -42,7 +59,7 @@ void ReplyGuard<Item>::attach(Machine<Item>& inner, const Unit& unit, const Opti
 template <class Item>
 void ReplyGuard<Item>::close() {
   const bool looked_after = phase_ == Phase::asking || phase_ == Phase::holding;  // and the conversation left
-  if (looked_after || (open_ && (!heard_ || doubtful_))) owe(request_, sent_at_);
+  if (looked_after || (open_ && (!heard_ || doubtful_))) owe();
   open_ = false;
   phase_ = Phase::passing;
 }
@@ -77,21 +94,25 @@ auto ReplyGuard<Item>::owed_to(std::span<const Item> reply) -> Owed* {
   return nullptr;
 }
 
+// The last request.
 template <class Item>
-void ReplyGuard<Item>::owe(std::span<const Item> request, Time sent_at) {
-  Owed* owed = find(request);
+void ReplyGuard<Item>::owe() {
+  Owed* owed = find(request_);
   if (owed == nullptr) {
-    if (owed_.size() == most_owed)
-      settle(*std::min_element(&owed_[0], &owed_[0] + most_owed,
-                               [](auto& one, auto& other) { return one.newest < other.newest; }));
-    Owed fresh;
-    fresh.oldest = sent_at;
-    fresh.request.append(request);
-    owed_.push_back(fresh);
+    if (owed_.size() == most_owed) {
+      const auto older = [](const Owed& one, const Owed& other) { return newest(one) < newest(other); };
+      settle(*std::min_element(&owed_[0], &owed_[0] + most_owed, older));
+    }
+    owed_.push_back({.request = request_, .expect = expect_});
     owed = &owed_[owed_.size() - 1];
   }
-  owed->newest = sent_at;
-  ++owed->count;
+  if (!owed->sent_at.push_back(sent_at_)) {
+    owed->lost_first = oldest(*owed);
+    owed->lost_last = owed->sent_at[0];
+    ++owed->lost;
+    drop_first(owed->sent_at);
+    owed->sent_at.push_back(sent_at_);
+  }
 }
 
 template <class Item>
@@ -105,7 +126,12 @@ void ReplyGuard<Item>::settle(Owed& owed) {
 
 template <class Item>
 Time ReplyGuard<Item>::quiet_time() const {
-  return std::min(std::max(quiet_limits * std::max(limit_, pending_.answer), lateness_ * 3 / 2), longest_quiet);
+  return std::min(std::max(quiet_limits * std::max(limit_, pending_.answer), lateness_ * 3 / 2), longest_wait());
+}
+
+template <class Item>
+Time ReplyGuard<Item>::longest_wait() const {
+  return std::max(longest_quiet, lateness_ * 3 / 2);
 }
 
 // ---- Steps
@@ -175,11 +201,11 @@ void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
   tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
   pending_ = request;
   reply_.clear();
-  latest_ = std::max(now, request.at) + 4 * longest_quiet;
+  latest_ = std::max(now, request.at) + 4 * longest_wait();
   // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
   until_ = request.at > now + 1ms ? request.at : now + tick;
   const Owed* owed = find(request.out);
-  if (owed != nullptr) until_ = std::max(until_, owed->newest + quiet_time());
+  if (owed != nullptr) until_ = std::max(until_, newest(*owed) + quiet_time());
   phase_ = Phase::before;
 }
 
@@ -187,6 +213,14 @@ template <class Item>
 Step<Item> ReplyGuard<Item>::send(Time now) {
   request_.clear();
   request_.append(pending_.out);
+  expect_ = pending_.expect;
+  asked_ = true;
+  if (Owed* const owed = find(request_)) {
+    owed->lost_last = newest(*owed);
+    owed->lost_first = std::max(oldest(*owed), owed->lost_last - longest_wait());
+    owed->lost += static_cast<unsigned>(owed->sent_at.size());
+    owed->sent_at.clear();
+  }
   reply_.clear();
   damaged_ = false;
   sent_at_ = received_at_ = now;
@@ -213,6 +247,7 @@ void ReplyGuard<Item>::feed(const Event<Item>& event) {
     case Phase::before:
     case Phase::holding:
       if (event.kind == Event<Item>::Kind::received) take_late(event.items, event.at);
+      if (event.kind == Event<Item>::Kind::silence) pause_late(event.at);
       return;
   }
 }
@@ -228,6 +263,12 @@ void ReplyGuard<Item>::feed_passing(const Event<Item>& event) {
       heard_ = true;
     }
   }
+  if constexpr (is_can) {
+    // Whoever only listens is not answered: what comes of that was owed to others.
+    if (event.kind == Kind::received && !open_ && !owed_.empty()) {
+      if (Owed* const owed = owed_to(event.items)) return count_late(owed, event.at);
+    }
+  }
   if (event.kind == Kind::silence && open_ && !heard_) limit_ = std::max(limit_, event.at - sent_at_);
   inner_->feed(event);
 }
@@ -239,7 +280,7 @@ void ReplyGuard<Item>::feed_asking(const Event<Item>& event) {
     case Kind::sent:
       sent_at_ = event.at;
       if (reply_.empty()) received_at_ = event.at;
-      until_ = sent_at_ + quiet_time() + longest_quiet;
+      until_ = sent_at_ + quiet_time() + longest_wait();
       break;
     case Kind::received:
       take(event.items, event.at);
@@ -266,6 +307,7 @@ void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
     if (reply_.empty()) first_at_ = at;
     reply_.push_back(item);
   }
+  if (!is_can) strip_late(at);
   if (reply_.empty()) return;
   received_at_ = at;
   // Where the length is not known silence ends the reply: some begin with what is one already.
@@ -274,12 +316,47 @@ void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
   if (is_reply(request_, reply_) || owed_to(reply_) != nullptr) conclude_asking(false);
 }
 
+// What begins with the reply to another request is that, and what is behind it may be this one's.
+template <class Item>
+void ReplyGuard<Item>::strip_late(Time at) {
+  for (std::size_t i = 0; i < owed_.size();) {
+    const std::size_t size = owed_[i].expect;
+    const std::span<const Item> start = reply_.view().first(std::min(size, reply_.size()));
+    if (size == 0 || start.size() < size || !is_reply(owed_[i].request, start) || is_reply(request_, start)) {
+      ++i;
+      continue;
+    }
+    count_late(&owed_[i], at);
+    drop_first(reply_, size);
+    first_at_ = at;
+    i = 0;
+  }
+}
+
+template <class Item>
+void ReplyGuard<Item>::count_late(Owed* owed, Time at) {
+  ++late_;
+  Time sent_at = sent_at_;
+  if (owed != nullptr) sent_at = owed->sent_at.empty() ? owed->lost_last : owed->sent_at[0];
+  lateness_ = std::max(lateness_, at - sent_at);
+  if (phase_ == Phase::holding) lateness_ = std::max(lateness_, suspected_);  // another one comes: it was
+  latest_reply_ = std::max(latest_reply_, lateness_);
+  if (owed == nullptr) return;
+  // It may be one that was taken for lost: then the one of the next is still to come.
+  if (owed->lost != 0) {
+    --owed->lost;
+  } else {
+    drop_first(owed->sent_at);
+  }
+  if (owed->lost == 0 && owed->sent_at.empty()) settle(*owed);
+}
+
 template <class Item>
 void ReplyGuard<Item>::conclude_asking(bool silent) {
   if (!reply_.empty()) {
     if (const Owed* owed = owed_to(reply_)) {
-      until_ =
-          std::min(sent_at_ + std::clamp((first_at_ - owed->oldest) * 5 / 4, quiet_time(), longest_quiet), latest_);
+      suspected_ = first_at_ - oldest(*owed);
+      until_ = std::min(sent_at_ + std::clamp(suspected_ * 5 / 4, quiet_time(), longest_wait()), latest_);
       reply_.clear();
       phase_ = Phase::holding;
       return;
@@ -296,32 +373,44 @@ void ReplyGuard<Item>::conclude_asking(bool silent) {
   if (!doubtful_) owed_.clear();  // the line keeps the order: whatever was to come before this has come, or is lost
 }
 
-// Of bytes, the last ones that could be a whole reply are looked at: noise may come before them.
+// Where the length of a reply is known, the last ones that could be it are looked at: noise may come before them.
 template <class Item>
 void ReplyGuard<Item>::take_late(std::span<const Item> items, Time at) {
-  const std::size_t whole = is_can ? 1 : std::clamp<std::size_t>(pending_.expect, 1, Reply::capacity());
   for (const Item& item : items) {
-    if (reply_.size() == whole) {
-      for (std::size_t i = 1; i < whole; ++i) reply_[i - 1] = reply_[i];
-      reply_[whole - 1] = item;
-    } else {
-      reply_.push_back(item);
+    if (reply_.size() == Reply::capacity()) drop_first(reply_);
+    reply_.push_back(item);
+    for (std::size_t i = 0; i < owed_.size(); ++i) {
+      if (ends_with_reply(owed_[i].request, owed_[i].expect)) return end_late(&owed_[i], at);
     }
-    if (reply_.size() == whole) look_at_late(at);
+    // One too many: what was taken for the reply to the last request may have been another one's.
+    if (!is_can && asked_ && ends_with_reply(request_, expect_)) end_late(nullptr, at);
   }
 }
 
+// Elsewhere silence ends it.
 template <class Item>
-void ReplyGuard<Item>::look_at_late(Time at) {
-  Owed* const owed = owed_to(reply_);
-  if (owed == nullptr && (is_can || request_.empty() || !is_reply(request_, reply_))) return;
+void ReplyGuard<Item>::pause_late(Time at) {
+  if (reply_.empty()) return;
+  if (Owed* const owed = owed_to(reply_)) {
+    end_late(owed, at);
+  } else if (!is_can && asked_ && is_reply(request_, reply_)) {
+    end_late(nullptr, at);
+  }
   reply_.clear();
-  ++late_;
-  lateness_ = std::max(lateness_, at - (owed != nullptr ? owed->oldest : sent_at_));
-  if (owed != nullptr && --owed->count == 0) settle(*owed);
+}
+
+template <class Item>
+bool ReplyGuard<Item>::ends_with_reply(std::span<const Item> request, std::size_t expect) const {
+  const std::size_t size = is_can ? 1 : expect;
+  return size != 0 && reply_.size() >= size && is_reply(request, reply_.view().last(size));
+}
+
+template <class Item>
+void ReplyGuard<Item>::end_late(Owed* owed, Time at) {
+  reply_.clear();
+  count_late(owed, at);
   if (phase_ == Phase::before) {
-    // One too many: what was taken for the reply of the last request may have been another one's.
-    if (owed == nullptr) owe(request_, sent_at_);
+    if (owed == nullptr) owe();
     if (owed_.empty()) {
       until_ = std::max(at + pending_.gap, pending_.at);
       return;
@@ -333,7 +422,7 @@ void ReplyGuard<Item>::look_at_late(Time at) {
 template <class Item>
 Step<Item> ReplyGuard<Item>::end_holding(Time now) {
   owed_.clear();
-  lateness_ /= 2;
+  lateness_ -= lateness_ / 16;
   if (may_repeat_) return send(now);
   phase_ = Phase::passing;
   reply_.clear();

@@ -40,21 +40,24 @@ class ReplyGuard final : public Machine<Item> {
 
   /// Replies that came after their time and were dropped.
   [[nodiscard]] std::uint64_t late() const { return late_; }
-  /// From the end of a request to the latest of them, at the most: the oldest request that it can have answered.
-  [[nodiscard]] Time lateness() const { return lateness_; }
+  /// How long after its request the latest of them came; 0: none did.
+  [[nodiscard]] Time lateness() const { return latest_reply_; }
 
  private:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
-  static constexpr std::size_t most_owed = 8;
+  static constexpr std::size_t most_owed = 4;
   using Request = Buffer<Item, is_can ? 1 : 16>;
   using Reply = Buffer<Item, is_can ? 1 : 64>;
 
   /// Equal requests that were not answered.
   struct Owed {
     Request request;
-    Time oldest{};  // when they were sent
-    Time newest{};
-    unsigned count = 0;
+    std::size_t expect = 0;     // items of the reply, 0 where that is not known before
+    Buffer<Time, 4> sent_at{};  // of each, the oldest first
+    // After these the line was quiet for so long that their replies are lost, most likely: the first and the last.
+    Time lost_first{};
+    Time lost_last{};
+    unsigned lost = 0;
   };
 
   enum class Phase : std::uint8_t {
@@ -69,9 +72,10 @@ class ReplyGuard final : public Machine<Item> {
   [[nodiscard]] bool is_reply(std::span<const Item> request, std::span<const Item> reply) const;
   [[nodiscard]] Owed* find(std::span<const Item> request);
   [[nodiscard]] Owed* owed_to(std::span<const Item> reply);
-  void owe(std::span<const Item> request, Time sent_at);
+  void owe();
   void settle(Owed& owed);
   [[nodiscard]] Time quiet_time() const;
+  [[nodiscard]] Time longest_wait() const;
 
   Step<Item> next_passing(Time now);
   bool deliver();
@@ -80,8 +84,12 @@ class ReplyGuard final : public Machine<Item> {
   void feed_passing(const Event<Item>& event);
   void feed_asking(const Event<Item>& event);
   void take(std::span<const Item> items, Time at);
+  void strip_late(Time at);
+  void count_late(Owed* owed, Time at);
   void take_late(std::span<const Item> items, Time at);
-  void look_at_late(Time at);
+  void pause_late(Time at);
+  [[nodiscard]] bool ends_with_reply(std::span<const Item> request, std::size_t expect) const;
+  void end_late(Owed* owed, Time at);
   void conclude_asking(bool silent);
   Step<Item> end_holding(Time now);
 
@@ -95,13 +103,16 @@ class ReplyGuard final : public Machine<Item> {
   Time until_{};          // before, asking, holding: no longer than that
   Time latest_{};         // no wait before or after the request is longer
 
-  Request request_{};      // the last one that went out
+  Request request_{};   // the last one that went out; of a pulse empty
+  bool asked_ = false;  // there was one
+  std::size_t expect_ = 0;
   bool open_ = false;      // it may still be answered
   bool heard_ = false;     // something came that may be its reply
   bool doubtful_ = false;  // what came was none, while others were owed
   Time sent_at_{};
   Time received_at_{};
   Time first_at_{};
+  Time suspected_{};  // holding: how late what came is, if it is
 
   Reply reply_{};  // asking: what came; before and holding: the end of it
   bool damaged_ = false;
@@ -112,8 +123,9 @@ class ReplyGuard final : public Machine<Item> {
   bool tell_silence_ = false;
 
   Buffer<Owed, most_owed> owed_{};
-  Time limit_{};  // the longest that was waited for a reply in vain
-  Time lateness_{};
+  Time limit_{};     // the longest that was waited for a reply in vain
+  Time lateness_{};  // that is allowed for: fades
+  Time latest_reply_{};
   std::uint64_t late_ = 0;
 };
 

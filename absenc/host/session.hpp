@@ -115,6 +115,7 @@ class Session {
   template <class OnEmit>
   const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     const unsigned attempts = command.repeatable ? attempts_ : 1;
+    const std::uint64_t late_before = guard_->late();
     for (unsigned number = 1;; ++number) {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
@@ -131,6 +132,7 @@ class Session {
       ++counters_.errors[static_cast<std::size_t>(error)];
       if (error == Error::timeout) doubt();  // it may have been switched off
       if (number >= attempts || error == Error::invalid_argument) return conversation;
+      if (error == Error::timeout && guard_->late() != late_before) return conversation;  // it would be late again
       ++counters_.repeated;
     }
   }

@@ -226,7 +226,7 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   bench.faulty->set_rates({});
   const auto before = bench.device->answered();
   EXPECT_EQ(bench.read().error(), Error::none);
-  EXPECT_EQ(bench.device->answered(), before + 2);
+  EXPECT_EQ(bench.device->answered(), before + 3);  // the first could have been the late reply to one of before
 }
 
 TEST(Session, AnInvalidPositionIsNeverConfirmed) {

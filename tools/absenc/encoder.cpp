@@ -40,6 +40,7 @@ class EncoderOn final : public Encoder {
     } else {
       port_.attach(*link_->link().bytes);
     }
+    session_.share(link_->guard<Item>());
     session_.doubt();
   }
 
@@ -104,6 +105,7 @@ class EncoderOn final : public Encoder {
     trouble.exchange = exchange(trouble);
     const std::string_view advice = outcome.advice.empty() ? text_of(outcome.error).advice : outcome.advice;
     trouble.advice = diagnosis.advice.empty() ? std::string(advice) : diagnosis.advice;
+    tell_lateness(trouble);
     return trouble;
   }
 
@@ -115,6 +117,19 @@ class EncoderOn final : public Encoder {
     last_ = conversation;
     return {conversation->error(), conversation->detail(), conversation->advice(), aborting_.take_aborted(),
             conversation->reading()};
+  }
+
+  // A reply that comes, only too late, is another trouble than one that never comes.
+  void tell_lateness(Trouble& trouble) const {
+    const Time lateness = session_.lateness();
+    if (trouble.error != Error::timeout || lateness == Time{}) return;
+    trouble.message += fmt::format(
+        ": replies came up to {} after their requests, later than its limit, and were dropped", to_text(lateness));
+    if (uri().place == Place::sim) return;
+    trouble.advice = fmt::format(
+        "allow the way so long with latency={} (milliseconds) behind the encoder, or find what "
+        "holds replies up: a busy computer, a network, the latency timer of a USB adapter",
+        std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count());
   }
 
   // Of a conversation that sent nothing.
@@ -221,12 +236,15 @@ void print_notes(const Encoder& encoder) {
 
 std::string summary(const host::Counters& counters) {
   std::string text = fmt::format("{} good", counters.good);
-  if (counters.bad() == 0) return text;
-  std::vector<std::string> kinds;
-  for (std::size_t i = 0; i < counters.errors.size(); ++i) {
-    if (counters.errors[i] != 0) kinds.push_back(fmt::format("{} {}", counters.errors[i], error_texts[i].name));
+  if (counters.bad() != 0) {
+    std::vector<std::string> kinds;
+    for (std::size_t i = 0; i < counters.errors.size(); ++i) {
+      if (counters.errors[i] != 0) kinds.push_back(fmt::format("{} {}", counters.errors[i], error_texts[i].name));
+    }
+    text += fmt::format(", {} failed ({}), {} repeated", counters.bad(), fmt::join(kinds, ", "), counters.repeated);
   }
-  return text + fmt::format(", {} failed ({}), {} repeated", counters.bad(), fmt::join(kinds, ", "), counters.repeated);
+  if (counters.late != 0) text += fmt::format(", {} came too late and were dropped", counters.late);
+  return text;
 }
 
 Json errors_to_json(const host::Counters& counters) {

@@ -16,7 +16,7 @@ struct Link {
   std::shared_ptr<void> owner;
   Port<std::uint8_t>* bytes = nullptr;  // exactly one is set
   Port<CanFrame>* frames = nullptr;
-  Time latency{};
+  Time latency{};  // of the way to the line
   std::string place;               // "/dev/ttyUSB0 at 2500000 baud"
   std::vector<std::string> notes;  // what could be better about it
 };

@@ -8,8 +8,10 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
+#include "absenc/host/reply_guard.hpp"
 #include "absenc/os/error.hpp"
 #include "tools/absenc/link.hpp"
 
@@ -62,10 +64,22 @@ class SharedLink {
 
   [[nodiscard]] const Link& link() const { return link_; }
 
+  /// What is known of late replies on this line; to be used in one's turn.
+  template <class Item>
+  [[nodiscard]] host::ReplyGuard<Item>& guard() {
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      return frame_guard_;
+    } else {
+      return byte_guard_;
+    }
+  }
+
  private:
   void lose(const os::Failure& failure);
 
   Link link_;
+  host::ReplyGuard<std::uint8_t> byte_guard_;
+  host::ReplyGuard<CanFrame> frame_guard_;
   Turns turns_;
   // Not the exception itself: threads must not share one.
   struct Loss {

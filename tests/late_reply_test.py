@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Late replies, end to end: between the command and a virtual encoder stands a way that holds replies up. Whatever is
+shown belongs to the last request that had been sent when it came. On pseudo-terminals and over TCP."""
+import json
+import os
+import re
+import select
+import socket
+import threading
+import time
+import tempfile
+import tty
+import unittest
+
+from command_support import Emulator, absenc, end
+
+ENCODERS = {  # what the command says of an encoder that turns, and the length of the request and reply of a position
+    "tformat": ("tformat", "", 1, 11),
+    "esl": ("esl", "", 2, 18),
+    "e201": ("e201", "", 1, 17),
+    "raa38-modbus": ("raa38-modbus", "?bits=16", 8, None),
+    "raa38": ("raa38", "?mode=bus&bits=16", 3, 5),
+}
+
+
+class Way(threading.Thread):
+    """Passes bytes between a host and an encoder, the replies late: `delay(n)` seconds for the n-th. Keeps the order."""
+
+    def __init__(self, host, encoder, delay):
+        super().__init__(daemon=True)
+        self.host, self.encoder, self.delay = host, encoder, delay
+        self.requests = 0  # bursts of the host so far
+        self.passed = []   # (burst of the host it answers, bursts of the host when it was passed on, bytes)
+        self.held = []     # (time to pass on, burst, bytes)
+        self.replies = 0
+        self.stop, self.wake = os.pipe()
+
+    def run(self):
+        while True:
+            now = time.monotonic()
+            while self.held and self.held[0][0] <= now:
+                _, burst, data = self.held.pop(0)
+                self.passed.append((burst, self.requests, data))
+                os.write(self.host, data)
+            limit = max(0, self.held[0][0] - now) if self.held else None
+            ready = select.select([self.host, self.encoder, self.stop], [], [], limit)[0]
+            if self.stop in ready:
+                return
+            if self.encoder in ready:
+                data = os.read(self.encoder, 4096)
+                at = time.monotonic() + self.delay(self.replies)
+                self.replies += 1
+                last = self.held[-1][0] if self.held else 0
+                self.held.append((max(at, last), self.requests, data))
+            if self.host in ready:
+                try:
+                    data = os.read(self.host, 4096)
+                except OSError:  # a pseudo-terminal whose host has closed it
+                    time.sleep(0.001)
+                    continue
+                if not data:
+                    return
+                self.requests += 1
+                os.write(self.encoder, data)
+
+    def fresh(self):
+        """The replies that came before the host had asked for anything else."""
+        return [data for burst, asked, data in self.passed if burst == asked]
+
+    def end(self):
+        os.write(self.wake, b".")
+        self.join()
+
+
+def raw(descriptor):
+    tty.setraw(descriptor)
+    return descriptor
+
+
+class LateReplyTest(unittest.TestCase):
+    def setUp(self):
+        self.directory = tempfile.TemporaryDirectory(prefix="absenc.")
+        self.addCleanup(self.directory.cleanup)
+
+    def pty_way(self, encoder, delay):
+        """An emulator behind a way, and the path of the host's end."""
+        unit, _, _, _ = ENCODERS[encoder]
+        options = [f"--option={option}" for option in ENCODERS[encoder][1].lstrip("?").split("&") if option]
+        emulator = Emulator(self.directory.name, "--motion", "rpm=6", *options, protocol=unit)
+        self.addCleanup(end, emulator.process)
+        master, slave = os.openpty()
+        raw(slave)
+        path = os.ttyname(slave)
+        far = raw(os.open(emulator.path, os.O_RDWR | os.O_NOCTTY))
+        way = Way(master, far, delay)
+        way.start()
+        self.addCleanup(lambda: [os.close(descriptor) for descriptor in (master, slave, far)])
+        self.addCleanup(way.end)
+        return way, f"{encoder}:{path}{ENCODERS[encoder][1]}"
+
+    def tcp_way(self, encoder, delay):
+        way, _ = self.pty_way(encoder, delay)
+        server = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(server.close)
+
+        def serve():
+            connection, _ = server.accept()
+            way.end()
+            over_tcp = Way(connection.fileno(), way.encoder, delay)
+            self.over_tcp = over_tcp
+            with connection:
+                over_tcp.run()
+
+        threading.Thread(target=serve, daemon=True).start()
+        return f"{encoder}:tcp:127.0.0.1:{server.getsockname()[1]}{ENCODERS[encoder][1]}"
+
+    def positions_in(self, encoder, replies):
+        """What the library makes of these replies, read alone."""
+        unit, options, _, _ = ENCODERS[encoder]
+        request = {"tformat": "1A", "esl": None, "e201": "34", "raa38": "BC AA B1", "raa38-modbus": None}[encoder]
+        found = set()
+        for data in set(replies):
+            words = ["decode", unit, "--hex", data.hex(" "), "--json"]
+            for option in options.lstrip("?").split("&"):
+                words += ["--option", option] if option else []
+            if request:
+                words += ["--request", request]
+            row = json.loads(absenc(*words).stdout.splitlines()[-1])
+            if row["ok"]:
+                found.add(row["fields"].get("singleturn", row["fields"].get("position")))
+        return found
+
+    def check(self, encoder, way, rows):
+        shown = [row["singleturn"] for row in rows if row.get("ok", True) and row.get("singleturn") is not None]
+        fresh = self.positions_in(encoder, way.fresh())
+        stale = [position for position in shown if position not in fresh]
+        self.assertEqual(stale, [], f"{len(stale)} of {len(shown)} positions are older than their request")
+        return len(shown)
+
+    def test_one_late_reply(self):
+        """One reply 60 ms late: the hiccup that made each later reading the one before."""
+        for encoder in ENCODERS:
+            with self.subTest(encoder):
+                way, address = self.pty_way(encoder, lambda n: 0.06 if n == 6 else 0)
+                done = absenc("read", address, "--count", "20", "--rate", "50", "--json")
+                rows = [json.loads(line) for line in done.stdout.splitlines()]
+                self.assertGreater(self.check(encoder, way, rows), 10)
+
+    def test_constant_lateness(self):
+        """Each reply is later than its limit: an error that says so and what to do, not positions."""
+        for encoder in ("tformat", "esl", "e201"):
+            with self.subTest(encoder):
+                way, address = self.pty_way(encoder, lambda n: 0.25)
+                done = absenc("read", address, "--count", "3", "--json")
+                rows = [json.loads(line) for line in done.stdout.splitlines()]
+                self.check(encoder, way, rows)
+                self.assertEqual(done.returncode, 1, done.stdout)
+                self.assertIn("latency=", rows[-1]["advice"], rows)
+                # And it helps.
+                told = re.search(r"latency=(\d+)", rows[-1]["advice"]).group(1)
+                joined = "&" if "?" in address else "?"
+                done = absenc("read", f"{address}{joined}latency={told}", "--count", "3", "--json")
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_record_and_bench(self):
+        for encoder in ("tformat", "raa38"):
+            with self.subTest(encoder):
+                way, address = self.pty_way(encoder, lambda n: 0.1 if n % 7 == 5 else 0)
+                path = os.path.join(self.directory.name, f"{encoder}.jsonl")
+                done = absenc("record", address, "--rate", "100", "--for", "1", "--output", path)
+                self.assertIn(done.returncode, (0, 1), done.stderr)
+                with open(path, encoding="utf-8") as file:
+                    rows = [json.loads(line) for line in file]
+                self.assertGreater(self.check(encoder, way, rows), 0)
+
+    def test_over_tcp(self):
+        for encoder in ("tformat", "e201"):
+            with self.subTest(encoder):
+                address = self.tcp_way(encoder, lambda n: 0.25)
+                done = absenc("read", address, "--count", "5", "--rate", "10", "--json")
+                rows = [json.loads(line) for line in done.stdout.splitlines()]
+                self.check(encoder, self.over_tcp, rows)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn("latency=", rows[-1]["advice"], rows)
+
+
+if __name__ == "__main__":
+    unittest.main()
