@@ -164,7 +164,7 @@ class Bytes(MemoryCase):
         address = self.encoder()
         status, shown = self.ask(address, b"n\n")
         self.assertEqual(status, 1)
-        self.assertIn("1 of 1 byte differs; writing takes one of the 100000", shown)
+        self.assertIn("1 of 1 byte differs; each byte takes one of 100000 writes in total", shown)
         self.assertIn("nothing was changed", shown)
         self.assertEqual(self.dump(address), EMPTY)
         status, shown = self.ask(address, b"y\n")

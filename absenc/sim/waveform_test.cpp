@@ -187,8 +187,8 @@ TEST(Waveform, HandsOverWhatIsSettled) {
   line.attach(Role::host, host);
   line.attach(Role::device, device);
   line.run_until(45us);  // within the fourth character of both
-  EXPECT_EQ(line.settled(), 34us);
-  EXPECT_EQ(counter.last, 30us);
+  EXPECT_EQ(line.settled(), 40us);
+  EXPECT_EQ(counter.last, 33us);
   EXPECT_EQ(counter.commented, 30us);
   line.run_until(100us);
   EXPECT_EQ(line.settled(), 100us);
