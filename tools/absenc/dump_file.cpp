@@ -178,9 +178,8 @@ std::string to_dump(const Unit& unit, const Options& options, const MemoryImage&
     text += line + '\n';
   }
   text +=
-      "# After editing: make the next line \"checksum: edited\". Bytes that are not in this file are neither written "
-      "nor "
-      "compared.\n";
+      "# After editing: make the number in the next line \"edited\". Bytes that are not in this file are neither "
+      "written nor compared.\n";
   return text + fmt::format("{}{}\n", checksum_name, sum.text());
 }
 
