@@ -23,7 +23,8 @@ void require_regular(bool regular, const std::string& path) {
 }  // namespace
 
 KeptFile::KeptFile(const std::string& path) : path_(path) {
-  for (;;) {
+  constexpr int most_tries = 100;
+  for (int tries = 0; tries < most_tries; ++tries) {
     // To open a device may already do something to it.
     struct stat named {};
     const bool there = ::stat(path.c_str(), &named) == 0;
@@ -43,6 +44,7 @@ KeptFile::KeptFile(const std::string& path) : path_(path) {
     // Until it was locked it may have been replaced.
     if (::stat(path.c_str(), &named) == 0 && named.st_ino == opened.st_ino && named.st_dev == opened.st_dev) return;
   }
+  throw system_failure("opening " + path, ELOOP);  // a link to itself; or somebody replaces it all the time
 }
 
 void KeptFile::replace(std::string_view content, Durable durable) {

@@ -70,6 +70,8 @@ TEST_F(KeptFileTest, IsARegularFile) {
     EXPECT_EQ(refusal(name), Failure::Kind::unsupported) << name;
   }
   EXPECT_EQ(refusal(path + "/below"), Failure::Kind::system);
+  fs::create_symlink(directory.path() / "loop", directory.path() / "loop");
+  EXPECT_EQ(refusal(directory.path() / "loop"), Failure::Kind::system);
 }
 
 TEST_F(KeptFileTest, WhatCannotBeWrittenLeavesTheOldOne) {
