@@ -27,7 +27,7 @@ void protect_standard_streams();
 
 enum class Durable : std::uint8_t { no, yes };
 
-/// A file that is written beside `path` and takes its place when it is whole; otherwise it is removed. Throws Failure.
+/// A file that takes the place of `path` when it is whole; otherwise nobody sees it. Throws Failure.
 class NewFile {
  public:
   explicit NewFile(const std::string& path);
@@ -36,15 +36,16 @@ class NewFile {
   NewFile& operator=(const NewFile&) = delete;
 
   [[nodiscard]] int descriptor() const { return file_.get(); }
-  /// Where it is meanwhile.
-  [[nodiscard]] const std::string& path() const { return beside_; }
+  /// By which it can be opened meanwhile.
+  [[nodiscard]] const std::string& path() const { return meanwhile_; }
   void write(std::string_view content);
   /// `Durable::yes` waits for the disk. Returns the file, open.
   Descriptor take_place(Durable durable);
 
  private:
   std::string path_;
-  std::string beside_;
+  std::string meanwhile_;
+  std::string beside_;  // its name as long as it has one of its own
   Descriptor file_;
 };
 

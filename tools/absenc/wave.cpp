@@ -155,18 +155,17 @@ capture::ScratchFile scratch_file(const std::string& path) {
 
 void write(const Invocation& invocation, const std::string& path, capture::Drawing& drawing, const LineSettings& line) {
   const FileFormat format = format_of(path);
-  os::NewFile file(path);
-  if (format == FileFormat::sigrok) {
+  if (format == FileFormat::sigrok) {  // which takes the place of the old one by itself
     const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
     const std::int64_t rate =
         invocation.number("--samplerate", static_cast<std::int64_t>(usual), 1, static_cast<std::int64_t>(fastest));
-    capture::write_sigrok(file.path(), drawing, static_cast<std::uint64_t>(rate));
-  } else {
-    std::ofstream out(file.path(), std::ios::binary);
-    format == FileFormat::vcd ? capture::write_vcd(out, drawing) : capture::write_saleae_csv(out, drawing);
-    out.flush();
-    if (!out) throw ToolFailure(fmt::format("{} cannot be written: {}", path, std::strerror(errno)));
+    return capture::write_sigrok(path, drawing, static_cast<std::uint64_t>(rate));
   }
+  os::NewFile file(path);
+  std::ofstream out(file.path(), std::ios::binary);
+  format == FileFormat::vcd ? capture::write_vcd(out, drawing) : capture::write_saleae_csv(out, drawing);
+  out.flush();
+  if (!out) throw ToolFailure(fmt::format("{} cannot be written: {}", path, std::strerror(errno)));
   file.take_place(os::Durable::no);
 }
 
