@@ -140,10 +140,31 @@ class WhereTheFileIs(ConfigCase):
         self.config(SIM)
         path = self.file("nothing.toml")
         self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG=path), path, "ABSENC_CONFIG")
-        self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG=self.directory), "cannot be read: Is a dir")
+        self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG=self.directory), "cannot be read", "directory")
 
 
 class WrongFiles(ConfigCase):
+    def test_what_is_nested_too_deep_is_told(self):
+        deep = 50_000
+        for text, place in [(".".join(["a"] * deep) + " = 1\n", "1:34:"),
+                            (SIM + "[" + ".".join(["a"] * deep) + "]\n", "4:35:"),
+                            ("[encoder.x]\n" + " . ".join(['"a"'] * deep) + " = 1\n", "2:"),
+                            ("a = " + "[" * deep + "]" * deep + "\n", "1:21:"),
+                            ("a = " + "{a=" * deep + "1" + "}" * deep + "\n", "1:"),
+                            ("a = [ \"\"\"x\"\"\"\", {" + ".".join(["a"] * deep) + " = 1} ]\n", "1:")]:
+            with self.subTest(text[:30]):
+                self.config(text)
+                self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:" + place, "nested")
+
+    def test_dots_and_brackets_in_texts_and_comments_nest_nothing(self):
+        dots = "." * 100 + "[" * 100
+        self.config(f"# {dots} it's\n[encoder.elbow] # {dots}\nprotocol = 'tformat'\nport = \"sim\"\n"
+                    f'alarm = ["over_heat"]\n[encoder.other]\nprotocol = "tformat"\nport = "/dev/{dots}\\"{dots}"\n')
+        self.assert_good(self.absenc("read", "elbow"))
+
+    def test_a_file_that_never_ends(self):
+        self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG="/dev/zero"), "/dev/zero", "16 MiB")
+
     def test_the_place_comes_first(self):
         for text, words in [("[encoder.elbow\n", ["1:15: this is no TOML"]),
                             (SIM + 'modle = "23-bit"\n', ["4:1:", "did you mean model?"]),

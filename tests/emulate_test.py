@@ -3,6 +3,7 @@
 import os
 import re
 import select
+import shutil
 import signal
 import socket
 import stat
@@ -61,7 +62,13 @@ class Client:
         while len(data) < length:
             if not select.select([self.descriptor], [], [], max(0, deadline - time.monotonic()))[0]:
                 break
-            data += os.read(self.descriptor, 256)
+            try:
+                part = os.read(self.descriptor, 256)
+            except OSError:  # the emulator has gone
+                break
+            if not part:
+                break
+            data += part
         return data
 
     def exchange(self, data_id, *body, length=None):
@@ -476,15 +483,58 @@ class Memory(EmulateCase):
         self.emulator("--memory", self.file("memory"))
         self.assertIn(b"size: ", self.content())
 
-    def test_it_is_saved_while_the_encoder_runs(self):
+    def test_it_is_saved_before_the_host_knows(self):
         client = self.client("--memory", self.file("memory"))
-        client.write_memory(0, 0xAB)
-        client.wait_until_written(0)
-        client.write_memory(1, 0xCD)  # within a second of the first: later, but without another request
-        deadline = time.monotonic() + PATIENCE
-        while b"\n0000: AB CD" not in self.content() and time.monotonic() < deadline:
-            select.select([], [], [], 0.01)
+        for address in range(10):
+            client.write_memory(address, 0xA0 + address)
+            client.wait_until_written(address)
+            self.assertIn(f"{0xA0 + address:02X}".encode(), self.content())
+
+    def test_what_was_acknowledged_survives_a_kill(self):
+        values = range(0x41, 0x4B)
+        with Emulator(self.directory, "--memory", self.file("memory")) as emulator:
+            written = absenc("memory", "write", f"tformat:{emulator.path}?latency=300", "0x10", *map(str, values), "--yes")
+            emulator.end(signal.SIGKILL)
+        self.assert_good(written)
+        self.assertIn("10 bytes written and read back", written.stdout)
+        self.assertIn(b"\n0010: 41 42 43 44 45 46 47 48 49 4A", self.content())
+
+    def test_one_file_is_kept_by_one_emulator(self):
+        os.symlink(self.file("memory"), self.file("another name"))
+        self.emulator("--memory", self.file("memory"))
+        for name in ("memory", "another name"):
+            result = absenc("emulate", "tformat", "--memory", self.file(name), "--for", "60")
+            self.assert_failed(result, self.file("memory"), "another emulator keeps its memory")
+            self.assertEqual(result.stdout, "")
+
+    def test_the_lock_outlives_what_is_saved_and_ends_with_the_emulator(self):
+        with Emulator(self.directory, "--memory", self.file("memory")) as emulator:
+            with Client.open(emulator.path) as client:
+                client.write_memory(0, 0xAB)  # replaces the file
+                client.wait_until_written(0)
+            result = absenc("emulate", "tformat", "--memory", self.file("memory"), "--for", "60")
+            self.assert_failed(result, "another emulator keeps its memory")
+            emulator.end(signal.SIGKILL)
+        self.write_and_end(1, 0xCD)
         self.assertIn(b"\n0000: AB CD", self.content())
+
+    def test_only_regular_files_are_kept(self):
+        os.mkfifo(self.file("fifo"))
+        for path in ("/dev/full", "/dev/zero", "/dev/null", self.directory, self.file("fifo")):
+            with self.subTest(path):
+                result = absenc("emulate", "tformat", "--memory", path, "--for", "60")
+                self.assert_failed(result, path, "no regular file")
+                self.assertEqual(result.stdout, "")
+
+    def test_a_memory_that_cannot_be_saved_is_not_acknowledged(self):
+        os.mkdir(self.file("sub"))
+        emulator = self.emulator("--memory", self.file("sub/memory"))
+        with Client.open(emulator.path) as client:
+            shutil.rmtree(self.file("sub"))
+            client.send(bytes.fromhex("32 05 5a 6d"))
+            self.assertEqual(client.receive(4), b"")  # until the emulator has gone
+        self.assertEqual(emulator.process.wait(PATIENCE), 1)
+        self.assert_sentence(emulator.end()[2], "memory file", "No such file")
 
     def test_a_link_stays_a_link(self):
         os.symlink(self.file("elsewhere"), self.file("memory"))

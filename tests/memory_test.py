@@ -86,7 +86,7 @@ class Bytes(MemoryCase):
         self.assert_good(result)
         self.assertIn("page 2 address 0x0E  00 00 00  41 42 43\n", result.stdout)
         self.assertIn("3 bytes written and read back", result.stdout)
-        self.assertIn("3 of 3 bytes differ; writing takes one of the 100000 writes in a byte's life", result.stderr)
+        self.assertIn("3 of 3 bytes differ; each byte takes one of 100000 writes in total", result.stderr)
         result = absenc("memory", "read", address, "0", "--page", "2", "--count", "18")
         self.assertEqual(result.stdout, "0x00  " + "00 " * 14 + "41 42  ..............AB\n0x10  43 00" + " " * 44 + "C.\n")
         answer = json.loads(absenc("memory", "read", address, "14", "--page", "2", "--count", "3", "--json").stdout)
@@ -164,7 +164,7 @@ class Bytes(MemoryCase):
         address = self.encoder()
         status, shown = self.ask(address, b"n\n")
         self.assertEqual(status, 1)
-        self.assertIn("1 of 1 byte differs; writing takes one of the 100000", shown)
+        self.assertIn("1 of 1 byte differs; each byte takes one of 100000 writes in total", shown)
         self.assertIn("nothing was changed", shown)
         self.assertEqual(self.dump(address), EMPTY)
         status, shown = self.ask(address, b"y\n")
@@ -223,19 +223,32 @@ class Files(MemoryCase):
         self.assert_good(absenc("memory", "load", address, self.partial({(7, 4): 0x80 + 70}), "--yes"))
         self.assertIn("70 degC", absenc("config", "get", address).stdout)
 
-    def test_no_checksum(self):
-        address = self.encoder()
-        path = self.file("edited.dump", HEADER + "page 0 address 0x00: 01\n")
-        result = absenc("memory", "load", address, path, "--dry-run")
-        self.assert_good(result)
-        self.assertIn(f"note: {path} has no checksum", result.stderr)
+    def test_a_dump_that_was_cut_off_is_refused(self):
+        emulator = self.emulator()
+        good = absenc("memory", "dump", "sim:tformat").stdout
+        for size in (900, good.index("checksum"), good.index("checksum") - 1):
+            path = self.file("cut.dump", good[:size])
+            for verb, more in (("load", ["--yes"]), ("load", ["--dry-run"]), ("verify", [])):
+                with self.subTest(size=size, verb=verb):
+                    result = absenc("memory", verb, f"tformat:{emulator.path}", path, *more)
+                    self.assert_failed(result, path, "has no checksum", "cut off", "checksum: edited", "--force")
+                    self.assertEqual(result.stdout, "")
+        self.assertIn("0 requests answered", emulator.end()[2])
+
+    def test_a_dump_that_was_cut_off_is_taken_by_force(self):
+        path = self.file("cut.dump", HEADER + "page 0 address 0x00: 00 00\n")
+        for verb in ("load", "verify"):
+            result = absenc("memory", verb, "sim:tformat", path, "--force")
+            self.assert_good(result)
+            self.assertIn(f"note: {path} has no checksum", result.stderr)
+            self.assertIn("2 bytes of it", result.stderr)
 
     def test_files_that_are_refused(self):
         emulator = self.emulator()
         good = absenc("memory", "dump", "sim:tformat").stdout
         self.file("memory file", "absenc memory 1\nprotocol: tformat\n")
         for text, words in [(good.replace("page 2 address 0x10: 00", "page 2 address 0x10: 01"),
-                             ["line 53", "damaged, or edited", "delete this line"]),
+                             ["line 53", "damaged, or edited", "checksum: edited"]),
                             (good.replace("TS5700N8500", "23-bit"), ["line 3", "model: 23-bit", "model: TS5700N8500"]),
                             (good.replace("tformat", "esl"), ["line 2", "protocol: esl", "protocol: tformat"]),
                             (good.replace("page 5 address 0x00: 00", "page 5 address 0x00: 0"), ["line 44", "hexadecimal"]),
@@ -253,6 +266,10 @@ class Files(MemoryCase):
             with self.subTest(path):
                 self.assert_failed(absenc("memory", "load", f"tformat:{emulator.path}", path, "--yes"), path, *words)
         self.assertIn("0 requests answered", emulator.end()[2])
+
+    def test_a_file_that_never_ends_is_refused(self):
+        for verb in ("load", "verify"):
+            self.assert_failed(absenc("memory", verb, "sim:tformat", "/dev/zero"), "/dev/zero", "16 MiB")
 
     def test_a_dump_is_no_memory_file(self):
         path = self.file("some.dump", absenc("memory", "dump", "sim:tformat").stdout)

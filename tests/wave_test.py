@@ -3,10 +3,13 @@
 """Conversations of virtual encoders as waveforms, and what sigrok's decoders read of them."""
 import json
 import os
+import resource
+import signal
 import subprocess
+import time
 import unittest
 
-from command_support import Case, absenc
+from command_support import ABSENC, PATIENCE, Case, absenc, end
 
 UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
@@ -102,6 +105,121 @@ class Wave(Case):
             self.wave("esl?motion=rpm=600&fault=drop=0.2", self.file(name), "--count", "30")
         with open(self.file("a.vcd"), "rb") as a, open(self.file("b.vcd"), "rb") as b:
             self.assertEqual(a.read(), b.read())
+
+    def test_what_decode_reads_is_all_that_wave_wrote(self):
+        """However slow the line is: what is before the first request and behind the last reply is long enough."""
+        for unit, kind in (("tformat", "exchange"), ("esl", "exchange"), ("encolink", "exchange"),
+                           ("encolink-spi", "exchange"), ("biss", "reply"), ("ssi", "reply"), ("e201", "exchange"),
+                           ("raa38", "reply"), ("raa38?mode=bus", "exchange"), ("raa38-modbus", "exchange"),
+                           ("raa38-modbus?baud=2400", "exchange"), ("raa38-modbus?baud=57600", "exchange"),
+                           ("raa38-can", "exchange"), ("raa38-can?bitrate=500000", "exchange"),
+                           ("raa38-can?bitrate=1000000", "exchange")):
+            protocol, _, options = unit.partition("?")
+            for count in (1, 5):
+                for ending in ("vcd", "sr", "csv"):
+                    path = self.file("all." + ending)
+                    self.wave(unit, path, "--count", str(count), "--rate", "50", "--force")
+                    result = absenc("decode", protocol, path, "--json", *(["--option", options] if options else []))
+                    with self.subTest(unit=unit, count=count, ending=ending):
+                        self.assert_good(result)
+                        rows = [json.loads(line) for line in result.stdout.splitlines()]
+                        self.assertEqual({row["kind"] for row in rows} - {kind, "request"}, set())
+                        self.assertFalse(any("begins or ends" in row.get("message", "") for row in rows), rows)
+                        self.assertGreaterEqual(sum(row["kind"] == kind for row in rows), count)
+
+    def edges(self, *arguments):
+        """The times of each wire's changes, and the levels at first."""
+        path = self.file("edges.vcd")
+        self.wave(*arguments[:1], path, *arguments[1:], "--force")
+        names, times, at = {}, {}, 0
+        with open(path, encoding="ascii") as file:
+            for line in file:
+                words = line.split()
+                if words[0] == "$var":
+                    names[words[3]] = words[4]
+                elif words[0].startswith("#"):
+                    at = int(words[0][1:])
+                elif words[0][0] in "01":
+                    times.setdefault(names[words[0][1:]], []).append(at)
+        return times
+
+    def test_the_line_is_idle_long_enough_at_first(self):
+        for unit, wire, least in (("raa38-can", "can", 11 * 4000), ("e201", "host", 10 * 8681),
+                                  ("raa38-modbus?baud=2400", "line", 35 * 416667)):
+            with self.subTest(unit):
+                self.assertGreaterEqual(self.edges(unit)[wire][1], least)
+
+    def test_the_clock_of_spi_waits_for_the_encoder(self):
+        times = self.edges("encolink-spi", "--count", "3")
+        selected = times["cs"][1::2]
+        self.assertGreaterEqual(len(selected), 3)
+        for begin, end in zip(selected, times["cs"][2::2]):
+            clocks = [at for at in times["sck"] if begin <= at <= end]
+            self.assertEqual(clocks[0] - begin, 5000)
+
+    def usage(self, path, *arguments):
+        """What a run of the command took: memory in KiB."""
+        process = subprocess.Popen([ABSENC, "wave", "tformat?motion=rpm=60", path, *arguments],
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        with process.stderr:
+            self.assertEqual(process.returncode, 0, process.stderr.read())
+        return usage.ru_maxrss
+
+    def test_its_memory_does_not_depend_on_its_length(self):
+        for ending, long in (("vcd", 10_000), ("csv", 10_000), ("sr", 3_000)):
+            path = self.file("long." + ending)
+            short = self.usage(path, "--count", "10")
+            with self.subTest(ending):
+                self.assertLess(self.usage(path, "--count", str(long), "--force") - short, 4096)
+
+    def test_interrupted_it_leaves_nothing(self):
+        for ending in ("vcd", "csv", "sr"):
+            for existing in (None, "precious"):
+                with self.subTest(ending=ending, existing=existing):
+                    path = self.file("long." + ending, existing)
+                    before = os.listdir(self.directory)
+                    process = subprocess.Popen([ABSENC, "wave", "esl", path, "--count", "1000000", "--force"],
+                                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+                    self.wait_for_work(process.pid)
+                    status, out, err = end(process, signal.SIGINT)
+                    self.assertEqual((status, out), (1, ""))
+                    self.assertIn("interrupted", err)
+                    self.assertEqual(os.listdir(self.directory), before)
+                    if existing is not None:
+                        with open(path, encoding="ascii") as file:
+                            self.assertEqual(file.read(), existing)
+                        os.remove(path)
+
+    @staticmethod
+    def wait_for_work(process):
+        """Until it has written a little somewhere: it catches signals by then."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            with open(f"/proc/{process}/io", encoding="ascii") as file:
+                if any(int(line.split()[1]) > 1 << 20 for line in file if line.startswith("wchar")):
+                    return
+        raise AssertionError("it does not write")
+
+    def test_a_full_disk_leaves_nothing(self):
+        def small_files():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        for ending in ("vcd", "csv"):
+            with self.subTest(ending):
+                path = self.file("long." + ending, "precious")
+                result = absenc("wave", "tformat", path, "--count", "1000", "--force", preexec_fn=small_files)
+                self.assert_failed(result, "too large")
+                with open(path, encoding="ascii") as file:
+                    self.assertEqual(file.read(), "precious")
+                os.remove(path)
+                self.assertEqual(os.listdir(self.directory), [])
+
+    def test_only_a_regular_file_is_replaced(self):
+        path = self.file("fifo.vcd")
+        os.mkfifo(path)
+        self.assert_failed(absenc("wave", "tformat", path, "--force"), path, "no regular file")
 
     def test_an_existing_file_is_kept(self):
         path = self.file("mine.vcd")

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <cstring>
+#include <exception>
+#include <limits>
 #include <memory>
 #include <ostream>
 #include <stdexcept>
@@ -14,35 +17,69 @@ namespace absenc::capture {
 
 namespace {
 
-/// The levels of all traces from one change to the next.
+// Numbers take as many bytes as they need, 7 bits each: most changes follow the one before closely.
+void put_number(std::FILE* file, std::uint64_t number) {
+  for (; number > 0x7F; number >>= 7) std::putc(static_cast<int>(number & 0x7F) | 0x80, file);
+  std::putc(static_cast<int>(number), file);
+}
+
+bool get_number(std::FILE* file, std::uint64_t& number) {
+  number = 0;
+  for (unsigned shift = 0; shift < 64; shift += 7) {
+    const int byte = std::getc(file);
+    if (byte == EOF) return false;
+    number |= static_cast<std::uint64_t>(byte & 0x7F) << shift;
+    if (byte < 0x80) return true;
+  }
+  return false;
+}
+
+[[noreturn]] void fail_scratch(const char* why) {
+  throw std::runtime_error(std::string("the waveform cannot be kept until it is written: ") + why);
+}
+
+void check(std::FILE* file) {
+  if (std::ferror(file) != 0) fail_scratch(std::strerror(errno));
+}
+
+void begin_reading(std::FILE* file) {
+  if (std::fflush(file) != 0 || std::fseek(file, 0, SEEK_SET) != 0) fail_scratch(std::strerror(errno));
+}
+
+/// The levels of all wires from one change to the next.
 class Levels {
  public:
-  explicit Levels(const Drawing& drawing) : drawing_(drawing), next_(drawing.traces.size()) {
-    for (const Trace& trace : drawing.traces) levels.push_back(trace.changes.before);
+  explicit Levels(Drawing& drawing) : drawing_(drawing) {
+    for (const Drawing::Wire& wire : drawing.wires()) levels.push_back(wire.before);
+    drawing.rewind_changes();
+    take();
+    advance(0);
   }
 
   /// The time of the next change, or the end of the drawing.
-  [[nodiscard]] Tick next_change() const {
-    Tick next = drawing_.end;
-    for (std::size_t i = 0; i < next_.size(); ++i) {
-      const std::vector<Tick>& at = drawing_.traces[i].changes.at;
-      if (next_[i] < at.size()) next = std::min(next, at[next_[i]]);
-    }
-    return next;
-  }
+  [[nodiscard]] Tick next_change() const { return std::min(next_, drawing_.end()); }
   /// Everything that changes up to and including `time`.
   void advance(Tick time) {
-    for (std::size_t i = 0; i < next_.size(); ++i) {
-      const std::vector<Tick>& at = drawing_.traces[i].changes.at;
-      for (; next_[i] < at.size() && at[next_[i]] <= time; ++next_[i]) levels[i] = !levels[i];
+    constexpr unsigned now_and_then = 4096;
+    for (; next_ <= time && next_ != none; take()) {
+      levels[wire_] = !levels[wire_];
+      if (++taken_ % now_and_then == 0) drawing_.look();
     }
   }
 
   std::vector<bool> levels;
 
  private:
-  const Drawing& drawing_;
-  std::vector<std::size_t> next_;
+  static constexpr Tick none = std::numeric_limits<Tick>::max();
+
+  void take() {
+    if (!drawing_.next_change(next_, wire_)) next_ = none;
+  }
+
+  Drawing& drawing_;
+  Tick next_ = 0;
+  std::size_t wire_ = 0;
+  std::uint64_t taken_ = 0;
 };
 
 // Printable characters from '!' on, more than one where there are many traces.
@@ -63,24 +100,35 @@ std::string seconds(Tick time) {
 /// The samples of a drawing, made while the archive asks for them: a part at a time, as sigrok itself writes them.
 class Samples {
  public:
-  Samples(const Drawing& drawing, std::uint64_t rate)
-      : size(std::bit_ceil((drawing.traces.size() + 7) / 8)),
-        count(sample_at(drawing.end, rate)),
+  Samples(Drawing& drawing, std::uint64_t rate)
+      : size(std::bit_ceil((drawing.wires().size() + 7) / 8)),
+        count(sample_at(drawing.end(), rate)),
+        drawing_(drawing),
         levels_(drawing),
         rate_(rate) {}
 
   /// As many whole samples as fit. Returns the number of bytes.
   std::size_t fill(std::uint8_t* bytes, std::size_t room) {
+    drawing_.look();
     const std::size_t wanted = room / size;
-    for (std::size_t i = 0; i < wanted; ++i, ++sample_) {
+    for (std::size_t done = 0; done < wanted;) {
       if (sample_ >= changes_at_) take_change();
-      std::memcpy(bytes + i * size, packed_, size);
+      const std::uint64_t same = changes_at_ > sample_ ? changes_at_ - sample_ : wanted;
+      const auto run = static_cast<std::size_t>(std::min<std::uint64_t>(wanted - done, same));
+      if (size == 1) {
+        std::memset(bytes + done, packed_[0], run);
+      } else {
+        for (std::size_t i = 0; i < run; ++i) std::memcpy(bytes + (done + i) * size, packed_, size);
+      }
+      done += run;
+      sample_ += run;
     }
     return wanted * size;
   }
 
   const std::size_t size;  // bytes of one sample
   const std::uint64_t count;
+  std::exception_ptr trouble{};  // what ended it
 
  private:
   // The first sample that is not before the time.
@@ -102,6 +150,7 @@ class Samples {
     }
   }
 
+  Drawing& drawing_;
   Levels levels_;
   std::uint64_t rate_;
   std::uint64_t sample_ = 0;
@@ -126,9 +175,14 @@ zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t
       return 0;
     case ZIP_SOURCE_READ: {
       const std::uint64_t room = std::min<std::uint64_t>(size, part.size - part.given);
-      const std::size_t filled = part.samples->fill(static_cast<std::uint8_t*>(data), room);
-      part.given += filled;
-      return static_cast<zip_int64_t>(filled);
+      try {
+        const std::size_t filled = part.samples->fill(static_cast<std::uint8_t*>(data), room);
+        part.given += filled;
+        return static_cast<zip_int64_t>(filled);
+      } catch (...) {  // not through libzip, which is C
+        part.samples->trouble = std::current_exception();
+        return -1;
+      }
     }
     case ZIP_SOURCE_STAT: {
       auto* const stat = static_cast<zip_stat_t*>(data);
@@ -160,30 +214,79 @@ void add(zip_t* archive, const std::string& path, const char* name, zip_source_t
   fail(path, zip_strerror(archive));
 }
 
-std::string metadata(const Drawing& drawing, std::uint64_t rate, std::size_t unit_size) {
+std::string metadata(Drawing& drawing, std::uint64_t rate, std::size_t unit_size) {
   std::string text = "[global]\nsigrok version=0.5.2\n\n[device 1]\ncapturefile=logic-1\ntotal probes=" +
-                     std::to_string(drawing.traces.size()) + "\nsamplerate=" + std::to_string(rate) +
+                     std::to_string(drawing.wires().size()) + "\nsamplerate=" + std::to_string(rate) +
                      " Hz\ntotal analog=0\n";
-  for (std::size_t i = 0; i < drawing.traces.size(); ++i) {
-    text += "probe" + std::to_string(i + 1) + '=' + drawing.traces[i].name + '\n';
+  for (std::size_t i = 0; i < drawing.wires().size(); ++i) {
+    text += "probe" + std::to_string(i + 1) + '=' + drawing.wires()[i].name + '\n';
   }
   return text + "unitsize=" + std::to_string(unit_size) + '\n';
 }
 
 }  // namespace
 
-void write_vcd(std::ostream& out, const Drawing& drawing) {
+Drawing::Drawing(std::string title, ScratchFile changes, ScratchFile labels)
+    : title_(std::move(title)), changes_(std::move(changes)), labels_(std::move(labels)) {
+  if (changes_ == nullptr || labels_ == nullptr) fail_scratch("there is no place for temporary files");
+}
+
+void Drawing::change(Tick at, std::size_t wire) {
+  put_number(changes_.get(), at - std::exchange(last_change_, at));
+  put_number(changes_.get(), wire);
+  check(changes_.get());
+}
+
+void Drawing::label(Tick at, std::string_view words) {
+  put_number(labels_.get(), at - std::exchange(last_label_, at));
+  put_number(labels_.get(), words.size());
+  std::fwrite(words.data(), 1, words.size(), labels_.get());
+  check(labels_.get());
+}
+
+void Drawing::rewind_changes() {
+  begin_reading(changes_.get());
+  last_change_ = 0;
+}
+
+bool Drawing::next_change(Tick& at, std::size_t& wire) {
+  std::uint64_t later = 0;
+  if (!get_number(changes_.get(), later) || !get_number(changes_.get(), wire)) return check(changes_.get()), false;
+  at = last_change_ += later;
+  return true;
+}
+
+void Drawing::rewind_labels() {
+  begin_reading(labels_.get());
+  last_label_ = 0;
+}
+
+bool Drawing::next_label(Tick& at, std::string& words) {
+  std::uint64_t later = 0;
+  std::uint64_t size = 0;
+  if (!get_number(labels_.get(), later) || !get_number(labels_.get(), size)) return check(labels_.get()), false;
+  words.resize(size);
+  if (std::fread(words.data(), 1, size, labels_.get()) != size) return check(labels_.get()), false;
+  at = last_label_ += later;
+  return true;
+}
+
+void write_vcd(std::ostream& out, Drawing& drawing) {
   out << "$version absenc $end\n$timescale 1 ns $end\n";
   // Not among the changes, where the standard allows them too: sigrok's reader stops at the first.
-  for (const Label& label : drawing.labels) out << "$comment #" << label.at << ' ' << label.words << " $end\n";
-  out << "$scope module " << drawing.title << " $end\n";
-  for (std::size_t i = 0; i < drawing.traces.size(); ++i) {
-    out << "$var wire 1 " << identifier(i) << ' ' << drawing.traces[i].name << " $end\n";
+  drawing.rewind_labels();
+  Tick labelled = 0;
+  for (std::string words; drawing.next_label(labelled, words);) {
+    out << "$comment #" << labelled << ' ' << words << " $end\n";
+  }
+  out << "$scope module " << drawing.title() << " $end\n";
+  for (std::size_t i = 0; i < drawing.wires().size(); ++i) {
+    out << "$var wire 1 " << identifier(i) << ' ' << drawing.wires()[i].name << " $end\n";
   }
   out << "$upscope $end\n$enddefinitions $end\n#0\n";
   Levels levels(drawing);
   for (std::size_t i = 0; i < levels.levels.size(); ++i) out << levels.levels[i] << identifier(i) << '\n';
-  for (Tick at = levels.next_change(); at < drawing.end; at = levels.next_change()) {
+  for (Tick at = levels.next_change(); at < drawing.end(); at = levels.next_change()) {
     const std::vector<bool> before = levels.levels;
     levels.advance(at);
     out << '#' << at << '\n';
@@ -191,12 +294,12 @@ void write_vcd(std::ostream& out, const Drawing& drawing) {
       if (before[i] != levels.levels[i]) out << levels.levels[i] << identifier(i) << '\n';
     }
   }
-  out << '#' << drawing.end << '\n';
+  out << '#' << drawing.end() << '\n';
 }
 
-void write_saleae_csv(std::ostream& out, const Drawing& drawing) {
+void write_saleae_csv(std::ostream& out, Drawing& drawing) {
   out << "Time [s]";
-  for (const Trace& trace : drawing.traces) out << ',' << trace.name;
+  for (const Drawing::Wire& wire : drawing.wires()) out << ',' << wire.name;
   out << '\n';
   Levels levels(drawing);
   for (Tick at = 0;; at = levels.next_change()) {
@@ -204,11 +307,11 @@ void write_saleae_csv(std::ostream& out, const Drawing& drawing) {
     out << seconds(at);
     for (const bool level : levels.levels) out << ',' << level;
     out << '\n';
-    if (at == drawing.end) break;
+    if (at == drawing.end()) break;
   }
 }
 
-void write_sigrok(const std::string& path, const Drawing& drawing, std::uint64_t rate) {
+void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate) {
   int code = 0;
   Archive archive(zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &code));
   if (archive == nullptr) {
@@ -232,7 +335,10 @@ void write_sigrok(const std::string& path, const Drawing& drawing, std::uint64_t
         zip_source_function(archive.get(), provide, parts.back().get()));
   }
   // Compresses everything, in the order of the files.
-  if (zip_close(archive.get()) != 0) fail(path, zip_strerror(archive.get()));
+  if (zip_close(archive.get()) != 0) {
+    if (samples.trouble != nullptr) std::rethrow_exception(samples.trouble);
+    fail(path, zip_strerror(archive.get()));
+  }
   static_cast<void>(archive.release());
 }
 

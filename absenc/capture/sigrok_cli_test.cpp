@@ -89,9 +89,11 @@ TEST_F(SigrokCli, Sessions) {
 TEST_F(SigrokCli, CutSessions) {
   make_samples(8, 9'000'000);
   ASSERT_NO_FATAL_FAILURE(write_session(8));
-  Drawing drawing{.title = "wire", .traces = {{"D0", {}}}, .labels = {}, .end = 9'000'000};
+  Drawing drawing("wire");
+  drawing.add_wire("D0", false);
+  drawing.set_end(9'000'000);
   std::mt19937 random(8);
-  for (Tick at = 1; at < drawing.end; at += 1 + random() % 99) drawing.traces[0].changes.at.push_back(at);
+  for (Tick at = 1; at < drawing.end(); at += 1 + random() % 99) drawing.change(at, 0);
   write_sigrok((folder_ / "drawn").string(), drawing, 1'000'000'000);
   for (const char* name : {"session", "drawn"}) {
     const Contents whole = read_all(*open_capture(folder_ / name, {}));

@@ -63,7 +63,7 @@ VcdHeader::VcdHeader(TextWords& words, std::string_view name)
     if (!keyword.starts_with('$')) fail("has a word outside of any section of its header: " + keyword.substr(0, 20));
     read_section(keyword);
     if (keyword == "$enddefinitions") break;
-    if (words_.offset() > longest_header) fail("has a header of more than 64 MiB");
+    if (words_.offset() - comments_ > longest_header) fail("has a header of more than 64 MiB");
   }
   if (ticks_per_second_ == 0) fail("does not tell its unit of time: it has no $timescale");
   if (names_.empty()) fail("declares no channels: it has no $var of a wire or register");
@@ -80,6 +80,10 @@ void VcdHeader::read_section(std::string_view keyword) {
     skip_to_end();
   } else if (keyword == "$var") {
     read_variable();
+  } else if (keyword == "$comment") {
+    const std::uint64_t begin = words_.offset();
+    skip_to_end();
+    comments_ += words_.offset() - begin;
   } else if (keyword != "$end") {
     skip_to_end();
   }

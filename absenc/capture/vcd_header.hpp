@@ -75,6 +75,7 @@ class VcdHeader {
   std::unordered_map<std::string, std::size_t> long_;
   std::uint64_t ticks_per_second_ = 0;
   std::size_t left_out_ = 0;
+  std::uint64_t comments_ = 0;  // bytes of them: a file may have any number, nothing of them is kept
 };
 
 }  // namespace absenc::capture

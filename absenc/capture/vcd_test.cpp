@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <memory>
 #include <random>
+#include <span>
+#include <string>
+#include <utility>
 
 #include "absenc/capture/test_files.hpp"
 
@@ -39,6 +44,57 @@ TEST(Vcd, LevelsAndTimes) {
   EXPECT_EQ(contents.changes[1].at, (Ticks{9}));
   EXPECT_EQ(contents.end, 20u);
   EXPECT_TRUE(reader->damages().empty());
+}
+
+// A file that nobody wants in memory: one text again and again, then another.
+class Repeated final : public Source {
+ public:
+  Repeated(std::string part, std::uint64_t count, std::string last)
+      : part_(std::move(part)), last_(std::move(last)), repeated_(count * part_.size()) {}
+  [[nodiscard]] std::uint64_t size() const override { return repeated_ + last_.size(); }
+  [[nodiscard]] std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) override {
+    std::size_t done = 0;
+    for (; done < into.size() && offset + done < size(); ++done) {
+      const std::uint64_t at = offset + done;
+      into[done] = static_cast<std::uint8_t>(at < repeated_ ? part_[at % part_.size()] : last_[at - repeated_]);
+    }
+    return done;
+  }
+
+ private:
+  std::string part_;
+  std::string last_;
+  std::uint64_t repeated_;
+};
+
+std::unique_ptr<Reader> open_repeated(const std::string& part) {
+  return read_vcd(
+      std::make_unique<Repeated>(part, (std::uint64_t{70} << 20) / part.size(), with_header("#0 1! 0\"\n#7 0!\n#20\n")),
+      "long.vcd");
+}
+
+// `absenc wave` says in comments what each byte was.
+TEST(Vcd, AnyNumberOfCommentsBeforeTheChanges) {
+  const auto reader = open_repeated("$comment #123456789012 device 1A and 0 more words like these in between $end\n");
+  const Contents contents = read_all(*reader);
+  EXPECT_EQ(contents.changes[0].at, (Ticks{7}));
+  EXPECT_EQ(contents.end, 20u);
+  EXPECT_TRUE(reader->damages().empty());
+}
+
+TEST(Vcd, AHeaderThatNeverEndsIsRefused) {
+  try {
+    static_cast<void>(open_repeated("$version and words and words and words and words and words and words $end\n"));
+    FAIL();
+  } catch (const OpenError& error) {
+    EXPECT_NE(std::string_view(error.what()).find("header of more than 64 MiB"), std::string_view::npos);
+  }
+}
+
+TEST(Vcd, ScopesMayNotNestForEver) {
+  std::string deep;
+  for (int i = 0; i < 50'000; ++i) deep += "$scope begin x $end ";
+  EXPECT_NE(trouble(deep).find("1000 deep"), std::string::npos);
 }
 
 TEST(Vcd, BeginsAtItsFirstTime) {

@@ -132,7 +132,9 @@ TEST_P(WholeWay, IsTheShortWay) {
   sim::FaultRates faults = sim::testing::damaged_replies(0.02);
   faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these make two speak at once
   Talker talker(unit, options, faults, 7);
-  sim::Waveform waveform(unit.link, line);
+  Drawing drawing("capture");
+  WaveformSink<sim::Waveform> wires(drawing);
+  sim::Waveform waveform(unit.link, line, wires);
   Lines expected;
   BurstAnnotator bursts(unit, options, expected);
   const auto characters = std::make_unique<Annotator>(unit, options, settings, expected);
@@ -150,7 +152,7 @@ TEST_P(WholeWay, IsTheShortWay) {
   characters->finish(talker.now());
   ASSERT_GE(expected.lines.size(), 300u);
 
-  const Drawing drawing = drawing_of("capture", waveform);
+  wires.finish(waveform, std::chrono::microseconds(10));
   std::ostringstream vcd, csv;
   write_vcd(vcd, drawing);
   write_saleae_csv(csv, drawing);

@@ -58,6 +58,7 @@ struct Event {
   Line line{};                    // triggered
   Time width{};                   // triggered: how long the pulse lasts; device side, selected on a clocked link and
                                   // sent on an exchange: the period of the clock; 0: not known
+  Time lead{};                    // sent, device side of an exchange: from chip select to the first clock
 };
 
 /// After each `feed`, call `next` until it returns `wait` or `done`. Both in one context: interrupts queue events.

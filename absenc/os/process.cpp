@@ -3,14 +3,16 @@
 
 #include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <utility>
 
-#include "absenc/os/descriptor.hpp"
 #include "absenc/os/error.hpp"
 
 namespace absenc::os {
@@ -41,24 +43,76 @@ int replaceable(const std::string& path) {
   return may ? 0 : errno;
 }
 
-void replace_file(const std::string& path, std::string_view content, Durable durable) {
-  const std::string beside = path + ".new";
-  const std::string what = "writing " + path;
-  const Descriptor file(::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666));
-  if (!file) throw system_failure(what, errno);
-  try {
-    while (!content.empty()) {
-      const ssize_t size = ::write(file.get(), content.data(), content.size());
-      if (size < 0 && errno == EINTR) continue;
-      if (size < 0) throw system_failure(what, errno);
-      content.remove_prefix(static_cast<std::size_t>(size));
-    }
-    if (durable == Durable::yes && ::fsync(file.get()) < 0) throw system_failure(what, errno);
-    if (::rename(beside.c_str(), path.c_str()) < 0) throw system_failure(what, errno);
-  } catch (const Failure&) {
-    ::unlink(beside.c_str());
-    throw;
+namespace {
+
+std::string folder_of(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path();
+  return folder.empty() ? "." : folder;
+}
+
+// Without a name: whatever becomes of the process, nothing stays. Not every file system has such files.
+Descriptor open_nameless(const std::string& folder, mode_t mode) {
+  return Descriptor(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode));
+}
+
+}  // namespace
+
+NewFile::NewFile(const std::string& path) : path_(path), file_(open_nameless(folder_of(path), 0666)) {
+  if (file_) {
+    meanwhile_ = "/proc/self/fd/" + std::to_string(file_.get());
+    return;
   }
+  beside_ = path_ + ".XXXXXX";
+  file_ = Descriptor(::mkostemp(beside_.data(), O_CLOEXEC));
+  if (!file_) throw system_failure("writing " + path_, errno);
+  meanwhile_ = beside_;
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  ::fchmod(file_.get(), 0666 & ~mask);
+}
+
+NewFile::~NewFile() {
+  if (!beside_.empty()) ::unlink(beside_.c_str());
+}
+
+void NewFile::write(std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t size = ::write(file_.get(), content.data(), content.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) throw system_failure("writing " + path_, errno);
+    content.remove_prefix(static_cast<std::size_t>(size));
+  }
+}
+
+Descriptor NewFile::take_place(Durable durable) {
+  if (durable == Durable::yes && ::fsync(file_.get()) < 0) throw system_failure("writing " + path_, errno);
+  if (beside_.empty()) {  // a name cannot be given in the place of another
+    beside_ = path_ + "." + std::to_string(::getpid());
+    ::unlink(beside_.c_str());
+    if (::linkat(AT_FDCWD, meanwhile_.c_str(), AT_FDCWD, beside_.c_str(), AT_SYMLINK_FOLLOW) < 0) {
+      throw system_failure("writing " + path_, errno);
+    }
+  }
+  if (::rename(beside_.c_str(), path_.c_str()) < 0) throw system_failure("writing " + path_, errno);
+  beside_.clear();
+  return std::move(file_);
+}
+
+Descriptor nameless_file(const std::string& folder) {
+  const std::string where = folder.empty() ? "." : folder;
+  Descriptor file = open_nameless(where, 0600);
+  if (file) return file;
+  std::string name = where + "/absenc.XXXXXX";
+  file = Descriptor(::mkostemp(name.data(), O_CLOEXEC));
+  if (!file) throw system_failure("writing to " + where, errno);
+  ::unlink(name.c_str());
+  return file;
+}
+
+void replace_file(const std::string& path, std::string_view content, Durable durable) {
+  NewFile file(path);
+  file.write(content);
+  file.take_place(durable);
 }
 
 }  // namespace absenc::os

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "absenc/core/time.hpp"
+#include "absenc/os/descriptor.hpp"
 
 namespace absenc::os {
 
@@ -26,8 +27,33 @@ void protect_standard_streams();
 
 enum class Durable : std::uint8_t { no, yes };
 
-/// Writes a new file and puts it in the place of the old one, so that there is always a whole one. `Durable::yes`
-/// waits for the disk. Throws Failure.
+/// A file that takes the place of `path` when it is whole; otherwise nobody sees it. Throws Failure.
+class NewFile {
+ public:
+  explicit NewFile(const std::string& path);
+  ~NewFile();
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+
+  [[nodiscard]] int descriptor() const { return file_.get(); }
+  /// By which it can be opened meanwhile.
+  [[nodiscard]] const std::string& path() const { return meanwhile_; }
+  void write(std::string_view content);
+  /// `Durable::yes` waits for the disk. Returns the file, open.
+  Descriptor take_place(Durable durable);
+
+ private:
+  std::string path_;
+  std::string meanwhile_;
+  std::string beside_;  // its name as long as it has one of its own
+  Descriptor file_;
+};
+
+/// A file in this folder ("": the working directory) that nobody sees and that is gone when it is closed. Throws
+/// Failure.
+[[nodiscard]] Descriptor nameless_file(const std::string& folder);
+
+/// Writes a new file and puts it in the place of the old one, so that there is always a whole one. Throws Failure.
 void replace_file(const std::string& path, std::string_view content, Durable durable);
 
 }  // namespace absenc::os

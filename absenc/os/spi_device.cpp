@@ -69,7 +69,8 @@ void SpiDevice::select(Time at, Time period) {
   heard_.clear();
   clocks_ = 0;
   last_out_ = false;
-  period_ = {};
+  period_ = lead_ = {};
+  selected_at_ = at;
   feed({.kind = ByteEvent::Kind::selected, .at = at, .width = period});
 }
 
@@ -78,13 +79,14 @@ void SpiDevice::deselect(Time at) {
   selected_ = false;
   if (kind_ == LinkKind::clocked) return feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_});
   feed({.kind = ByteEvent::Kind::received, .at = at, .items = heard_});
-  feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_, .width = period_});
+  feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_, .width = period_, .lead = lead_});
 }
 
 Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
   const LineSettings clock{.rate = transfer.rate};
   const Time period = clock.bits(1);
   if (!selected_) select(at, period);
+  if (clocks_ == 0) lead_ = at - selected_at_;
   period_ = period_ == Time{} ? period : std::min(period_, period);
   heard_.resize(std::min(heard_.size() + transfer.size, most_heard));
   std::fill(transfer.in.begin(), transfer.in.end(), std::uint8_t{0});

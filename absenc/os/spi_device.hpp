@@ -66,6 +66,8 @@ class SpiDevice {
   std::size_t clocks_ = 0;
   bool last_out_ = false;
   Time period_{};  // the shortest
+  Time selected_at_{};
+  Time lead_{};  // to the first clock
 };
 
 }  // namespace absenc::os

@@ -107,6 +107,26 @@ TEST_F(SpiEncoder, Encolink) {
   EXPECT_EQ(hurried.violations()[0].rule, "clock faster than 4 MHz");
 }
 
+TEST_F(SpiEncoder, EncolinkNoticesAClockTooSoonAfterChipSelect) {
+  for (const Time lead : {Time{}, Time{4000}, Time{5000}}) {
+    encolink::VirtualEncoder encoder({}, encolink::Wire::spi, shaft);
+    encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);
+    LineSettings settings = encolink::spi_settings;
+    settings.select_lead = lead;
+    FakeSpi controller;
+    controller.connect(LinkKind::exchange, settings, encoder);
+    SpiPort port(FakeSpi::path, LinkKind::exchange, settings, {}, controller);
+    encolink::ReadPosition conversation(encolink::virtual_format, encolink::Wire::spi);
+    ASSERT_TRUE(run(conversation, port));
+    if (lead == encolink::spi_lead) {
+      EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
+    } else {
+      ASSERT_GT(encoder.violation_count(), 0u);
+      EXPECT_EQ(encoder.violations()[0].rule, "clock less than 5 us after NCS went low");
+    }
+  }
+}
+
 TEST_F(SpiEncoder, NobodyThere) {
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
   biss::ReadPosition read({}, {});

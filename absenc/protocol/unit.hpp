@@ -51,9 +51,9 @@ struct Command {
   std::string_view meaning;
   std::span<const Argument> arguments{};
   bool changes_encoder = false;
-  bool repeatable = true;             // whether the same request may be sent again after an error
-  std::string_view reads_back{};      // config_set: the name of the config_get command that reads this setting; "": none
-                                      // can, and the setting has the name of this command
+  bool repeatable = true;         // whether the same request may be sent again after an error
+  std::string_view reads_back{};  // config_set: the name of the config_get command that reads this setting; "": none
+                                  // can, and the setting has the name of this command
   std::string_view changes_option{};  // config_set: the option that must follow its first argument
 };
 
@@ -67,8 +67,9 @@ struct MemoryArea {
   std::string_view meaning;
   bool writable = true;
   bool in_dump = true;            // whether it belongs to a copy of the memory
-  std::uint32_t write_life = 0;   // how often a byte may be written; 0: not known
+  std::uint32_t write_life = 0;   // writes that the document permits; 0: not known
   std::string_view protection{};  // why only memory_write's argument `force` writes it; "": it needs none
+  bool life_in_total = false;     // write_life is of all bytes together; false: the document does not say of what
 
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
     return on_page == page && address >= first && address - first < count;

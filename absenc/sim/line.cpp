@@ -98,6 +98,16 @@ Time Line<Item>::next_event() const {
 }
 
 template <class Item>
+Time Line<Item>::settled() const {
+  Time time = now_;
+  for (const auto& node : nodes_) {
+    if (node->doing != Step<Item>::Kind::transfer || !node->begun) continue;
+    time = std::min(time, node->start + node->each * static_cast<std::int64_t>(node->index));
+  }
+  return time;
+}
+
+template <class Item>
 void Line<Item>::schedule(typename Happening::Kind kind, Time at, Node node) {
   happenings_.push({kind, std::max(at, now_), order_++, node, nodes_[node]->begin_generation});
 }

@@ -30,13 +30,15 @@ class Line {
   using OnEmit = std::function<bool()>;
   /// Called for every character or CAN frame that was on the wire, at its end.
   using Observer = std::function<void(Node sender, Time start, Time end, const Item& item)>;
-  /// Of an exchange or of `bits` clocks: what the host sent and what it received, the last byte left-aligned.
+  /// Of an exchange or of `bits` clocks: what the host sent and what it received, the last byte left-aligned. `lead` is
+  /// the time from `start`, when the chip was selected, to the first clock.
   struct Exchange {
     Time start;
     Time end;
     std::size_t bits;
     std::span<const Item> out;
     std::span<const Item> in;
+    Time lead{};
   };
   /// Called for every exchange, at its end.
   using ExchangeObserver = std::function<void(const Exchange& exchange)>;
@@ -62,6 +64,8 @@ class Line {
   [[nodiscard]] Time now() const { return now_; }
   [[nodiscard]] Role role(Node node) const;
   [[nodiscard]] bool done(Node node) const;
+  /// Observers were told everything that has begun before this time.
+  [[nodiscard]] Time settled() const;
   /// Time of the next event, or `never`.
   [[nodiscard]] Time next_event() const;
 

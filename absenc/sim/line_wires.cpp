@@ -144,7 +144,8 @@ void Line<Item>::begin_exchange(Node node) {
     const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .width = period});
   }
-  schedule(Happening::Kind::exchanged, now_ + host.settings.bits(host.bits), node);
+  if (kind_ == LinkKind::exchange) host.lead = host.settings.select_lead;
+  schedule(Happening::Kind::exchanged, now_ + host.lead + host.settings.bits(host.bits), node);
 }
 
 template <class Item>
@@ -161,7 +162,7 @@ void Line<Item>::end_exchange(Node node) {
     std::vector<Item> out = host.out;
     out.resize(host.expect, 0);
     const std::size_t bits = host.bits;
-    if (exchange_observer_ && bits > 0) exchange_observer_({host.start, now_, bits, out, in});
+    if (exchange_observer_ && bits > 0) exchange_observer_({host.start, now_, bits, out, in, host.lead});
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (nodes_[other]->role == Role::host) continue;
       nodes_[other]->doing = Step<Item>::Kind::wait;
@@ -169,7 +170,7 @@ void Line<Item>::end_exchange(Node node) {
         feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});
       }
       const Time period = kind_ == LinkKind::exchange ? host.settings.bits(1) : Time{};
-      feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period});
+      feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period, .lead = host.lead});
     }
     finish(node);
     host.heard = true;

@@ -2,6 +2,7 @@
 #include "absenc/sim/motion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -110,10 +111,14 @@ Motion Motion::sine(std::int64_t start, double amplitude_degrees, double frequen
 }
 
 Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name) {
+  constexpr std::size_t longest_line = 1024;
+  constexpr std::size_t most_knots = 4'000'000;  // an hour, a thousand a second
   Path path;
-  std::string line;
+  std::array<char, longest_line + 1> buffer;
   bool heading_allowed = true;
-  for (std::size_t line_number = 1; std::getline(csv, line); ++line_number) {
+  for (std::size_t line_number = 1; csv.getline(buffer.data(), buffer.size()) || csv.gcount() > 0; ++line_number) {
+    if (csv.fail()) refuse(std::string(name) + ", line " + std::to_string(line_number) + ": more than 1024 characters");
+    const std::string_view line(buffer.data());
     const auto first = line.find_first_not_of(" \t\r");
     if (first == std::string::npos || line[first] == '#') continue;
     const auto place = [&] { return std::string(name) + ", line " + std::to_string(line_number) + ": "; };
@@ -125,6 +130,7 @@ Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name
     if (!path.knots.empty() && next->time <= path.knots.back().time) {
       refuse(place() + "the seconds must rise from line to line");
     }
+    if (path.knots.size() == most_knots) refuse(place() + "more than 4000000 lines");
     path.knots.push_back(*next);
   }
   if (path.knots.empty()) refuse(std::string(name) + ": no line with `seconds,degrees`");

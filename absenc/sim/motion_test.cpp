@@ -107,6 +107,9 @@ TEST(Motion, BadPathNamesItsLine) {
   EXPECT_EQ(refusal([] { return path("0,0\n\n1,5,6\n"); }),
             "motion.csv, line 3: expected `seconds,degrees`, for example `0.5,90`");
   EXPECT_EQ(refusal([] { return path("1,0\n1,5\n"); }), "motion.csv, line 2: the seconds must rise from line to line");
+  EXPECT_EQ(refusal([] { return path("0,0\n# " + std::string(2000, 'x') + "\n1,5\n"); }),
+            "motion.csv, line 2: more than 1024 characters");
+  EXPECT_EQ(refusal([] { return path(std::string(2000, '\0')); }), "motion.csv, line 1: more than 1024 characters");
   EXPECT_EQ(refusal([] { return path("# nothing\n"); }), "motion.csv: no line with `seconds,degrees`");
   EXPECT_EQ(refusal([] { return path("1e300,0\n"); }),
             "motion.csv, line 1: expected `seconds,degrees`, for example `0.5,90`");

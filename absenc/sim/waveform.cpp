@@ -43,7 +43,8 @@ std::string to_hex(Bytes bytes) {
 
 }  // namespace
 
-Waveform::Waveform(LinkKind kind, const LineSettings& settings) : kind_(kind), settings_(settings) {
+Waveform::Waveform(LinkKind kind, const LineSettings& settings, Sink& sink)
+    : kind_(kind), settings_(settings), sink_(&sink) {
   switch (kind) {
     case LinkKind::half_duplex:
       wires_ = {{"line", true}};
@@ -61,25 +62,39 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings) : kind_(kind), s
       wires_ = {{"can", true}};
       break;
   }
+  drivers_.resize(wires_.size());
 }
 
 void Waveform::observe(Line<std::uint8_t>& observed) {
   observed.observe([this, &observed](std::size_t sender, Time start, Time end, std::uint8_t byte) {
     character(observed.role(sender), start, end, byte);
+    settle(observed.settled());
   });
-  observed.observe_exchanges([this](const Line<std::uint8_t>::Exchange& seen) { exchange(seen); });
+  observed.observe_exchanges([this, &observed](const Line<std::uint8_t>::Exchange& seen) {
+    exchange(seen);
+    settle(observed.settled());
+  });
   observed.observe_pulses([this](absenc::Line by, Time start, Time end) { pulse(by, start, end); });
 }
 
 void Waveform::observe(Line<CanFrame>& observed) {
-  observed.observe([this](std::size_t, Time start, Time, const CanFrame& seen) { frame(start, seen); });
+  observed.observe([this, &observed](std::size_t, Time start, Time, const CanFrame& seen) {
+    frame(start, seen);
+    settle(observed.settled());
+  });
 }
 
 void Waveform::drive(std::size_t wire, Time from, Time to) {
   if (to <= from) return;
-  changes_.push_back({from, wire, 1});
-  changes_.push_back({to, wire, -1});
+  changes_.push({from, wire, 1});
+  changes_.push({to, wire, -1});
   end_ = std::max(end_, to);
+}
+
+void Waveform::comment(Time at, std::string words) {
+  const auto behind = std::upper_bound(comments_.begin(), comments_.end(), at,
+                                       [](Time time, const Comment& other) { return time < other.at; });
+  comments_.insert(behind, {at, std::move(words)});
 }
 
 void Waveform::character(Role sender, Time start, Time end, std::uint8_t byte) {
@@ -94,17 +109,17 @@ void Waveform::character(Role sender, Time start, Time end, std::uint8_t byte) {
   const bool odd = std::popcount(byte) % 2 != 0;
   const bool parity = settings_.parity == Parity::even ? odd : !odd;
   if (settings_.parity != Parity::none && !parity) drive(wire, edge(9), edge(10));
-  comments_.push_back({start, (by_host ? "host " : "device ") + to_hex(Bytes(&byte, 1))});
+  comment(start, (by_host ? "host " : "device ") + to_hex(Bytes(&byte, 1)));
   end_ = std::max(end_, end);
 }
 
 void Waveform::exchange(const Line<std::uint8_t>::Exchange& seen) {
   if (kind_ == LinkKind::clocked) {
     draw_clocked(seen);
-    comments_.push_back({seen.start, std::to_string(seen.bits) + " bits " + to_hex(seen.in)});
+    comment(seen.start, std::to_string(seen.bits) + " bits " + to_hex(seen.in));
   } else {
     draw_exchange(seen);
-    comments_.push_back({seen.start, "mosi " + to_hex(seen.out) + " miso " + to_hex(seen.in)});
+    comment(seen.start, "mosi " + to_hex(seen.out) + " miso " + to_hex(seen.in));
   }
   end_ = std::max(end_, seen.end);
 }
@@ -124,7 +139,8 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Exchange& seen) {
 // CPHA 0: data stands before the leading edge, which takes it. CPHA 1: it comes with the leading edge.
 void Waveform::draw_exchange(const Line<std::uint8_t>::Exchange& seen) {
   const std::int64_t phase = (settings_.spi_mode & 1) != 0 ? 0 : 1;
-  const Scale half{seen.start, seen.end - seen.start, static_cast<std::int64_t>(2 * seen.bits)};
+  const Time first = seen.start + seen.lead;
+  const Scale half{first, seen.end - first, static_cast<std::int64_t>(2 * seen.bits)};
   drive(cs, seen.start, seen.end);
   for (std::size_t i = 0; i < seen.bits; ++i) {
     const auto at = static_cast<std::int64_t>(2 * i);
@@ -144,7 +160,7 @@ void Waveform::frame(Time start, const CanFrame& frame) {
   constexpr std::string_view digits = "0123456789ABCDEF";
   std::string id;
   for (unsigned digit = frame.extended ? 8 : 3; digit-- > 0;) id += digits[frame.id >> 4 * digit & 15];
-  comments_.push_back({start, id + (frame.remote ? " remote" : ": " + to_hex(frame.bytes()))});
+  comment(start, id + (frame.remote ? " remote" : ": " + to_hex(frame.bytes())));
   end_ = std::max(end_, edge(count));
 }
 
@@ -156,36 +172,28 @@ std::size_t Waveform::pulse_wire(std::string_view name) {
   const auto known = std::find_if(wires_.begin(), wires_.end(), [&](const Wire& wire) { return wire.name == name; });
   if (known == wires_.end()) {
     wires_.push_back({name, true});
+    drivers_.push_back(0);
     return wires_.size() - 1;
   }
   return static_cast<std::size_t>(known - wires_.begin());
 }
 
-std::vector<Waveform::Comment> Waveform::comments() const {
-  std::vector<Comment> sorted = comments_;
-  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
-  return sorted;
-}
-
-std::vector<Waveform::Wire> Waveform::wires() const {
-  std::vector<Change> sorted = changes_;
-  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
-  std::vector<Wire> wires = wires_;
-  std::vector<int> drivers(wires.size());
-  for (auto change = sorted.begin(); change != sorted.end();) {
-    const Time at = change->at;
-    std::vector<int> before = drivers;
-    for (; change != sorted.end() && change->at == at; ++change) drivers[change->wire] += change->by;
-    for (std::size_t i = 0; i < wires.size(); ++i) {
-      if ((before[i] == 0) == (drivers[i] == 0)) continue;
-      if (at == Time{}) {
-        wires[i].before = !wires[i].idle;
-      } else {
-        wires[i].changes.push_back(at);
-      }
+void Waveform::settle(Time time) {
+  std::vector<int> before;
+  while (!changes_.empty() && changes_.top().at < time) {
+    const Time at = changes_.top().at;
+    before = drivers_;
+    for (; !changes_.empty() && changes_.top().at == at; changes_.pop()) {
+      drivers_[changes_.top().wire] += changes_.top().by;
+    }
+    for (std::size_t i = 0; i < drivers_.size(); ++i) {
+      if ((before[i] == 0) != (drivers_[i] == 0)) sink_->change(at, i);
     }
   }
-  return wires;
+  const auto later =
+      std::find_if(comments_.begin(), comments_.end(), [&](const Comment& one) { return one.at >= time; });
+  for (auto one = comments_.begin(); one != later; ++one) sink_->comment(one->at, one->words);
+  comments_.erase(comments_.begin(), later);
 }
 
 }  // namespace absenc::sim

@@ -2,7 +2,10 @@
 // The wires of a simulated conversation: when each changes its level.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <queue>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,7 +15,8 @@
 
 namespace absenc::sim {
 
-/// Draws what it is told, or what it sees on a line, with levels as of logic: an idle line and a mark are 1.
+/// Draws what it is told, or what it sees on a line, with levels as of logic: an idle line and a mark are 1. It keeps
+/// no more than what is not settled.
 ///
 /// - half duplex: `line`; full duplex: `host` and `device`, by who drives the pair
 /// - beside these, when there were pulses: `trigger`, `clear`, which a pulse pulls to 0
@@ -24,17 +28,21 @@ class Waveform {
  public:
   struct Wire {
     std::string_view name;
-    bool idle;
-    bool before = idle;           // the level at first
-    std::vector<Time> changes{};  // in rising order; each inverts the level
+    bool idle;  // the level before the first change
   };
-  /// What an item was, in words.
-  struct Comment {
-    Time at;
-    std::string words;
+  /// Gets everything in the order of time, as soon as that is known.
+  struct Sink {
+    /// Inverts the level of this wire, of `wires()`.
+    virtual void change(Time at, std::size_t wire) = 0;
+    /// What an item was, in words.
+    virtual void comment(Time at, std::string_view words) = 0;
+
+   protected:
+    ~Sink() = default;
   };
 
-  Waveform(LinkKind kind, const LineSettings& settings);
+  /// `sink` must outlive it.
+  Waveform(LinkKind kind, const LineSettings& settings, Sink& sink);
 
   /// From now on everything on `line`, of the same kind and settings. Takes its observers; must outlive it.
   void observe(Line<std::uint8_t>& line);
@@ -46,9 +54,13 @@ class Waveform {
   void frame(Time start, const CanFrame& frame);
   void pulse(absenc::Line line, Time start, Time end);
 
-  [[nodiscard]] std::vector<Wire> wires() const;
-  /// In the order of time.
-  [[nodiscard]] std::vector<Comment> comments() const;
+  /// The sink gets what is before `time`: nothing that is told later may begin before it.
+  void settle(Time time);
+  /// The sink gets all there is.
+  void finish() { settle(never); }
+
+  /// Those of pulses are added by the first pulse.
+  [[nodiscard]] const std::vector<Wire>& wires() const { return wires_; }
   /// Of the last item.
   [[nodiscard]] Time end() const { return end_; }
 
@@ -58,18 +70,27 @@ class Waveform {
     Time at;
     std::size_t wire;
     int by;
+    bool operator>(const Change& other) const { return at > other.at; }
+  };
+  struct Comment {
+    Time at;
+    std::string words;
   };
 
   void drive(std::size_t wire, Time from, Time to);
+  void comment(Time at, std::string words);
   std::size_t pulse_wire(std::string_view name);
   void draw_clocked(const Line<std::uint8_t>::Exchange& exchange);
   void draw_exchange(const Line<std::uint8_t>::Exchange& exchange);
 
   LinkKind kind_;
   LineSettings settings_;
+  Sink* sink_;
   std::vector<Wire> wires_;
-  std::vector<Change> changes_;
-  std::vector<Comment> comments_;
+  std::vector<int> drivers_;  // of each wire
+  // What the sink has not got yet:
+  std::priority_queue<Change, std::vector<Change>, std::greater<>> changes_;
+  std::vector<Comment> comments_;  // in the order of time
   Time end_{};
 };
 

@@ -30,47 +30,59 @@ using ::testing::HasSubstr;
 
 constexpr LineSettings slow{.rate = 1'000'000};
 
-std::string vcd(const Waveform& waveform, const std::string& title) {
-  std::ostringstream text;
-  capture::write_vcd(text, capture::drawing_of(title, waveform));
-  return text.str();
-}
+struct Canvas {
+  capture::Drawing drawing{"test"};
+  capture::WaveformSink<Waveform> sink{drawing};
+};
 
-std::string body(const Waveform& waveform) {
-  const std::string text = vcd(waveform, "test");
+struct Picture : Canvas, Waveform {
+  Picture(LinkKind kind, const LineSettings& settings) : Waveform(kind, settings, sink) {}
+
+  const std::string& vcd() {
+    if (!text.empty()) return text;
+    sink.finish(*this, 10us);
+    std::ostringstream out;
+    capture::write_vcd(out, drawing);
+    return text = out.str();
+  }
+  std::string text;
+};
+
+std::string body(Picture& picture) {
+  const std::string text = picture.vcd();
   const std::size_t end = text.find("$enddefinitions $end\n");
   EXPECT_NE(end, std::string::npos);
   return text.substr(end + 21);
 }
 
 TEST(Waveform, NamesItsWires) {
-  EXPECT_THAT(vcd(Waveform(LinkKind::exchange, slow), "encolink"),
-              ::testing::StartsWith("$version absenc $end\n$timescale 1 ns $end\n$scope module encolink $end\n"
+  EXPECT_THAT(Picture(LinkKind::exchange, slow).vcd(),
+              ::testing::StartsWith("$version absenc $end\n$timescale 1 ns $end\n$scope module test $end\n"
                                     "$var wire 1 ! cs $end\n$var wire 1 \" sck $end\n$var wire 1 # mosi $end\n"
                                     "$var wire 1 $ miso $end\n$upscope $end\n$enddefinitions $end\n#0\n"
                                     "1!\n0\"\n0#\n1$\n"));
-  EXPECT_THAT(vcd(Waveform(LinkKind::full_duplex, slow), "x"), HasSubstr("! host $end\n$var wire 1 \" device $end\n"));
-  EXPECT_THAT(vcd(Waveform(LinkKind::can, slow), "x"), HasSubstr("! can $end\n"));
+  EXPECT_THAT(Picture(LinkKind::full_duplex, slow).vcd(), HasSubstr("! host $end\n$var wire 1 \" device $end\n"));
+  EXPECT_THAT(Picture(LinkKind::can, slow).vcd(), HasSubstr("! can $end\n"));
 }
 
 TEST(Waveform, CommentsListTheItems) {
-  Waveform waveform(LinkKind::full_duplex, slow);
+  Picture waveform(LinkKind::full_duplex, slow);
   waveform.character(Role::device, 7us, 17us, 0x00);
   waveform.character(Role::host, 5us, 15us, 0x1A);
-  EXPECT_THAT(vcd(waveform, "x"), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
-                                            "$comment #7000 device 00 $end\n$scope"));
-  Waveform spi(LinkKind::exchange, slow);
+  EXPECT_THAT(waveform.vcd(), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
+                                        "$comment #7000 device 00 $end\n$scope"));
+  Picture spi(LinkKind::exchange, slow);
   const std::array<std::uint8_t, 2> out{0x12, 0x34};
   const std::array<std::uint8_t, 2> in{0xAB, 0xCD};
   spi.exchange({0us, 16us, 16, out, in});
-  EXPECT_THAT(vcd(spi, "x"), HasSubstr("$comment #0 mosi 12 34 miso AB CD $end\n"));
-  Waveform clocked(LinkKind::clocked, slow);
+  EXPECT_THAT(spi.vcd(), HasSubstr("$comment #0 mosi 12 34 miso AB CD $end\n"));
+  Picture clocked(LinkKind::clocked, slow);
   clocked.exchange({0us, 12us, 12, {}, in});
-  EXPECT_THAT(vcd(clocked, "x"), HasSubstr("$comment #0 12 bits AB CD $end\n"));
+  EXPECT_THAT(clocked.vcd(), HasSubstr("$comment #0 12 bits AB CD $end\n"));
 }
 
 TEST(Waveform, Character) {
-  Waveform waveform(LinkKind::half_duplex, slow);
+  Picture waveform(LinkKind::half_duplex, slow);
   waveform.character(Role::host, 5us, 15us, 0x1A);  // 0 01011000 1
   EXPECT_EQ(body(waveform),
             "#0\n1!\n#5000\n0!\n#7000\n1!\n#8000\n0!\n#9000\n1!\n#11000\n0!\n#14000\n1!\n"
@@ -79,21 +91,21 @@ TEST(Waveform, Character) {
 
 TEST(Waveform, ParityAndTwoStopBits) {
   for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
-    Waveform waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
+    Picture waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
     waveform.character(Role::device, 0us, 12us, 0x80);  // 0 00000001 p 11
     EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
   }
 }
 
 TEST(Waveform, CollisionIsTheAnd) {
-  Waveform waveform(LinkKind::half_duplex, slow);
+  Picture waveform(LinkKind::half_duplex, slow);
   waveform.character(Role::device, 0us, 10us, 0xFE);
   waveform.character(Role::device, 1us, 11us, 0xFE);
   EXPECT_EQ(body(waveform), "#0\n0!\n#3000\n1!\n#21000\n");
 }
 
 TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
-  Waveform waveform(LinkKind::half_duplex, {.rate = 3'000'000});
+  Picture waveform(LinkKind::half_duplex, {.rate = 3'000'000});
   waveform.character(Role::host, 0ns, 3333ns, 0x55);  // a change at each edge
   std::string edges;
   for (const int edge : {333, 667, 1000, 1333, 1667, 2000, 2333, 2666, 3000}) {
@@ -106,7 +118,7 @@ TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0x7F};
   const auto drawn = [&](std::uint8_t mode) {
-    Waveform waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = mode});
+    Picture waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = mode});
     waveform.exchange({1us, 9us, 8, out, in});
     return body(waveform);
   };
@@ -122,14 +134,23 @@ TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
   EXPECT_THAT(drawn(3), StartsWith("#0\n1!\n1\"\n0#\n1$\n#1000\n0!\n0\"\n1#\n0$\n#1500\n1\"\n#2000\n0\"\n0#\n1$\n"));
 }
 
+TEST(Waveform, TheClockWaitsForTheChip) {
+  Picture waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us});
+  const std::array<std::uint8_t, 1> out{0x80};
+  const std::array<std::uint8_t, 1> in{0xFF};
+  waveform.exchange({1us, 14us, 8, out, in, 5us});
+  EXPECT_THAT(body(waveform),
+              ::testing::StartsWith("#0\n1!\n0\"\n0#\n1$\n#1000\n0!\n#6000\n1\"\n1#\n#6500\n0\"\n#7000\n"));
+}
+
 TEST(Waveform, ClockedBits) {
-  Waveform at_once(LinkKind::clocked, slow);
+  Picture at_once(LinkKind::clocked, slow);
   const std::array<std::uint8_t, 1> bits{0x50};  // 010
   at_once.exchange({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(at_once),
             "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
             "#3500\n1!\n1\"\n#14000\n");
-  Waveform after_an_edge(LinkKind::clocked, {.rate = 1'000'000, .idle_clocks = 1});
+  Picture after_an_edge(LinkKind::clocked, {.rate = 1'000'000, .idle_clocks = 1});
   after_an_edge.exchange({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(after_an_edge),
             "#0\n1!\n1\"\n#1000\n0!\n#1500\n1!\n0\"\n#2000\n0!\n#2500\n1!\n1\"\n#3000\n0!\n"
@@ -137,15 +158,42 @@ TEST(Waveform, ClockedBits) {
 }
 
 TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
-  Waveform waveform(LinkKind::full_duplex, slow);
+  Picture waveform(LinkKind::full_duplex, slow);
   waveform.pulse(absenc::Line::trigger, 1us, 3us);
   waveform.pulse(absenc::Line::clear, 5us, 6us);
-  const std::vector<Waveform::Wire> wires = waveform.wires();
-  ASSERT_EQ(wires.size(), 4u);
-  EXPECT_EQ(wires[2].name, "trigger");
-  EXPECT_EQ(wires[2].changes, (std::vector<Time>{1us, 3us}));
-  EXPECT_EQ(wires[3].name, "clear");
-  EXPECT_EQ(wires[3].changes, (std::vector<Time>{5us, 6us}));
+  EXPECT_THAT(waveform.vcd(), HasSubstr("$var wire 1 # trigger $end\n$var wire 1 $ clear $end\n"));
+  EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
+}
+
+// Whoever keeps everything until the end runs out of memory.
+TEST(Waveform, HandsOverWhatIsSettled) {
+  struct Counter final : Waveform::Sink {
+    void change(Time at, std::size_t) override {
+      EXPECT_GE(at, last);
+      last = at;
+    }
+    void comment(Time at, std::string_view) override { commented = at; }
+    Time last{};
+    Time commented{};
+  };
+  Counter counter;
+  Line<std::uint8_t> line(LinkKind::full_duplex, slow);
+  Waveform waveform(LinkKind::full_duplex, slow, counter);
+  waveform.observe(line);
+  toy::Toy<std::uint8_t> host;
+  toy::Toy<std::uint8_t> device;
+  host.send({0x00, 0x55, 0x00, 0x55}, 10us);
+  device.send({0x55, 0x00, 0x55, 0x00}, 14us);
+  line.attach(Role::host, host);
+  line.attach(Role::device, device);
+  line.run_until(45us);  // within the fourth character of both
+  EXPECT_EQ(line.settled(), 40us);
+  EXPECT_EQ(counter.last, 33us);
+  EXPECT_EQ(counter.commented, 30us);
+  line.run_until(100us);
+  EXPECT_EQ(line.settled(), 100us);
+  waveform.finish();
+  EXPECT_EQ(counter.last, 53us);
 }
 
 // What others see in a file.
@@ -158,10 +206,9 @@ struct Sigrok : ::testing::Test {
   ~Sigrok() override { std::filesystem::remove_all(directory); }
 
   // The annotations, a line each, without the decoder's name.
-  [[nodiscard]] std::string decode(const Waveform& waveform, const std::string& decoder,
-                                   const std::string& what) const {
+  [[nodiscard]] std::string decode(Picture& waveform, const std::string& decoder, const std::string& what) const {
     const std::filesystem::path file = directory / "waveform.vcd";
-    std::ofstream(file) << vcd(waveform, "encoder");
+    std::ofstream(file) << waveform.vcd();
     const std::string command =
         "sigrok-cli -I vcd -i " + file.string() + " -P " + decoder + " -A " + what + " 2>&1 </dev/null";
     FILE* pipe = ::popen(command.c_str(), "r");
@@ -191,7 +238,7 @@ std::string bits_of(BitView bits) {
 TEST_F(Sigrok, ReadsTheBitsOfSsi) {
   const ssi::Format format{.word = "multiturn:12 position:13 gray"_word, .extra_clocks = 25};
   biss::testing::ClockedBench<ssi::VirtualEncoder> bench(ssi::line_settings, format);
-  Waveform waveform(LinkKind::clocked, ssi::line_settings);
+  Picture waveform(LinkKind::clocked, ssi::line_settings);
   waveform.observe(bench.line);
   bench.shaft.state.position = 0x123'95C6'1234;
   ssi::ReadPosition read(format);
@@ -206,7 +253,7 @@ TEST_F(Sigrok, ReadsTheBitsOfSsi) {
 TEST_F(Sigrok, ReadsTheSamplesOfBiss) {
   const biss::Format format{.word = "multiturn:16 position:19 error:1! warning:1!"_word};
   biss::testing::Bench bench(biss::line_settings, format);
-  Waveform waveform(LinkKind::clocked, biss::line_settings);
+  Picture waveform(LinkKind::clocked, biss::line_settings);
   waveform.observe(bench.line);
   bench.shaft.state.position = 0x123'95C6'1234;
   biss::ReadPosition read(format, {});
@@ -224,7 +271,7 @@ TEST_F(Sigrok, ReadsAnExchangeInEveryMode) {
   for (std::uint8_t mode = 0; mode < 4; ++mode) {
     const LineSettings settings{.rate = 4'000'000, .spi_mode = mode};
     Line<std::uint8_t> line(LinkKind::exchange, settings);
-    Waveform waveform(LinkKind::exchange, settings);
+    Picture waveform(LinkKind::exchange, settings);
     waveform.observe(line);
     toy::Toy<std::uint8_t> device([](auto& self, const Event<std::uint8_t>& event) {
       if (event.kind == Event<std::uint8_t>::Kind::selected) self.send({0xA1, 0x5E, 0xC3});
@@ -243,7 +290,7 @@ TEST_F(Sigrok, ReadsAnExchangeInEveryMode) {
 
 TEST_F(Sigrok, ReadsFramesOfCan) {
   const LineSettings settings{.rate = 500'000};
-  Waveform waveform(LinkKind::can, settings);
+  Picture waveform(LinkKind::can, settings);
   Time at = 50us;
   const auto add = [&](const CanFrame& frame) {
     waveform.frame(at, frame);
@@ -269,7 +316,7 @@ TEST_F(Sigrok, ReadsFramesOfCan) {
 
 TEST_F(Sigrok, ReadsTheBytesOfTformat) {
   tformat::testing::Bench bench;
-  Waveform waveform(LinkKind::half_duplex, tformat::line_settings);
+  Picture waveform(LinkKind::half_duplex, tformat::line_settings);
   waveform.observe(bench.line);
   bench.shaft.put(3, 4660);
   bench.pass(20us);  // a decoder wants to see the line idle first

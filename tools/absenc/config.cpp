@@ -7,15 +7,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/nearest.hpp"
+#include "tools/absenc/text_file.hpp"
 
 namespace absenc::tool {
 
@@ -132,15 +129,63 @@ class Reader {
   std::string path_;
 };
 
-std::string read_file(const std::string& path) {
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  if (file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
-  if (!file.is_open() || file.bad()) {
-    throw UsageError(fmt::format("{} cannot be read: {}", path, std::strerror(errno)));
+// The last character of the string that begins at `at`, or of the text.
+std::size_t end_of_string(std::string_view text, std::size_t at) {
+  const char quote = text[at];
+  const bool lines = text.substr(at).starts_with(std::string(3, quote));
+  for (std::size_t i = at + (lines ? 3 : 1); i < text.size(); ++i) {
+    if (text[i] == '\\' && quote == '"') {
+      ++i;
+    } else if (!lines && (text[i] == quote || text[i] == '\n')) {
+      return i;
+    } else if (lines && text.substr(i).starts_with(std::string(3, quote))) {
+      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;  // two more may belong to it
+    }
   }
-  return text.str();
+  return text.size();
+}
+
+// The library recurses as deep as what it reads: nothing of ours is deeper than a list behind [encoder.NAME]. Throws.
+void check_depth(std::string_view text, const Reader& reader) {
+  constexpr std::size_t deepest = 16;
+  std::size_t brackets = 0;
+  std::size_t dots = 0;  // in a row of names
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    switch (text[at]) {
+      case '#':
+        at = std::min(text.find('\n', at), text.size()) - 1;
+        break;
+      case '"':
+      case '\'':
+        at = end_of_string(text, at);
+        break;
+      case '[':
+      case '{':
+        ++brackets;
+        dots = 0;
+        break;
+      case ']':
+      case '}':
+        brackets -= std::min<std::size_t>(brackets, 1);
+        break;
+      case '.':
+        ++dots;
+        break;
+      case '=':
+      case ',':
+      case '\n':
+        dots = 0;
+        break;
+      default:
+        break;
+    }
+    if (brackets <= deepest && dots <= deepest) continue;
+    const std::string_view before = text.substr(0, at);
+    const auto line = static_cast<toml::source_index>(std::count(before.begin(), before.end(), '\n') + 1);
+    const auto column = static_cast<toml::source_index>(at - (before.rfind('\n') + 1) + 1);
+    throw UsageError(fmt::format("{}: this is nested more than {} deep, which nothing in the file needs to be",
+                                 reader.place({line, column}), deepest));
+  }
 }
 
 // "": not set.
@@ -159,6 +204,7 @@ const ConfigSetting* ConfigSection::find(std::string_view setting) const {
 
 Config parse_config(std::string_view text, const std::string& path) {
   const Reader reader(path);
+  check_depth(text, reader);
   try {
     return reader.config(toml::parse(text, path));
   } catch (const toml::parse_error& error) {
@@ -183,7 +229,13 @@ std::optional<Config> load_config() {
   const bool must_exist = !environment(variable).empty();
   for (const std::string& path : config_paths()) {
     std::error_code ignored;
-    if (std::filesystem::exists(path, ignored)) return parse_config(read_file(path), path);
+    if (std::filesystem::exists(path, ignored)) {
+      try {
+        return parse_config(read_text_file("the file of encoders' names", path), path);
+      } catch (const ToolFailure& failure) {
+        throw UsageError(failure.what());
+      }
+    }
     if (must_exist) throw UsageError(fmt::format("{}, which {} names, is not there", path, variable));
   }
   return std::nullopt;

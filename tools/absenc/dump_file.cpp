@@ -147,8 +147,8 @@ class Parser {
     const std::string_view written = lines_.line.substr(checksum_name.size());
     if (written != edited && written != sum_.text()) {
       refuse(
-          "the checksum is wrong: the file was damaged, or edited. If you edited it on purpose, delete this line or "
-          "write \"checksum: edited\"");
+          "the checksum is wrong: the file was damaged, or edited. If you edited it on purpose, write \"checksum: "
+          "edited\" instead");
     }
     dump_.checked = true;
   }
@@ -177,7 +177,9 @@ std::string to_dump(const Unit& unit, const Options& options, const MemoryImage&
     sum.add(line);
     text += line + '\n';
   }
-  text += "# After editing: delete the next line. Bytes that are not in this file are neither written nor compared.\n";
+  text +=
+      "# After editing: make the number in the next line \"edited\". Bytes that are not in this file are neither "
+      "written nor compared.\n";
   return text + fmt::format("{}{}\n", checksum_name, sum.text());
 }
 

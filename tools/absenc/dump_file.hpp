@@ -11,7 +11,8 @@ namespace absenc::tool {
 
 struct Dump {
   MemoryImage image;
-  bool checked = false;  // it has a checksum, which is right, or says that it was edited
+  // It has a checksum, which is right, or says that it was edited; otherwise nobody knows whether it is whole.
+  bool checked = false;
 };
 
 [[nodiscard]] std::string to_dump(const Unit& unit, const Options& options, const MemoryImage& image);

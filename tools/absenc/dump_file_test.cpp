@@ -104,7 +104,7 @@ TEST(DumpFile, ChecksumCountsOnlyWhatCounts) {
   const std::string good = to_dump(unit, options_of("TS5700N8500"), {{{0, 5}, 0x5A}});
   const std::string with_comment = replaced(good, "page 0", "# mine\r\n\npage 0");
   EXPECT_EQ(refusal(with_comment), "nothing");
-  expect_refusal(replaced(good, "5A", "5B"), {"file, line 6", "damaged, or edited", "delete this line"});
+  expect_refusal(replaced(good, "5A", "5B"), {"file, line 6", "damaged, or edited", "checksum: edited"});
   const std::string edited = replaced(good, "5A", "5B");
   EXPECT_EQ(refusal(edited.substr(0, edited.find("checksum"))), "nothing");
   EXPECT_EQ(refusal(edited.substr(0, edited.find("checksum")) + "checksum: edited\n"), "nothing");

@@ -149,11 +149,18 @@ struct Emulation {
     const Time start = os::now();
     line.power_on(start);
     MemoryKeeper<Item> keeper(line.machine(), line.first(), file);
-    const std::vector<std::string> notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : line.machine());
-    const bool saved = !keeps_memory || keeper.finish();
+    std::vector<std::string> notes;
+    int status = exit_good;
+    try {
+      notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : line.machine());
+      if (keeps_memory) keeper.finish();
+    } catch (const ToolFailure& failure) {
+      print_message(failure.what());
+      status = exit_failed;
+    }
     line.summarize(start);
     for (const std::string& note : notes) print_note("  " + note);
-    return saved ? exit_good : exit_failed;
+    return status;
   }
 
   // `never`: at a signal.
@@ -273,7 +280,7 @@ constexpr std::array<Parameter, 18> parameters{{
     {"--also", "SETTINGS",
      "one more encoder on the line: what stands behind sim:PROTOCOL? to set it; --model and --option are for all", "",
      false, true},
-    {"--memory", "FILE", "keep the encoder's memory in this file; it is made if missing"},
+    {"--memory", "FILE", "keep the encoder's memory in this file, which it locks; it is made if missing"},
     {"--power-on", "real|skip", "whether the encoder takes its time to start", "skip"},
     {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
 }};

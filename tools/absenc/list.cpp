@@ -124,8 +124,7 @@ Rows memory_rows(const Unit& unit) {
     const std::string to = last == area.first ? "" : fmt::format(" to 0x{:02X}", last);
     std::string writes = area.writable ? "" : "read only";
     if (!area.protection.empty()) writes = "written only with --force";
-    if (area.write_life != 0 && area.protection.empty())
-      writes = fmt::format("{} writes in a byte's life", area.write_life);
+    if (area.write_life != 0 && area.protection.empty()) writes = life_of(area);
     rows.push_back({fmt::format("page {}: 0x{:02X}{}", area.page, area.first, to), std::string(area.meaning), writes});
   }
   return rows;
@@ -243,6 +242,7 @@ Json memory_json(const Unit& unit) {
                      .set("writable", area.writable)
                      .set("in_dump", area.in_dump)
                      .set("write_life", area.write_life)
+                     .set("write_life_in_total", area.life_in_total)
                      .set("protection", area.protection));
   }
   return areas;

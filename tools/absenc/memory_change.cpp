@@ -15,6 +15,7 @@
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/run.hpp"
+#include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
@@ -35,16 +36,16 @@ Json addresses_json(const MemoryImage& image) {
   return list;
 }
 
-// The least that one of these bytes bears; 0: not known.
-std::uint32_t write_life(const Unit& unit, const MemoryImage& image) {
-  std::uint32_t least = 0;
+// The least that one of these bytes bears; "": not known.
+std::string write_life(const Unit& unit, const MemoryImage& image) {
+  const MemoryArea* least = nullptr;
   for (const auto& [at, value] : image) {
     for (const MemoryArea& area : unit.memory) {
       if (!area.has(at.page, at.address) || area.write_life == 0) continue;
-      least = least == 0 ? area.write_life : std::min(least, area.write_life);
+      if (least == nullptr || area.write_life < least->write_life) least = &area;
     }
   }
-  return least;
+  return least == nullptr ? "" : life_of(*least);
 }
 
 class Change {
@@ -81,9 +82,8 @@ class Change {
 
   [[nodiscard]] std::string cost() const {
     const std::size_t count = differing_.size();
-    const std::uint32_t life = write_life(unit_, differing_);
-    const std::string wear =
-        life == 0 ? "" : fmt::format("; writing takes one of the {} writes in a byte's life", life);
+    const std::string life = write_life(unit_, differing_);
+    const std::string wear = life.empty() ? "" : fmt::format("; each byte takes one of {}", life);
     return fmt::format("{} of {} {} differ{}{}", count, wanted_.size(), noun(wanted_.size()), count == 1 ? "s" : "",
                        wear);
   }

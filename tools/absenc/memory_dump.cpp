@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cstring>
-#include <filesystem>
 
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
@@ -19,23 +17,6 @@
 namespace absenc::tool {
 
 namespace {
-
-namespace fs = std::filesystem;
-
-// Before the encoder is read for nothing.
-void require_replaceable(const std::string& path) {
-  const auto refuse = [&](std::string_view why) {
-    throw ToolFailure(fmt::format("{} cannot be written: {}", path, why));
-  };
-  std::error_code ignored;
-  const fs::path folder = fs::path(path).parent_path();
-  if (!fs::exists(path, ignored)) {
-    if (!fs::is_directory(folder, ignored)) refuse(fmt::format("there is no directory {}", folder.string()));
-    return;
-  }
-  if (!fs::is_regular_file(path, ignored)) refuse("it is no regular file");
-  if (const int error = os::replaceable(path); error != 0) refuse(std::strerror(error));
-}
 
 int run_dump(const Invocation& invocation) {
   os::catch_interrupts();
@@ -63,7 +44,15 @@ MemoryImage read_dump(const Invocation& invocation, const EncoderUri& uri, Acces
   const std::string path(invocation.text("file"));
   const std::string text = read_text_file("the dump", path);
   const Dump dump = parse_dump(path, text, *uri.unit, uri.options, access);
-  if (!dump.checked) print_message(fmt::format("note: {} has no checksum: damage would not be noticed", path));
+  if (dump.checked) return dump.image;
+  const std::string what = fmt::format("{} has no checksum, which is its last line: was it cut off?", path);
+  if (!invocation.has("--force")) {
+    throw ToolFailure(
+        fmt::format("{} If you edited it and it is whole, end it with the line \"checksum: edited\"; "
+                    "--force takes it as it is",
+                    what));
+  }
+  print_message(fmt::format("note: {} {} bytes of it are taken", what, dump.image.size()));
   return dump.image;
 }
 
@@ -116,7 +105,7 @@ constexpr std::array<Parameter, 7> load_parameters{{
     parameter::encoder,
     file,
     {"--dry-run", "", "only show what differs"},
-    parameter::force,
+    {"--force", "", "write also what the protocol protects, as calibration, and take a file without a checksum"},
     parameter::yes,
     parameter::json,
     parameter::option,
@@ -126,7 +115,13 @@ constexpr std::array<Example, 2> load_examples{{
     {"absenc memory load tformat:/dev/ttyUSB0 motor7.dump --dry-run", "what would be written"},
 }};
 
-constexpr std::array<Parameter, 4> verify_parameters{{parameter::encoder, file, parameter::json, parameter::option}};
+constexpr std::array<Parameter, 5> verify_parameters{{
+    parameter::encoder,
+    file,
+    {"--force", "", "take a file without a checksum"},
+    parameter::json,
+    parameter::option,
+}};
 constexpr std::array<Example, 2> verify_examples{{
     {"absenc memory verify tformat:/dev/ttyUSB0 motor7.dump", "is it what was written?"},
     {"absenc memory verify tformat:/dev/ttyUSB0 motor7.dump --json", "the same for programs"},
@@ -137,8 +132,9 @@ constexpr std::array<Example, 2> verify_examples{{
 const Subcommand memory_dump_subcommand{
     "memory dump",
     "copy the memory into a file that can be edited",
-    "Lines of page, address and bytes in hexadecimal. After editing, delete the line with the checksum: a file\n"
-    "whose checksum is wrong is refused, one without is taken. What is not in the file is left alone.",
+    "Lines of page, address and bytes in hexadecimal. After editing, write \"checksum: edited\" in the place of the\n"
+    "last line: a file whose checksum is wrong or missing was damaged or cut off, and is refused. What is not in the\n"
+    "file is left alone.",
     dump_parameters,
     dump_examples,
     run_dump};

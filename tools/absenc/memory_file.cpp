@@ -42,15 +42,30 @@ void expect(const std::string& path, LineReader& lines, std::string_view name, s
 MemoryFile::MemoryFile(const std::string& path, std::string_view protocol, std::string_view model)
     : path_(link_target(path)), protocol_(protocol), model_(model) {}
 
-void MemoryFile::load(MutableBytes memory) const {
-  std::error_code error;
-  if (!std::filesystem::exists(path_, error) && !error) return save(memory, os::Durable::yes);
+void MemoryFile::load(MutableBytes memory) {
+  const auto refuse_writing = [&](std::string_view why) {
+    throw ToolFailure(fmt::format("the memory file {} cannot be written: {}", path_, why));
+  };
+  try {
+    file_.emplace(path_);
+  } catch (const os::Failure& failure) {
+    if (failure.kind() != os::Failure::Kind::in_use) refuse_writing(failure.what());
+    throw ToolFailure(
+        fmt::format("another emulator keeps its memory in {}: end it, or give each a file of its own", path_));
+  }
+  if (file_->made()) {
+    try {
+      return save(memory, os::Durable::yes);
+    } catch (const ToolFailure&) {
+      std::error_code ignored;
+      std::filesystem::remove(path_, ignored);
+      throw;
+    }
+  }
   const std::string text = read_text_file("the memory file", path_);
   std::vector<std::uint8_t> bytes(memory.size());
   parse(text, bytes);
-  if (const int refusal = os::replaceable(path_); refusal != 0) {
-    throw ToolFailure(fmt::format("the memory file {} cannot be written: {}", path_, std::strerror(refusal)));
-  }
+  if (const int refusal = os::replaceable(path_); refusal != 0) refuse_writing(std::strerror(refusal));
   std::copy(bytes.begin(), bytes.end(), memory.begin());
 }
 
@@ -95,9 +110,9 @@ std::string MemoryFile::to_text(Bytes memory) const {
   return text;
 }
 
-void MemoryFile::save(Bytes memory, os::Durable durable) const {
+void MemoryFile::save(Bytes memory, os::Durable durable) {
   try {
-    os::replace_file(path_, to_text(memory), durable);
+    file_->replace(to_text(memory), durable);
   } catch (const os::Failure& failure) {
     throw ToolFailure(fmt::format("the memory file cannot be written: {}", failure.what()));
   }

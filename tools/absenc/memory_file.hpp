@@ -2,11 +2,12 @@
 // The memory of a virtual encoder in a file, for people to read and edit. memory_file.cpp describes the format.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "absenc/core/bytes.hpp"
-#include "absenc/os/process.hpp"
+#include "absenc/os/kept_file.hpp"
 
 namespace absenc::tool {
 
@@ -15,12 +16,13 @@ class MemoryFile {
   /// `path` may be a symbolic link. Nothing is opened yet.
   MemoryFile(const std::string& path, std::string_view protocol, std::string_view model);
 
-  /// Fills `memory` from the file, or makes the file from `memory` when there is none. Throws ToolFailure, and leaves
-  /// both as they are, when the file is none of ours, damaged, of another model or size, or cannot be written.
-  void load(MutableBytes memory) const;
+  /// Fills `memory` from the file, or makes the file from `memory` when there is none. From then on it is locked.
+  /// Throws ToolFailure, and leaves both as they are, when the file is none of ours, damaged, of another model or size,
+  /// kept by another emulator, or cannot be written.
+  void load(MutableBytes memory);
 
-  /// Replaces the file in one go. Throws ToolFailure.
-  void save(Bytes memory, os::Durable durable) const;
+  /// Replaces the file, which was loaded, in one go. Throws ToolFailure.
+  void save(Bytes memory, os::Durable durable);
 
  private:
   [[nodiscard]] std::string to_text(Bytes memory) const;
@@ -29,6 +31,7 @@ class MemoryFile {
   std::string path_;
   std::string protocol_;
   std::string model_;
+  std::optional<os::KeptFile> file_;
 };
 
 }  // namespace absenc::tool

@@ -4,17 +4,24 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
+#include "absenc/os/process.hpp"
 #include "tools/absenc/error.hpp"
 
 namespace absenc::tool {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t largest = 16 << 20;
+
+}  // namespace
 
 std::string read_text_file(std::string_view what, const std::string& path) {
   const auto refuse = [&](std::string_view why) {
@@ -24,10 +31,13 @@ std::string read_text_file(std::string_view what, const std::string& path) {
   if (fs::is_directory(path, ignored)) refuse("it is a directory");
   std::ifstream file(path, std::ios::binary);
   if (!file) refuse(std::strerror(errno));
-  std::ostringstream text;
-  text << file.rdbuf();  // fails for an empty file, too
+  std::string text;
+  for (std::array<char, 1 << 16> part; file; text.append(part.data(), static_cast<std::size_t>(file.gcount()))) {
+    if (text.size() > largest) refuse("it has more than 16 MiB: it is something else, or never ends");
+    file.read(part.data(), part.size());
+  }
   if (file.bad()) refuse(std::strerror(errno));
-  return text.str();
+  return text;
 }
 
 std::string link_target(const std::string& path) {
@@ -37,6 +47,20 @@ std::string link_target(const std::string& path) {
     target = target.parent_path() / fs::read_symlink(target, ignored);
   }
   return target;
+}
+
+void require_replaceable(const std::string& path) {
+  const auto refuse = [&](std::string_view why) {
+    throw ToolFailure(fmt::format("{} cannot be written: {}", path, why));
+  };
+  std::error_code ignored;
+  const fs::path folder = fs::absolute(path, ignored).parent_path();
+  if (!fs::exists(path, ignored)) {
+    if (!fs::is_directory(folder, ignored)) refuse(fmt::format("there is no directory {}", folder.string()));
+    return;
+  }
+  if (!fs::is_regular_file(path, ignored)) refuse("it is no regular file");
+  if (const int error = os::replaceable(path); error != 0) refuse(std::strerror(error));
 }
 
 bool LineReader::next() {

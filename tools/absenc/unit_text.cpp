@@ -271,6 +271,11 @@ void FieldTable::put(const FieldValue& value) {
   }
 }
 
+std::string life_of(const MemoryArea& area) {
+  if (area.write_life == 0) return "";
+  return fmt::format("{} {}", area.write_life, area.life_in_total ? "writes in total" : "writing cycles");
+}
+
 std::string_view name_of(LinkKind link) {
   static constexpr std::array<std::string_view, 5> names{"half_duplex", "full_duplex", "exchange", "clocked", "can"};
   return names[static_cast<std::size_t>(link)];

@@ -59,6 +59,9 @@ struct NamedArgument {
 [[nodiscard]] Json to_json(const FieldValue& value);
 [[nodiscard]] std::string to_text(const FieldValue& value);
 
+/// "100000 writes in total", "1000000 writing cycles" where the document does not say of what; "": not known
+[[nodiscard]] std::string life_of(const MemoryArea& area);
+
 /// "half_duplex"
 [[nodiscard]] std::string_view name_of(LinkKind link);
 /// "RS-485 half duplex, 2.5 Mbit/s"

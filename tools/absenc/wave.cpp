@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cerrno>
 #include <cstddef>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -10,6 +13,9 @@
 
 #include "absenc/capture/drawing.hpp"
 #include "absenc/host/drive.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/process.hpp"
+#include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/sim_port.hpp"
 #include "absenc/sim/waveform.hpp"
@@ -17,7 +23,9 @@
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/progress.hpp"
 #include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text_file.hpp"
 #include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
@@ -26,8 +34,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Time lead_in = 20us;                    // viewers and decoders want to see the line idle first
+constexpr Time first_request = 20us;              // so long is the encoder switched on
 constexpr std::uint64_t fastest = 1'000'000'000;  // samples a second: those of the drawing
+
+// Decoders want to see the line idle before and behind what they take for whole: CAN nodes 11 bits, Modbus 3.5
+// characters, whoever guesses the rate a little more.
+Time idle_around(const LineSettings& line) { return std::max(first_request, 5 * line.character()); }
 
 enum class FileFormat : std::uint8_t { vcd, sigrok, saleae };
 
@@ -67,22 +79,23 @@ std::vector<Spoken> commands_of(const Unit& unit, std::span<const std::string> t
   return {{read, require_arguments(*read, {})}};
 }
 
-/// A virtual encoder and its host in virtual time, and what their line shows.
+/// A virtual encoder and its host in virtual time.
 struct Conversations {
   const EncoderUri& uri;
   std::vector<Spoken> commands;
   std::uint64_t rounds;
   Time period;
+  sim::Waveform& waveform;
+  Progress& progress;
 
   std::uint64_t results = 0;
   std::uint64_t failures = 0;
-  sim::Waveform waveform{uri.unit->link, uri.line};
 
   template <class Item>
   void hold(Machine<Item>& device) {
     sim::SimPort<Item> port(uri.unit->link, uri.line, device);
     waveform.observe(port.line());
-    for (Time next = lead_in; results < rounds; next += period) {
+    for (Time next = first_request; results < rounds; next += period) {
       pass(port, next);
       for (const Spoken& one : commands) hold(port, one);
     }
@@ -110,7 +123,9 @@ struct Conversations {
     }
     const bool reads = one.command->verb == Verb::read;
     const auto count = [&] {
-      ++results;
+      constexpr std::uint64_t now_and_then = 256;
+      if (os::interrupted()) throw os::Interrupted{};
+      if (results++ % now_and_then == 0) progress.show(fmt::format("{} of {} results", results, rounds));
       if (conversation->error() != Error::none) ++failures;
     };
     const bool ended = host::drive(*conversation, port, [&] {
@@ -121,11 +136,8 @@ struct Conversations {
   }
 };
 
-Conversations converse(const Invocation& invocation, const EncoderUri& uri) {
-  const double rate = invocation.real("--rate", 1000, 0.001, 1e6);
-  Conversations conversations{uri, commands_of(*uri.unit, invocation.texts("--command")),
-                              static_cast<std::uint64_t>(invocation.number("--count", 1, 1, 1'000'000)),
-                              Time(static_cast<std::int64_t>(1e9 / rate))};
+void converse(Conversations& conversations) {
+  const EncoderUri& uri = conversations.uri;
   VirtualDevice device(*uri.unit, uri.options, uri.device);
   device.power_on(Time{});
   if (device.bytes() != nullptr) {
@@ -133,25 +145,28 @@ Conversations converse(const Invocation& invocation, const EncoderUri& uri) {
   } else {
     conversations.hold(*device.frames());
   }
-  return conversations;
 }
 
-void write(const Invocation& invocation, const std::string& path, const capture::Drawing& drawing,
-           const LineSettings& line) {
+// Room on the disk that the file will be on.
+capture::ScratchFile scratch_file(const std::string& path) {
+  os::Descriptor file = os::nameless_file(std::filesystem::path(path).parent_path());
+  return capture::ScratchFile(::fdopen(file.release(), "w+"));
+}
+
+void write(const Invocation& invocation, const std::string& path, capture::Drawing& drawing, const LineSettings& line) {
   const FileFormat format = format_of(path);
-  if (format == FileFormat::sigrok) {
+  if (format == FileFormat::sigrok) {  // which takes the place of the old one by itself
     const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
     const std::int64_t rate =
         invocation.number("--samplerate", static_cast<std::int64_t>(usual), 1, static_cast<std::int64_t>(fastest));
-    capture::write_sigrok(path, drawing, static_cast<std::uint64_t>(rate));
-    return;
+    return capture::write_sigrok(path, drawing, static_cast<std::uint64_t>(rate));
   }
-  if (invocation.has("--samplerate"))
-    throw UsageError("--samplerate is for .sr: the other files keep every nanosecond");
-  std::ofstream out(path, std::ios::binary);
+  os::NewFile file(path);
+  std::ofstream out(file.path(), std::ios::binary);
   format == FileFormat::vcd ? capture::write_vcd(out, drawing) : capture::write_saleae_csv(out, drawing);
   out.flush();
-  if (!out) throw ToolFailure(fmt::format("{} cannot be written", path));
+  if (!out) throw ToolFailure(fmt::format("{} cannot be written: {}", path, std::strerror(errno)));
+  file.take_place(os::Durable::no);
 }
 
 // "sim:" may be left out: no other encoder shows its wires.
@@ -167,20 +182,42 @@ EncoderUri virtual_encoder(const Invocation& invocation) {
 }
 
 int run_wave(const Invocation& invocation) {
-  const std::string path(invocation.text("file"));
-  static_cast<void>(format_of(path));
+  os::catch_interrupts();
+  const std::string_view name = invocation.text("file");
+  const std::string path = link_target(std::string(name));
+  if (format_of(path) != FileFormat::sigrok && invocation.has("--samplerate")) {
+    throw UsageError("--samplerate is for .sr: the other files keep every nanosecond");
+  }
   if (std::filesystem::exists(path) && !invocation.has("--force")) {
-    throw UsageError(fmt::format("{} exists: give another name, or --force to replace it", path));
+    throw UsageError(fmt::format("{} exists: give another name, or --force to replace it", name));
   }
   const EncoderUri uri = virtual_encoder(invocation);
-  const Conversations conversations = converse(invocation, uri);
-  const capture::Drawing drawing = capture::drawing_of(std::string(uri.unit->id), conversations.waveform);
+  require_replaceable(path);
+
+  capture::Drawing drawing(std::string(uri.unit->id), scratch_file(path), scratch_file(path));
+  capture::WaveformSink<sim::Waveform> sink(drawing, idle_around(uri.line));
+  sim::Waveform waveform(uri.unit->link, uri.line, sink);
+  Progress progress;
+  const double rate = invocation.real("--rate", 1000, 0.001, 1e6);
+  Conversations conversations{uri,
+                              commands_of(*uri.unit, invocation.texts("--command")),
+                              static_cast<std::uint64_t>(invocation.number("--count", 1, 1, 1'000'000)),
+                              Time(static_cast<std::int64_t>(1e9 / rate)),
+                              waveform,
+                              progress};
+  converse(conversations);
+  sink.finish(waveform, idle_around(uri.line));
+  progress.show(fmt::format("writing {}", name));
+  drawing.watch([] {
+    if (os::interrupted()) throw os::Interrupted{};
+  });
   write(invocation, path, drawing, uri.line);
+  progress.clear();
   std::string wires;
-  for (const capture::Trace& trace : drawing.traces) wires += (wires.empty() ? "" : ", ") + trace.name;
-  print_line(fmt::format("{}: {} result{} in {}, {} of them an error; wires: {}", path, conversations.results,
-                         conversations.results == 1 ? "" : "s", to_text(conversations.waveform.end()),
-                         conversations.failures, wires));
+  for (const capture::Drawing::Wire& wire : drawing.wires()) wires += (wires.empty() ? "" : ", ") + wire.name;
+  print_line(fmt::format("{}: {} result{} in {}, {} of them an error; wires: {}", name, conversations.results,
+                         conversations.results == 1 ? "" : "s", to_text(waveform.end()), conversations.failures,
+                         wires));
   return exit_good;
 }
 

@@ -112,6 +112,7 @@ void VirtualEncoder::selected(Time at) {
 
 void VirtualEncoder::stopped_clocking(const ByteEvent& event) {
   pause_since_ = event.at;
+  if (event.bits > 0 && event.lead < spi_lead) violate("clock less than 5 us after NCS went low", event.at);
   if (event.width > Time{} && event.width < shortest_clock) violate("clock faster than 4 MHz", event.at);
 }
 

@@ -153,6 +153,14 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
   fast.run(too_fast);
   ASSERT_EQ(fast.encoder.violation_count(), 1u);
   EXPECT_EQ(fast.encoder.violations()[0].rule, "clock faster than 4 MHz");
+
+  Bench early(testing::single, Wire::spi);
+  Hasty too_early;
+  too_early.left = 1;
+  too_early.settings.select_lead = 4999ns;
+  early.run(too_early);
+  ASSERT_EQ(early.encoder.violation_count(), 1u);
+  EXPECT_EQ(early.encoder.violations()[0].rule, "clock less than 5 us after NCS went low");
 }
 
 TEST(EncolinkDevice, AnAccessBeforeTheLastOneWasAnsweredIsAViolation) {

@@ -42,8 +42,8 @@ TEST(EncolinkHostSpi, ThePositionIsTakenWhenNcsFalls) {
   bench.run(read);
   ASSERT_EQ(read.error(), Error::none);
   EXPECT_EQ(read.reading()->latched, 1ms);
-  EXPECT_EQ(read.reading()->received, 1ms + 40us);
-  EXPECT_EQ(bench.took, 40us);
+  EXPECT_EQ(read.reading()->received, 1ms + spi_lead + 40us);
+  EXPECT_EQ(bench.took, spi_lead + 40us);
 }
 
 TEST_P(EncolinkHost, ReadsPositionsOneAfterTheOther) {

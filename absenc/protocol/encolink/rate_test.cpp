@@ -40,7 +40,7 @@ TEST_P(EncolinkRate, UartReachesWhatTheCharactersAllow) {
 
 TEST_P(EncolinkRate, SpiReachesWhatClockAndPauseAllow) {
   const Format format = GetParam();
-  const Time frame = spi_settings.bits(8 * format.frame_bytes()) + spi_pause;
+  const Time frame = spi_lead + spi_settings.bits(8 * format.frame_bytes()) + spi_pause;
   const double most = 1 / std::chrono::duration<double>(frame).count();
   const double reached = positions_a_second(format, Wire::spi);
   EXPECT_GE(reached, 0.99 * most);

@@ -10,8 +10,9 @@ namespace absenc::encolink {
 using namespace std::chrono_literals;
 
 inline constexpr LineSettings uart_settings{.rate = 1'000'000};  // interface variant L
-// 4 MHz at most; CPOL 0, CPHA 1; t_s, from NCS to the first edge
-inline constexpr LineSettings spi_settings{.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us};
+inline constexpr Time spi_lead = 5us;                            // t_s: NCS low to the first edge of SCK
+// 4 MHz at most; CPOL 0, CPHA 1
+inline constexpr LineSettings spi_settings{.rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead};
 inline constexpr Time shortest_clock = 250ns;
 inline constexpr Time spi_pause = 5us;  // t_p
 

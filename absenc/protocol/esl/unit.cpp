@@ -35,6 +35,7 @@ constexpr std::array<Argument, 1> page_arguments{{{"page", "0 to 6, 8 or 14", 0,
 
 constexpr std::string_view protection = "what is written there can spoil the encoder";
 
+// Permissible writing cycles (notes 6 and 7 of Table 11), which do not say of what.
 constexpr std::uint32_t write_life(MemoryArea::Kind kind) {
   if (kind == MemoryArea::Kind::registers) return 0;
   return kind == MemoryArea::Kind::eeprom ? 1'000'000 : 100'000;

@@ -39,7 +39,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void set_environment(const Environment& environment) { environment_ = environment; }
   /// Turns so that the counter shows `turns` now.
   void set_turns(std::uint32_t turns, Time now);
-  /// EEPROM writes since it was made: of 100 000 in a life (6.1.1).
+  /// EEPROM writes since it was made: of 100 000 in total (6.1.1).
   [[nodiscard]] std::uint32_t writes() const { return writes_; }
   /// What an ID 3 reply would say now.
   [[nodiscard]] Reply everything(Time now);

@@ -144,7 +144,7 @@ class ReadOverheatThreshold final : public ReadMemory {
 };
 
 enum class Wear : std::uint8_t {
-  avoid,   // a byte that already holds the value is not written (100 000 writes in a life)
+  avoid,   // a byte that already holds the value is not written (100 000 writes in total)
   accept,  // write it all the same
 };
 

@@ -73,7 +73,7 @@ constexpr std::array<Command, 12> commands{{
 }};
 
 constexpr MemoryArea user_page(std::uint32_t number) {
-  return {number, 0, page_addresses, "the user's EEPROM", true, true, write_life};
+  return {number, 0, page_addresses, "the user's EEPROM", true, true, write_life, {}, true};
 }
 constexpr std::array<MemoryArea, user_pages + 2> memory{{
     user_page(0),
@@ -82,7 +82,7 @@ constexpr std::array<MemoryArea, user_pages + 2> memory{{
     user_page(3),
     user_page(4),
     user_page(5),
-    {service_page, overheat_address, 1, "over-heat threshold", true, false, write_life},
+    {service_page, overheat_address, 1, "over-heat threshold", true, false, write_life, {}, true},
     {service_page, temperature_address, 1, "temperature", false, false},
 }};
 

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/os/kept_file.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <utility>
+
+#include "absenc/os/error.hpp"
+
+namespace absenc::os {
+
+namespace {
+
+bool is_regular(const struct stat& status) { return S_ISREG(status.st_mode); }
+
+void require_regular(bool regular, const std::string& path) {
+  if (!regular) throw Failure(Failure::Kind::unsupported, path + " is no regular file");
+}
+
+}  // namespace
+
+KeptFile::KeptFile(const std::string& path) : path_(path) {
+  constexpr int most_tries = 100;
+  for (int tries = 0; tries < most_tries; ++tries) {
+    // To open a device may already do something to it.
+    struct stat named {};
+    const bool there = ::stat(path.c_str(), &named) == 0;
+    if (there) require_regular(is_regular(named), path);
+    const int make = there ? 0 : O_CREAT | O_EXCL;
+    file_ = Descriptor(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC | make, 0666));
+    if (!file_ && (errno == EEXIST || (there && errno == ENOENT))) continue;  // somebody else was faster
+    if (!file_) throw system_failure("opening " + path, errno);
+    made_ = made_ || !there;
+    struct stat opened {};
+    if (::fstat(file_.get(), &opened) < 0) throw system_failure("opening " + path, errno);
+    require_regular(is_regular(opened), path);
+    if (::flock(file_.get(), LOCK_EX | LOCK_NB) < 0) {
+      if (errno != EWOULDBLOCK) throw system_failure("locking " + path, errno);
+      throw Failure(Failure::Kind::in_use, "another program keeps " + path);
+    }
+    // Until it was locked it may have been replaced.
+    if (::stat(path.c_str(), &named) == 0 && named.st_ino == opened.st_ino && named.st_dev == opened.st_dev) return;
+  }
+  throw system_failure("opening " + path, ELOOP);  // a link to itself; or somebody replaces it all the time
+}
+
+void KeptFile::replace(std::string_view content, Durable durable) {
+  NewFile file(path_);
+  if (::flock(file.descriptor(), LOCK_EX | LOCK_NB) < 0) throw system_failure("locking " + path_, errno);
+  file.write(content);
+  file_ = file.take_place(durable);
+}
+
+}  // namespace absenc::os

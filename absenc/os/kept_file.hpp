@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// A file that one process keeps up to date, as the memory of a virtual encoder.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "absenc/os/descriptor.hpp"
+#include "absenc/os/process.hpp"
+
+namespace absenc::os {
+
+/// Locked (flock) from the constructor to the end of the object, also while it is replaced.
+class KeptFile {
+ public:
+  /// Makes an empty file where there is none. Throws Failure: `in_use` when another process keeps it, `unsupported`
+  /// when it is no regular file.
+  explicit KeptFile(const std::string& path);
+
+  /// Whether the constructor made it.
+  [[nodiscard]] bool made() const { return made_; }
+
+  /// There is always a whole file, the old one or the new one. Afterwards the system has it, whatever becomes of this
+  /// process; with `Durable::yes` the disk has it too. Throws Failure.
+  void replace(std::string_view content, Durable durable);
+
+ private:
+  std::string path_;
+  Descriptor file_;
+  bool made_ = false;
+};
+
+}  // namespace absenc::os
