@@ -150,15 +150,20 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
       }
       case Phase::before:
         if (now < until_) return {.at = until_, .gap = pending_.gap};
+        // Never into what is still coming.
+        if (heard_at_ + pending_.gap > now && now < latest_) {
+          until_ = heard_at_ + pending_.gap;
+          break;
+        }
         return send(now);
       case Phase::asking:
         if (now < until_) {
           const std::size_t due = pending_.expect - std::min(pending_.expect, reply_.size());
           return {.expect = due, .at = until_, .answer = pending_.answer, .gap = pending_.gap};
         }
-        // Something goes on that is no reply.
+        // Something goes on that is no reply: on CAN that of others.
         reply_.clear();
-        damaged_ = true;
+        damaged_ = !is_can;
         conclude_asking(true);
         break;
       case Phase::holding:
@@ -201,6 +206,7 @@ void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
   tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
   pending_ = request;
   reply_.clear();
+  heard_at_ = now - request.gap;
   latest_ = std::max(now, request.at) + 4 * longest_wait();
   // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
   until_ = request.at > now + 1ms ? request.at : now + tick;
@@ -280,7 +286,7 @@ void ReplyGuard<Item>::feed_asking(const Event<Item>& event) {
     case Kind::sent:
       sent_at_ = event.at;
       if (reply_.empty()) received_at_ = event.at;
-      until_ = sent_at_ + quiet_time() + longest_wait();
+      until_ = sent_at_ + quiet_time() + (is_can ? Time{} : longest_wait());
       break;
     case Kind::received:
       take(event.items, event.at);
@@ -376,6 +382,7 @@ void ReplyGuard<Item>::conclude_asking(bool silent) {
 // Where the length of a reply is known, the last ones that could be it are looked at: noise may come before them.
 template <class Item>
 void ReplyGuard<Item>::take_late(std::span<const Item> items, Time at) {
+  heard_at_ = at;
   for (const Item& item : items) {
     if (reply_.size() == Reply::capacity()) drop_first(reply_);
     reply_.push_back(item);
@@ -416,7 +423,8 @@ void ReplyGuard<Item>::end_late(Owed* owed, Time at) {
       return;
     }
   }
-  until_ = std::min(std::max(until_, at + quiet_time()), latest_);
+  // On CAN it may also have been sent unasked.
+  if (!is_can) until_ = std::min(std::max(until_, at + quiet_time()), latest_);
 }
 
 template <class Item>

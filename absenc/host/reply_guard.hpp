@@ -112,6 +112,7 @@ class ReplyGuard final : public Machine<Item> {
   Time sent_at_{};
   Time received_at_{};
   Time first_at_{};
+  Time heard_at_{};   // before: when something came that was not asked for
   Time suspected_{};  // holding: how late what came is, if it is
 
   Reply reply_{};  // asking: what came; before and holding: the end of it

@@ -5,6 +5,8 @@
 
 #include <cstdio>
 
+#include "absenc/host/guarded_host_test.hpp"
+#include "absenc/protocol/all.hpp"
 #include "absenc/protocol/e201/bench_test.hpp"
 #include "absenc/sim/faults.hpp"
 
@@ -69,21 +71,19 @@ class Campaign {
 
  private:
   template <class Procedure>
-  const Procedure& converse(Procedure&& procedure) {
+  const Procedure& converse(Procedure&& procedure, bool may_repeat = true) {
     line_.run_until(line_.now() + 1us);
-    if (host_ == none) {
-      host_ = line_.attach(sim::Role::host, procedure);
-    } else {
-      line_.replace(host_, procedure);
-    }
-    EXPECT_TRUE(line_.run(host_, line_.now() + 10s)) << "hangs";
+    changed_before_ = host::testing::changed_bytes(faulty_);
+    EXPECT_TRUE(host_.run(procedure, 10s, may_repeat)) << "hangs";
     return procedure;
   }
 
   void judge(const Conversation<std::uint8_t>& conversation, bool right) {
     if (conversation.error() != Error::none) return;
     ++accepted_;
-    if (!right) ++undetectable_;
+    if (right) return;
+    ++undetectable_;
+    EXPECT_NE(host::testing::changed_bytes(faulty_), changed_before_) << "wrong, though no byte was changed";
   }
 
   void read() {
@@ -97,10 +97,10 @@ class Campaign {
   // Not M7, M8: the ACK would be too long.
   void set_clock() {
     const auto clock = static_cast<unsigned>(1 + random_.below(6));
-    const Set set = converse(Set(command::set_clock, clock));
+    const Set set = converse(Set(command::set_clock, clock), false);
     judge(set, adapter_.clock() == clock);
     // An interface that did not hear the M, because a stretched reply made it deaf, takes 1 for its stream.
-    if (set.error() != Error::none) converse(Tell(command::stream_off));
+    if (set.error() != Error::none) converse(Tell(command::stream_off), false);
     if (set.error() == Error::none && adapter_.clock() != clock) {
       EXPECT_EQ(find_clock(set.exchange().received), clock);  // a digit was changed into another one
     }
@@ -108,14 +108,15 @@ class Campaign {
 
   void info() { judge(converse(Info()), true); }
 
-  static constexpr std::size_t none = ~std::size_t{0};
   sim::Random random_;
   Format format_ = testing::biss_format();
   testing::TestShaft shaft_;
   VirtualAdapter adapter_;
   sim::FaultyDevice faulty_;
   sim::Line<std::uint8_t> line_{LinkKind::full_duplex, line_settings};
-  std::size_t host_ = none;
+  static constexpr std::array<OptionText, 2> options_{{{"singleturn_bits", "19"}, {"multiturn_bits", "16"}}};
+  host::testing::GuardedHost<std::uint8_t> host_{*find_unit("e201"), line_, options_};
+  std::uint64_t changed_before_ = 0;  // before the present conversation
   std::uint64_t accepted_ = 0;
   std::uint64_t undetectable_ = 0;
 };

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <string>
 
+#include "absenc/host/guarded_host_test.hpp"
+#include "absenc/protocol/all.hpp"
 #include "absenc/protocol/encolink/bench_test.hpp"
 #include "absenc/sim/faults.hpp"
 
@@ -61,13 +63,9 @@ class Campaign {
 
  private:
   template <class Conversation>
-  void converse(Conversation& conversation) {
-    if (host_ == none) {
-      host_ = line_.attach(sim::Role::host, conversation);
-    } else {
-      line_.replace(host_, conversation);
-    }
-    EXPECT_TRUE(line_.run(host_, line_.now() + 60s)) << "hangs";
+  void converse(Conversation& conversation, bool may_repeat = true) {
+    changed_before_ = host::testing::changed_bytes(faulty_);
+    EXPECT_TRUE(host_.run(conversation, 60s, may_repeat)) << "hangs";
   }
 
   void read_position() {
@@ -80,6 +78,7 @@ class Campaign {
                        read.position().warning == truth.warning;
     if (!right) {
       ++undetectable_;
+      EXPECT_NE(host::testing::changed_bytes(faulty_), changed_before_) << "wrong, though no byte was changed";
       EXPECT_TRUE(looks_right(read.exchange().received));
     } else if (read.detailed_status() && *read.detailed_status() != encoder_.alarms()) {
       ++wrong_alarms_;
@@ -98,21 +97,22 @@ class Campaign {
     const auto value = static_cast<std::uint32_t>(random_.next());
     const std::uint32_t before = encoder_.offset();
     WriteRegister write(testing::multi, Wire::uart, 0, 0, value);
-    converse(write);
+    converse(write, false);
     EXPECT_TRUE(encoder_.offset() == value || encoder_.offset() == before);
     if (write.error() != Error::none) return;
     ++registers_;
     EXPECT_EQ(encoder_.offset(), value);
   }
 
-  static constexpr std::size_t none = ~std::size_t{0};
   sim::Random random_;
   double register_share_;
   testing::TestShaft shaft_;
   VirtualEncoder encoder_;
   sim::FaultyDevice faulty_;
   sim::Line<std::uint8_t> line_{LinkKind::full_duplex, uart_settings};
-  std::size_t host_ = none;
+  static constexpr std::array<OptionText, 2> options_{{{"resolution", "20"}, {"multiturn_bits", "16"}}};
+  host::testing::GuardedHost<std::uint8_t> host_{*find_unit("encolink"), line_, options_};
+  std::uint64_t changed_before_ = 0;  // before the present conversation
   std::uint64_t accepted_ = 0;
   std::uint64_t undetectable_ = 0;
   std::uint64_t wrong_alarms_ = 0;

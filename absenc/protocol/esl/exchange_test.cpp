@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "absenc/host/guarded_host_test.hpp"
+#include "absenc/protocol/all.hpp"
 #include "absenc/protocol/esl/bench_test.hpp"
 #include "absenc/sim/faults.hpp"
 
@@ -76,13 +78,9 @@ class Campaign {
 
  private:
   template <class Procedure>
-  const Procedure& converse(Procedure&& procedure) {
-    if (host_ == none) {
-      host_ = line_.attach(sim::Role::host, procedure);
-    } else {
-      line_.replace(host_, procedure);
-    }
-    EXPECT_TRUE(line_.run(host_, line_.now() + 10s)) << "hangs";
+  const Procedure& converse(Procedure&& procedure, bool may_repeat = true) {
+    changed_before_ = host::testing::changed_bytes(faulty_);
+    EXPECT_TRUE(host_.run(procedure, 10s, may_repeat)) << "hangs";
     return procedure;
   }
 
@@ -92,6 +90,7 @@ class Campaign {
     ++accepted_;
     if (right) return;
     ++undetectable_;
+    EXPECT_NE(host::testing::changed_bytes(faulty_), changed_before_) << "wrong, though no byte was changed: " << ::testing::PrintToString(std::vector<int>(conversation.exchange().sent.begin(),conversation.exchange().sent.end()))<< ::testing::PrintToString(std::vector<int>(conversation.exchange().received.begin(),conversation.exchange().received.end()));
     EXPECT_TRUE(looks_right(conversation.exchange().sent, conversation.exchange().received))
         << ::testing::PrintToString(
                std::vector<int>(conversation.exchange().received.begin(), conversation.exchange().received.end()));
@@ -144,25 +143,25 @@ class Campaign {
     const auto page = static_cast<std::uint8_t>(random_.below(4));
     const auto address = static_cast<std::uint8_t>(random_.below(last_address + 1));
     const auto value = static_cast<std::uint8_t>(random_.below(256));
-    const WriteMemory write = converse(WriteMemory({}, page, address, value));
+    const WriteMemory write = converse(WriteMemory({}, page, address, value), false);
     judge(write, *encoder_.stored(page, address) == value);
   }
 
   void reset() {
     const DataId id = std::array{DataId::clear_alarms, DataId::zero, DataId::reset_multiturn}[random_.below(3)];
-    const Reset done = converse(Reset({}, id));
+    const Reset done = converse(Reset({}, id), false);
     const Reply truth = encoder_.reply_to(DataId::position, line_.now());
     if (id == DataId::zero) return judge(done, truth.singleturn == 0);
     judge(done, id == DataId::clear_alarms ? truth.one.alarms == 0 : truth.multiturn == 0);
   }
 
-  static constexpr std::size_t none = ~std::size_t{0};
   sim::Random random_;
   testing::TestShaft shaft_;
   VirtualEncoder encoder_;
   sim::FaultyDevice faulty_;
   sim::Line<std::uint8_t> line_{LinkKind::half_duplex, line_settings};
-  std::size_t host_ = none;
+  host::testing::GuardedHost<std::uint8_t> host_{*find_unit("esl"), line_};
+  std::uint64_t changed_before_ = 0;  // before the present conversation
   std::uint64_t accepted_ = 0;
   std::uint64_t safe_ = 0;
   std::uint64_t undetectable_ = 0;

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "absenc/host/guarded_host_test.hpp"
+#include "absenc/protocol/all.hpp"
 #include "absenc/protocol/raa38/modbus_bench_test.hpp"
 #include "absenc/sim/faults.hpp"
 
@@ -87,13 +89,9 @@ class Campaign {
 
  private:
   template <class Machine>
-  Machine& converse(Machine& machine) {
-    if (host_ == none) {
-      host_ = line_.attach(sim::Role::host, machine);
-    } else {
-      line_.replace(host_, machine);
-    }
-    EXPECT_TRUE(line_.run(host_, line_.now() + 60s)) << "hangs";
+  Machine& converse(Machine& machine, bool may_repeat = true) {
+    changed_before_ = host::testing::changed_bytes(faulty_);
+    EXPECT_TRUE(host_.run(machine, 60s, may_repeat)) << "hangs";
     return machine;
   }
 
@@ -103,6 +101,7 @@ class Campaign {
     ++accepted_;
     if (right) return;
     ++undetectable_;
+    EXPECT_NE(host::testing::changed_bytes(faulty_), changed_before_) << "wrong, though no byte was changed";
     EXPECT_TRUE(looks_right(format_, conversation.exchange().sent, conversation.exchange().received))
         << ::testing::PrintToString(
                std::vector<int>(conversation.exchange().received.begin(), conversation.exchange().received.end()));
@@ -116,11 +115,11 @@ class Campaign {
       set_baud();
     } else if (kind == 2) {
       SetDirection set(format_, encoder_.counts_backwards() ? parameter::positive : parameter::negative);
-      converse(set);
+      converse(set, false);
       judge(set, true);
     } else if (kind == 3) {
       Zero zero(format_);
-      converse(zero);
+      converse(zero, false);
       judge(zero, encoder_.singleturn(line_.now()) == 0);
     } else if (kind < 500) {
       ReadAddress read(format_);
@@ -136,7 +135,7 @@ class Campaign {
   void set_address() {
     const auto address = static_cast<std::uint8_t>(1 + random_.below(247));
     SetAddress set(format_, address);
-    converse(set);
+    converse(set, false);
     judge(set, encoder_.address() == address);
     format_.address = encoder_.address();
   }
@@ -145,21 +144,21 @@ class Campaign {
   void set_baud() {
     const std::size_t baud = 3 + random_.below(2);
     SetBaud set(format_, bauds[baud]);
-    converse(set);
+    converse(set, false);
     judge(set, encoder_.baud() == bauds[baud]);
     format_.baud = *baud_index(encoder_.baud());
     SetRate again(format_.line());
-    converse(again);
+    converse(again, false);
   }
 
-  static constexpr std::size_t none = ~std::size_t{0};
   Format format_;
   sim::Random random_;
   testing::TestShaft shaft_;
   VirtualEncoder encoder_;
   sim::FaultyDevice faulty_;
   sim::Line<std::uint8_t> line_{LinkKind::half_duplex, line_settings};
-  std::size_t host_ = none;
+  host::testing::GuardedHost<std::uint8_t> host_{*find_unit("raa38-modbus"), line_};
+  std::uint64_t changed_before_ = 0;  // before the present conversation
   std::uint64_t accepted_ = 0;
   std::uint64_t undetectable_ = 0;
 };

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Conversations on a simulated line behind the ReplyGuard, as a session runs them: for the campaigns of the units.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "absenc/host/reply_guard.hpp"
+#include "absenc/sim/faults.hpp"
+#include "absenc/sim/line.hpp"
+
+namespace absenc::host::testing {
+
+template <class Item>
+class GuardedHost {
+ public:
+  GuardedHost(const Unit& unit, sim::Line<Item>& line, std::span<const OptionText> options = {})
+      : unit_(&unit), line_(&line) {
+    valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
+  }
+
+  /// Whether it came to its end within this time. `may_repeat`: whether it only reads.
+  [[nodiscard]] bool run(Machine<Item>& conversation, Time limit, bool may_repeat = true) {
+    guard_.attach(conversation, *unit_, options_, may_repeat);
+    if (node_ == none) {
+      node_ = line_->attach(sim::Role::host, guard_);
+    } else {
+      line_->replace(node_, guard_);
+    }
+    const bool ended = line_->run(node_, line_->now() + limit);
+    guard_.conclude();
+    return valid_ && ended;
+  }
+
+ private:
+  static constexpr std::size_t none = ~std::size_t{0};
+  const Unit* unit_;
+  sim::Line<Item>* line_;
+  Options options_;
+  bool valid_ = false;
+  ReplyGuard<Item> guard_;
+  std::size_t node_ = none;
+};
+
+/// Faults after which wrong bytes may be a good frame: all others leave frames as they were, and nothing wrong may come
+/// of them.
+[[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
+  using sim::FaultKind;
+  std::uint64_t sum = 0;
+  for (const FaultKind kind :
+       {FaultKind::drop, FaultKind::corrupt, FaultKind::truncate, FaultKind::garbage, FaultKind::request_corrupt}) {
+    sum += faulty.count(kind);
+  }
+  return sum;
+}
+
+}  // namespace absenc::host::testing
