@@ -17,6 +17,14 @@ constexpr std::string_view needs_firmware = "reading by `4` needs firmware 1.16 
 constexpr std::string_view check_firmware = "`info` shows which firmware it has";
 constexpr std::string_view check_clocks = "read it and set it with clock and set-clock";
 
+// Whether a line may be the answer to this command.
+Error judge(std::uint8_t letter, Bytes line) {
+  struct Nowhere final : FieldSink {
+    void put(const FieldValue&) override {}
+  } nowhere;
+  return detail::decode_line(letter, line, nowhere);
+}
+
 }  // namespace
 
 void Procedure::ask(const RequestText& request, Answer answer, Time earliest) {
@@ -138,10 +146,7 @@ Query::Query(std::uint8_t letter) : letter_(letter) { ask(encode_request(letter)
 
 void Query::answered(Bytes reply) {
   line_.append(reply);
-  struct Nowhere final : FieldSink {
-    void put(const FieldValue&) override {}
-  } nowhere;
-  const Error error = detail::decode_line(letter_, line_, nowhere);
+  const Error error = judge(letter_, line_);
   finish(error, explain_reply(error));
 }
 
@@ -152,6 +157,8 @@ void Query::report(FieldSink& sink) const {
 Info::Info() { ask(encode_request(info_letters[0]), Answer::line); }
 
 void Info::answered(Bytes reply) {
+  const Error error = judge(info_letters[index_], reply);
+  if (index_ == 0 && error != Error::none) return failed(error);
   lines_[index_].append(reply);
   go_on();
 }

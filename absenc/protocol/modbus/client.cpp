@@ -32,7 +32,7 @@ void Client::set_rate(std::uint32_t rate) {
 
 void Client::finish(Error error, const Explanation& explanation) {
   error_ = error;
-  explanation_ = error == Error::none ? Explanation{} : explanation;
+  explanation_ = error == Error::none ? Explanation{} : explanation.found.empty() ? noise_explanation() : explanation;
   state_ = State::done;
 }
 
