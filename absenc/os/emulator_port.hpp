@@ -36,7 +36,7 @@ class EmulatorPort final : public StreamPort {
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;
   void drive(Line, bool) override {}
-  void apply(const LineSettings& settings) override { device_rate_ = settings.rate; }
+  void change_rate(std::uint32_t rate) override { device_rate_ = rate; }
 
   void open_terminal();
   void listen_on(std::uint16_t port);

@@ -39,7 +39,7 @@ void StreamPort::begin(const ByteStep& step) {
       break;
     case ByteStep::Kind::configure:
       reach(sent_at_);  // what is on its way leaves with the old settings
-      apply(step.settings);
+      change_rate(step.settings.rate);
       break;
     case ByteStep::Kind::wait:
     case ByteStep::Kind::emit:
@@ -115,9 +115,9 @@ void StreamPort::drive(Line, bool) {
 
 Time StreamPort::pulse_width(Line, Time asked) const { return asked; }
 
-void StreamPort::apply(const LineSettings& settings) {
+void StreamPort::change_rate(std::uint32_t rate) {
   throw Failure(Failure::Kind::unsupported,
-                "this kind of port cannot change to " + std::to_string(settings.rate) + " baud: use a serial port");
+                "this kind of port cannot change to " + std::to_string(rate) + " baud: use a serial port");
 }
 
 DescriptorPort::DescriptorPort(Descriptor descriptor, std::string name)

@@ -57,7 +57,7 @@ class StreamPort : public Port<std::uint8_t> {
   virtual void write_all(Bytes bytes) = 0;
   /// Both throw `unsupported` unless overridden.
   virtual void drive(Line line, bool active);
-  virtual void apply(const LineSettings& settings);
+  virtual void change_rate(std::uint32_t rate);
   /// How long a pulse lasts: as asked, unless overridden.
   [[nodiscard]] virtual Time pulse_width(Line line, Time asked) const;
 

@@ -42,7 +42,7 @@ ByteStep Client::next(Time now) {
   begun_ = true;
   if (setting_rate_) {
     setting_rate_ = false;
-    return {.kind = ByteStep::Kind::configure, .settings = line_};
+    return {.kind = ByteStep::Kind::configure, .settings = {.rate = line_.rate}};
   }
   // Whatever is heard meanwhile begins the silence anew.
   const Time due = received_at_ + std::max(request_silence(line_), pause_);

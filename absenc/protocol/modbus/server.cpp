@@ -31,7 +31,7 @@ ByteStep Server::next(Time) {
   if (setting_rate_ && !transmitting_) {
     setting_rate_ = false;
     line_.rate = next_rate_;
-    return {.kind = ByteStep::Kind::configure, .settings = line_};
+    return {.kind = ByteStep::Kind::configure, .settings = {.rate = line_.rate}};
   }
   if (reply_pending_) {
     reply_pending_ = false;
