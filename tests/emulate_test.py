@@ -114,6 +114,40 @@ class EmulateCase(Case):
         self.assertEqual(reply.hex(" "), (wanted + bytes([crc(wanted)])).hex(" "))
 
 
+class Gap(EmulateCase):
+    """The pause that ends a request."""
+
+    def trickle(self, client, request, pause):
+        """Writes byte by byte and returns what comes back until PATIENCE or for as many bytes as were sent."""
+        for byte in request:
+            client.send([byte])
+            select.select([], [], [], pause)
+        return client.receive(len(request))
+
+    def test_a_host_that_is_slow_with_its_bytes(self):
+        page_select = bytes.fromhex("327f004d")  # 5 ms between two bytes: by default four broken requests
+        client = self.client("--gap", "2000")
+        self.assertEqual(self.trickle(client, page_select, 0.005), page_select)
+
+    def test_somebody_absent_is_asked_in_between(self):
+        emulator = self.emulator("--gap", "0.05", protocol="esl")
+        with Client.open(emulator.path) as client:
+            for _ in range(20):
+                client.send(bytes.fromhex("0bd5"))  # address 3, where nobody is
+                select.select([], [], [], 0.001)
+            # A machine that is busy may have let the emulator see no pause before this one.
+            for _ in range(100):
+                client.send(bytes.fromhex("0875"))
+                if select.select([client.descriptor], [], [], 0.2)[0]:
+                    break
+            self.assertEqual(client.receive(18)[:1], b"\x08")
+
+    def test_where_it_means_nothing(self):
+        for arguments in (["tformat", "--port", "/dev/null"], ["raa38-can"], ["encolink", "--spidev", "spidev9.9"]):
+            self.assert_wrong_usage(absenc("emulate", *arguments, "--gap", "5"), "--gap", "latency=MS")
+        self.assert_wrong_usage(absenc("emulate", "tformat", "--gap", "0"), "--gap")
+
+
 class DataIds(EmulateCase):
     def test_positions(self):
         client = self.client("--singleturn", "0x1ABCD", "--multiturn", "0x1234")
