@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """`absenc emulate tformat` against a T-format client that shares no code with it."""
+import fcntl
 import os
 import re
 import select
 import signal
 import socket
 import stat
+import struct
 import subprocess
 import time
 import tty
@@ -17,6 +19,12 @@ REPLY_LENGTH = {0x0: 6, 0x1: 6, 0x2: 4, 0x3: 11, 0x6: 4, 0x7: 6, 0x8: 6, 0xC: 6,
 ALARMS = ["over_speed", "full_absolute_status", "counting_error", "counter_overflow", "over_heat", "multiturn_error",
           "battery_error", "battery_alarm"]
 COUNTING_ERROR, ALARM = 0x10, 0x20  # in SF
+
+
+def rate_of(terminal):
+    """Bits a second, of a struct termios2 (<asm-generic/ioctls.h>)."""
+    tcgets2 = 0x802C542A
+    return struct.unpack("IIIIB19sII", fcntl.ioctl(terminal, tcgets2, bytes(44)))[-1]
 
 
 def control_field(data_id):
@@ -407,6 +415,29 @@ class Port(EmulateCase):
         os.replace(link + "-new", link)
         self.assertIn(f"the port {link} is back", read_line(emulator.process.stderr, deadline))
         self.assert_reply(Client(ours).exchange(0), 0, 0, [0xE8, 0x03, 0])
+        self.assertEqual(emulator.end()[0], 0)
+
+    def test_one_that_comes_back_has_the_rate_that_the_encoder_was_set_to(self):
+        link = os.path.join(self.directory, "port")
+        ours, terminal = os.openpty()
+        os.symlink(os.ttyname(terminal), link)
+        emulator = self.emulator(protocol="raa38-modbus", name=link, line="--port")
+        os.close(terminal)
+        client = Client(ours)
+        set_baud = bytes.fromhex("01cc96f56e")
+        client.send(set_baud)
+        self.assertEqual(client.receive(len(set_baud)), set_baud)
+        os.close(ours)
+        deadline = time.monotonic() + PATIENCE
+        self.assertRegex(read_line(emulator.process.stderr, deadline), f"the port {link} went away: unplugged")
+        ours, terminal = os.openpty()
+        self.addCleanup(os.close, ours)
+        self.addCleanup(os.close, terminal)
+        os.symlink(os.ttyname(terminal), link + "-new")
+        os.replace(link + "-new", link)
+        read_line(emulator.process.stderr, deadline)
+        self.assertIn(f"the port {link} is back", read_line(emulator.process.stderr, deadline))
+        self.assertEqual(rate_of(ours), 9600)
         self.assertEqual(emulator.end()[0], 0)
 
     def test_wrong_usage(self):
