@@ -54,7 +54,8 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
   if (std::exchange(sent_pending_, false)) return tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
 
   const Time limit = heard_ ? step.gap : step.answer;
-  const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency_ : never;
+  const Time latency = heard_ && step.expect == 0 ? std::min(latency_, idle_latency_) : latency_;
+  const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency : never;
   const Time due = std::min(armed_, quiet_end);
   for (;;) {
     const std::span<const int> ready = poller_.wait(std::min(due, end_));

@@ -39,6 +39,7 @@ ByteStep Server::next(Time) {
   }
   ByteStep step{.at = never};
   if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
+  if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;  // or more: not yet a whole one
   return step;
 }
 
