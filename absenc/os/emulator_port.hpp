@@ -14,7 +14,7 @@ namespace absenc::os {
 
 /// All ends are one line: the device hears what comes from any of them, and each gets what the device sends. Like a
 /// wire, the line keeps nothing: what nobody reads is lost. Latency is 2 ms at first: a pause that long is a gap, and
-/// one of a tenth of it where the device waits for nothing more.
+/// one of 0.2 ms where the device waits for nothing more.
 ///
 /// A device that configures the line hears a terminal only at its own rate. A terminal that nobody has set (the
 /// kernel's 38400 baud) and TCP have none: they are heard at every rate.

@@ -269,9 +269,8 @@ constexpr std::array<Parameter, 19> parameters{{
      "only the pseudo-terminal itself"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
     {"--gap", "MS",
-     "on --pty and --tcp, the pause that ends a request: longer for a host that is slow with its bytes, shorter for "
-     "one "
-     "that asks somebody else in between",
+     "on --pty and --tcp, the pause that ends a request which is not complete: longer for a host that is slow with its "
+     "bytes",
      "2"},
     {"--port", "PATH", "instead: a serial port that is there already, with ?baud=RATE and more as behind an encoder"},
     {"--spidev", "NAME", "SPI: be a device /dev/NAME, which the kernel's module cuse makes"},
