@@ -60,6 +60,25 @@ class Virtual(Case):
                 reading, = self.run_json("read", encoder + "&alarm=error")
                 self.assertEqual((reading["alarms"], reading["singleturn_valid"]), (["error"], False))
 
+    def test_a_long_line_needs_a_longer_latency(self):
+        for delay_ns in (400, 1100, 20_300):
+            with self.subTest(delay_ns):
+                encoder = f"{BISS}&line_delay_ns={delay_ns}"
+                if delay_ns > 1000:
+                    self.assert_failed(absenc("read", encoder), "truncated", "latency_us", "raise it")
+                reading, = self.run_json("read", f"{encoder}&latency_us={11 + delay_ns / 1000}")
+                self.assertEqual(reading["singleturn"], 275087)
+        self.assert_good(absenc("read", f"{BISS}&latency_us=2"))
+        self.assert_failed(absenc("read", f"{BISS}&latency_us=10&ready_us=12"), "truncated", "latency_us")
+
+    def test_clock_and_pause_of_ssi_vary_by_product(self):
+        reading, = self.run_json("read", f"{SSI}&clock_khz=125&pause_us=2000")
+        self.assertEqual(reading["singleturn"], 4660)
+        self.assertIn("clocked bits, 125 kbit/s", absenc("info", f"{SSI}&clock_khz=125").stdout)
+        readings = self.run_json("read", f"{SSI}&pause_us=20000", "--count", "5")
+        self.assertEqual([one["singleturn"] for one in readings], [4660] * 5)
+        self.assertGreaterEqual(readings[-1]["time_s"] - readings[0]["time_s"], 4 * 0.02)
+
     def test_trouble_shows_what_the_clocks_brought(self):
         result = absenc("read", "sim:biss?singleturn_bits=19&fault=silence=1")
         self.assert_failed(result, "line_stuck", "41 clocks to the virtual encoder; received 1111 1111 1111 1111 ",

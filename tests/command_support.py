@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the end-to-end tests share: the command, an emulator that runs beside it, and a line with a fake encoder."""
+import contextlib
+import itertools
 import json
 import os
 import select
@@ -89,6 +91,44 @@ class FakeEncoder:
             if self.wake in ready:
                 return
             os.write(self.master, self.answer(os.read(self.master, 64)))
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        os.write(self.waker, b"x")
+        self.thread.join()
+        for descriptor in (self.master, self.slave, self.wake, self.waker):
+            os.close(descriptor)
+
+
+class BabblingLine:
+    """A pseudo-terminal that is never silent: one of `pieces` every `period` seconds, over and over, whoever asks what.
+    With a period of 0 as much as the line takes. What nobody reads is lost."""
+
+    def __init__(self, period=0.005, pieces=(b"\x55",)):
+        self.period = period
+        self.pieces = pieces
+        self.master, self.slave = os.openpty()
+        tty.setraw(self.slave)
+        os.set_blocking(self.master, False)
+        self.path = os.ttyname(self.slave)
+        self.wake, self.waker = os.pipe()
+        self.thread = threading.Thread(target=self.babble)
+
+    def babble(self):
+        due = time.monotonic()
+        for piece in itertools.cycle(self.pieces):
+            # Whoever was held up goes on from now.
+            due = max(due + self.period, time.monotonic())
+            writable = [self.master] if self.period == 0 else []
+            timeout = None if self.period == 0 else max(due - time.monotonic(), 0)
+            if select.select([self.wake], writable, [], timeout)[0]:
+                return
+            for transfer in (lambda: os.write(self.master, piece), lambda: os.read(self.master, 4096)):
+                with contextlib.suppress(BlockingIOError):
+                    transfer()
 
     def __enter__(self):
         self.thread.start()

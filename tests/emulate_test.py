@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`absenc emulate tformat` against a T-format client that shares no code with it."""
+import fcntl
+import itertools
 import os
 import re
 import select
@@ -7,6 +9,7 @@ import shutil
 import signal
 import socket
 import stat
+import struct
 import subprocess
 import time
 import tty
@@ -18,6 +21,12 @@ REPLY_LENGTH = {0x0: 6, 0x1: 6, 0x2: 4, 0x3: 11, 0x6: 4, 0x7: 6, 0x8: 6, 0xC: 6,
 ALARMS = ["over_speed", "full_absolute_status", "counting_error", "counter_overflow", "over_heat", "multiturn_error",
           "battery_error", "battery_alarm"]
 COUNTING_ERROR, ALARM = 0x10, 0x20  # in SF
+
+
+def rate_of(terminal):
+    """Bits a second, of a struct termios2 (<asm-generic/ioctls.h>)."""
+    tcgets2 = 0x802C542A
+    return struct.unpack("IIIIB19sII", fcntl.ioctl(terminal, tcgets2, bytes(44)))[-1]
 
 
 def control_field(data_id):
@@ -119,6 +128,45 @@ class EmulateCase(Case):
     def assert_reply(self, reply, data_id, status, body):
         wanted = bytes([control_field(data_id), status]) + bytes(body)
         self.assertEqual(reply.hex(" "), (wanted + bytes([crc(wanted)])).hex(" "))
+
+
+class Gap(EmulateCase):
+    """The pause that ends a request."""
+
+    def trickle(self, client, request, pause):
+        """Writes byte by byte and returns what comes back until PATIENCE or for as many bytes as were sent."""
+        for byte in request:
+            client.send([byte])
+            select.select([], [], [], pause)
+        return client.receive(len(request))
+
+    def test_a_host_that_is_slow_with_its_bytes(self):
+        page_select = bytes.fromhex("327f004d")  # 5 ms between two bytes: by default four broken requests
+        client = self.client("--gap", "2000")
+        self.assertEqual(self.trickle(client, page_select, 0.005), page_select)
+
+    def test_somebody_absent_is_asked_in_between(self):
+        absent = {"esl": "0bd5", "raa38-modbus": "0903000000018542"}
+        present = {"esl": ("0875", 18), "raa38-modbus": ("010300000001840a", 7)}
+        for protocol, gap in itertools.product(absent, ("2", "10000")):
+            with self.subTest(protocol=protocol, gap=gap):
+                # Where the machine is busy, the emulator may see two requests as one, which only the gap ends.
+                self.assertTrue(any(self.answers(protocol, gap, number, absent[protocol], *present[protocol])
+                                    for number in range(10)))
+
+    def answers(self, protocol, gap, number, absent, present, length):
+        emulator = self.emulator("--gap", gap, protocol=protocol, name=f"{protocol}-{gap}-{number}")
+        with Client.open(emulator.path) as client:
+            for _ in range(5):
+                client.send(bytes.fromhex(absent))
+                select.select([], [], [], 0.005)
+            client.send(bytes.fromhex(present))
+            return client.receive(length, patience=2)[:1] == bytes.fromhex(present)[:1]
+
+    def test_where_it_means_nothing(self):
+        for arguments in (["tformat", "--port", "/dev/null"], ["raa38-can"], ["encolink", "--spidev", "spidev9.9"]):
+            self.assert_wrong_usage(absenc("emulate", *arguments, "--gap", "5"), "--gap", "latency=MS")
+        self.assert_wrong_usage(absenc("emulate", "tformat", "--gap", "0"), "--gap")
 
 
 class DataIds(EmulateCase):
@@ -380,6 +428,29 @@ class Port(EmulateCase):
         os.replace(link + "-new", link)
         self.assertIn(f"the port {link} is back", read_line(emulator.process.stderr, deadline))
         self.assert_reply(Client(ours).exchange(0), 0, 0, [0xE8, 0x03, 0])
+        self.assertEqual(emulator.end()[0], 0)
+
+    def test_one_that_comes_back_has_the_rate_that_the_encoder_was_set_to(self):
+        link = os.path.join(self.directory, "port")
+        ours, terminal = os.openpty()
+        os.symlink(os.ttyname(terminal), link)
+        emulator = self.emulator(protocol="raa38-modbus", name=link, line="--port")
+        os.close(terminal)
+        client = Client(ours)
+        set_baud = bytes.fromhex("01cc96f56e")
+        client.send(set_baud)
+        self.assertEqual(client.receive(len(set_baud)), set_baud)
+        os.close(ours)
+        deadline = time.monotonic() + PATIENCE
+        self.assertRegex(read_line(emulator.process.stderr, deadline), f"the port {link} went away: unplugged")
+        ours, terminal = os.openpty()
+        self.addCleanup(os.close, ours)
+        self.addCleanup(os.close, terminal)
+        os.symlink(os.ttyname(terminal), link + "-new")
+        os.replace(link + "-new", link)
+        read_line(emulator.process.stderr, deadline)
+        self.assertIn(f"the port {link} is back", read_line(emulator.process.stderr, deadline))
+        self.assertEqual(rate_of(ours), 9600)
         self.assertEqual(emulator.end()[0], 0)
 
     def test_wrong_usage(self):

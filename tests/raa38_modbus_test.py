@@ -145,6 +145,13 @@ class Settings(ModbusCase):
         kept = self.emulator("--memory", self.file("memory"), name="again")
         self.assertEqual(self.good_json("read", self.uri(kept, "&baud=9600"))["singleturn"], 0)
 
+    def test_a_change_of_the_baud_rate_leaves_the_parity(self):
+        for parity in ("odd", "even"):
+            uri = f"sim:raa38-modbus?parity={parity}&singleturn=383"
+            self.assertEqual(self.good_json("read", uri)["singleturn"], 383)
+            now, _ = self.set(uri, "baud", "9600")
+            self.assertEqual((now["old"], now["new"]), ({"baud": 19200}, {"baud": 9600}))
+
     def test_an_address_is_verified(self):
         emulator = self.emulator()
         now, note = self.set(self.uri(emulator), "address", "200")

@@ -257,6 +257,13 @@ class Settings(RaaCase):
             self.assert_good(result)
         self.assert_good(absenc("read", "sim:raa38?parity=even"))
 
+    def test_acquisition_may_take_long(self):
+        for mode in ("handshake", "bus"):
+            for t3 in (20_000, 400_000):
+                result = absenc("read", f"sim:raa38?mode={mode}&acquisition_us={t3}&singleturn=383", "--json")
+                self.assert_good(result)
+                self.assertEqual(json.loads(result.stdout)["singleturn"], 383)
+
     def test_handshake_in_virtual_time(self):
         result = absenc("read", "sim:raa38?mode=handshake&acquisition_us=500&singleturn=383", "--count", "3", "--json")
         self.assert_good(result)

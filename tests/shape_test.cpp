@@ -337,6 +337,23 @@ TEST_F(BaudChange, TalkGoesOn) {
   EXPECT_EQ(talk(true), "10000 sent, 25000 received 19, 35000 sent, 45000 received 01");
 }
 
+TEST_F(BaudChange, ParityAndStopBitsAreNotItsBusiness) {
+  const LineSettings with_parity{.rate = 1'000'000, .parity = Parity::odd, .stop_bits = 2};
+  sim::Line<Byte> parity_line{LinkKind::half_duplex, with_parity};
+  ByteToy follows([this](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind != Kind::sent || std::exchange(changed, true)) return;
+    configure(self);
+    self.send({0x01}, event.at);
+  });
+  ByteToy listens([](ByteToy&, const Event<Byte>&) {});
+  configure(listens);
+  follows.send({0x19});
+  parity_line.attach(Role::device, listens);
+  parity_line.attach(Role::host, follows);
+  parity_line.run_until(microseconds(100));
+  EXPECT_EQ(listens.log, "12000 error, 18000 received 01");
+}
+
 TEST_F(BaudChange, HostThatDoesNotFollowGetsLineErrors) {
   EXPECT_EQ(talk(false), "10000 sent, 25000 received 19, 40000 sent, 50000 error");
   EXPECT_EQ(device.log, "10000 received 19, 25000 sent, 40000 error");

@@ -21,7 +21,7 @@ struct Step {
     wait,       // until the next event
     transfer,   // not before `at`: send `out` (exchange: and receive max(out, expect) items; clocked: clock `bits`)
     pulse,      // not before `at`: drive `line` active for `width`
-    configure,  // switch this end of the line to `settings`
+    configure,  // switch this end of the line to the rate of `settings`; all else stays as it is
     emit,       // a result is ready to be looked at; ask again
     done,       // the conversation is over
   };
@@ -35,7 +35,7 @@ struct Step {
   Time gap{};               // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
   Time width{};             // pulse
   Line line{};              // pulse
-  LineSettings settings{};  // configure
+  LineSettings settings{};  // configure: `rate`
 };
 
 /// What happened. `at` is the time at which it was complete: the end of the last bit.

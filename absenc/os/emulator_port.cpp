@@ -38,6 +38,7 @@ void check(bool good, const std::string& what) {
 
 EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_port) {
   set_latency(2ms);
+  set_idle_latency(200us);
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
   for (const Descriptor* end : {&master_, &watch_, &listener_}) {

@@ -13,7 +13,8 @@
 namespace absenc::os {
 
 /// All ends are one line: the device hears what comes from any of them, and each gets what the device sends. Like a
-/// wire, the line keeps nothing: what nobody reads is lost. Latency is 2 ms at first: a pause that long is a gap.
+/// wire, the line keeps nothing: what nobody reads is lost. Latency is 2 ms at first: a pause that long is a gap, and
+/// one of 0.2 ms where the device waits for nothing more.
 ///
 /// A device that configures the line hears a terminal only at its own rate. A terminal that nobody has set (the
 /// kernel's 38400 baud) and TCP have none: they are heard at every rate.
@@ -36,7 +37,7 @@ class EmulatorPort final : public StreamPort {
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;
   void drive(Line, bool) override {}
-  void apply(const LineSettings& settings) override { device_rate_ = settings.rate; }
+  void change_rate(std::uint32_t rate) override { device_rate_ = rate; }
 
   void open_terminal();
   void listen_on(std::uint16_t port);

@@ -170,6 +170,17 @@ TEST(EmulatorPort, IsNotLockedByAUserWhoLeft) {
   EXPECT_EQ(exclusive, 0);
 }
 
+// A host that is slow with its bytes is waited for, whoever has nothing more to expect is ready for the next request.
+TEST(EmulatorPort, APauseIsShorterWhereNothingMoreIsDue) {
+  EmulatorPort device;
+  device.set_latency(std::chrono::hours(1));
+  const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
+  put(host.get(), {0x55});
+  ASSERT_EQ(device.wait({.at = never}).kind, Kind::received);
+  EXPECT_EQ(device.wait({.expect = 1, .at = now() + 5ms, .gap = 1us}).kind, Kind::timer);
+  EXPECT_EQ(device.wait({.at = never, .gap = 1us}).kind, Kind::silence);
+}
+
 TEST(EmulatorPort, EndsInTime) {
   EmulatorPort device;
   device.set_end(now() + 3ms);

@@ -103,9 +103,17 @@ void SerialPort::lock() const {
   if (!pseudo_) ::ioctl(descriptor(), TIOCEXCL);
 }
 
+// Parity and stop bits are those of the wiring, whatever a conversation does with the rate.
+void SerialPort::change_rate(std::uint32_t rate) {
+  LineSettings settings = line_;
+  settings.rate = rate;
+  apply(settings);
+}
+
 void SerialPort::apply(const LineSettings& settings) {
   if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
   const LineSettings given = set_terminal(descriptor(), settings);
+  line_ = settings;
   if (is_gadget(path_)) return;
   if (!rates_agree(settings.rate, given.rate)) {
     throw Failure(Failure::Kind::bad_rate,

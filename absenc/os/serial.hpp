@@ -42,11 +42,12 @@ class SerialPort final : public DescriptorPort {
  private:
   void drive(Line line, bool active) override;
   [[nodiscard]] Time pulse_width(Line line, Time asked) const override;
-  void apply(const LineSettings& settings) override;
+  void change_rate(std::uint32_t rate) override;
 
   [[nodiscard]] const std::optional<PulseLine>& pulse_line(Line line) const {
     return line == Line::trigger ? trigger_ : clear_;
   }
+  void apply(const LineSettings& settings);
   void lock() const;
   void set_direction(Rs485 rs485);
   void take_wires(const PulseWires& wires, WireKernel& kernel);
@@ -57,6 +58,7 @@ class SerialPort final : public DescriptorPort {
   bool pseudo_ = false;
   bool kernel_direction_ = false;
   TerminalState before_{};
+  LineSettings line_{};
   std::optional<PulseLine> trigger_;
   std::optional<PulseLine> clear_;
   std::vector<std::string> notes_;

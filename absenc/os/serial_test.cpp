@@ -7,6 +7,7 @@
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <termios.h>
 
 #include <cstring>
 #include <fstream>
@@ -66,6 +67,21 @@ TEST(SerialPort, ChangesTheRate) {
   EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), 123'456u);
   const auto zero = [&] { port.begin({.kind = ByteStep::Kind::configure}); };
   EXPECT_EQ(failure_of(zero).kind(), Kind::bad_rate);
+}
+
+// A pseudo-terminal takes parity back, but not which one it would be, nor the stop bits.
+TEST(SerialPort, AChangeOfTheRateLeavesParityAndStopBits) {
+  const PseudoTerminal terminal;
+  SerialPort port(terminal.path, {.rate = 19'200, .parity = Parity::odd, .stop_bits = 2});
+  const auto flags = [&] {
+    termios state{};
+    EXPECT_EQ(::tcgetattr(terminal.master.get(), &state), 0);
+    return state.c_cflag & (PARODD | CSTOPB);
+  };
+  ASSERT_EQ(flags(), static_cast<tcflag_t>(PARODD | CSTOPB));
+  port.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 9600}});
+  EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), 9600u);
+  EXPECT_EQ(flags(), static_cast<tcflag_t>(PARODD | CSTOPB));
 }
 
 TEST(SerialPort, CarriesEveryByteUnchanged) {

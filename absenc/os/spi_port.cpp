@@ -114,7 +114,7 @@ void SpiPort::begin(const ByteStep& step) {
     case ByteStep::Kind::pulse:
       throw Failure(Kind::unsupported, "an SPI controller has no trigger and clear lines: use a serial port");
     case ByteStep::Kind::configure:
-      apply(step.settings);
+      change_rate(step.settings.rate);
       break;
     case ByteStep::Kind::wait:
     case ByteStep::Kind::emit:
@@ -205,6 +205,12 @@ void SpiPort::apply(LineSettings settings) {
   if (first || settings.spi_mode != settings_.spi_mode) set_mode(settings.spi_mode);
   if (first || settings.rate != settings_.rate) set_speed(settings.rate);
   settings_ = settings;
+}
+
+void SpiPort::change_rate(std::uint32_t rate) {
+  LineSettings settings = settings_;
+  settings.rate = rate;
+  apply(settings);
 }
 
 void SpiPort::set_mode(std::uint8_t mode) {

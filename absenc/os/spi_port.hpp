@@ -59,6 +59,7 @@ class SpiPort final : public Port<std::uint8_t> {
   void keep_bits(std::size_t bits);
 
   void apply(LineSettings settings);
+  void change_rate(std::uint32_t rate);
   void set_mode(std::uint8_t mode);
   void set_word();
   void set_speed(std::uint32_t speed);

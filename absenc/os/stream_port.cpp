@@ -39,7 +39,7 @@ void StreamPort::begin(const ByteStep& step) {
       break;
     case ByteStep::Kind::configure:
       reach(sent_at_);  // what is on its way leaves with the old settings
-      apply(step.settings);
+      change_rate(step.settings.rate);
       break;
     case ByteStep::Kind::wait:
     case ByteStep::Kind::emit:
@@ -54,7 +54,8 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
   if (std::exchange(sent_pending_, false)) return tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
 
   const Time limit = heard_ ? step.gap : step.answer;
-  const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency_ : never;
+  const Time latency = heard_ && step.expect == 0 ? std::min(latency_, idle_latency_) : latency_;
+  const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency : never;
   const Time due = std::min(armed_, quiet_end);
   for (;;) {
     const std::span<const int> ready = poller_.wait(std::min(due, end_));
@@ -115,9 +116,9 @@ void StreamPort::drive(Line, bool) {
 
 Time StreamPort::pulse_width(Line, Time asked) const { return asked; }
 
-void StreamPort::apply(const LineSettings& settings) {
+void StreamPort::change_rate(std::uint32_t rate) {
   throw Failure(Failure::Kind::unsupported,
-                "this kind of port cannot change to " + std::to_string(settings.rate) + " baud: use a serial port");
+                "this kind of port cannot change to " + std::to_string(rate) + " baud: use a serial port");
 }
 
 DescriptorPort::DescriptorPort(Descriptor descriptor, std::string name)

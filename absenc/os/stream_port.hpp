@@ -33,6 +33,8 @@ class StreamPort : public Port<std::uint8_t> {
   /// What the way between the line and this program adds to the answer and gap limits of a step.
   [[nodiscard]] Time latency() const { return latency_; }
   void set_latency(Time latency) { latency_ = latency; }
+  /// The same to the gap limit where nothing more is due (`expect` 0), when that is less. `never` at first.
+  void set_idle_latency(Time latency) { idle_latency_ = latency; }
 
   /// A transfer due within `slack` is sent at once: for a virtual encoder, whose line takes no time. 0 at first.
   void set_send_slack(Time slack) { send_slack_ = slack; }
@@ -57,7 +59,7 @@ class StreamPort : public Port<std::uint8_t> {
   virtual void write_all(Bytes bytes) = 0;
   /// Both throw `unsupported` unless overridden.
   virtual void drive(Line line, bool active);
-  virtual void apply(const LineSettings& settings);
+  virtual void change_rate(std::uint32_t rate);
   /// How long a pulse lasts: as asked, unless overridden.
   [[nodiscard]] virtual Time pulse_width(Line line, Time asked) const;
 
@@ -69,6 +71,7 @@ class StreamPort : public Port<std::uint8_t> {
 
   Poller poller_;
   Time latency_{};
+  Time idle_latency_ = never;
   Time send_slack_{};
   Time end_ = never;
   Time character_time_{};

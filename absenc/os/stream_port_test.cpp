@@ -248,7 +248,7 @@ class PulsePort : public DescriptorPort {
     EXPECT_EQ(active, edges.size() % 2 == 0);
     edges.push_back(os::now());
   }
-  void apply(const LineSettings&) override { applied = os::now(); }
+  void change_rate(std::uint32_t) override { applied = os::now(); }
 };
 
 TEST_F(StreamPortTest, DrivesAPulse) {
@@ -270,7 +270,7 @@ TEST_F(StreamPortTest, ReleasesTheWireOfAPulseThatIsCutShort) {
   EXPECT_EQ(port.edges.size(), 2u);
 }
 
-TEST_F(StreamPortTest, ChangesSettingsAfterTheLastCharacter) {
+TEST_F(StreamPortTest, ChangesTheRateAfterTheLastCharacter) {
   PulsePort port(std::move(peer_), "the line");
   port.set_character_time(1ms);
   port.begin(transfer(request_));

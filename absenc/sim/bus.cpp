@@ -129,6 +129,7 @@ ByteStep Bus::wait_step() const {
     if (node.doing != Doing::waiting) continue;
     step.answer = shorter(step.answer, node.wait.answer);
     step.gap = shorter(step.gap, node.wait.gap);
+    if (node.wait.gap > Time{}) step.expect = std::max(step.expect, node.wait.expect);
   }
   return step;
 }

@@ -196,7 +196,7 @@ void Line<Item>::serve(Node node) {
         state.done = true;
         break;
       case Kind::configure:
-        state.settings = step.settings;
+        state.settings.rate = step.settings.rate;
         break;
       case Kind::transfer:
       case Kind::pulse:

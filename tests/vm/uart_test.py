@@ -15,6 +15,7 @@ PORT, OTHER = "/dev/ttyS1", "/dev/ttyS2"
 REGISTERS = 0x2F8  # of PORT
 CLOCK = 115200     # a divisor of 1
 NOBODY = 65534
+PARITY = termios.PARENB | termios.PARODD
 
 # <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h>, <linux/tty_flags.h>
 TCGETS2, BOTHER, BAUD_MASK = 0x802C542A, 0o010000, 0o010017
@@ -106,6 +107,19 @@ class Uart(EncoderCase):
         self.assertNotEqual(settings(PORT), before)
         self.assertEqual(end(reader, signal.SIGINT)[0], 0)
         self.assertEqual(settings(PORT), before)
+
+    def test_a_change_of_the_rate_leaves_the_parity(self):
+        """On both sides: of the host that tells the encoder, and of the encoder that follows."""
+        emulator = Emulator("/dev", protocol="raa38-modbus", name=f"{OTHER}?parity=odd", line="--port")
+        self.addCleanup(emulator.end)
+        address = f"raa38-modbus:{PORT}?latency=2000&parity=odd"
+        self.assert_good(absenc("config", "set", address, "baud", "9600", "--yes"))
+        reader = self.start("read", f"{address}&baud=9600", "--count", "0", "--rate", "10")
+        self.first_line(reader)
+        for path in (PORT, OTHER):
+            _, _, control, _, _, _, _, rate = settings(path)
+            self.assertEqual((rate, control & PARITY), (9600, PARITY), path)
+        self.assertEqual(end(reader, signal.SIGINT)[0], 0)
 
     def test_rs485(self):
         """The 16550 has no RS-485: who asks for it must hear so, who leaves it to absenc must be able to read."""

@@ -34,6 +34,7 @@ using namespace std::chrono_literals;
 // A host on a pseudo-terminal waits milliseconds for what takes microseconds on a wire.
 constexpr Time send_slack = 500us;
 constexpr Time late_reply = 50ms;
+constexpr double default_gap_ms = 2;
 
 std::string fault_counts(const sim::FaultCounts& faults) {
   std::vector<std::string> counts;
@@ -87,6 +88,13 @@ struct Where {
   std::string_view line;
   bool fits;
 };
+
+// What has no meaning where the encoder is.
+void check_gap(const Unit& unit, const Invocation& invocation) {
+  if (!invocation.has("--gap")) return;
+  const bool elsewhere = invocation.has("--port") || invocation.has("--spidev") || unit.link == LinkKind::can;
+  if (elsewhere) throw UsageError("--gap is for bytes on --pty and --tcp: with --port write PATH?latency=MS");
+}
 
 void check_line(const Unit& unit, const Options& options, const Invocation& invocation) {
   const bool is_spi = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
@@ -187,6 +195,8 @@ void print_ready(const os::EmulatorPort& port) {
 
 Notes serve_terminal(Machine<std::uint8_t>& machine, const Invocation& invocation, Time end) {
   os::EmulatorPort port(std::string(invocation.text("--pty")), tcp_port(invocation));
+  const double gap_ms = invocation.real("--gap", default_gap_ms, 0.01, 60'000);
+  port.set_latency(Time(static_cast<std::int64_t>(gap_ms * 1e6)));
   port.set_send_slack(send_slack);
   port.set_end(end);
   print_ready(port);
@@ -196,8 +206,9 @@ Notes serve_terminal(Machine<std::uint8_t>& machine, const Invocation& invocatio
   return notes;
 }
 
-Notes serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const Invocation& invocation, Time end) {
-  os::SpiDevice device(unit.link, unit.line, machine);
+Notes serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const LineSettings& line,
+                const Invocation& invocation, Time end) {
+  os::SpiDevice device(unit.link, line, machine);
   os::Spidev spidev(device);
   os::SpidevNode node(std::string(invocation.text("--spidev")), spidev);
   print_line(fmt::format("ready: {}", node.path()));
@@ -206,7 +217,7 @@ Notes serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const Invocati
   } catch (const os::Interrupted&) {
   }
   Notes notes;
-  note_count(notes, fmt::format("messages in another SPI mode than the encoder's, which is {}", unit.line.spi_mode),
+  note_count(notes, fmt::format("messages in another SPI mode than the encoder's, which is {}", line.spi_mode),
              device.wrong_modes());
   return notes;
 }
@@ -217,7 +228,7 @@ int emulate_bytes(const Unit& unit, const Options& options, const Invocation& in
   Emulation<std::uint8_t> emulation(unit, options, invocation);
   const Time end = emulation.end();
   return emulation.run([&](Machine<std::uint8_t>& machine) -> Notes {
-    if (invocation.has("--spidev")) return serve_spi(machine, unit, invocation, end);
+    if (invocation.has("--spidev")) return serve_spi(machine, unit, line_settings(unit, options), invocation, end);
     if (!served) return serve_terminal(machine, invocation, end);
     serve_port(machine, *served, send_slack, end);
     return {};
@@ -254,15 +265,20 @@ int run_emulate(const Invocation& invocation) {
   const Unit& unit = emulated_unit(invocation);
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
   check_line(unit, options, invocation);
+  check_gap(unit, invocation);
   return unit.link == LinkKind::can ? emulate_frames(unit, options, invocation)
                                     : emulate_bytes(unit, options, invocation);
 }
 
-constexpr std::array<Parameter, 18> parameters{{
+constexpr std::array<Parameter, 19> parameters{{
     parameter::protocol,
     {"--pty", "PATH", "where to put the link to the pseudo-terminal; CAN: that of an slcan adapter",
      "only the pseudo-terminal itself"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
+    {"--gap", "MS",
+     "on --pty and --tcp, the pause that ends a request which is not complete: longer for a host that is slow with its "
+     "bytes",
+     "2"},
     {"--port", "PATH", "instead: a serial port that is there already, with ?baud=RATE and more as behind an encoder"},
     {"--spidev", "NAME", "SPI: be a device /dev/NAME, which the kernel's module cuse makes"},
     {"--can", "INTERFACE", "CAN: be on this interface, as vcan0"},

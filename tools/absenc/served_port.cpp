@@ -39,6 +39,7 @@ class Movable final : public Machine<Item> {
   Step<Item> next(Time now) override {
     const Step<Item> step = inner_->next(now);
     if (step.kind == Step<Item>::Kind::transfer) sending_ = true;
+    if (step.kind == Step<Item>::Kind::configure) rate_ = step.settings.rate;
     return step;
   }
 
@@ -46,9 +47,13 @@ class Movable final : public Machine<Item> {
     if (sending_) feed({.kind = Event<Item>::Kind::sent, .at = now});
   }
 
+  /// What it has set the last port to; 0: nothing.
+  [[nodiscard]] std::uint32_t rate() const { return rate_; }
+
  private:
   Machine<Item>* inner_;
   bool sending_ = false;
+  std::uint32_t rate_ = 0;
 };
 
 /// `Open` makes the port.
@@ -91,6 +96,9 @@ class Server {
     port->set_end(end_);
     if (state_ == State::away) {
       machine_.left(port->now());
+      if (machine_.rate() != 0) {
+        port->begin({.kind = Step<Item>::Kind::configure, .settings = {.rate = machine_.rate()}});
+      }
       print_message(fmt::format("the port {} is back", name_));
     } else {
       print_line(fmt::format("ready: {}", name_));

@@ -19,13 +19,10 @@ ReadPosition::ReadPosition(const Format& format, const Clocking& clocking)
 
 ByteStep ReadPosition::next(Time now) {
   switch (state_) {
-    case State::configure: {
+    case State::configure:
       state_ = State::ready;
       earliest_ = now + timeout_maximum;  // whoever clocked before: the encoder is ready then
-      LineSettings settings = line_settings;
-      settings.rate = clocking_.rate;
-      return {.kind = ByteStep::Kind::configure, .settings = settings};
-    }
+      return {.kind = ByteStep::Kind::configure, .settings = {.rate = clocking_.rate}};
     case State::ready:
       state_ = State::clocking;
       return {.kind = ByteStep::Kind::transfer, .expect = (bits_ + 7) / 8, .bits = bits_, .at = earliest_};
@@ -76,7 +73,7 @@ std::string_view ReadPosition::detail() const {
     case Error::invalid_argument:
       return "a frame of more than 512 clocks: lower latency_us or ma_khz";
     case Error::truncated:
-      return "the ACK is longer than latency_us allows at this clock: raise it, or lower the MA clock";
+      return "ACK and line take longer than latency_us allows at this clock: raise it, or lower the MA clock";
     case Error::bad_checksum:
       return "the delay of the line may not suit this MA clock: try another one";
     default:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/biss/unit.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "absenc/protocol/biss/fields.hpp"
@@ -14,7 +15,7 @@ namespace {
 
 constexpr std::array<std::string_view, 2> check_choices{"crc6", "crc16"};
 
-constexpr std::array<Option, 9> options{{
+constexpr std::array<Option, 10> options{{
     singleturn_bits_option,
     multiturn_bits_option,
     multiturn_first_option,
@@ -27,7 +28,7 @@ constexpr std::array<Option, 9> options{{
      .probeable = true},
     {.name = "ma_khz", .meaning = "clock, kHz", .default_value = 1000, .minimum = 10, .maximum = 10'000},
     {.name = "latency_us",
-     .meaning = "the longest time that the encoder needs until its position is ready, us",
+     .meaning = "the longest time until the position is ready, us: of the encoder, and of the line there and back",
      .default_value = 10'000,
      .minimum = 0,
      .maximum = 1'000'000,
@@ -37,8 +38,14 @@ constexpr std::array<Option, 9> options{{
      .default_value = 0,
      .minimum = 0,
      .maximum = 100'000},
+    {.name = "ready_us",
+     .meaning = "virtual encoder: the time that it needs itself, us; 0: as latency_us, but at most 10",
+     .default_value = 0,
+     .minimum = 0,
+     .maximum = 1'000'000,
+     .decimals = 3},
 }};
-static_assert(options[option_unit_um].name == "unit_um" && options[option_line_delay_ns].name == "line_delay_ns");
+static_assert(options[option_unit_um].name == "unit_um" && options[option_ready_us].name == "ready_us");
 
 constexpr auto models =
     position_models<option_singleturn_bits, option_multiturn_bits, option_position_bits, option_unit_um>;
@@ -48,7 +55,9 @@ constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position
 constexpr auto fields = joined_fields(word_fields, own_fields);
 
 Behaviour behaviour_of(const Options& values) {
-  return {.latency = Time(values[option_latency_us]), .line_delay = Time(values[option_line_delay_ns])};
+  const Time allowed = std::min(Time(values[option_latency_us]), Behaviour{}.latency);
+  const Time ready(values[option_ready_us]);
+  return {.latency = ready > Time{} ? ready : allowed, .line_delay = Time(values[option_line_delay_ns])};
 }
 
 Error decode_frame(const Options& values, Frame, Frame reply, FieldSink& sink) {

@@ -22,6 +22,7 @@ enum OptionIndex : std::size_t {
   option_ma_khz,
   option_latency_us,
   option_line_delay_ns,
+  option_ready_us,
 };
 
 [[nodiscard]] Format to_format(const Options& options);

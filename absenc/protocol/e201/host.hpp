@@ -30,6 +30,7 @@ class Procedure : public RequestReply {
     unknown,  // no document says whether there is one: whatever comes until it is silent
   };
 
+  Procedure() : RequestReply(reply_limit) {}
   ~Procedure() = default;
 
   /// Sends `request`, not before `earliest`.
@@ -38,15 +39,16 @@ class Procedure : public RequestReply {
   /// Hands out an intermediate result before what was asked last is sent.
   void emit() { emitting_ = true; }
 
-  /// A reply of the right shape came, with its CR; with Answer::unknown anything, also nothing. Calls `ask` or
-  /// `finish`.
+  /// A reply of the right shape came, with its CR; with Answer::unknown anything that has an end, also nothing. Calls
+  /// `ask` or `finish`.
   virtual void answered(Bytes reply) = 0;
   /// No such reply came. Calls `ask` or `finish`; by default the procedure ends with this error.
   virtual void failed(Error error) { finish(error, explain_reply(error)); }
 
   /// The error of what came last in reply.
   [[nodiscard]] Explanation explain_reply(Error error, const Format& format = {}) const {
-    return explain(format, error, request_[0], reply_);
+    const Explanation explanation = explain(format, error, request_[0], reply_);
+    return is_noisy() ? Explanation{noise_explanation().found, explanation.advice} : explanation;
   }
 
  private:

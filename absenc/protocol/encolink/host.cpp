@@ -84,8 +84,7 @@ ByteStep Stream::next(Time now) {
 }
 
 void Stream::begin_frame(Time now) {
-  state_ = State::sending;
-  disturbed_ = false;
+  begin_request();
   reply_.clear();
   began_at_ = std::max(now, earliest_);
   Config config = Config::position;
@@ -127,7 +126,7 @@ void Stream::conclude() {
   Error error = Error::wrong_length;  // disturbed: bytes that are not this reply's
   if (reply_.empty()) {
     error = disturbed_ ? Error::bad_framing : Error::timeout;
-  } else if (!disturbed_) {
+  } else if (!disturbed_ && !is_noisy()) {
     error = check();
   }
   state_ = State::ready;
@@ -200,7 +199,7 @@ void Stream::bad_frame(Error error) {
   if (asked_ == Asked::identity) asked_ = Asked::position, identify_pending_ = true;
   cycle_.lose_step();
   reset_pending_ = uses_channel2_;
-  if (--frame_attempts_left_ == 0) {
+  if (--frame_attempts_left_ == 0 || is_noisy()) {
     access_.stop();
     return on_failure(error, detail);
   }
@@ -208,6 +207,7 @@ void Stream::bad_frame(Error error) {
 }
 
 std::string_view Stream::describe(Error error) const {
+  if (is_noisy()) return noise_explanation().found;
   if (access_.active() && error == Error::timeout) return "the encoder stopped answering during a register access";
   switch (error) {
     case Error::wrong_length:

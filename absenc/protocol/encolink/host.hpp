@@ -25,6 +25,7 @@ class Stream : public RequestReply {
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   [[nodiscard]] std::string_view detail() const final { return detail_; }
+  [[nodiscard]] std::string_view advice() const final { return noise_explanation().advice; }
   /// The latest position: at every `emit`, and at the end.
   [[nodiscard]] const Reading* reading() const override;
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final;

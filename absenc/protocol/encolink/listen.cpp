@@ -19,10 +19,12 @@ Listen::Listen(const Format& format, std::uint32_t count) : format_(format), cou
 ByteStep Listen::next(Time now) {
   if (emit_pending_) {
     emit_pending_ = false;
+    deadline_ = Time{};  // what happens meanwhile is not the encoder's doing
     return {.kind = ByteStep::Kind::emit};
   }
-  if (done_) return {.kind = ByteStep::Kind::done};
   if (deadline_ == Time{}) deadline_ = now + listen_limit;
+  if (!done_ && now >= deadline_) give_up();  // bytes that are no frames may come before every timer
+  if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};
 }
 
@@ -34,8 +36,6 @@ void Listen::feed(const ByteEvent& event) {
     in_step_ = false;
     skipped_ += bytes_.size() + 1;
     bytes_.clear();
-  } else if (event.kind == ByteEvent::Kind::timer && event.at >= deadline_) {
-    give_up();
   }
 }
 
@@ -75,7 +75,6 @@ void Listen::accept(const Position& position, Time at) {
   position_ = position;
   reading_ = to_reading(format_, position);
   reading_.latched = reading_.received = at;  // when it was taken is not known
-  deadline_ = at + listen_limit;
   ++found_;
   done_ = found_ == count_;
   emit_pending_ = !done_;

@@ -97,6 +97,7 @@ void Scan::answered(const Reply& reply) {
 }
 
 void Scan::failed(Error error) {
+  if (is_noisy()) return finish(error);
   if (error != Error::timeout) disturbed_ = static_cast<std::uint8_t>(disturbed_ | 1u << address_);
   go_on();
 }

@@ -37,13 +37,17 @@ ByteStep VirtualEncoder::next(Time) {
     step.gap = idle_time;
     if (!ignoring_) step.expect = request_length(profile_, *data_id(request_[0])) - request_.size();
   }
+  if (ignoring_) step.expect = foreign_end_ > heard_ ? foreign_end_ - heard_ : 0;
   return step;
 }
 
 void VirtualEncoder::feed(const ByteEvent& event) {
   switch (event.kind) {
     case ByteEvent::Kind::received:
-      for (const std::uint8_t byte : event.items) byte_received(byte, event.at);
+      for (const std::uint8_t byte : event.items) {
+        ++heard_;
+        byte_received(byte, event.at);
+      }
       break;
     case ByteEvent::Kind::sent:
       transmitting_ = false;
@@ -71,8 +75,15 @@ void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
   if (transmitting_) return violate("something was sent during the encoder's transmission", at);
   if (ignoring_) return;
   request_.push_back(byte);
-  if (request_.size() == 1 && (address_of(byte) != profile_.address || !data_id(byte))) return ignore();
+  if (request_.size() == 1 && (address_of(byte) != profile_.address || !data_id(byte))) return ignore_request(byte);
   if (request_.size() == request_length(profile_, *data_id(request_[0]))) request_complete(at);
+}
+
+// Of another encoder, which may be absent: behind its last byte any pause is enough.
+void VirtualEncoder::ignore_request(std::uint8_t control_field) {
+  const auto id = data_id(control_field);
+  foreign_end_ = heard_ + (id ? request_length(profile_, *id) - 1 : 0);
+  ignore();
 }
 
 void VirtualEncoder::request_complete(Time at) {

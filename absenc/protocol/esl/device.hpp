@@ -80,6 +80,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
     request_.clear();
     ignoring_ = true;
   }
+  void ignore_request(std::uint8_t control_field);
   void report_bad_request(std::uint8_t status_bit, Time at);
   void send(const Reply& reply, Time at);
 
@@ -132,7 +133,9 @@ class VirtualEncoder final : public Device<std::uint8_t> {
 
   RequestBytes request_;
   ReplyBytes reply_;
-  bool ignoring_ = false;  // until the line is idle
+  bool ignoring_ = false;          // until the line is idle
+  std::uint64_t heard_ = 0;        // bytes so far
+  std::uint64_t foreign_end_ = 0;  // of them, when another encoder's request is over
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Time reply_at_{};

@@ -203,7 +203,7 @@ TEST(EslHost, ANodeThatNeverStopsDoesNotHoldTheHost) {
   EXPECT_EQ(bench.run(read).error(), Error::wrong_length);
   EXPECT_TRUE(bench.finished);
   EXPECT_NE(read.detail().find("without a pause"), std::string_view::npos) << read.detail();
-  EXPECT_LE(bench.line.now(), 2 * settle_limit);
+  EXPECT_LE(bench.line.now(), 2 * noise_limit);
 }
 
 // ---- Resets

@@ -9,7 +9,6 @@ namespace absenc::esl {
 namespace {
 
 using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
 
 void add_change(Sentence& sentence, const Profile& profile, Bytes reply) {
   const Change change = find_change(profile, {.reply = reply});
@@ -55,8 +54,6 @@ void Procedure::finish(Error error, std::string_view detail) {
 }
 
 ByteStep Procedure::next(Time now) {
-  // Something may have come in the very moment of the timer.
-  if (state_ == State::settling && now >= settle_until_) end_settling(now);
   if (emit_pending_) {
     emit_pending_ = false;
     return {.kind = ByteStep::Kind::emit};
@@ -68,8 +65,7 @@ ByteStep Procedure::next(Time now) {
   ByteStep step{.expect = expected(), .at = never, .answer = answer_limit, .gap = gap_limit};
   switch (state_) {
     case State::ready:
-      state_ = State::sending;
-      disturbed_ = false;
+      begin_request();
       reply_bytes_.clear();
       detail_.clear();
       step.kind = ByteStep::Kind::transfer;
@@ -83,7 +79,6 @@ ByteStep Procedure::next(Time now) {
       break;
     case State::settling:
       step.expect = 0;
-      step.at = settle_until_;
       break;
     case State::ending:
     case State::done:
@@ -93,72 +88,28 @@ ByteStep Procedure::next(Time now) {
   return step;
 }
 
-void Procedure::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::sent:
-      sent_at_ = received_at_ = event.at;
-      if (state_ != State::sending) break;
-      state_ = State::receiving;
-      if (disturbed_) settle(event.at);
-      break;
-    case ByteEvent::Kind::received:
-      received(event);
-      break;
-    case ByteEvent::Kind::line_error:
-      disturbed_ = true;
-      hear(event.at);
-      if (state_ == State::receiving) settle(event.at);
-      break;
-    case ByteEvent::Kind::silence:
-      if (state_ == State::receiving || state_ == State::settling) conclude(false);
-      break;
-    default:
-      break;
-  }
-}
-
-void Procedure::settle(Time at) {
-  state_ = State::settling;
-  settle_until_ = at + settle_limit;
-}
-
-void Procedure::hear(Time at) {
-  heard_at_ = at;
-  if (settle_until_ == never) settle_until_ = at + settle_limit;
-}
-
-// A carrier with latency tells silence later than the limit: then the line is not noisy, but not yet known to be idle.
-void Procedure::end_settling(Time now) {
-  if (now - heard_at_ < settle_limit / 2) return conclude(true);
-  settle_until_ = never;
-}
-
-void Procedure::received(const ByteEvent& event) {
-  if (state_ == State::done || state_ == State::ending || state_ == State::ready) return;
-  received_at_ = event.at;
-  hear(event.at);
-  for (const std::uint8_t byte : event.items) reply_bytes_.push_back(byte);
-  if (state_ == State::sending) disturbed_ = true;
+void Procedure::received(Bytes bytes) {
+  for (const std::uint8_t byte : bytes) reply_bytes_.push_back(byte);
   if (state_ != State::receiving || reply_bytes_.size() < expected()) return;
   Reply reply;
   check_ = check_reply(profile_, request_, reply_bytes_, reply);
   // After anything that is wrong more may be coming: wait for silence before sending again.
   if (check_ == Check::passed) return answered(reply);
-  settle(event.at);
+  state_ = State::settling;
 }
 
-void Procedure::conclude(bool noisy) {
+void Procedure::conclude() {
   Error error = Error::wrong_length;  // disturbed: bytes that are not this reply's
   check_ = Check::length;
   if (reply_bytes_.empty()) {
     error = disturbed_ ? Error::bad_framing : Error::timeout;
-  } else if (!disturbed_) {
+  } else if (!disturbed_ && !is_noisy()) {
     Reply reply;
     check_ = check_reply(profile_, request_, reply_bytes_, reply);
     error = error_of(check_);
   }
-  if (attempts_left_ > 0 && !noisy) return start(received_at_ + pause_before_repeat());
-  explain(error, noisy);
+  if (attempts_left_ > 0 && !is_noisy()) return start(received_at_ + pause_before_repeat());
+  explain(error);
   failed(error);
 }
 
@@ -168,14 +119,14 @@ Time Procedure::pause_before_repeat() const {
   return is_memory_access(request_.id) ? eeprom_read_time + 20us : Time{};
 }
 
-void Procedure::explain(Error error, bool noisy) {
+void Procedure::explain(Error error) {
   detail_.clear();
   if (error == Error::timeout) {
     detail_.add("it is also silent when request_crc, crc_bit_order or address is another");
     return;
   }
-  if (noisy) {
-    detail_.add("something sends without a pause: find the node that does not stop");
+  if (is_noisy()) {
+    detail_.add(noise_explanation().found);
     return;
   }
   if (disturbed_) return;

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <string_view>
 
-#include "absenc/protocol/conversation.hpp"
 #include "absenc/protocol/esl/reply.hpp"
 #include "absenc/protocol/esl/timing.hpp"
+#include "absenc/protocol/request_reply.hpp"
 
 namespace absenc::esl {
 
@@ -27,12 +27,12 @@ class Sentence {
   Buffer<char, 400> text_;
 };
 
-class Procedure : public Conversation<std::uint8_t> {
+class Procedure : public RequestReply {
  public:
-  void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   [[nodiscard]] std::string_view detail() const final { return detail_.view(); }
+  [[nodiscard]] std::string_view advice() const final { return noise_explanation().advice; }
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final;
 
   [[nodiscard]] const Profile& profile() const { return profile_; }
@@ -62,21 +62,14 @@ class Procedure : public Conversation<std::uint8_t> {
 
   [[nodiscard]] const Request& request() const { return request_; }
   [[nodiscard]] Bytes reply_bytes() const { return reply_bytes_; }
-  [[nodiscard]] Time sent_at() const { return sent_at_; }
-  [[nodiscard]] Time received_at() const { return received_at_; }
   /// The reading of a reply that has just come, with its times.
   [[nodiscard]] Reading reading_of(const Reply& reply) const;
 
  private:
-  enum class State : std::uint8_t { ready, sending, receiving, settling, ending, done };
-
-  void received(const Event<std::uint8_t>& event);
-  void conclude(bool noisy);
-  void explain(Error error, bool noisy);
+  void received(Bytes bytes) final;
+  void conclude() final;
+  void explain(Error error);
   void start(Time earliest);
-  void settle(Time at);
-  void hear(Time at);
-  void end_settling(Time now);
   [[nodiscard]] bool selects_page() const;
   [[nodiscard]] Time pause_before_repeat() const;
   [[nodiscard]] std::size_t expected() const { return reply_length(request_.id); }
@@ -84,19 +77,13 @@ class Procedure : public Conversation<std::uint8_t> {
   Profile profile_;
   unsigned read_attempts_;
   unsigned attempts_left_ = 0;
-  State state_ = State::done;
   bool emit_pending_ = false;
-  bool disturbed_ = false;  // something came before the request was out, or a damaged character
   Request request_{};
   RequestBytes request_bytes_;
   // One character more than the longest reply tells "too long"; what no longer fits changes nothing.
   ByteBuffer<3 * reply_capacity> reply_bytes_;
   Check check_ = Check::passed;
   Time earliest_{};
-  Time sent_at_{};
-  Time received_at_{};
-  Time settle_until_{};
-  Time heard_at_{};
   Error error_ = Error::none;
   Sentence detail_;
 };

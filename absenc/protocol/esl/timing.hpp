@@ -31,8 +31,6 @@ inline constexpr Time gap_limit = 3 * line_settings.character();
 /// reply and the next request. A missing start bit ends a frame set, so one bit would do.
 inline constexpr Time idle_time = line_settings.bits(1);
 inline constexpr Time request_pause = line_settings.bits(2);
-/// Not in the document: how long a line may be noisy before the host gives the exchange up.
-inline constexpr Time settle_limit = 1ms;
 
 /// Table 11. `kind` tells how the bytes are reached.
 struct MemoryArea {

@@ -9,15 +9,18 @@ namespace {
 
 using ByteStep = Step<std::uint8_t>;
 
-constexpr Time noise_limit = 1s;  // longer than any reply, and than carriers are late to tell silence
+constexpr Time patience = 1s;  // longer than any reply, and than carriers are late to tell silence
 
 }  // namespace
+
+Client::Client(const LineSettings& line, Time answer_limit)
+    : RequestReply(patience), line_(line), answer_limit_(answer_limit) {}
 
 void Client::ask(Bytes request, Time pause) {
   request_.clear();
   request_.append(request);
   reply_.clear();
-  give_up_ = never;
+  clear_noise();
   pause_ = pause;
   state_ = State::ready;
 }
@@ -29,7 +32,7 @@ void Client::set_rate(std::uint32_t rate) {
 
 void Client::finish(Error error, const Explanation& explanation) {
   error_ = error;
-  explanation_ = error == Error::none ? Explanation{} : explanation;
+  explanation_ = error == Error::none ? Explanation{} : explanation.found.empty() ? noise_explanation() : explanation;
   state_ = State::done;
 }
 
@@ -37,12 +40,9 @@ ByteStep Client::next(Time now) {
   // What was on the line before this conversation is not known: the silence begins now.
   if (!begun_) received_at_ = now;
   begun_ = true;
-  const bool hearing = state_ == State::settling || (!reply_.empty() && state_ != State::done);
-  if (hearing && give_up_ == never) give_up_ = now + noise_limit;
-  if (hearing && now >= give_up_) give_up();
   if (setting_rate_) {
     setting_rate_ = false;
-    return {.kind = ByteStep::Kind::configure, .settings = line_};
+    return {.kind = ByteStep::Kind::configure, .settings = {.rate = line_.rate}};
   }
   // Whatever is heard meanwhile begins the silence anew.
   const Time due = received_at_ + std::max(request_silence(line_), pause_);
@@ -53,20 +53,16 @@ ByteStep Client::next(Time now) {
   }
   switch (state_) {
     case State::ready:
-      state_ = State::sending;
-      disturbed_ = false;
+      begin_request();
       reply_.clear();
-      give_up_ = never;
       step.expect = expected({});
       step.kind = ByteStep::Kind::transfer;
       step.out = request_;
       step.at = now;
       break;
     case State::sending:
-      break;
     case State::receiving:
     case State::settling:
-      step.at = give_up_;
       break;
     case State::ending:
     case State::done:
@@ -84,11 +80,8 @@ void Client::received(Bytes bytes) {
   state_ = State::settling;
 }
 
-void Client::give_up() {
-  finish(Error::wrong_length, {"something sends without a pause", "find the node that does not stop"});
-}
-
 void Client::conclude() {
+  if (is_noisy()) return failed(Error::wrong_length, reply_);
   Error error = reply_.empty() ? Error::timeout : check(reply_);
   if (disturbed_) error = reply_.empty() ? Error::bad_framing : Error::wrong_length;
   if (error == Error::none) return answered(reply_);

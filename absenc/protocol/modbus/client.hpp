@@ -22,7 +22,7 @@ class Client : public RequestReply {
 
  protected:
   /// `line`: as it is set; `answer_limit`: how long after a request the reply may begin.
-  Client(const LineSettings& line, Time answer_limit) : line_(line), answer_limit_(answer_limit) {}
+  Client(const LineSettings& line, Time answer_limit);
   ~Client() = default;
 
   /// Sends a request of at most 16 bytes, CRC included, when the line has been silent for `request_silence`, and
@@ -39,13 +39,12 @@ class Client : public RequestReply {
   [[nodiscard]] virtual Error check(Bytes reply) const = 0;
   /// A reply that passed came. Calls `ask` or `finish`.
   virtual void answered(Bytes reply) = 0;
-  /// No such reply came, but `reply`. Calls `ask` or `finish`.
+  /// No such reply came, but `reply`; or the line `is_noisy`. Calls `ask` or `finish`.
   virtual void failed(Error error, Bytes reply) = 0;
 
  private:
   void received(Bytes bytes) final;
   void conclude() final;
-  void give_up();
 
   LineSettings line_;
   Time answer_limit_;
@@ -54,7 +53,6 @@ class Client : public RequestReply {
   ByteBuffer<16> request_;
   FrameBytes reply_;  // what no longer fits changes nothing
   Time pause_{};
-  Time give_up_ = never;  // a line that is not silent by then will not be
   Error error_ = Error::none;
   Explanation explanation_{};
 };

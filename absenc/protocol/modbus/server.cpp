@@ -31,7 +31,7 @@ ByteStep Server::next(Time) {
   if (setting_rate_ && !transmitting_) {
     setting_rate_ = false;
     line_.rate = next_rate_;
-    return {.kind = ByteStep::Kind::configure, .settings = line_};
+    return {.kind = ByteStep::Kind::configure, .settings = {.rate = line_.rate}};
   }
   if (reply_pending_) {
     reply_pending_ = false;
@@ -39,6 +39,7 @@ ByteStep Server::next(Time) {
   }
   ByteStep step{.at = never};
   if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
+  if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;  // or more: not yet a whole one
   return step;
 }
 

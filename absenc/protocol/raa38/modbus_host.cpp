@@ -50,8 +50,8 @@ void Procedure::answered(Bytes reply) {
 
 void Procedure::failed(Error error, Bytes reply) {
   doubtful_length_ = 0;
-  reason_ = explain(request_, error, reply);
-  if (attempts_left_ > 0 && error != Error::request_rejected) return send({});
+  reason_ = is_noisy() ? noise_explanation() : explain(request_, error, reply);
+  if (attempts_left_ > 0 && error != Error::request_rejected && !is_noisy()) return send({});
   missed(error);
 }
 
@@ -118,6 +118,7 @@ FindBaud::FindBaud(const Format& format) : Procedure(format, 2), found_(format.b
 void FindBaud::replied(const Reply&) { conclude_with(Error::none); }
 
 void FindBaud::missed(Error error) {
+  if (is_noisy()) return conclude_with(error, reason());
   if (error == Error::request_rejected) return conclude_with(Error::none);  // it is understood
   if (first_error_ == Error::none) {
     first_error_ = error;
@@ -173,6 +174,7 @@ void Scan::replied(const Reply& reply) {
 }
 
 void Scan::missed(Error error) {
+  if (is_noisy()) return finish(error, reason());
   if (phase_ == Phase::walk && error != Error::timeout) {
     const bool refuses = error == Error::request_rejected;
     if (!refuses && ++damaged_answers_ < most_damaged_answers) return ask_position(address_);

@@ -55,12 +55,13 @@ void Reader::clear() { doing_ = Doing::to_clear; }
 void Reader::finish(Error error, std::string_view detail, std::string_view advice) {
   doing_ = Doing::done;
   error_ = error;
-  const Explanation more = explanation(settings_, error);
+  const Explanation more = is_noisy() ? noise_.explanation() : explanation(settings_, error);
   detail_ = detail.empty() ? more.found : detail;
   advice_ = advice.empty() && detail.empty() ? more.advice : advice;
 }
 
 ByteStep Reader::next(Time now) {
+  if (doing_ == Doing::listening && now >= deadline_) end_listening(now);  // bytes may come before every timer
   switch (doing_) {
     case Doing::asking:
       if (wait_first_ > Time{}) earliest_ = now + std::exchange(wait_first_, Time{});
@@ -78,6 +79,7 @@ ByteStep Reader::ask_step(Time now) {
   frame_.clear();
   sent_.clear();
   disturbed_ = heard_ = false;
+  noise_.clear();
   found_ = Error::none;
   if (settings_.mode == Mode::timing) {
     doing_ = Doing::listening;
@@ -131,11 +133,10 @@ void Reader::feed(const ByteEvent& event) {
         doing_ = Doing::settling;
         found_ = Error::bad_framing;
       }
-      return;
+      noise_.heard(event.at);
+      return end_noise();
     case ByteEvent::Kind::silence:
       return silence();
-    case ByteEvent::Kind::timer:
-      return timer(event.at);
     default:
       return;
   }
@@ -161,11 +162,13 @@ void Reader::received(Bytes bytes, Time at) {
   if (doing_ == Doing::asking) return unasked();
   if (doing_ != Doing::sending && doing_ != Doing::receiving && doing_ != Doing::settling) return;
   heard_ = true;
+  noise_.heard(at);
   received_at_ = at;
   if (doing_ == Doing::sending && settings_.mode != Mode::handshake) disturbed_ = true;
   const std::size_t room = frame_.capacity() - frame_.size();
   frame_.append(bytes.first(std::min(bytes.size(), room)));
   if (doing_ == Doing::receiving) check_frame();
+  end_noise();
 }
 
 void Reader::check_frame() {
@@ -203,9 +206,13 @@ void Reader::silence() {
   }
 }
 
-void Reader::timer(Time at) {
-  if (doing_ != Doing::listening || at < deadline_) return;
-  received_at_ = at;
+void Reader::end_noise() {
+  if (doing_ != Doing::receiving && doing_ != Doing::settling) return;
+  if (is_noisy()) failed(Error::wrong_length);
+}
+
+void Reader::end_listening(Time now) {
+  received_at_ = now;
   if (!heard_) return failed(Error::timeout);
   failed(decoder_.saw_larger_positions() ? Error::out_of_range : Error::bad_framing);
 }
@@ -310,6 +317,7 @@ void Scan::got(const Position& position) {
 }
 
 void Scan::failed(Error error) {
+  if (is_noisy()) return finish(error);
   if (error != Error::timeout) {
     if (attempt_++ < scan_attempts) return ask({}, static_cast<std::uint8_t>(unit_));
     disturbed_ = static_cast<std::uint16_t>(disturbed_ | 1u << unit_);

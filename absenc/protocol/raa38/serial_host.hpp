@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/noise.hpp"
 #include "absenc/protocol/raa38/serial_settings.hpp"
 #include "absenc/protocol/raa38/serial_stream.hpp"
 
@@ -38,12 +39,14 @@ class Reader : public Conversation<std::uint8_t> {
   void finish(Error error = Error::none, std::string_view detail = {}, std::string_view advice = {});
 
   virtual void got(const Position& position) = 0;
+  /// No position came; or the line `is_noisy`, when asking others is of no use.
   virtual void failed(Error error) = 0;
   virtual void cleared() {}
   /// Something came before it was asked for.
   virtual void unasked() {}
 
   [[nodiscard]] const Settings& settings() const { return settings_; }
+  [[nodiscard]] bool is_noisy() const { return noise_.is_endless(); }
   /// When the encoder took the last position, at the earliest, and when it was there.
   [[nodiscard]] Time latched_at() const { return latched_at_; }
   [[nodiscard]] Time received_at() const { return received_at_; }
@@ -59,7 +62,8 @@ class Reader : public Conversation<std::uint8_t> {
   void listen(Bytes bytes, Time at);
   void check_frame();
   void silence();
-  void timer(Time at);
+  void end_noise();
+  void end_listening(Time now);
 
   Settings settings_;
   StreamDecoder decoder_;
@@ -71,6 +75,7 @@ class Reader : public Conversation<std::uint8_t> {
   bool heard_ = false;      // anything since it was asked
   RequestBytes sent_;
   ByteBuffer<2 * frame_capacity> frame_;
+  Noise noise_{patience};
   Error found_ = Error::none;  // settling: what is wrong
   Time deadline_{};
   Time sent_at_{};

@@ -20,12 +20,14 @@ Listen::Listen(const Settings& settings)
 ByteStep Listen::next(Time now) {
   if (taken_ < waiting_.size()) {
     take(waiting_[taken_++]);
+    arm_ = true;
     return {.kind = ByteStep::Kind::emit};
   }
-  if (done_) return {.kind = ByteStep::Kind::done};
   // Whoever stops at a result and comes back later has not waited in vain meanwhile.
   if (arm_) deadline_ = now + std::max(listen_limit, 4 * settings_.period);
   arm_ = false;
+  if (!done_ && now >= deadline_) give_up();  // bytes that are no frames may come before every timer
+  if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};
 }
 
@@ -44,8 +46,6 @@ void Listen::feed(const ByteEvent& event) {
   } else if (event.kind == ByteEvent::Kind::line_error) {
     heard_ = true;
     decoder_.disturbed(keep);
-  } else if (event.kind == ByteEvent::Kind::timer && event.at >= deadline_) {
-    give_up();
   }
 }
 
@@ -72,7 +72,6 @@ void Listen::accept(const Found& found, Time latched) {
   last_number_ = frame_number_;
   has_suspect_ = false;
   heard_ = false;
-  arm_ = true;
   ++good_;
 }
 

@@ -18,6 +18,7 @@ inline constexpr Time clear_width = 1ms;     // of the pulse on CLR
 inline constexpr Time answer_limit = 100ms;  // T3, and from a request to its answer
 inline constexpr Time answer_slack = 5ms;    // beyond a T3 that is given
 inline constexpr Time gap_limit = 10ms;      // between characters: 1200 baud
+inline constexpr Time patience = 1s;         // with a line that is never silent: two frames at 1200 baud are 130 ms
 inline constexpr Time listen_limit = 1s;     // without a good frame of an encoder that transmits by itself
 inline constexpr Time scan_silence = 200ms;  // before a scan: longer than most refresh rates take
 inline constexpr Time zero_limit = 500ms;    // until the position must be zero

@@ -23,17 +23,17 @@ void VirtualEncoder::feed(const ByteEvent& event) {
     answering_ = false;
     shifted_ += event.bits;
     if (shifted_ < format_.word.bits()) violate("fewer clocks than the word has bits", event.at);
-    free_at_ = event.at + pause;
+    free_at_ = event.at + timing_.pause;
     ++answered_;
   }
 }
 
 void VirtualEncoder::selected(Time at, Time period) {
-  if (period > Time{} && (period < shortest_period || period > longest_period)) {
-    violate("clock outside 100 to 250 kHz", at);
+  if (period > Time{} && (period < timing_.shortest_period || period > timing_.longest_period)) {
+    violate("clock outside min_clock_khz to max_clock_khz", at);
   }
   if (at < free_at_) {  // the shift register goes on
-    violate("clocked again within the pause of 500 us", at);
+    violate("clocked again within pause_us", at);
     shifted_ %= 2 * format_.word.bits();
   } else {
     latched_ = word(at);

@@ -10,7 +10,8 @@ namespace absenc::ssi {
 
 class VirtualEncoder final : public Device<std::uint8_t> {
  public:
-  VirtualEncoder(const Format& format, const Shaft& shaft) : format_(format), shaft_(&shaft) {}
+  VirtualEncoder(const Format& format, const Shaft& shaft, const Timing& timing = {})
+      : format_(format), timing_(timing), shaft_(&shaft) {}
 
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
@@ -32,6 +33,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void violate(std::string_view rule, Time at);
 
   Format format_;
+  Timing timing_;
   const Shaft* shaft_;
   bool powered_ = false;
   std::uint32_t alarms_ = 0;

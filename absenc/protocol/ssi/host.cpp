@@ -8,7 +8,7 @@ using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 }  // namespace
 
-ReadPosition::ReadPosition(const Format& format) : format_(format) {
+ReadPosition::ReadPosition(const Format& format, Time pause) : format_(format), pause_(pause) {
   if (clocks(format) > frame_capacity) finish(Error::invalid_argument);
 }
 
@@ -17,7 +17,7 @@ ByteStep ReadPosition::next(Time now) {
   switch (state_) {
     case State::ready:
       state_ = State::clocking;
-      clocked_at_ = now + host_pause;  // whoever clocked before: the encoder takes a new position then
+      clocked_at_ = now + pause_ + pause_margin;  // whoever clocked before: the encoder takes a new position then
       step.kind = ByteStep::Kind::transfer;
       step.at = clocked_at_;
       break;

@@ -11,7 +11,8 @@ namespace absenc::ssi {
 /// One word, and the bits behind it that `format.extra_clocks` asks for.
 class ReadPosition final : public Conversation<std::uint8_t> {
  public:
-  explicit ReadPosition(const Format& format);
+  /// `pause`: Tm of the encoder.
+  explicit ReadPosition(const Format& format, Time pause = Timing{}.pause);
 
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
@@ -30,6 +31,7 @@ class ReadPosition final : public Conversation<std::uint8_t> {
   void finish(Error error);
 
   Format format_;
+  Time pause_;
   State state_ = State::ready;
   Time clocked_at_{};
   Time sent_at_{};

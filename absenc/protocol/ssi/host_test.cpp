@@ -43,6 +43,35 @@ TEST(SsiHost, ReadingsKeepThePause) {
   EXPECT_EQ(bench.encoder.answered(), 5u);
 }
 
+TEST(SsiHost, ThePauseVariesByProduct) {
+  for (const Time pause : {Time(20us), Time(2ms), Time(100ms)}) {
+    Bench bench(line_settings, bits_12, Timing{.pause = pause});
+    bench.shaft.state.position = std::int64_t{495} << 20;
+    ReadPosition first(bits_12, pause);
+    EXPECT_EQ(bench.run(first).reading()->singleturn, 495u);
+    bench.shaft.state.position = 0;
+    ReadPosition second(bits_12, pause);
+    EXPECT_EQ(bench.run(second).reading()->singleturn, 0u);
+    EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  }
+  Bench slow(line_settings, bits_12, Timing{.pause = 2ms});
+  slow.shaft.state.position = std::int64_t{495} << 20;
+  for (int i = 0; i < 2; ++i) {
+    ReadPosition read(bits_12);
+    slow.run(read);
+  }
+  EXPECT_EQ(last_rule(slow), "clocked again within pause_us");
+}
+
+TEST(SsiDevice, TheClockVariesByProduct) {
+  Bench bench(line_settings, bits_12, Timing{.shortest_period = 1us, .longest_period = 2us});
+  bench.clock(12, 1ms, 1'000'000);
+  bench.clock(12, 1ms, 500'000);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  bench.clock(12, 1ms, 400'000);
+  EXPECT_EQ(last_rule(bench), "clock outside min_clock_khz to max_clock_khz");
+}
+
 TEST(SsiHost, TurnsGrayParityAndErrorBit) {
   const Format format{.word = word_with({.position = 13, .multiturn = 12}, true, ErrorBit::active_low, Parity::odd),
                       .extra_clocks = 27};
@@ -98,7 +127,7 @@ TEST(SsiDevice, GoesOnWithTheOldWordWithinThePause) {
   EXPECT_EQ(bench.clock(12), "000111101111");
   bench.shaft.state.position = 0;
   EXPECT_EQ(bench.clock(4, 499us), "0001");
-  EXPECT_EQ(last_rule(bench), "clocked again within the pause of 500 us");
+  EXPECT_EQ(last_rule(bench), "clocked again within pause_us");
   EXPECT_EQ(bench.clock(12, 100us), "111011110001");
   EXPECT_EQ(bench.clock(12, 500us), "000000000000");
   EXPECT_EQ(bench.encoder.violation_count(), 2u);
@@ -109,7 +138,7 @@ TEST(SsiDevice, ReportsTooFewClocksAndAWrongRate) {
   EXPECT_EQ(bench.clock(8).size(), 8u);
   EXPECT_EQ(last_rule(bench), "fewer clocks than the word has bits");
   bench.clock(12, 1ms, 300'000);
-  EXPECT_EQ(last_rule(bench), "clock outside 100 to 250 kHz");
+  EXPECT_EQ(last_rule(bench), "clock outside min_clock_khz to max_clock_khz");
   bench.clock(12, 1ms, 90'000);
   EXPECT_EQ(bench.encoder.violation_count(), 3u);
   bench.clock(12, 1ms, 250'000);

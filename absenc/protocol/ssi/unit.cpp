@@ -17,7 +17,7 @@ namespace {
 constexpr std::array<std::string_view, 3> error_bit_choices{"none", "active_high", "active_low"};
 constexpr std::array<std::string_view, 3> parity_choices{"none", "odd", "even"};
 
-constexpr std::array<Option, 9> options{{
+constexpr std::array<Option, 13> options{{
     {.name = "bits",
      .meaning = "bits of the position within the turn",
      .default_value = 12,
@@ -49,8 +49,25 @@ constexpr std::array<Option, 9> options{{
      .minimum = 0,
      .maximum = WordFormat::maximum_bits},
     unit_um_option,
+    {.name = "clock_khz", .meaning = "clock, kHz", .default_value = 200, .minimum = 1, .maximum = 10'000},
+    {.name = "pause_us",
+     .meaning = "Tm, the longest pause of the clock after which the old word still goes on, us",
+     .default_value = 500'000,
+     .minimum = 0,
+     .maximum = 1'000'000'000,
+     .decimals = 3},
+    {.name = "min_clock_khz",
+     .meaning = "virtual encoder: slowest clock that it allows",
+     .default_value = 100,
+     .minimum = 1,
+     .maximum = 10'000},
+    {.name = "max_clock_khz",
+     .meaning = "virtual encoder: fastest clock that it allows",
+     .default_value = 250,
+     .minimum = 1,
+     .maximum = 10'000},
 }};
-static_assert(options[option_unit_um].name == "unit_um");
+static_assert(options[option_unit_um].name == "unit_um" && options[option_max_clock_khz].name == "max_clock_khz");
 
 constexpr std::array<OptionValue, 3> raa38s6_12{{{option_bits, 12}, {option_multiturn_bits, 0}, {option_gray, 0}}};
 constexpr std::array<Model, 1> models{{{"RAA38S6-12", "RAA38S6 with 12 bits, binary", 0, raa38s6_12}}};
@@ -58,6 +75,20 @@ constexpr std::array<Model, 1> models{{{"RAA38S6-12", "RAA38S6 with 12 bits, bin
 constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position and turns"}}};
 
 bool is_usable(const Format& format) { return absenc::is_usable(format.word) && clocks(format) <= frame_capacity; }
+
+std::uint32_t rate_of(const Options& values, OptionIndex khz) { return static_cast<std::uint32_t>(values[khz]) * 1000; }
+
+LineSettings settings(const Options& values) {
+  LineSettings line = line_settings;
+  line.rate = rate_of(values, option_clock_khz);
+  return line;
+}
+
+Timing timing_of(const Options& values) {
+  return {.pause = Time(values[option_pause_us]),
+          .shortest_period = LineSettings{.rate = rate_of(values, option_max_clock_khz)}.bits(1),
+          .longest_period = LineSettings{.rate = rate_of(values, option_min_clock_khz)}.bits(1)};
+}
 
 Error decode_frame(const Options& values, Frame, Frame reply, FieldSink& sink) {
   const Format format = to_format(values);
@@ -74,13 +105,13 @@ Delimit delimit(const Options&, Direction, Bytes bytes) { return {Delimit::Kind:
 Any<Conversation> host(const Options& values, const Command&, Arguments, std::span<std::byte> storage) {
   const Format format = to_format(values);
   if (!is_usable(format)) return {};
-  return make_host<ReadPosition>(storage, format);
+  return make_host<ReadPosition>(storage, format, Time(values[option_pause_us]));
 }
 
 Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
   const Format format = to_format(values);
   if (!is_usable(format)) return {};
-  return make_device<VirtualEncoder>(storage, format, shaft);
+  return make_device<VirtualEncoder>(storage, format, shaft, timing_of(values));
 }
 
 Resolution resolution(const Options& values) {
@@ -130,6 +161,7 @@ constinit const Unit unit{
     .device = device,
     .resolution = resolution,
     .covered = covered,
+    .settings = settings,
 };
 
 }  // namespace absenc::ssi

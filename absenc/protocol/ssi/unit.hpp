@@ -20,6 +20,10 @@ enum OptionIndex : std::size_t {
   option_after_word,
   option_extra_clocks,
   option_unit_um,
+  option_clock_khz,
+  option_pause_us,
+  option_min_clock_khz,
+  option_max_clock_khz,
 };
 
 [[nodiscard]] Format to_format(const Options& options);

@@ -54,8 +54,7 @@ ByteStep Procedure::next(Time now) {
   ByteStep step{.expect = expected(), .at = never, .answer = answer_limit, .gap = gap_limit};
   switch (state_) {
     case State::ready:
-      state_ = State::sending;
-      disturbed_ = false;
+      begin_request();
       reply_bytes_.clear();
       step.kind = ByteStep::Kind::transfer;
       step.out = request_bytes_;
@@ -97,10 +96,10 @@ void Procedure::conclude() {
   Error error = Error::wrong_length;  // disturbed: bytes that are not this reply's
   if (reply_bytes_.empty()) {
     error = disturbed_ ? Error::bad_framing : Error::timeout;
-  } else if (!disturbed_) {
+  } else if (!disturbed_ && !is_noisy()) {
     error = decode_reply(format_, request_, reply_bytes_).error();
   }
-  if (attempts_left_ > 0) {
+  if (attempts_left_ > 0 && !is_noisy()) {
     start(selects_page() ? received_at_ + memory_time : Time{});
   } else {
     failed(error);

@@ -18,7 +18,8 @@ class Procedure : public RequestReply {
  public:
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
-  [[nodiscard]] std::string_view detail() const final { return detail_; }
+  [[nodiscard]] std::string_view detail() const final { return detail_.empty() ? noise_explanation().found : detail_; }
+  [[nodiscard]] std::string_view advice() const final { return noise_explanation().advice; }
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final;
 
   [[nodiscard]] const Format& format() const { return format_; }

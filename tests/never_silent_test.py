@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A line that is never silent, on a pseudo-terminal: whatever the command is asked to do there, it ends and says so."""
+import concurrent.futures
+import json
+import time
+import unittest
+
+from command_support import BabblingLine, Case, absenc
+
+LIMIT = 40.0  # seconds on a busy machine; alone the longest takes about ten
+AT_ONCE = 8   # commands that mostly wait
+
+
+def units():
+    """Those on a line of characters."""
+    listed = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
+    return [unit for unit in listed if unit["link"] in ("half_duplex", "full_duplex")]
+
+
+def least(argument):
+    return str(max(argument["minimum"], 1))
+
+
+def invocations(unit, encoder):
+    """Each verb of the command that converses with this unit, and each command of the unit."""
+    verbs = {command["verb"] for command in unit["commands"]}
+    yield "read", encoder
+    yield "read", encoder, "--count", "2"
+    yield "info", encoder
+    yield "bench", encoder, "--seconds", "0.1"
+    if "memory_read" in verbs:
+        yield "memory", "read", encoder, "0"
+    if unit["memory"]:
+        yield "memory", "dump", encoder
+    if "config_get" in verbs:
+        yield "config", "get", encoder
+    for verb in ("scan", "alarms", "temperature"):
+        if verb in verbs:
+            yield verb, encoder
+    for verb in ("zero", "reset_multiturn", "clear_alarms"):
+        if verb in verbs:
+            yield verb.replace("_", "-"), encoder, "--yes"
+    for command in unit["commands"]:
+        arguments = [least(argument) for argument in command["arguments"] if argument["required"]]
+        yield ("run", encoder, command["name"], *arguments, *(["--yes"] if command["changes_encoder"] else []))
+
+
+class NeverSilentTest(Case):
+    def run_all(self, period, pieces, wanted):
+        """Each invocation on a line of its own; `wanted`: of those of a unit."""
+        def one(unit, number):
+            with BabblingLine(period, pieces) as line:
+                arguments = list(invocations(unit, f"{unit['protocol']}:{line.path}"))[number]
+                start = time.monotonic()
+                return arguments, absenc(*arguments), time.monotonic() - start
+
+        with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+            waiting = [pool.submit(one, unit, number) for unit in units()
+                       for number, arguments in enumerate(invocations(unit, "")) if wanted(arguments)]
+            for future in waiting:
+                arguments, result, duration = future.result()
+                with self.subTest(arguments=arguments):
+                    self.assertLess(duration, LIMIT)
+                    self.assertIn(result.returncode, (0, 1), result.stderr)
+                    # What is told to an interface without being answered may find it silent for a moment.
+                    if arguments[0] != "run":
+                        self.assert_failed(result)
+
+    def test_a_byte_every_5_ms_ends_every_conversation(self):
+        self.run_all(0.005, (b"\x55",), lambda arguments: True)
+
+    def test_a_flood_ends_reading(self):
+        self.run_all(0, (b"\x55" * 64,), lambda arguments: arguments[0] in ("read", "zero", "scan"))
+
+    def test_lines_that_are_answers_to_nothing_end_reading(self):
+        self.run_all(0.005, (b"\r",), lambda arguments: arguments[0] in ("read", "info", "zero"))
+
+    def test_it_says_what_it_heard(self):
+        with BabblingLine() as line:
+            result = absenc("read", f"tformat:{line.path}?latency=500&echo=off")
+        self.assert_failed(result, "something sends without a pause", "received 55 55 55", "find the node")
+
+    def test_identify_ends_in_its_time(self):
+        with BabblingLine() as line:
+            start = time.monotonic()
+            result = absenc("identify", line.path, "--for", "2")
+            self.assertLess(time.monotonic() - start, LIMIT)
+        self.assertEqual(result.returncode, 1, result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
