@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """EncoLink as a user types it: over a pseudo-terminal (UART), and both wires in the simulator."""
+import csv
 import json
+import os
 import unittest
 
 from command_support import Case, Emulator, absenc
@@ -50,6 +52,35 @@ class OverAPseudoTerminal(Case):
         self.assert_good(absenc("run", f"encolink:{emulator.path}", "info"))
         self.assert_good(absenc("read", f"encolink:{emulator.path}", "--count", "20", "--rate", "0"))
         self.assertNotIn("rules", emulator.end()[2])
+
+
+class TurnsAcrossAGap(Case):
+    """The identity says that no turns are counted, whatever would be expected of an encoder that says nothing."""
+
+    def record(self, motion, settings=""):
+        emulator = Emulator(self.directory, "--option", "multiturn_bits=0", "--motion", motion, protocol="encolink")
+        self.addCleanup(emulator.end)
+        path = os.path.join(self.directory, "log.csv")
+        result = absenc("record", f"encolink:{emulator.path}{settings}", "--output", path, "--rate", "5", "--count", "6")
+        self.assert_good(result)
+        with open(path, encoding="utf-8", newline="") as file:
+            return result, list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+    def test_what_cannot_be_known_is_not_presented_as_known(self):
+        result, rows = self.record("rpm=600")
+        self.assertEqual([row["event"] for row in rows], [""] + 5 * ["restarted"])
+        self.assertEqual([row["speed_rpm"] for row in rows], 6 * [""])
+        for row in rows:
+            self.assertEqual(row["position"], row["singleturn"])
+        self.assertIn("max_rpm=RPM", result.stderr)
+        self.assertIn("started again 5 times", result.stderr)
+
+    def test_a_shaft_that_is_known_to_be_slow_is_followed(self):
+        _, rows = self.record("rpm=30", "?max_rpm=30")
+        self.assertEqual({row["event"] for row in rows}, {""})
+        turned = int(rows[-1]["position"]) - int(rows[0]["position"])
+        seconds = float(rows[-1]["time_s"]) - float(rows[0]["time_s"])
+        self.assertAlmostEqual(turned / 2**20, seconds / 2, delta=0.02)
 
 
 class InTheSimulator(Case):
