@@ -12,18 +12,11 @@ using ByteEvent = Event<std::uint8_t>;
 
 constexpr Time access_time = 200us;  // until an access is executed; assumed
 constexpr std::string_view serial_text = "AK2A0001";
-constexpr std::string_view part_text = "MB080SLA20MENT00";       // 16 characters; [8..9] hold the resolution
-constexpr std::string_view order_text = "MB080SLA20MENT00 SIM";  // 20 characters
+constexpr std::string_view part_text = "MB080SLA20MENT00";             // 16 characters; [8..9] hold the resolution
+constexpr std::string_view extended_serial_text = "AK2A0001-0000001";  // 16 characters
+constexpr std::string_view order_text = "MB080SLA20MENT00 SIM";        // 20 characters
 constexpr std::uint64_t firmware_major_value = 1;
 constexpr std::uint64_t firmware_minor_value = 4;
-
-Identity identity_of(const Format& format) {
-  Identity identity{.protocol_version = 2,
-                    .frame_bytes = static_cast<std::uint8_t>(format.turns_bytes() != 0 ? 7 : 5),
-                    .resolution = format.resolution};
-  std::copy(part_text.begin(), part_text.end(), identity.text.begin() + 2);
-  return identity;
-}
 
 ByteBuffer<20> text_value(std::string_view text) {
   ByteBuffer<20> bytes;
@@ -97,6 +90,10 @@ void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
   const std::uint8_t ra = request_[1];
   request_.clear();
   make_frame(at);
+  // Whoever asks with the vendor's library reads as many bytes as the identity may have, twice.
+  const bool identifies = frame_.size() == identity_bytes || config == static_cast<std::uint8_t>(Config::identify);
+  while (identifies && frame_.size() < build_.identity_size && build_.identity_size > identity_bytes)
+    frame_.push_back(0);
   frame_at_ = at + answer_time;
   handle(config, ra, at);
 }
@@ -121,13 +118,21 @@ void VirtualEncoder::make_frame(Time now) {
   if (power_ == Power::starting) {
     frame_ = encode_position(format_, {});
   } else if (identity_next_) {
-    frame_ = encode_identity(identity_of(format_));
+    frame_ = encode_identity(identity());
     identity_next_ = false;
   } else {
     Position position = measure(now);
     position.channel2 = next_channel2(position, now);
     frame_ = encode_position(format_, position);
   }
+}
+
+Identity VirtualEncoder::identity() const {
+  Identity identity{.protocol_version = build_.protocol_version,
+                    .frame_bytes = static_cast<std::uint8_t>(format_.turns_bytes() != 0 ? 7 : 5),
+                    .resolution = format_.resolution};
+  std::copy(part_text.begin(), part_text.end(), identity.text.begin() + 2);
+  return identity;
 }
 
 // The frame that goes out with this request was made before: what it asks for shows in the next one.
@@ -212,8 +217,13 @@ void VirtualEncoder::execute(Time at) {
   }
 }
 
+// Those of an AksIM-4 are others, which are not described.
+const Register* VirtualEncoder::find(std::uint32_t address) const {
+  return build_.protocol_version == version::aksim2 ? find_register(address) : nullptr;
+}
+
 void VirtualEncoder::execute_read(const RegisterRequest& request, Time at) {
-  const Register* found = find_register(request.address);
+  const Register* found = find(request.address);
   AccessStatus status = AccessStatus::ok;
   if (found == nullptr) {
     status = AccessStatus::no_such_register;
@@ -231,7 +241,7 @@ void VirtualEncoder::execute_read(const RegisterRequest& request, Time at) {
 }
 
 void VirtualEncoder::execute_write(const RegisterRequest& request, Time at) {
-  const Register* found = find_register(request.address);
+  const Register* found = find(request.address);
   AccessStatus status = AccessStatus::no_such_register;
   if (found != nullptr) {
     const auto index = static_cast<std::size_t>(found - registers.data());
@@ -251,12 +261,22 @@ void VirtualEncoder::execute_write(const RegisterRequest& request, Time at) {
 AccessStatus VirtualEncoder::write(std::size_t index, std::uint64_t value, Time at) {
   switch (index) {
     case position_offset:
+      if (value > build_.offset.largest(format_.resolution)) return AccessStatus::out_of_range;
       settings_.offset = static_cast<std::uint32_t>(value);
       return AccessStatus::ok;
     case multiturn_preset:
       if (value > low_mask(static_cast<unsigned>(format_.multiturn_bits))) return AccessStatus::out_of_range;
       settings_.preset = static_cast<std::uint32_t>(value);
       settings_.turns = static_cast<std::uint32_t>(static_cast<std::uint64_t>(place(at) >> 32) - value);
+      return AccessStatus::ok;
+    case position_filter:
+    case position_filter_speed:
+    case velocity_filter:
+    case velocity_filter_speed:
+      settings_.filters[index - position_filter] = static_cast<std::uint32_t>(value);
+      return AccessStatus::ok;
+    case calibration_range:
+      settings_.calibration_range = static_cast<std::uint16_t>(value);
       return AccessStatus::ok;
     case write_lock:
       if (value > 1) return AccessStatus::out_of_range;
@@ -296,6 +316,15 @@ ByteBuffer<20> VirtualEncoder::value_of(std::size_t index, Time at) const {
     case multiturn_preset:
       value = settings_.preset;
       break;
+    case position_filter:
+    case position_filter_speed:
+    case velocity_filter:
+    case velocity_filter_speed:
+      value = settings_.filters[index - position_filter];
+      break;
+    case calibration_range:
+      value = settings_.calibration_range;
+      break;
     case write_lock:
       value = settings_.lock;
       break;
@@ -306,7 +335,7 @@ ByteBuffer<20> VirtualEncoder::value_of(std::size_t index, Time at) const {
       value = firmware_minor_value;
       break;
     case protocol_register:
-      value = identity_of(format_).protocol_version;
+      value = build_.protocol_version;
       break;
     case temperature:
       value = static_cast<std::uint64_t>(build_.temperature);
@@ -319,8 +348,12 @@ ByteBuffer<20> VirtualEncoder::value_of(std::size_t index, Time at) const {
       break;
     case serial_number:
       return text_value(serial_text);
-    default:
+    case serial_number_extended:
+      return text_value(extended_serial_text);
+    case part_number:
       return text_value(order_text);
+    default:  // what a calibration or the factory has found: nothing
+      break;
   }
   std::array<std::uint8_t, 8> bytes{};
   store_big_endian(bytes, value);
@@ -333,9 +366,9 @@ ByteBuffer<20> VirtualEncoder::value_of(std::size_t index, Time at) const {
 
 // Of the shaft with the offset, as if the turn counter had no end: 2^-32 revolution.
 std::int64_t VirtualEncoder::place(Time now) const {
-  const auto offset = static_cast<std::int32_t>(settings_.offset);
+  const auto offset = static_cast<std::int32_t>(build_.offset.fraction(format_.resolution, settings_.offset));
   const std::int64_t position = shaft_->at(now).position;
-  return build_.offset_sign == OffsetSign::add ? position + offset : position - offset;
+  return build_.offset.sign == OffsetSign::add ? position + offset : position - offset;
 }
 
 Position VirtualEncoder::measure(Time now) const {
@@ -377,6 +410,10 @@ void VirtualEncoder::load() {
   settings_.preset = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(4, 4)));
   settings_.lock = bytes[8];
   settings_.turns = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(9, 4)));
+  for (std::size_t i = 0; i < settings_.filters.size(); ++i) {
+    settings_.filters[i] = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(13 + 4 * i, 4)));
+  }
+  settings_.calibration_range = static_cast<std::uint16_t>(load_big_endian(bytes.subspan(29, 2)));
 }
 
 void VirtualEncoder::store() {
@@ -385,6 +422,10 @@ void VirtualEncoder::store() {
   store_big_endian(bytes.subspan(4, 4), settings_.preset);
   bytes[8] = settings_.lock;
   store_big_endian(bytes.subspan(9, 4), settings_.turns);
+  for (std::size_t i = 0; i < settings_.filters.size(); ++i) {
+    store_big_endian(bytes.subspan(13 + 4 * i, 4), settings_.filters[i]);
+  }
+  store_big_endian(bytes.subspan(29, 2), settings_.calibration_range);
   ++memory_version_;
 }
 

@@ -88,7 +88,11 @@ TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
   EXPECT_EQ(asked->resolution, 18u);
   EXPECT_EQ(asked->multiturn_bits, 16);
   EXPECT_EQ(complete({.multiturn_bits = 12}, turns)->multiturn_bits, 12);
-  EXPECT_EQ(complete({.resolution = 17}, turns)->resolution, 17u);  // what is set holds
+  EXPECT_EQ(complete({.resolution = 18}, turns)->resolution, 18u);
+  EXPECT_EQ(complete({.resolution = 17}, turns).error(), Error::unexpected_reply);
+  EXPECT_EQ(as_identified({.resolution = 17, .multiturn_bits = 12}, turns).resolution, 18u);
+  EXPECT_EQ(as_identified({.resolution = 17, .multiturn_bits = 12}, turns).multiturn_bits, 12);
+  EXPECT_EQ(as_identified({.multiturn_bits = 0}, turns).multiturn_bits, 16);
   EXPECT_EQ(complete({.multiturn_bits = 0}, turns).error(), Error::unexpected_reply);
   EXPECT_EQ(complete({}, {.frame_bytes = 5, .resolution = 18})->multiturn_bits, 0);
 }
