@@ -84,6 +84,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void execute_write(const RegisterRequest& request, Time at);
   [[nodiscard]] AccessStatus write(std::size_t index, std::uint64_t value, Time at);
   [[nodiscard]] AccessStatus obey(std::uint8_t command, Time at);
+  [[nodiscard]] std::uint64_t number_of(std::size_t index, Time at) const;
   [[nodiscard]] ByteBuffer<20> value_of(std::size_t index, Time at) const;
 
   void update(Time now);

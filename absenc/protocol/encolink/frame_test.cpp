@@ -82,6 +82,20 @@ TEST(EncolinkFrame, LengthsAreThoseOfTurnsAndChannel2) {
   EXPECT_EQ((Format{19, 16, false}.frame_bytes()), 6u);
 }
 
+TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
+  ReplyBytes bytes = encode_identity({.frame_bytes = 7, .resolution = 18});
+  for (const std::uint8_t behind : std::initializer_list<std::uint8_t>{0x00, 0x5A, 0xFF}) {
+    ReplyBytes padded = bytes;
+    padded.push_back(behind);
+    ASSERT_TRUE(decode_identity(padded).has_value());
+    EXPECT_EQ(decode_identity(padded)->resolution, 18u);
+    padded[18] = static_cast<std::uint8_t>(padded[18] ^ 1);
+    EXPECT_EQ(decode_identity(padded).error(), Error::bad_checksum);
+  }
+  bytes.clear();
+  EXPECT_EQ(decode_identity(bytes).error(), Error::wrong_length);
+}
+
 TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
   const Identity turns{.frame_bytes = 7, .resolution = 18};
   const Result<Format> asked = complete({}, turns);

@@ -226,8 +226,6 @@ Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
     return known ? Delimit{Delimit::Kind::complete, request_bytes} : Delimit{Delimit::Kind::no_frame};
   }
   const Format format = to_format(values);
-  const bool padded = bytes.size() == padded_identity_bytes;
-  if (padded && decode_identity(bytes)) return {Delimit::Kind::complete, padded_identity_bytes};
   for (std::size_t size = 1; size <= identity_bytes; ++size) {
     for (const int turns : {0, 16}) {
       if (format.multiturn_bits >= 0 && (format.multiturn_bits > 0) != (turns > 0)) continue;
