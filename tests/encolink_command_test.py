@@ -75,6 +75,15 @@ class TurnsAcrossAGap(Case):
         self.assertIn("max_rpm=RPM", result.stderr)
         self.assertIn("started again 5 times", result.stderr)
 
+    def test_the_monitor_shows_no_speed_that_it_cannot_know(self):
+        emulator = Emulator(self.directory, "--option", "multiturn_bits=0", "--motion", "rpm=600", protocol="encolink")
+        self.addCleanup(emulator.end)
+        result = absenc("monitor", f"encolink:{emulator.path}", "--json", "--rate", "5", "--for", "2")
+        self.assert_good(result)
+        last = json.loads(result.stdout.splitlines()[-1])
+        self.assertGreater(last["restarts"], 1)
+        self.assertIsNone(last["speed_rpm"])
+
     def test_a_shaft_that_is_known_to_be_slow_is_followed(self):
         _, rows = self.record("rpm=6", "?max_rpm=6")
         self.assertEqual({row["event"] for row in rows}, {""})

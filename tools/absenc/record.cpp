@@ -153,6 +153,8 @@ const Subcommand record_subcommand{
     "Each file begins with the encoder, its model and options, the start time and the units. Lines are handed to\n"
     "the system as they come: nothing is lost when the command is killed, and a full disk leaves whole lines. When\n"
     "the port goes away, that is a line, the command waits for it to come back, and that is another line.\n"
+    "After a pause in which the shaft may have turned too far to know, the position starts again: the event of that\n"
+    "reading is restarted. max_rpm=RPM behind ? says how fast the shaft turns at most.\n"
     "In CSV, lines before the column names begin with #.",
     parameters,
     examples,
