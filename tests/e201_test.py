@@ -101,13 +101,16 @@ class Interface(InterfaceCase):
             return self.run_json(path, "run", "decimal")["fields"]["counts"]
         with self.emulator("--singleturn", "1000") as emulator:
             self.assertEqual(counts(emulator.path), 1000)
-            self.assert_good(absenc("zero", f"e201:{emulator.path}", "--yes"))
+            # It is not the zero of what `read` shows, so it is no `zero`.
+            self.assert_wrong_usage(absenc("zero", f"e201:{emulator.path}", "--yes"), "set-zero")
+            self.assertEqual(counts(emulator.path), 1000)
+            self.assert_good(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"))
             self.assertEqual(counts(emulator.path), 0)
             self.assertEqual(self.run_json(emulator.path, "read")["singleturn"], 1000)
             self.assert_good(absenc("run", f"e201:{emulator.path}", "clear-zero", "--yes"))
             self.assertEqual(counts(emulator.path), 1000)
         with self.emulator("--motion", "rpm=60") as emulator:
-            self.assert_failed(absenc("zero", f"e201:{emulator.path}", "--yes"), "stand still")
+            self.assert_failed(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"), "stand still")
 
     def test_a_line_that_is_too_long(self):
         with self.emulator("--option", "line_delay_ns=3600") as emulator:

@@ -12,6 +12,7 @@ KEYS = bytes([0x00, 0xCD, 0xEF, 0x89, 0xAB])
 READ, WRITE = 0x59, 0x58
 IDLE, BUSY, READ_READY, WRITE_READY = 0x33, 0x66, 0x88, 0x99
 OK, ACCESS_DENIED, LOCKED, BAD_WRITE_CRC, BAD_READ_CRC = 0x09, 0x96, 0xF6, 0xF9, (0xE4, 0xE6)
+NO_SUCH_REGISTER, OUT_OF_RANGE = 0x26, 0x56
 STATUSES = {OK, 0x26, 0x56, ACCESS_DENIED, 0xEE, LOCKED, BAD_WRITE_CRC, *BAD_READ_CRC}
 
 
@@ -150,9 +151,42 @@ class Encolink(Case):
         status, serial = client.access(READ, 0x5C, size=8)
         self.assertEqual((status, len(serial)), (OK, 8))
         self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes(4)))
-        self.assertEqual(client.access(WRITE, 0x00, bytes([0x40, 0, 0, 0]))[0], OK)
-        self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes([0x40, 0, 0, 0])))
+        self.assertEqual(client.access(WRITE, 0x00, bytes([0, 0x10, 0, 0]))[0], OK)
+        self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes([0, 0x10, 0, 0])))
         self.assertEqual(client.frame()[1], 2**20)
+
+    def test_every_register_of_the_vendors_map(self):
+        client = self.client(*self.options(True))
+        client.frame(RESET_CHANNELS)
+        sizes = {0x00: 4, 0x04: 4, 0x08: 4, 0x0C: 4, 0x10: 4, 0x14: 4, 0x19: 2, 0x1B: 2, 0x1D: 2, 0x1F: 2, 0x2E: 1, 0x2F: 2,
+                 0x31: 2, 0x33: 4, 0x35: 4, 0x4C: 2, 0x50: 4, 0x52: 1, 0x5C: 8, 0x64: 20, 0x100: 16, 0x120C: 4, 0x1210: 4,
+                 0x1214: 4, 0x1218: 4}
+        for address, size in sizes.items():
+            with self.subTest(address):
+                status, data = client.access(READ, address, size=size)
+                self.assertEqual((status, len(data)), (OK, size))
+
+    def test_the_vendors_example_of_a_value_outside_the_range(self):
+        client = self.client(*self.options(True))
+        client.frame(RESET_CHANNELS)
+        self.assertEqual(client.access(WRITE, 0x00, b"\xff\xff\xff\xff")[0], OUT_OF_RANGE)
+        self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes(4)))
+
+    def test_an_identity_as_the_vendors_library_reads_it(self):
+        """It reads twenty bytes for the frame that asks for it, and twenty for the identity."""
+        client = self.client(*self.options(True), "--option", "identity_bytes=20")
+        for config in (IDENTIFY, POSITION):
+            os.write(client.port, bytes([config, 0]))
+            reply = client.read(20)
+        self.assertEqual((reply[18], reply[1], reply[10:12]), (inverted_crc(reply[:18]), 7, b"22"))
+        self.assertEqual(client.frame()[1], 0)
+
+    def test_version_4(self):
+        client = self.client(*self.options(True), "--option", "protocol_version=4", "--singleturn", "77")
+        self.assertEqual(client.identify()[0], 4)
+        self.assertEqual(client.frame()[1], 77)
+        client.frame(RESET_CHANNELS)
+        self.assertEqual(client.access(WRITE, 0x49, b"\x63")[0], NO_SUCH_REGISTER)
 
     def test_what_is_refused(self):
         client = self.client(*self.options(True))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """EncoLink as a user types it: over a pseudo-terminal (UART), and both wires in the simulator."""
+import csv
 import json
+import os
 import unittest
 
 from command_support import Case, Emulator, absenc
@@ -50,6 +52,94 @@ class OverAPseudoTerminal(Case):
         self.assert_good(absenc("run", f"encolink:{emulator.path}", "info"))
         self.assert_good(absenc("read", f"encolink:{emulator.path}", "--count", "20", "--rate", "0"))
         self.assertNotIn("rules", emulator.end()[2])
+
+
+class TurnsAcrossAGap(Case):
+    """The identity says that no turns are counted, whatever would be expected of an encoder that says nothing."""
+
+    def record(self, motion, settings=""):
+        emulator = Emulator(self.directory, "--option", "multiturn_bits=0", "--motion", motion, protocol="encolink")
+        self.addCleanup(emulator.end)
+        path = os.path.join(self.directory, "log.csv")
+        result = absenc("record", f"encolink:{emulator.path}{settings}", "--output", path, "--rate", "5", "--count", "6")
+        self.assert_good(result)
+        with open(path, encoding="utf-8", newline="") as file:
+            return result, list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+    def test_what_cannot_be_known_is_not_presented_as_known(self):
+        result, rows = self.record("rpm=600")
+        self.assertEqual([row["event"] for row in rows], [""] + 5 * ["restarted"])
+        self.assertEqual([row["speed_rpm"] for row in rows], 6 * [""])
+        for row in rows:
+            self.assertEqual(row["position"], row["singleturn"])
+        self.assertIn("max_rpm=RPM", result.stderr)
+        self.assertIn("started again 5 times", result.stderr)
+
+    def test_the_monitor_shows_no_speed_that_it_cannot_know(self):
+        emulator = Emulator(self.directory, "--option", "multiturn_bits=0", "--motion", "rpm=600", protocol="encolink")
+        self.addCleanup(emulator.end)
+        result = absenc("monitor", f"encolink:{emulator.path}", "--json", "--rate", "5", "--for", "2")
+        self.assert_good(result)
+        last = json.loads(result.stdout.splitlines()[-1])
+        self.assertGreater(last["restarts"], 1)
+        self.assertIsNone(last["speed_rpm"])
+
+    def test_a_shaft_that_is_known_to_be_slow_is_followed(self):
+        _, rows = self.record("rpm=6", "?max_rpm=6")
+        self.assertEqual({row["event"] for row in rows}, {""})
+        turned = int(rows[-1]["position"]) - int(rows[0]["position"])
+        seconds = float(rows[-1]["time_s"]) - float(rows[0]["time_s"])
+        self.assertAlmostEqual(turned / 2**20, seconds / 10, delta=0.01)
+
+
+class Identity(Case):
+    def encoder(self, *arguments, settings=""):
+        emulator = Emulator(self.directory, *arguments, protocol="encolink")
+        self.addCleanup(emulator.end)
+        return f"encolink:{emulator.path}{settings}"
+
+    def test_info_shows_the_resolution_that_it_says(self):
+        built = ["--option", "resolution=17", "--option", "multiturn_bits=0", "--singleturn", "1000"]
+        uri = self.encoder(*built)
+        result = absenc("info", uri)
+        self.assert_good(result)
+        self.assertRegex(result.stdout, r"(?m)^resolution +17 bits in a turn$")
+        info = json.loads(absenc("info", uri, "--json").stdout)
+        self.assertEqual(info["resolution"], {"singleturn_bits": 17, "multiturn_bits": 0})
+        # Against options that say otherwise no position is shown.
+        for settings in ("?resolution=20&multiturn_bits=0", "?resolution=20"):
+            with self.subTest(settings):
+                result = absenc("info", uri + settings, "--json")
+                self.assertEqual(result.returncode, 1)
+                info = json.loads(result.stdout)
+                self.assertEqual(info["resolution"], {"singleturn_bits": 17, "multiturn_bits": 0})
+                self.assertFalse(info["answers"]["position"]["ok"])
+        self.assert_failed(absenc("read", uri + "?resolution=20"), "unexpected_reply", "another resolution")
+
+    def test_one_byte_more_than_it_has(self):
+        uri = self.encoder("--option", "identity_bytes=20", "--singleturn", "1000")
+        for _ in range(3):
+            self.assertEqual(json.loads(absenc("read", uri, "--json").stdout)["singleturn"], 1000)
+        self.assertEqual(fields(uri, "info")["serial_number"], "AK2A0001")
+        self.assertEqual(fields(uri + "?" + KNOWN, "identify")["resolution"], 20)
+        padded = "02074d42303830534c4132304d454e5430302900"
+        self.assert_good(absenc("decode", "encolink", "--hex", padded))
+
+    def test_version_4_has_positions_and_no_registers(self):
+        uri = self.encoder("--option", "protocol_version=4", "--singleturn", "1000")
+        self.assertEqual(json.loads(absenc("read", uri, "--json").stdout)["singleturn"], 1000)
+        for one in (uri, f"{uri}?{KNOWN}", "sim:encolink-spi?protocol_version=4"):
+            for arguments in (["run", one, "save", "--yes"], ["run", one, "self-calibrate", "--yes"],
+                              ["zero", one, "--yes"], ["reset-multiturn", one, "--yes"], ["temperature", one],
+                              ["memory", "read", one, "serial_number"],
+                              ["memory", "write", one, "position_offset", "5", "--yes"],
+                              ["config", "get", one, "position-offset"],
+                              ["config", "set", one, "write-lock", "1", "--yes"]):
+                with self.subTest(arguments):
+                    self.assert_failed(absenc(*arguments), "unsupported", "AksIM-4")
+        shown = fields(uri, "info")
+        self.assertEqual(shown["protocol_version"], 4)
+        self.assertIn("AksIM-4", shown["registers"])
 
 
 class InTheSimulator(Case):

@@ -44,7 +44,7 @@ bool drive_frames(Machine<CanFrame>& machine, Port<CanFrame>& port) {
 }
 
 double speed(const Reading& reading, host::Unwrapper& unwrapper, host::Velocity& velocity) {
-  if (unwrapper.add(reading) == host::Unwrapper::Joined::started) velocity.restart();
+  if (unwrapper.add(reading) != host::Unwrapper::Joined::continued) velocity.restart();
   velocity.add(unwrapper.position(), reading.latched);
   return velocity.counts_per_second();
 }

@@ -5,38 +5,36 @@
 #include <cstdint>
 
 #include "absenc/core/angle.hpp"
+#include "absenc/host/speed_limit.hpp"
 
 namespace absenc::host {
 
-/// How long a shaft of this speed takes for half of what the encoder counts: readings must be nearer to each other than
-/// that. `never` when no speed is known (0).
-[[nodiscard]] constexpr Time longest_gap(unsigned multiturn_bits, std::uint32_t maximum_rpm) {
-  if (maximum_rpm == 0) return never;
-  const double turns = multiturn_bits >= 63 ? 9.2e18 : static_cast<double>(std::uint64_t{1} << multiturn_bits);
-  const double nanoseconds = turns / 2 * 60e9 / maximum_rpm;
-  return nanoseconds < 9.2e18 ? Time(static_cast<std::int64_t>(nanoseconds)) : never;
-}
-
 /// Takes the shorter way round between two readings, so it is right as long as the shaft turns less than half of what
-/// the encoder counts between them: half a revolution with a single-turn encoder. Faster than that it cannot know.
+/// the encoder counts between them: half a revolution with a single-turn encoder. What the encoder counts is what its
+/// readings say, whatever was expected of it. Where the fastest shaft could have turned further it starts again.
 class Unwrapper {
  public:
   enum class Joined : std::uint8_t {
     ignored,    // the reading has no valid position
-    started,    // the first one, or too late after the one before: the position is the encoder's own again
+    started,    // the first one: the position is the encoder's own
     continued,  // the way since the reading before was added
+    restarted,  // too late after the one before to know how often it turned: the position is the encoder's own again
   };
 
-  /// Readings that were latched further apart than `longest_gap` are not joined.
-  explicit constexpr Unwrapper(Time longest_gap = never) : longest_gap_(longest_gap) {}
+  /// When a reading was latched: known, or only that it came then. Those that had to wait come together.
+  enum class Times : std::uint8_t { latched, arrived };
+
+  explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
+      : limit_(limit), times_(times) {}
 
   constexpr Joined add(const Reading& reading) {
     if (!reading.ready || !reading.singleturn_valid()) return Joined::ignored;
-    const bool joins = started_ && reading.latched - last_.latched <= longest_gap_;
+    const bool first = !started_;
+    const bool joins = !first && is_near(reading);
     position_ = joins ? position_ + static_cast<std::uint64_t>(way(reading)) : absolute(reading);
     last_ = reading;
     started_ = true;
-    return joins ? Joined::continued : Joined::started;
+    return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
   }
 
   /// Counts of the single-turn resolution; at the start the encoder's own turns and counts.
@@ -53,15 +51,39 @@ class Unwrapper {
     return reading.multiturn << reading.singleturn_bits | reading.singleturn;
   }
 
+  [[nodiscard]] constexpr bool have_turns(const Reading& reading) const {
+    return turn_bits(reading) != 0 && turn_bits(last_) != 0;
+  }
+
+  [[nodiscard]] constexpr bool is_near(const Reading& reading) {
+    const unsigned turns = have_turns(reading) ? reading.multiturn_bits : 0;
+    return apart(reading) < longest_gap({reading.singleturn_bits, turns, reading.unit_um}, limit_);
+  }
+
+  // How long the two can have been apart at most. What came together after a wait was taken during that wait, or while
+  // it was handed over, which takes less long.
+  [[nodiscard]] constexpr Time apart(const Reading& reading) {
+    const Time apart = reading.latched - last_.latched;
+    if (times_ == Times::latched) return apart;
+    if (apart >= wait_ || reading.latched >= wait_counts_until_) {
+      wait_ = apart;
+      wait_counts_until_ = reading.latched + apart;
+    }
+    return wait_;
+  }
+
   [[nodiscard]] constexpr std::int64_t way(const Reading& reading) const {
-    const bool with_turns = turn_bits(reading) != 0 && turn_bits(last_) != 0;
+    const bool with_turns = have_turns(reading);
     const unsigned bits = reading.singleturn_bits + (with_turns ? reading.multiturn_bits : 0);
     const std::uint64_t to = with_turns ? absolute(reading) : reading.singleturn;
     const std::uint64_t from = with_turns ? absolute(last_) : last_.singleturn;
     return bits == 64 ? static_cast<std::int64_t>(to - from) : wrapped_difference(to, from, bits);
   }
 
-  Time longest_gap_;
+  SpeedLimit limit_;
+  Times times_;
+  Time wait_{};
+  Time wait_counts_until_{};
   bool started_ = false;
   std::uint64_t position_ = 0;  // unsigned: what overflows after 2^63 counts goes round
   Reading last_{};

@@ -70,12 +70,57 @@ TEST(Unwrapper, IgnoresWhatIsNotValid) {
 }
 
 TEST(Unwrapper, DoesNotJoinWhatIsTooFarApart) {
-  Unwrapper unwrapper(5ms);
+  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // half a turn in 5 ms
   unwrapper.add(singleturn(1000, 0ms));
-  EXPECT_EQ(unwrapper.add(singleturn(10, 5ms)), Joined::continued);
+  EXPECT_EQ(unwrapper.add(singleturn(10, 4ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 1034);
-  EXPECT_EQ(unwrapper.add(singleturn(20, 10ms + 1ns)), Joined::started);
+  EXPECT_EQ(unwrapper.add(singleturn(20, 9ms)), Joined::restarted);
   EXPECT_EQ(unwrapper.position(), 20);
+  EXPECT_EQ(unwrapper.add(singleturn(30, 10ms)), Joined::continued);
+}
+
+TEST(Unwrapper, HasALimitEvenWhereNobodySaysOne) {
+  Unwrapper unwrapper;
+  unwrapper.add(singleturn(1000, 0ms));
+  EXPECT_EQ(unwrapper.add(singleturn(10, 1ms)), Joined::continued);
+  EXPECT_EQ(unwrapper.add(singleturn(1000, 101ms)), Joined::restarted);
+}
+
+TEST(Unwrapper, JoinsAsFarAsTheTurnsGoThatTheReadingsHave) {
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // 8 turns in 800 ms, half of one in 50
+  unwrapper.add(multiturn(3, 0, 0ms));
+  EXPECT_EQ(unwrapper.add(multiturn(9, 0, 700ms)), Joined::continued);
+  EXPECT_EQ(unwrapper.add(multiturn(1, 0, 1500ms)), Joined::restarted);
+  Reading without = singleturn(5, 1600ms);
+  EXPECT_EQ(unwrapper.add(without), Joined::restarted);
+  without.latched = 1640ms;
+  EXPECT_EQ(unwrapper.add(without), Joined::continued);
+}
+
+TEST(Unwrapper, OfALinearEncoderByItsOwnSpeed) {
+  Unwrapper unwrapper;
+  Reading reading = singleturn(1000, 0ms);
+  reading.unit_um = 1000;  // 1.024 m in all
+  unwrapper.add(reading);
+  reading.singleturn = 10;
+  reading.latched = 20ms;
+  EXPECT_EQ(unwrapper.add(reading), Joined::continued);
+  reading.latched = 50ms;
+  EXPECT_EQ(unwrapper.add(reading), Joined::restarted);
+  EXPECT_EQ(unwrapper.position(), 10);
+}
+
+TEST(Unwrapper, ReadingsThatCameTogetherMayHaveBeenApart) {
+  // Half a turn in 50 ms. A host that was held up for 100 ms finds four frames at once.
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Unwrapper::Times::arrived);
+  unwrapper.add(singleturn(0, 0ms));
+  EXPECT_EQ(unwrapper.add(singleturn(10, 25ms)), Joined::continued);
+  EXPECT_EQ(unwrapper.add(singleturn(20, 125ms)), Joined::restarted);
+  EXPECT_EQ(unwrapper.add(singleturn(30, 125ms)), Joined::restarted);
+  EXPECT_EQ(unwrapper.add(singleturn(40, 126ms)), Joined::restarted);
+  EXPECT_EQ(unwrapper.add(singleturn(50, 150ms)), Joined::restarted);
+  for (const Time at : {175ms, 200ms}) EXPECT_EQ(unwrapper.add(singleturn(60, at)), Joined::restarted);
+  EXPECT_EQ(unwrapper.add(singleturn(70, 225ms)), Joined::continued);
 }
 
 TEST(Unwrapper, TakesPositionsOf64Bits) {
@@ -85,11 +130,12 @@ TEST(Unwrapper, TakesPositionsOf64Bits) {
   EXPECT_EQ(unwrapper.position(), 3);
 }
 
-TEST(LongestGap, IsHalfOfTheRangeAtFullSpeed) {
-  EXPECT_EQ(longest_gap(0, 6000), 5ms);
-  EXPECT_EQ(longest_gap(16, 6000), 327'680ms);
-  EXPECT_EQ(longest_gap(16, 0), never);
-  EXPECT_EQ(longest_gap(64, 1), never);
+TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {
+  EXPECT_EQ(longest_gap({.singleturn_bits = 17}, {.rpm = 6000}), Time(4'687'500));
+  EXPECT_EQ(longest_gap({.singleturn_bits = 17, .multiturn_bits = 16}, {.rpm = 6000}), 307'200ms);
+  EXPECT_EQ(longest_gap({.singleturn_bits = 20, .unit_um = 1}, {.mm_s = 1000}), Time(491'520'000));
+  EXPECT_EQ(longest_gap({.multiturn_bits = 16}, {.rpm = 0}), never);
+  EXPECT_EQ(longest_gap({.multiturn_bits = 64}, {.rpm = 1}), never);
 }
 
 }  // namespace

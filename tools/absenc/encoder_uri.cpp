@@ -84,6 +84,8 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
   } else if (setting.name == "echo") {
     constexpr std::array modes{host::EchoMode::automatic, host::EchoMode::on, host::EchoMode::off};
     uri.echo = modes[choice_of(setting, {"auto", "on", "off"})];
+  } else if (setting.name == host::maximum_rpm_name) {
+    uri.maximum_rpm = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
   } else if (setting.name == "motion") {
     uri.device.motion = value;
   } else if (setting.name == "singleturn") {
@@ -306,6 +308,12 @@ EncoderUri parse_encoder(std::string_view text, std::span<const std::string> mor
   EncoderUri uri = parse_address(address);
   take_settings(uri, settings);
   return uri;
+}
+
+host::SpeedLimit speed_limit(const EncoderUri& uri) {
+  host::SpeedLimit limit = host::speed_limit(*uri.unit, uri.options);
+  if (uri.maximum_rpm != 0) limit.rpm = uri.maximum_rpm;
+  return limit;
 }
 
 std::string address_of(const EncoderUri& uri) {

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "absenc/host/echo.hpp"
+#include "absenc/host/speed_limit.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/spi_port.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -30,7 +31,7 @@ struct LinkParameter {
   bool repeatable = false;
 };
 
-inline constexpr std::array<LinkParameter, 20> link_parameters{{
+inline constexpr std::array<LinkParameter, 21> link_parameters{{
     {"baud", "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan"},
     {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
@@ -47,6 +48,9 @@ inline constexpr std::array<LinkParameter, 20> link_parameters{{
     {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi"},
     {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi"},
     {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim"},
+    {host::maximum_rpm_name, "RPM",
+     "the fastest that the shaft turns: how long a pause may be to know its turns after it",
+     "serial, tcp, spi, can, slcan, sim"},
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
     {"multiturn", "TURNS", "turns at the start", "sim"},
@@ -74,8 +78,12 @@ struct EncoderUri {
   std::uint32_t adapter_rate = 115'200;  // slcan: of the serial port, not of the bus
   std::string log;                       // "": none
   host::EchoMode echo = host::EchoMode::off;
+  std::uint32_t maximum_rpm = 0;  // 0: as option or model say
   DeviceSettings device;
 };
+
+/// How fast the encoder may be taken to move: what the user says, or else as host::speed_limit.
+[[nodiscard]] host::SpeedLimit speed_limit(const EncoderUri& uri);
 
 /// `settings` ("name=value") count as if they stood behind the text; both override what absenc.toml says of a name.
 /// Throws UsageError, which names what is wrong and the nearest name that would be right.

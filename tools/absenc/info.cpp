@@ -58,7 +58,6 @@ Rows identity_rows(const EncoderUri& uri) {
   rows.push_back(
       {"model", model == nullptr ? "none with these options" : fmt::format("{}: {}", model->name, model->meaning)});
   rows.push_back({"line", line_of(unit.link, uri.line)});
-  rows.push_back({"resolution", resolution_text(unit.resolution(uri.options))});
   std::string_view heading = "options";
   for (const std::string& option : option_texts(unit, uri.options)) {
     rows.push_back({std::string(heading), option});
@@ -67,9 +66,8 @@ Rows identity_rows(const EncoderUri& uri) {
   return rows;
 }
 
-Json identity_json(const EncoderUri& uri) {
+Json identity_json(const EncoderUri& uri, const Resolution& resolution) {
   const Unit& unit = *uri.unit;
-  const Resolution resolution = unit.resolution(uri.options);
   Json bits = Json::object().set("singleturn_bits", resolution.singleturn_bits);
   bits.set("multiturn_bits", resolution.multiturn_bits);
   if (resolution.unit_um > 0) bits.set("unit_um", resolution.unit_um);
@@ -86,11 +84,13 @@ Json identity_json(const EncoderUri& uri) {
 /// Asks the encoder and keeps what it says, for people and for programs.
 class Survey {
  public:
-  explicit Survey(const EncoderUri& uri) : encoder_(Encoder::open(uri)) {}
+  explicit Survey(const EncoderUri& uri)
+      : encoder_(Encoder::open(uri)), resolution_(uri.unit->resolution(uri.options)) {}
 
   void ask(const Command& command) {
     const Outcome outcome = encoder_->run(command, require_arguments(command, {}));
-    if (outcome.error != Error::none) return fail(command, outcome);
+    if (outcome.error != Error::none) return fail(command, encoder_->trouble(outcome));
+    if (outcome.reading != nullptr) hear(resolution_of(*outcome.reading));
     JsonFields fields;
     encoder_->report(fields);
     answers.set(command.name, Json::object().set("ok", true).set("fields", fields.fields));
@@ -107,8 +107,11 @@ class Survey {
     const Unit& unit = encoder_->unit();
     const Outcome outcome = encoder_->read();
     const Command& command = *find_command(unit, Verb::read);
-    if (outcome.error != Error::none) return fail(command, outcome);
+    if (outcome.error != Error::none) return fail(command, encoder_->trouble(outcome));
     if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no position");
+    const Resolution read_as = resolution_of(*outcome.reading);
+    if (heard_ && !same(read_as, resolution_)) return fail(command, contradiction(read_as));
+    hear(read_as);
     const Reading reading = checked(*outcome.reading, encoder_->confirmed());
     Json json = Json::object();
     set_reading(json, unit, reading, encoder_->confirmed());
@@ -121,6 +124,9 @@ class Survey {
     }
   }
 
+  /// What the encoder's answers show; before them, what it was told to be.
+  [[nodiscard]] const Resolution& resolution() const { return resolution_; }
+
   Json answers = Json::object();
   Rows rows;
   std::string position;           // below the rows; "" when it could not be read
@@ -131,8 +137,27 @@ class Survey {
     rows.push_back({std::string(command.name), "", std::string(command.meaning)});
   }
 
-  void fail(const Command& command, const Outcome& outcome) {
-    const Trouble trouble = encoder_->trouble(outcome);
+  static Resolution resolution_of(const Reading& reading) {
+    return {reading.singleturn_bits, reading.multiturn_bits, reading.unit_um};
+  }
+  static bool same(const Resolution& a, const Resolution& b) {
+    return a.singleturn_bits == b.singleturn_bits && a.multiturn_bits == b.multiturn_bits && a.unit_um == b.unit_um;
+  }
+
+  // The first who says it, since he was asked who he is.
+  void hear(const Resolution& resolution) {
+    if (!heard_) resolution_ = resolution;
+    heard_ = true;
+  }
+
+  [[nodiscard]] Trouble contradiction(const Resolution& read_as) const {
+    return {.error = Error::cross_check_failed,
+            .message = fmt::format("it would be read as {}, by the options, but the encoder says that it has {}",
+                                   resolution_text(read_as), resolution_text(resolution_)),
+            .advice = "leave the options out that say otherwise, or give those that the encoder says"};
+  }
+
+  void fail(const Command& command, const Trouble& trouble) {
     answers.set(command.name, trouble.json());
     rows.push_back(
         {std::string(command.name), "FAILED", fmt::format("{}: {}", text_of(trouble.error).name, trouble.message)});
@@ -142,6 +167,8 @@ class Survey {
   }
 
   std::unique_ptr<Encoder> encoder_;
+  Resolution resolution_;
+  bool heard_ = false;  // from the encoder
 };
 
 int run_info(const Invocation& invocation) {
@@ -154,9 +181,10 @@ int run_info(const Invocation& invocation) {
   if (find_command(*uri.unit, Verb::read) != nullptr) survey.read();
   const bool good = survey.troubles.empty();
   if (json) {
-    print_line(identity_json(uri).set("answers", survey.answers).set("ok", good).line());
+    print_line(identity_json(uri, survey.resolution()).set("answers", survey.answers).set("ok", good).line());
   } else {
-    print_line(table(survey.rows) + survey.position);
+    print_line(table(Rows{{"resolution", resolution_text(survey.resolution())}}) + '\n' + table(survey.rows) +
+               survey.position);
     for (const Trouble& trouble : survey.troubles) print_message(trouble.text());
   }
   return good ? exit_good : exit_failed;

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
+#include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
@@ -20,15 +20,17 @@ using namespace std::chrono_literals;
 
 constexpr Time time_between_tries = 250ms;
 
-std::uint32_t maximum_rpm(const EncoderUri& uri) {
-  return uri.options.model != nullptr ? uri.options.model->maximum_rpm : 0;
+// What transmits by itself has no time but that of its arrival.
+host::Unwrapper make_unwrapper(const EncoderUri& uri) {
+  const Unit& unit = *uri.unit;
+  const bool unasked = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(uri.options));
+  return host::Unwrapper(speed_limit(uri), unasked ? host::Unwrapper::Times::arrived : host::Unwrapper::Times::latched);
 }
 
-unsigned multiturn_bits(const EncoderUri& uri) { return uri.unit->resolution(uri.options).multiturn_bits; }
-
-// A pause of a few readings is joined even if the fastest shaft could have deceived us: most shafts are slower.
-Time longest_gap(const EncoderUri& uri, Time period) {
-  return std::max({host::longest_gap(multiturn_bits(uri), maximum_rpm(uri)), 3 * period, Time(50ms)});
+std::string limit_text(const EncoderUri& uri, const Reading& reading) {
+  const host::SpeedLimit limit = speed_limit(uri);
+  if (reading.unit_um > 0) return fmt::format("{} mm/s", limit.mm_s);
+  return fmt::format("{} rpm", limit.rpm);
 }
 
 double speed_of(const Reading& reading, double counts_per_second) {
@@ -39,7 +41,7 @@ double speed_of(const Reading& reading, double counts_per_second) {
 }  // namespace
 
 LiveEncoder::LiveEncoder(const EncoderUri& uri, Time period)
-    : encoder_(Encoder::make(uri)), period_(period), unwrapper_(longest_gap(uri, period)) {}
+    : encoder_(Encoder::make(uri)), period_(period), unwrapper_(make_unwrapper(uri)) {}
 
 void LiveEncoder::connect() {
   encoder_->connect();
@@ -48,7 +50,7 @@ void LiveEncoder::connect() {
 }
 
 void LiveEncoder::forget_position() {
-  unwrapper_ = host::Unwrapper(longest_gap(encoder_->uri(), period_));
+  unwrapper_ = make_unwrapper(encoder_->uri());
   velocity_.restart();
 }
 
@@ -103,7 +105,9 @@ Sample LiveEncoder::take(Reading reading) {
   sample.reading = reading = checked(reading, sample.confirmed);
   const host::Unwrapper::Joined joined = unwrapper_.add(reading);
   if (joined == host::Unwrapper::Joined::ignored) return sample;
-  if (joined == host::Unwrapper::Joined::started) velocity_.restart();
+  if (joined != host::Unwrapper::Joined::continued) velocity_.restart();
+  if (joined == host::Unwrapper::Joined::restarted) note_restart(sample, reading);
+  unwrapped_at_ = reading.latched;
   velocity_.add(unwrapper_.position(), reading.latched);
   sample.position_valid = true;
   sample.position = unwrapper_.position();
@@ -111,6 +115,16 @@ Sample LiveEncoder::take(Reading reading) {
   sample.speed = speed_of(reading, velocity_.counts_per_second());
   sample.speed_delay = velocity_.delay();
   return sample;
+}
+
+void LiveEncoder::note_restart(Sample& sample, const Reading& reading) {
+  ++restarts_;
+  sample.restarted = true;
+  sample.message = fmt::format(
+      "{} between two readings are too long to know how far it went meanwhile, at up to {}: the position starts again "
+      "from the encoder's own{}",
+      to_text(reading.latched - unwrapped_at_), limit_text(encoder_->uri(), reading),
+      reading.unit_um > 0 ? "" : ". If the shaft is slower, say so with max_rpm=RPM");
 }
 
 std::string_view speed_unit(const Reading& reading) { return reading.unit_um > 0 ? "mm/s" : "rpm"; }
@@ -128,13 +142,15 @@ void set_motion(Json& json, const Sample& sample, double unit_um) {
 
 std::string LiveEncoder::rate_note() const {
   const EncoderUri& uri = encoder_->uri();
-  if (period_ == Time{} || host::longest_gap(multiturn_bits(uri), maximum_rpm(uri)) >= period_) return {};
-  const double half_range = std::ldexp(0.5, static_cast<int>(multiturn_bits(uri)));  // revolutions
-  const double seconds = std::chrono::duration<double>(period_).count();
+  const Resolution resolution = uri.unit->resolution(uri.options);
+  const host::SpeedLimit limit = speed_limit(uri);
+  const Time longest = host::longest_gap(resolution, limit);
+  if (period_ == Time{} || period_ < longest || resolution.unit_um > 0) return {};
+  const auto seconds = [](Time time) { return std::chrono::duration<double>(time).count(); };
   return fmt::format(
       "at this rate the turns are followed up to {:.0f} rpm, but the shaft may reach {} rpm: {:.0f} readings a second "
-      "would be enough",
-      60 * half_range / seconds, maximum_rpm(uri), std::floor(maximum_rpm(uri) / (60 * half_range)) + 1);
+      "would be enough; if it is slower, say so with max_rpm=RPM",
+      std::floor(limit.rpm * seconds(longest) / seconds(period_)), limit.rpm, std::floor(1 / seconds(longest)) + 1);
 }
 
 }  // namespace absenc::tool

@@ -32,11 +32,12 @@ struct Sample {
   bool doubtful = false;   // it looked valid, but none agreed with it: it is marked invalid
   bool position_valid = false;
   std::int64_t position = 0;  // counts, continued past the end of the counter
+  bool restarted = false;     // how far it went since the reading before is not known: `position` starts again
   bool speed_valid = false;
   double speed = 0;  // `speed_delay` before `at`: rpm, of linear encoders mm/s
   Time speed_delay{};
   Trouble trouble{};      // failed
-  std::string message{};  // lost, absent, back
+  std::string message{};  // lost, absent, back, restarted
 };
 
 class LiveEncoder {
@@ -58,6 +59,8 @@ class LiveEncoder {
   [[nodiscard]] const Encoder& encoder() const { return *encoder_; }
   /// How often the port went away.
   [[nodiscard]] std::uint64_t losses() const { return losses_; }
+  /// How often the position started again, because a pause was too long to know how often the shaft turned.
+  [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
   /// Good readings a second.
   [[nodiscard]] double rate() const;
   /// As Encoder::bad_exchanges, with times of os::now.
@@ -68,6 +71,7 @@ class LiveEncoder {
  private:
   Sample search();
   Sample take(Reading reading);
+  void note_restart(Sample& sample, const Reading& reading);
 
   std::unique_ptr<Encoder> encoder_;
   Time period_;
@@ -79,6 +83,8 @@ class LiveEncoder {
   Time next_try_{};
   bool was_there_ = false;
   std::uint64_t losses_ = 0;
+  Time unwrapped_at_{};  // of the last valid position
+  std::uint64_t restarts_ = 0;
 };
 
 /// "rpm", or of linear encoders "mm/s"

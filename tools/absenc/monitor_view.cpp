@@ -174,6 +174,7 @@ std::string speed_line(const Snapshot& snapshot) {
     const double mm = micrometres(snapshot.last.position, reading.unit_um) / 1000;
     text = fmt::format("position {} mm", millimetres_text(mm, reading.unit_um));
   }
+  if (snapshot.last.restarted) return text + ", started again: the turns before are not known (max_rpm)";
   if (!snapshot.last.speed_valid) return text;
   return fmt::format("speed {} {}, {} ago; {}", speed_text(snapshot), speed_unit(reading),
                      to_text(snapshot.last.speed_delay), text);
@@ -340,6 +341,7 @@ Json to_json(const Shown& shown) {
                              .set("p99", microseconds(snapshot.percentile_99))
                              .set("max", microseconds(snapshot.longest)));
   json.set("errors", errors_to_json(snapshot.counters)).set("losses", snapshot.losses);
+  json.set("restarts", snapshot.restarts);
   return is_live(snapshot) ? json : json.set("message", snapshot.message);
 }
 

@@ -44,7 +44,11 @@ struct Limits {
 };
 
 // What comes between the readings is told; the file has it too.
-void tell(const Sample& sample, Report& report) {
+void tell(const Sample& sample, const LiveEncoder& live, Report& report) {
+  if (sample.restarted && live.restarts() == 1) {  // the summary says how often
+    report.clear();
+    print_message(sample.message);
+  }
   if (sample.kind != Sample::Kind::lost && sample.kind != Sample::Kind::back) return;
   report.clear();
   print_message(sample.kind == Sample::Kind::lost ? fmt::format("{}\n  Waiting for it to come back.", sample.message)
@@ -60,7 +64,7 @@ bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limit
       const Sample sample = live.next();
       good = sample.kind == Sample::Kind::reading;
       recording.take(sample);
-      tell(sample, report);
+      tell(sample, live, report);
       report.show(recording, live);
       os::sleep_until(std::min(pace.next(), limits.end));
     }
@@ -104,6 +108,10 @@ int run_record(const Invocation& invocation) {
     print_message(fmt::format("{} readings and {} failures in {} are in {}; exchanges: {}", recording.readings(),
                               recording.failures(), to_text(os::now() - recording.start()), recording.names(),
                               summary(live.encoder().counters())));
+    if (live.restarts() > 0) {
+      print_message(fmt::format("the position started again {} times (event restarted): turns are only right between",
+                                live.restarts()));
+    }
   };
   bool good = false;
   try {
@@ -145,6 +153,8 @@ const Subcommand record_subcommand{
     "Each file begins with the encoder, its model and options, the start time and the units. Lines are handed to\n"
     "the system as they come: nothing is lost when the command is killed, and a full disk leaves whole lines. When\n"
     "the port goes away, that is a line, the command waits for it to come back, and that is another line.\n"
+    "After a pause in which the shaft may have turned too far to know, the position starts again: the event of that\n"
+    "reading is restarted. max_rpm=RPM behind ? says how fast the shaft turns at most.\n"
     "In CSV, lines before the column names begin with #.",
     parameters,
     examples,

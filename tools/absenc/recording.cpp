@@ -53,7 +53,10 @@ Columns columns_of(bool linear) {
   }
   add({{"speed_delay_s",
         linear ? "how long before time_s it was so fast" : "how long before time_s the shaft had that speed"},
-       {"event", "empty for a reading; lost or back: the port; otherwise the error that came in its place"}});
+       {"event",
+        "empty for a reading; restarted: a reading so long after the one before that the way between them is not "
+        "known: "
+        "position starts again; lost or back: the port; otherwise the error that came in its place"}});
   return columns;
 }
 
@@ -72,6 +75,8 @@ std::string_view event_of(const Sample& sample) {
       return "back";
     case Sample::Kind::failed:
       return text_of(sample.trouble.error).name;
+    case Sample::Kind::reading:
+      return sample.restarted ? "restarted" : "";
     default:
       return "";
   }
@@ -174,12 +179,13 @@ std::string Recording::line_of(const Sample& sample) const {
       position += fmt::format("{}", micrometres(sample.position, unit_um_) / 1000);
     }
     const std::string speed = sample.speed_valid ? fmt::format("{:.6g},{:.6f}", sample.speed, delay) : ",";
-    return fmt::format("{},{},{},\n", to_csv(*unit_, sample.reading, seconds), position, speed);
+    return fmt::format("{},{},{},{}\n", to_csv(*unit_, sample.reading, seconds), position, speed, event_of(sample));
   }
   if (is_reading) {
     Json json = to_json(*unit_, sample.reading, seconds, sample.confirmed);
     set_motion(json, sample, unit_um_);
     json.set("speed_delay_s", sample.speed_valid ? Json(delay) : Json());
+    if (sample.restarted) json.set("event", event_of(sample));
     return json.line() + '\n';
   }
   Json json = Json::object().set("time_s", seconds).set("ok", false).set("event", event_of(sample));

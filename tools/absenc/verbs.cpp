@@ -13,13 +13,24 @@ namespace absenc::tool {
 
 namespace {
 
+// Of commands that have to do with it, but are not what the verb promises: "set-zero" for "zero".
+std::string related(const Unit& unit, std::string_view word) {
+  std::string names;
+  for (const Command& command : unit.commands) {
+    if (command.verb != Verb::run || command.name.find(word) == std::string_view::npos) continue;
+    names += fmt::format("{}`absenc run {}:PORT {}` ({})", names.empty() ? ". There is " : ", ", unit.id, command.name,
+                         command.meaning);
+  }
+  return names;
+}
+
 template <Verb verb>
 int run_verb(const Invocation& invocation) {
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const Command* command = find_command(*uri.unit, verb);
   if (command == nullptr) {
-    throw UsageError(
-        fmt::format("{} has no command for this: `absenc list {}` shows those it has", uri.unit->id, uri.unit->id));
+    throw UsageError(fmt::format("{} has no command for this: `absenc list {}` shows those it has{}", uri.unit->id,
+                                 uri.unit->id, verb == Verb::zero ? related(*uri.unit, "zero") : ""));
   }
   return run_command(invocation, uri, *command, require_arguments(*command, {}));
 }

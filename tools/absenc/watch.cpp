@@ -169,6 +169,7 @@ void Watch::publish(const LiveEncoder& live, const Sample& sample) {
     known_.fields = std::move(fields.texts);
   }
   known_.losses = live.losses();
+  known_.restarts = live.restarts();
   known_.rate = live.rate();
   known_.median = encoder.latencies().percentile(0.5);
   known_.percentile_99 = encoder.latencies().percentile(0.99);
@@ -181,6 +182,8 @@ void Watch::trace(const LiveEncoder& live, const Sample& sample) {
   const Unit& unit = live.encoder().unit();
   switch (sample.kind) {
     case Sample::Kind::reading: {
+      if (sample.restarted && !restarted_) add_line(sample.at, sample.message);
+      restarted_ = sample.restarted;
       const bool other_alarms = sample.reading.alarms != alarms_;
       if (!other_alarms && sample.at < next_line_) return;
       alarms_ = sample.reading.alarms;

@@ -36,8 +36,9 @@ struct Snapshot {
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  double rate = 0;  // readings a second
-  Time median{};    // of the latencies
+  std::uint64_t restarts = 0;  // of the position, as LiveEncoder::restarts
+  double rate = 0;             // readings a second
+  Time median{};               // of the latencies
   Time percentile_99{};
   Time longest{};
   std::vector<std::string> trace{};   // only with details; the newest last
@@ -92,6 +93,7 @@ class Watch {
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
+  bool restarted_ = false;  // by the reading before
 
   std::jthread thread_;  // last: it uses all of the others
 };

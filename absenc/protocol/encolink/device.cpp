@@ -10,26 +10,7 @@ namespace {
 using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
-constexpr Time access_time = 200us;  // until an access is executed; assumed
-constexpr std::string_view serial_text = "AK2A0001";
-constexpr std::string_view part_text = "MB080SLA20MENT00";       // 16 characters; [8..9] hold the resolution
-constexpr std::string_view order_text = "MB080SLA20MENT00 SIM";  // 20 characters
-constexpr std::uint64_t firmware_major_value = 1;
-constexpr std::uint64_t firmware_minor_value = 4;
-
-Identity identity_of(const Format& format) {
-  Identity identity{.protocol_version = 2,
-                    .frame_bytes = static_cast<std::uint8_t>(format.turns_bytes() != 0 ? 7 : 5),
-                    .resolution = format.resolution};
-  std::copy(part_text.begin(), part_text.end(), identity.text.begin() + 2);
-  return identity;
-}
-
-ByteBuffer<20> text_value(std::string_view text) {
-  ByteBuffer<20> bytes;
-  for (const char c : text) bytes.push_back(static_cast<std::uint8_t>(c));
-  return bytes;
-}
+constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8..9] hold the resolution
 
 }  // namespace
 
@@ -97,6 +78,10 @@ void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
   const std::uint8_t ra = request_[1];
   request_.clear();
   make_frame(at);
+  // Whoever asks with the vendor's library reads as many bytes as the identity may have, twice.
+  const bool identifies = frame_.size() == identity_bytes || config == static_cast<std::uint8_t>(Config::identify);
+  while (identifies && frame_.size() < build_.identity_size && build_.identity_size > identity_bytes)
+    frame_.push_back(0);
   frame_at_ = at + answer_time;
   handle(config, ra, at);
 }
@@ -122,13 +107,21 @@ void VirtualEncoder::make_frame(Time now) {
   if (power_ == Power::starting) {
     frame_ = encode_position(format_, {});
   } else if (identity_next_) {
-    frame_ = encode_identity(identity_of(format_));
+    frame_ = encode_identity(identity());
     identity_next_ = false;
   } else {
     Position position = measure(now);
     position.channel2 = next_channel2(position, now);
     frame_ = encode_position(format_, position);
   }
+}
+
+Identity VirtualEncoder::identity() const {
+  Identity identity{.protocol_version = build_.protocol_version,
+                    .frame_bytes = static_cast<std::uint8_t>(format_.turns_bytes() != 0 ? 7 : 5),
+                    .resolution = format_.resolution};
+  std::copy(part_text.begin(), part_text.end(), identity.text.begin() + 2);
+  return identity;
 }
 
 // The frame that goes out with this request was made before: what it asks for shows in the next one.
@@ -192,151 +185,13 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
   if (access_.size() == access_header + (writes ? std::min(length, access_capacity) : 0) + 1) execute(at);
 }
 
-void VirtualEncoder::execute(Time at) {
-  const Result<RegisterRequest> request = decode_access(access_);
-  const bool writes = access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
-  access_.clear();
-  answer_.clear();
-  answered_bytes_ = 0;
-  answer_.push_back(writes ? channel3::write_ready : channel3::read_ready);
-  busy_until_ = std::max(busy_until_, at + access_time);
-  if (request.error() == Error::unsupported) {
-    answer_.clear();  // no operation of this number: it stays idle
-  } else if (request.error() == Error::wrong_length) {
-    answer_.push_back(static_cast<std::uint8_t>(AccessStatus::byte_count));
-  } else if (!request) {
-    answer_.push_back(static_cast<std::uint8_t>(writes ? AccessStatus::write_checksum : AccessStatus::read_checksum));
-  } else if (writes) {
-    execute_write(*request, at);
-  } else {
-    execute_read(*request, at);
-  }
-}
-
-void VirtualEncoder::execute_read(const RegisterRequest& request, Time at) {
-  const Register* found = find_register(request.address);
-  AccessStatus status = AccessStatus::ok;
-  if (found == nullptr) {
-    status = AccessStatus::no_such_register;
-  } else if (found->size != request.length) {
-    status = AccessStatus::byte_count;
-  } else if (found->access == Access::write_only) {
-    status = AccessStatus::denied;
-  }
-  answer_.push_back(static_cast<std::uint8_t>(status));
-  if (status == AccessStatus::ok) {
-    answer_.append(value_of(static_cast<std::size_t>(found - registers.data()), at));
-  } else {  // the vendor's host takes the bytes it asked for whatever the status says
-    for (std::size_t i = 0; i < std::min<std::size_t>(request.length, access_capacity); ++i) answer_.push_back(0);
-  }
-}
-
-void VirtualEncoder::execute_write(const RegisterRequest& request, Time at) {
-  const Register* found = find_register(request.address);
-  AccessStatus status = AccessStatus::no_such_register;
-  if (found != nullptr) {
-    const auto index = static_cast<std::size_t>(found - registers.data());
-    if (found->access == Access::read_only) {
-      status = AccessStatus::denied;
-    } else if (found->size != request.length) {
-      status = AccessStatus::byte_count;
-    } else if (settings_.lock != 0 && index != write_lock) {
-      status = AccessStatus::locked;
-    } else {
-      status = write(index, load_big_endian(request.data), at);
-    }
-  }
-  answer_.push_back(static_cast<std::uint8_t>(status));
-}
-
-AccessStatus VirtualEncoder::write(std::size_t index, std::uint64_t value, Time at) {
-  switch (index) {
-    case position_offset:
-      settings_.offset = static_cast<std::uint32_t>(value);
-      return AccessStatus::ok;
-    case multiturn_preset:
-      if (value > low_mask(static_cast<unsigned>(format_.multiturn_bits))) return AccessStatus::out_of_range;
-      settings_.preset = static_cast<std::uint32_t>(value);
-      settings_.turns = static_cast<std::uint32_t>(static_cast<std::uint64_t>(place(at) >> 32) - value);
-      return AccessStatus::ok;
-    case write_lock:
-      if (value > 1) return AccessStatus::out_of_range;
-      settings_.lock = static_cast<std::uint8_t>(value);
-      return AccessStatus::ok;
-    default:
-      return obey(static_cast<std::uint8_t>(value), at);
-  }
-}
-
-AccessStatus VirtualEncoder::obey(std::uint8_t command, Time at) {
-  switch (command) {
-    case commands::save:
-      save_pending_ = true;
-      busy_until_ = at + save_time;
-      return AccessStatus::ok;
-    case commands::reset:
-      settings_ = {};
-      return AccessStatus::ok;
-    case commands::self_calibrate:
-      calibrating_ = true;
-      calibrated_at_ = at + calibration_time;
-      calibrated_from_ = shaft_->at(at).position;
-      calibration_status_ &= calibration::count;
-      return AccessStatus::ok;
-    default:
-      return AccessStatus::out_of_range;
-  }
-}
-
-ByteBuffer<20> VirtualEncoder::value_of(std::size_t index, Time at) const {
-  std::uint64_t value = 0;
-  switch (index) {
-    case position_offset:
-      value = settings_.offset;
-      break;
-    case multiturn_preset:
-      value = settings_.preset;
-      break;
-    case write_lock:
-      value = settings_.lock;
-      break;
-    case firmware_major:
-      value = firmware_major_value;
-      break;
-    case firmware_minor:
-      value = firmware_minor_value;
-      break;
-    case protocol_register:
-      value = identity_of(format_).protocol_version;
-      break;
-    case temperature:
-      value = static_cast<std::uint64_t>(build_.temperature);
-      break;
-    case speed:
-      value = static_cast<std::uint64_t>(std::int64_t{shaft_->at(at).speed_millirpm} / 100);
-      break;
-    case calibration_status:
-      value = calibration_status_;
-      break;
-    case serial_number:
-      return text_value(serial_text);
-    default:
-      return text_value(order_text);
-  }
-  std::array<std::uint8_t, 8> bytes{};
-  store_big_endian(bytes, value);
-  ByteBuffer<20> result;
-  result.append(Bytes(bytes).last(registers[index].size));
-  return result;
-}
-
 // ---- State
 
 // Of the shaft with the offset, as if the turn counter had no end: 2^-32 revolution.
 std::int64_t VirtualEncoder::place(Time now) const {
-  const auto offset = static_cast<std::int32_t>(settings_.offset);
+  const auto offset = static_cast<std::int32_t>(build_.offset.fraction(format_.resolution, settings_.offset));
   const std::int64_t position = shaft_->at(now).position;
-  return build_.offset_sign == OffsetSign::add ? position + offset : position - offset;
+  return build_.offset.sign == OffsetSign::add ? position + offset : position - offset;
 }
 
 Position VirtualEncoder::measure(Time now) const {
@@ -370,23 +225,6 @@ void VirtualEncoder::end_calibration(Time now) {
   } else {
     calibration_status_ = static_cast<std::uint8_t>((calibration_status_ + 1) & calibration::count);
   }
-}
-
-void VirtualEncoder::load() {
-  const Bytes bytes = memory_;
-  settings_.offset = static_cast<std::uint32_t>(load_big_endian(bytes.first(4)));
-  settings_.preset = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(4, 4)));
-  settings_.lock = bytes[8];
-  settings_.turns = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(9, 4)));
-}
-
-void VirtualEncoder::store() {
-  const MutableBytes bytes = memory_;
-  store_big_endian(bytes.first(4), settings_.offset);
-  store_big_endian(bytes.subspan(4, 4), settings_.preset);
-  bytes[8] = settings_.lock;
-  store_big_endian(bytes.subspan(9, 4), settings_.turns);
-  ++memory_version_;
 }
 
 // ---- Power

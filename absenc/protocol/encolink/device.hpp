@@ -20,11 +20,13 @@ inline constexpr Format virtual_format{.resolution = 20, .multiturn_bits = 16};
 
 /// How a virtual encoder is built and where it stands.
 struct Build {
-  OffsetSign offset_sign = OffsetSign::add;
+  Offset offset{};
   std::uint32_t stream_rate = 0;   // frames a second that it sends by itself; 0: it answers requests
   std::int16_t temperature = 350;  // tenths of degC
   bool busy_for_ever = false;      // register accesses never end
   bool channel2_disagrees = false;
+  std::uint8_t protocol_version = version::aksim2;
+  std::size_t identity_size = identity_bytes;  // or padded_identity_bytes, and the frame before it too (UART)
 };
 
 class VirtualEncoder final : public Device<std::uint8_t> {
@@ -40,7 +42,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void power_off(Time now) override;
   void raise_alarms(std::uint32_t bits) override { alarms_ = static_cast<std::uint16_t>(alarms_ | bits); }
   void lower_alarms(std::uint32_t bits) override { alarms_ = static_cast<std::uint16_t>(alarms_ & ~bits); }
-  /// What `save` has stored: offset, preset, lock, turns; 13 bytes.
+  /// What `save` has stored: offset, preset, lock, turns, filters, range of calibration; 31 bytes.
   [[nodiscard]] MutableBytes memory() override { return memory_; }
   [[nodiscard]] std::uint32_t memory_version() const override { return memory_version_; }
   [[nodiscard]] std::span<const Violation> violations() const override { return violations_; }
@@ -60,24 +62,29 @@ class VirtualEncoder final : public Device<std::uint8_t> {
     std::uint32_t offset = 0;
     std::uint32_t preset = 0;
     std::uint8_t lock = 0;
-    std::uint32_t turns = 0;  // taken off those of the shaft
+    std::uint32_t turns = 0;                 // taken off those of the shaft
+    std::array<std::uint32_t, 4> filters{};  // kept, without effect
+    std::uint16_t calibration_range = 0;     // likewise
   };
 
   void byte_received(std::uint8_t byte, Time at);
   void selected(Time at);
   void stopped_clocking(const Event<std::uint8_t>& event);
   void make_frame(Time now);
+  [[nodiscard]] Identity identity() const;
   void handle(std::uint8_t config, std::uint8_t ra, Time at);
   void reset_channels();
   [[nodiscard]] std::uint8_t next_channel2(const Position& position, Time now);
   [[nodiscard]] std::uint8_t next_channel3(Time now);
 
   void ra_received(std::uint8_t byte, Time at);
+  [[nodiscard]] const Register* find(std::uint32_t address) const;
   void execute(Time at);
   void execute_read(const RegisterRequest& request, Time at);
   void execute_write(const RegisterRequest& request, Time at);
   [[nodiscard]] AccessStatus write(std::size_t index, std::uint64_t value, Time at);
   [[nodiscard]] AccessStatus obey(std::uint8_t command, Time at);
+  [[nodiscard]] std::uint64_t number_of(std::size_t index, Time at) const;
   [[nodiscard]] ByteBuffer<20> value_of(std::size_t index, Time at) const;
 
   void update(Time now);
@@ -92,7 +99,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   const Shaft* shaft_;
   Build build_;
   Settings settings_{};
-  std::array<std::uint8_t, 13> memory_{};
+  std::array<std::uint8_t, 31> memory_{};
   std::uint32_t memory_version_ = 0;
   std::uint16_t alarms_ = 0;
 

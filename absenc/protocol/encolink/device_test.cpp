@@ -219,9 +219,9 @@ TEST(EncolinkDevice, TransmitsByItselfAtItsRate) {
 
 TEST(EncolinkDevice, KeepsWhatIsSaved) {
   Bench bench;
-  EXPECT_EQ(bench.encoder.memory().size(), 13u);
+  EXPECT_EQ(bench.encoder.memory().size(), 31u);
   bench.encoder.power_off(Time{});
-  store_big_endian(bench.encoder.memory().first(4), 0x10000000);
+  store_big_endian(bench.encoder.memory().first(4), 0x10000);
   bench.encoder.power_on(Time{}, PowerOn::skip);
   EXPECT_EQ(bench.encoder.measure(Time{}).singleturn, 0x12345u + (1u << 16));
 }

@@ -75,10 +75,10 @@ RC_GTEST_PROP(EncolinkProperty, APositionIsReadAsTheShaftStands, (std::int32_t t
 RC_GTEST_PROP(EncolinkProperty, ZeroIsHereWhereverTheShaftStands,
               (std::int32_t turns, std::uint32_t fraction, std::uint32_t offset)) {
   const auto sign = *rc::gen::element(OffsetSign::add, OffsetSign::subtract);
-  testing::Bench bench(testing::multi, Wire::uart, {.offset_sign = sign});
+  testing::Bench bench(testing::multi, Wire::uart, {.offset = {.sign = sign}});
   bench.shaft.start.position = (std::int64_t{turns} << 32) + fraction;
-  RC_ASSERT(bench.conversed<WriteRegister>(0u, std::uint16_t{0}, std::uint64_t{offset}).error() == Error::none);
-  RC_ASSERT(bench.conversed<Zero>(sign).error() == Error::none);
+  RC_ASSERT(bench.conversed<WriteRegister>(0u, std::uint16_t{0}, std::uint64_t{offset & 0xFFFFF}).error() == Error::none);
+  RC_ASSERT(bench.conversed<Zero>(Offset{.sign = sign}).error() == Error::none);
   RC_ASSERT(bench.conversed<ReadPosition>().reading()->singleturn == 0u);
 }
 

@@ -23,6 +23,12 @@ inline constexpr std::string_view wrong_resolution =
     "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `info` asks "
     "it";
 
+/// Why the registers of an AksIM-4 are refused.
+inline constexpr std::string_view not_described =
+    "protocol version 4 (AksIM-4) has its registers at other addresses, which are not described here: its positions "
+    "may "
+    "be read";
+
 // What to do is ours: the vendor only names the bits.
 inline constexpr std::array<FlagInfo, 16> alarm_flags{{
     {"acceleration_error", "the position changed faster than a shaft can", "check the fixing of ring and readhead"},
@@ -77,6 +83,7 @@ enum FieldIndex : std::size_t {
   field_registers,  // one for each of the table, in its order
   field_calibrations = field_registers + registers.size(),
   field_running,
+  field_not_described,
   field_count,
 };
 
@@ -123,6 +130,7 @@ constexpr std::array<FieldInfo, field_count> make_fields() {
   }};
   for (std::size_t i = 0; i < registers.size(); ++i) fields[field_registers + i] = register_field(registers[i]);
   fields[field_calibrations] = {"calibrations", Kind::number, "", "self-calibrations that ended, modulo 4"};
+  fields[field_not_described] = {"registers", Kind::text, "", "why none of them is shown"};
   fields[field_running] = {"running", Kind::boolean, "", "whether the self-calibration still goes on"};
   return fields;
 }
@@ -233,7 +241,7 @@ constexpr Error decode_request(Bytes request, FieldSink& sink) {
 /// The length of a reply says what it is: a position frame, a channel 2 cycle or the identity.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
-  if (reply.size() == identity_bytes) {
+  if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) {
     const Result<Identity> identity = decode_identity(reply);
     if (identity) put_fields(sink, *identity);
     return identity.error();

@@ -32,8 +32,9 @@ enum class Config : std::uint8_t {
   identify = 0xBB,        // the frame after this one carries the identity
 };
 
-inline constexpr std::size_t request_bytes = 2;    // config, ra
-inline constexpr std::size_t identity_bytes = 19;  // with the checksum
+inline constexpr std::size_t request_bytes = 2;           // config, ra
+inline constexpr std::size_t identity_bytes = 19;         // with the checksum
+inline constexpr std::size_t padded_identity_bytes = 20;  // what the vendor's library reads: one byte more
 inline constexpr std::size_t reply_capacity = 20;
 inline constexpr unsigned maximum_resolution = 22;
 inline constexpr unsigned maximum_multiturn_bits = 16;
@@ -90,8 +91,14 @@ inline constexpr std::uint32_t error = 1;
 inline constexpr std::uint32_t warning = 2;
 }  // namespace general
 
+/// Of the protocol. The frames of both are the same; the registers behind them are not.
+namespace version {
+inline constexpr std::uint8_t aksim2 = 2;
+inline constexpr std::uint8_t aksim4 = 4;
+}  // namespace version
+
 struct Identity {
-  std::uint8_t protocol_version = 2;
+  std::uint8_t protocol_version = version::aksim2;
   std::uint8_t frame_bytes = 5;
   unsigned resolution = 20;
   std::array<std::uint8_t, 18> text{};  // the whole of it; text[2..17] is the part number
@@ -183,12 +190,14 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return bytes;
 }
 
-/// Errors in this order: wrong_length, bad_checksum, unexpected_reply (another protocol version or frame length),
-/// out_of_range (the resolution is no number from 1 to 22).
+/// With or without a byte behind it, which means nothing. Errors in this order: wrong_length, bad_checksum,
+/// unexpected_reply (another protocol version or frame length), out_of_range (the resolution is no number from 1 to
+/// 22).
 [[nodiscard]] constexpr Result<Identity> decode_identity(Bytes bytes) {
-  if (bytes.size() != identity_bytes) return Error::wrong_length;
-  if (!is_sealed(bytes)) return Error::bad_checksum;
-  if ((bytes[0] != 2 && bytes[0] != 4) || (bytes[1] != 5 && bytes[1] != 7)) return Error::unexpected_reply;
+  if (bytes.size() != identity_bytes && bytes.size() != padded_identity_bytes) return Error::wrong_length;
+  if (!is_sealed(bytes.first(identity_bytes))) return Error::bad_checksum;
+  if ((bytes[0] != version::aksim2 && bytes[0] != version::aksim4) || (bytes[1] != 5 && bytes[1] != 7))
+    return Error::unexpected_reply;
   const unsigned tens = bytes[10] - unsigned{'0'};
   const unsigned ones = bytes[11] - unsigned{'0'};
   if (tens > 9 || ones > 9) return Error::out_of_range;
@@ -198,13 +207,21 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return identity;
 }
 
-/// The format with what was unknown taken from the identity. Error: unexpected_reply (it says that there are turns
-/// where none were expected, or the other way round).
-[[nodiscard]] constexpr Result<Format> complete(const Format& format, const Identity& identity) {
+/// The format as the identity says it, which does not tell how many bits of turns there are.
+[[nodiscard]] constexpr Format as_identified(const Format& format, const Identity& identity) {
   Format known = format;
-  if (known.resolution == 0) known.resolution = identity.resolution;
-  if (known.multiturn_bits < 0) known.multiturn_bits = identity.frame_bytes == 7 ? 16 : 0;
-  if ((known.multiturn_bits > 0) != (identity.frame_bytes == 7)) return Error::unexpected_reply;
+  known.resolution = identity.resolution;
+  const bool turns = identity.frame_bytes == 7;
+  if (known.multiturn_bits < 0 || (known.multiturn_bits > 0) != turns) known.multiturn_bits = turns ? 16 : 0;
+  return known;
+}
+
+/// The format with what was unknown taken from the identity. Error: unexpected_reply (it says otherwise than what was
+/// known: another resolution, or turns where none were expected, or the other way round).
+[[nodiscard]] constexpr Result<Format> complete(const Format& format, const Identity& identity) {
+  const Format known = as_identified(format, identity);
+  const bool other_turns = format.multiturn_bits >= 0 && known.multiturn_bits != format.multiturn_bits;
+  if (other_turns || (format.resolution != 0 && known.resolution != format.resolution)) return Error::unexpected_reply;
   return known;
 }
 

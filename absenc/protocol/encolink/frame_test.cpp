@@ -82,13 +82,31 @@ TEST(EncolinkFrame, LengthsAreThoseOfTurnsAndChannel2) {
   EXPECT_EQ((Format{19, 16, false}.frame_bytes()), 6u);
 }
 
+TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
+  ReplyBytes bytes = encode_identity({.frame_bytes = 7, .resolution = 18});
+  for (const std::uint8_t behind : std::initializer_list<std::uint8_t>{0x00, 0x5A, 0xFF}) {
+    ReplyBytes padded = bytes;
+    padded.push_back(behind);
+    ASSERT_TRUE(decode_identity(padded).has_value());
+    EXPECT_EQ(decode_identity(padded)->resolution, 18u);
+    padded[18] = static_cast<std::uint8_t>(padded[18] ^ 1);
+    EXPECT_EQ(decode_identity(padded).error(), Error::bad_checksum);
+  }
+  bytes.clear();
+  EXPECT_EQ(decode_identity(bytes).error(), Error::wrong_length);
+}
+
 TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
   const Identity turns{.frame_bytes = 7, .resolution = 18};
   const Result<Format> asked = complete({}, turns);
   EXPECT_EQ(asked->resolution, 18u);
   EXPECT_EQ(asked->multiturn_bits, 16);
   EXPECT_EQ(complete({.multiturn_bits = 12}, turns)->multiturn_bits, 12);
-  EXPECT_EQ(complete({.resolution = 17}, turns)->resolution, 17u);  // what is set holds
+  EXPECT_EQ(complete({.resolution = 18}, turns)->resolution, 18u);
+  EXPECT_EQ(complete({.resolution = 17}, turns).error(), Error::unexpected_reply);
+  EXPECT_EQ(as_identified({.resolution = 17, .multiturn_bits = 12}, turns).resolution, 18u);
+  EXPECT_EQ(as_identified({.resolution = 17, .multiturn_bits = 12}, turns).multiturn_bits, 12);
+  EXPECT_EQ(as_identified({.multiturn_bits = 0}, turns).multiturn_bits, 16);
   EXPECT_EQ(complete({.multiturn_bits = 0}, turns).error(), Error::unexpected_reply);
   EXPECT_EQ(complete({}, {.frame_bytes = 5, .resolution = 18})->multiturn_bits, 0);
 }

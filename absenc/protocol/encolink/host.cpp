@@ -33,6 +33,8 @@ void Stream::reset_channels() {
 
 void Stream::submit(const RegisterRequest& request) {
   if (!format_.has_ch2) return finish(Error::unsupported, no_channel2);
+  if (protocol_version_ == 0) identify();
+  if (protocol_version_ == version::aksim4) return finish(Error::unsupported, not_described);
   access_.start(request);
   access_attempts_left_ = access_attempts - 1;
   uses_channel2_ = true;
@@ -103,11 +105,12 @@ void Stream::begin_frame(Time now) {
   request_ = {static_cast<std::uint8_t>(config), ra};
 }
 
-// 0: what comes before the identity has a length that may be unknown; silence ends it.
+// 0: silence ends it. What comes before the identity has a length that may be unknown, and behind both there may be
+// more.
 std::size_t Stream::expected() const {
-  if (asked_ == Asked::identity) return identity_bytes;
-  if (format_.known()) return format_.frame_bytes();
-  return wire_ == Wire::spi ? identity_bytes : 0;
+  const bool identifies = asked_ == Asked::to_identify || asked_ == Asked::identity;
+  if (identifies) return wire_ == Wire::spi ? identity_bytes : 0;
+  return format_.frame_bytes();
 }
 
 void Stream::received(Bytes bytes) {
@@ -147,7 +150,7 @@ bool Stream::is_stuck() const {
 Error Stream::check() {
   if (is_stuck()) return Error::line_stuck;
   if (asked_ == Asked::identity) return decode_identity(reply_).error();
-  if (!format_.known()) return Error::none;  // what comes before the identity
+  if (asked_ == Asked::to_identify) return Error::none;
   return decode_position(format_, reply_).error();
 }
 
@@ -167,11 +170,18 @@ void Stream::good_identity() {
   asked_ = Asked::position;
   identify_pending_ = false;
   cycle_.lose_step();  // asking for it has reset the channels
-  const Result<Format> known = complete(format_, identity);
+  protocol_version_ = identity.protocol_version;
+  const Result<Format> known = trusts_identity_ ? as_identified(format_, identity) : complete(format_, identity);
   if (!known) {
-    return finish(known.error(), "the identity and the option multiturn_bits disagree on whether there are turns");
+    return finish(known.error(),
+                  "the identity says another resolution than the options, or disagrees on whether there are turns: "
+                  "leave resolution and multiturn_bits out, and it is asked");
   }
   format_ = *known;
+  if (access_.active()) {
+    if (protocol_version_ == version::aksim4) return finish(Error::unsupported, not_described);
+    reset_pending_ = true;
+  }
   on_identity(identity);
 }
 
@@ -336,7 +346,10 @@ void ReadDetailedStatus::report(FieldSink& sink) const {
 
 // ---- Identify
 
-Identify::Identify(const Format& format, Wire wire) : Stream(format, wire, 1) { identify(); }
+Identify::Identify(const Format& format, Wire wire) : Stream(format, wire, 1) {
+  trust_identity();
+  identify();
+}
 
 void Identify::on_identity(const Identity& identity) {
   identity_ = identity;

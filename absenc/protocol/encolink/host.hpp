@@ -45,9 +45,12 @@ class Stream : public RequestReply {
 
   /// Channels 2 and 3 begin anew.
   void reset_channels();
-  /// Begins an access as soon as channel 3 is free; the channels are reset for it when they have to be.
+  /// Begins an access as soon as channel 3 is free; the channels are reset for it when they have to be. The identity is
+  /// asked first: an encoder with other registers is `unsupported`.
   void submit(const RegisterRequest& request);
   void identify();
+  /// What the identity says counts, also against the options.
+  void trust_identity() { trusts_identity_ = true; }
   /// Whether every good frame is emitted.
   void emit_frames(bool emits) { emits_frames_ = emits; }
   void emit_once() { emit_pending_ = true; }
@@ -95,6 +98,8 @@ class Stream : public RequestReply {
 
   Asked asked_ = Asked::position;
   bool identify_pending_ = false;
+  bool trusts_identity_ = false;
+  std::uint8_t protocol_version_ = 0;  // 0: not asked yet
   bool uses_channel2_ = false;
   bool reset_pending_ = false;
   bool emits_frames_ = false;

@@ -19,11 +19,13 @@ std::uint16_t size_of(std::uint32_t address, std::uint16_t wanted) {
   return wanted == 0 && known != nullptr ? known->size : wanted;
 }
 
+void put_text(FieldSink& sink, std::size_t field, std::string_view text) {
+  put(sink, field, Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
 void put_register(FieldSink& sink, std::uint32_t address, Bytes data) {
   const Register* known = find_register(address);
-  if (known != nullptr) {
-    put(sink, field_register, Bytes(reinterpret_cast<const std::uint8_t*>(known->name.data()), known->name.size()));
-  }
+  if (known != nullptr) put_text(sink, field_register, known->name);
   put(sink, field_address, address);
   put(sink, field_length, static_cast<std::int64_t>(data.size()));
   put(sink, field_data, data);
@@ -104,6 +106,8 @@ void RegisterWriter::on_access(Error error, std::string_view detail) {
 }
 
 void RegisterWriter::on_failure(Error error, std::string_view detail) {
+  const bool nothing_done = phase_ != Phase::read_back && !access().was_asked();
+  if (nothing_done || phase_ == Phase::read) return finish(error, detail);
   if (phase_ == Phase::command) detail = "the encoder stopped answering: the command may have been executed";
   if (phase_ == Phase::write || phase_ == Phase::read_back) {
     detail = "the encoder stopped answering in the middle of a register write: read it to see whether it was written";
@@ -150,8 +154,8 @@ void WriteRegister::report(FieldSink& sink) const {
 
 // ---- Zero
 
-Zero::Zero(const Format& format, Wire wire, OffsetSign sign, Keep keep)
-    : RegisterWriter(format, wire), sign_(sign), keep_(keep) {
+Zero::Zero(const Format& format, Wire wire, const Offset& offset, Keep keep)
+    : RegisterWriter(format, wire), unit_(offset), keep_(keep) {
   emit_frames(true);
   read(registers[position_offset]);
 }
@@ -174,8 +178,7 @@ void Zero::on_read() {
   }
   if (!is_near(first_position_)) return finish(Error::invalid_argument, "the shaft turns: hold it still");
   old_offset_ = static_cast<std::uint32_t>(value_read());
-  const std::uint32_t here = position().singleturn << (32 - format().resolution);
-  offset_ = sign_ == OffsetSign::add ? old_offset_ - here : old_offset_ + here;
+  offset_ = unit_.moved(format().resolution, old_offset_, position().singleturn);
   write(registers[position_offset].address, registers[position_offset].size, offset_);
 }
 
@@ -184,7 +187,7 @@ void Zero::on_written() {
     return finish(
         Error::cross_check_failed,
         "the position did not become zero, the old offset is back: hold the shaft still, or change the option "
-        "offset_sign");
+        "offset_sign or offset_unit");
   }
   if (!is_near(0)) {
     restoring_ = true;
@@ -207,7 +210,7 @@ void Zero::report(FieldSink& sink) const {
 PresetMultiturn::PresetMultiturn(const Format& format, Wire wire, std::uint16_t turns, Keep keep)
     : RegisterWriter(format, wire), turns_(turns), keep_(keep) {
   emit_frames(true);
-  if (format.known()) begin();
+  identify();
 }
 
 void PresetMultiturn::begin() {
@@ -293,12 +296,19 @@ void SelfCalibrate::report(FieldSink& sink) const {
 
 // ---- ReadInfo
 
-ReadInfo::ReadInfo(const Format& format, Wire wire) : Stream(format, wire, frame_attempts) { identify(); }
+ReadInfo::ReadInfo(const Format& format, Wire wire) : Stream(format, wire, frame_attempts) {
+  trust_identity();
+  identify();
+}
 
 void ReadInfo::on_identity(const Identity& identity) {
   identity_ = identity;
-  if (!format().has_ch2) return finish();
-  ask_from(0);
+  only_identity_ = !format().has_ch2 || identity.protocol_version == version::aksim4;
+  if (!only_identity_) ask_from(0);
+}
+
+void ReadInfo::on_frame() {
+  if (only_identity_) finish();
 }
 
 void ReadInfo::ask_from(std::size_t index) {
@@ -318,6 +328,7 @@ void ReadInfo::on_access(Error error, std::string_view detail) {
 void ReadInfo::report(FieldSink& sink) const {
   if (error() != Error::none) return;
   put_fields(sink, identity_);
+  if (identity_.protocol_version == version::aksim4) put_text(sink, field_not_described, not_described);
   std::size_t at = 0;
   for (std::size_t i = 0; i < registers.size(); ++i) {
     if (!has_[i]) continue;

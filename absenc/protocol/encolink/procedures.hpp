@@ -63,6 +63,28 @@ class WriteRegister final : public RegisterWriter {
 
 /// Whether the position offset is added to what the sensor measures or taken off. The register map does not say.
 enum class OffsetSign : std::uint8_t { add, subtract };
+/// What the position offset counts. The map does not say it either; the vendor's example shows FFFFFFFF refused.
+enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
+
+struct Offset {
+  OffsetSign sign = OffsetSign::add;
+  OffsetUnit unit = OffsetUnit::counts;
+
+  /// The largest value, of an encoder with this resolution.
+  [[nodiscard]] constexpr std::uint32_t largest(unsigned resolution) const {
+    return static_cast<std::uint32_t>(low_mask(unit == OffsetUnit::counts ? resolution : 32));
+  }
+  /// The offset that takes `singleturn` off what the encoder shows with `offset`.
+  [[nodiscard]] constexpr std::uint32_t moved(unsigned resolution, std::uint32_t offset,
+                                              std::uint32_t singleturn) const {
+    const std::uint32_t here = unit == OffsetUnit::counts ? singleturn : singleturn << (32 - resolution);
+    return (sign == OffsetSign::add ? offset - here : offset + here) & largest(resolution);
+  }
+  /// Of a turn, in 2^-32.
+  [[nodiscard]] constexpr std::uint32_t fraction(unsigned resolution, std::uint32_t offset) const {
+    return unit == OffsetUnit::counts ? offset << (32 - resolution) : offset;
+  }
+};
 
 enum class Keep : std::uint8_t {
   until_power_off,
@@ -73,7 +95,7 @@ enum class Keep : std::uint8_t {
 /// position is not valid), cross_check_failed (it is not zero afterwards; the old offset is back), as RegisterWriter.
 class Zero final : public RegisterWriter {
  public:
-  Zero(const Format& format, Wire wire, OffsetSign sign = OffsetSign::add, Keep keep = Keep::forever);
+  Zero(const Format& format, Wire wire, const Offset& offset = {}, Keep keep = Keep::forever);
   void report(FieldSink& sink) const override;
 
  private:
@@ -83,7 +105,7 @@ class Zero final : public RegisterWriter {
   void on_command() override;
   [[nodiscard]] bool is_near(std::uint32_t singleturn) const;
 
-  OffsetSign sign_;
+  Offset unit_;
   Keep keep_;
   bool begun_ = false;
   bool restoring_ = false;
@@ -141,12 +163,14 @@ class ReadInfo final : public Stream {
 
  private:
   void on_identity(const Identity& identity) override;
+  void on_frame() override;
   void on_access(Error error, std::string_view detail) override;
   void ask_from(std::size_t index);
 
   Identity identity_{};
+  bool only_identity_ = false;
   std::size_t index_ = 0;
-  ByteBuffer<64> data_;
+  ByteBuffer<80> data_;
   std::array<bool, registers.size()> has_{};
 };
 

@@ -79,33 +79,62 @@ struct Register {
 
 enum RegisterIndex : std::size_t {
   position_offset,
+  position_filter,
+  position_filter_speed,
+  velocity_filter,
+  velocity_filter_speed,
   multiturn_preset,
+  calibration_range,
+  eccentricity,
+  eccentricity_phase,
+  radial_displacement,
   write_lock,
   firmware_major,
   firmware_minor,
   protocol_register,
+  revision,
   command_register,
   temperature,
   speed,
   calibration_status,
   serial_number,
   part_number,
+  serial_number_extended,
+  temperature_compensation_k,
+  temperature_compensation_n,
+  voltage_compensation_k,
+  voltage_compensation_n,
 };
 
-// Addresses and sizes: rls-encolink 1.0.1, product_aksim2_map.h. Some overlap; each is accessed as a whole.
-inline constexpr std::array<Register, 12> registers{{
+// Addresses and sizes: rls-encolink 1.0.1, product_aksim2_map.h. Some overlap; each is accessed as a whole. Which can
+// be written it does not say: README.md has what is assumed.
+inline constexpr std::array<Register, 26> registers{{
     {"position_offset", 0x00, 4, Access::read_write, Content::number, false},
+    {"position_filter", 0x04, 4, Access::read_write, Content::number, false},
+    {"position_filter_speed", 0x08, 4, Access::read_write, Content::number, false},
+    {"velocity_filter", 0x0C, 4, Access::read_write, Content::number, false},
+    {"velocity_filter_speed", 0x10, 4, Access::read_write, Content::number, false},
     {"multiturn_preset", 0x14, 4, Access::read_write, Content::number, false},
+    {"calibration_range", 0x19, 2, Access::read_write, Content::number, false},
+    {"eccentricity", 0x1B, 2, Access::read_only, Content::number, false},
+    {"eccentricity_phase", 0x1D, 2, Access::read_only, Content::number, false},
+    {"radial_displacement", 0x1F, 2, Access::read_only, Content::number, false},
     {"write_lock", 0x2E, 1, Access::read_write, Content::number, true},
     {"firmware_major", 0x2F, 2, Access::read_only, Content::number, true},
     {"firmware_minor", 0x31, 2, Access::read_only, Content::number, true},
     {"protocol_register", 0x33, 4, Access::read_only, Content::number, false},
+    {"revision", 0x35, 4, Access::read_only, Content::number, false},
     {"command", 0x49, 1, Access::write_only, Content::number, false},
     {"temperature_c", 0x4C, 2, Access::read_only, Content::tenths, true},
     {"speed_rpm", 0x50, 4, Access::read_only, Content::tenths, true},
     {"calibration_status", 0x52, 1, Access::read_only, Content::flags, false},
     {"serial_number", 0x5C, 8, Access::read_only, Content::text, true},
     {"order_number", 0x64, 20, Access::read_only, Content::text, true},
+    {"serial_number_extended", 0x100, 16, Access::read_only, Content::text, true},
+    {"temperature_compensation_k", 0x120C, 4, Access::read_only, Content::number, false},
+    {"temperature_compensation_n", 0x1210, 4, Access::read_only, Content::number, false},
+    {"voltage_compensation_k", 0x1214, 4, Access::read_only, Content::number, false},
+    {"voltage_compensation_n", 0x1218, 4, Access::read_only, Content::number, false},
 }};
 
 /// Values of the command register.

@@ -17,8 +17,10 @@ namespace absenc::encolink {
 namespace {
 
 constexpr std::array<std::string_view, 2> offset_signs{"add", "subtract"};
+constexpr std::array<std::string_view, 2> offset_units{"counts", "turn_fraction"};
+constexpr std::array<std::string_view, 2> protocol_versions{"2", "4"};
 
-constexpr std::array<Option, 5> options{{
+constexpr std::array<Option, 8> options{{
     {.name = "resolution",
      .meaning = "bits of a turn; 0: asked from the encoder before each command (decode: 22)",
      .default_value = 0,
@@ -42,6 +44,21 @@ constexpr std::array<Option, 5> options{{
      .default_value = 0,
      .minimum = 0,
      .maximum = 10'000},
+    {.name = "offset_unit",
+     .meaning = "of the position offset: counts of the resolution, or 2^-32 revolution",
+     .default_value = 0,
+     .choices = offset_units},
+    {.name = "protocol_version",
+     .meaning = "virtual encoder: 2, or 4 as an AksIM-4, of which only the positions are described",
+     .default_value = 0,
+     .choices = protocol_versions},
+    {.name = "identity_bytes",
+     .meaning =
+         "virtual encoder, UART: bytes of its identity; 20: one is behind it, and the frame before is as long, as "
+         "clients with the vendor's library read them",
+     .default_value = identity_bytes,
+     .minimum = identity_bytes,
+     .maximum = padded_identity_bytes},
 }};
 
 constexpr std::array<Model, 1> models{{{"AksIM-2", "off-axis; resolution and turns as its identity says", 10'000, {}}}};
@@ -70,7 +87,7 @@ constexpr std::array<Argument, 2> read_arguments{{address, {"length", length.mea
 constexpr std::array<Argument, 3> write_arguments{{address, {"value", "big endian", 0, INT64_MAX}, length}};
 constexpr std::array<Argument, 1> zero_arguments{{keep}};
 constexpr std::array<Argument, 2> preset_arguments{{{"turns", "", 0, 65535, 0, false}, keep}};
-constexpr std::array<Argument, 1> offset_arguments{{{"value", "2^-32 revolution", 0, largest_address}}};
+constexpr std::array<Argument, 1> offset_arguments{{{"value", "in what offset_unit says", 0, largest_address}}};
 constexpr std::array<Argument, 1> lock_arguments{{{"value", "0: open, 1: locked", 0, 1}}};
 constexpr std::array<Argument, 1> listen_arguments{{{"count", "frames", 1, UINT32_MAX, 100, false}}};
 
@@ -221,9 +238,11 @@ Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
   return {Delimit::Kind::no_frame};
 }
 
-// The byte of channel 2 stands behind the checksum of a position frame.
-bool covered(const Options& values, Frame request, Frame, std::size_t bit) {
+// The byte of channel 2 stands behind the checksum of a position frame; one that means nothing may stand behind that of
+// the identity.
+bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = to_format(values);
+  if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
 }
 
@@ -261,7 +280,7 @@ Any<Conversation> host(const Options& values, const Command& command, Arguments 
     case Verb::temperature:
       return make_host<ReadRegister>(storage, format, wire, registers[temperature].address);
     case Verb::zero:
-      return make_host<Zero>(storage, format, wire, to_build(values).offset_sign, to_keep(value(0)));
+      return make_host<Zero>(storage, format, wire, to_build(values).offset, to_keep(value(0)));
     case Verb::reset_multiturn:
       return make_host<PresetMultiturn>(storage, format, wire, static_cast<std::uint16_t>(value(0)), to_keep(value(1)));
     case Verb::memory_read:
@@ -336,8 +355,11 @@ Format to_format(const Options& values) {
 }
 
 Build to_build(const Options& values) {
-  return {.offset_sign = values[option_offset_sign] != 0 ? OffsetSign::subtract : OffsetSign::add,
-          .stream_rate = static_cast<std::uint32_t>(values[option_stream_rate])};
+  return {.offset = {values[option_offset_sign] != 0 ? OffsetSign::subtract : OffsetSign::add,
+                     values[option_offset_unit] != 0 ? OffsetUnit::turn_fraction : OffsetUnit::counts},
+          .stream_rate = static_cast<std::uint32_t>(values[option_stream_rate]),
+          .protocol_version = values[option_protocol_version] != 0 ? version::aksim4 : version::aksim2,
+          .identity_size = static_cast<std::size_t>(values[option_identity_bytes])};
 }
 
 constinit const Unit unit = make_unit("encolink", "RLS EncoLink (AksIM-2), UART", Wire::uart, vectors);

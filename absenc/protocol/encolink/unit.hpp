@@ -18,6 +18,9 @@ enum OptionIndex : std::size_t {
   option_has_ch2,
   option_offset_sign,
   option_stream_rate,
+  option_offset_unit,
+  option_protocol_version,
+  option_identity_bytes,
 };
 
 [[nodiscard]] Format to_format(const Options& options);

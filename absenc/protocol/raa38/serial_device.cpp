@@ -15,14 +15,22 @@ VirtualEncoder::VirtualEncoder(const Settings& settings, const Shaft& shaft) : s
 
 ByteStep VirtualEncoder::next(Time now) {
   if (on_ && settings_.mode == Mode::timing && !transmitting_ && now >= due_) stream(now);
-  if (frame_pending_) {
-    frame_pending_ = false;
-    return {.kind = ByteStep::Kind::transfer, .out = frame_.view(), .at = frame_at_};
-  }
+  if (frame_pending_) return transmit();
   ByteStep step{.expect = 1, .at = never};
   if (on_ && settings_.mode == Mode::timing && !transmitting_) step.at = due_;
   if (!heard_.empty()) step.gap = request_gap;
   return step;
+}
+
+// As long as the frame was ordered to take: character by character.
+ByteStep VirtualEncoder::transmit() {
+  frame_pending_ = false;
+  const Bytes rest = frame_.view().subspan(sent_);
+  const auto before = static_cast<std::int64_t>(sent_);
+  const Time at = frame_at_ + before * settings_.transmission / static_cast<std::int64_t>(frame_.size());
+  const Bytes out = settings_.transmission > Time{} ? rest.first(1) : rest;
+  sent_ += out.size();
+  return {.kind = ByteStep::Kind::transfer, .out = out, .at = at};
 }
 
 // What was held up is made up for, so that the rate stays; after a long time there is no use in it.
@@ -35,7 +43,7 @@ void VirtualEncoder::stream(Time now) {
 void VirtualEncoder::feed(const ByteEvent& event) {
   switch (event.kind) {
     case ByteEvent::Kind::sent:
-      transmitting_ = false;
+      transmitting_ = frame_pending_ = sent_ < frame_.size();
       break;
     case ByteEvent::Kind::received:
       if (on_) received(event.items, event.at);
@@ -106,6 +114,7 @@ void VirtualEncoder::send(std::uint8_t second_byte, Time latched, Time at) {
   const auto mask = static_cast<std::uint32_t>(low_mask(settings_.format.bits));
   frame_ = encode_position(settings_.format, {(shaft_counts(latched) - zero) & mask, second_byte});
   frame_at_ = at;
+  sent_ = 0;
   frame_pending_ = transmitting_ = true;
   ++answered_;
 }
@@ -131,6 +140,7 @@ void VirtualEncoder::power_on(Time now, PowerOn) {
 void VirtualEncoder::power_off(Time) {
   on_ = false;
   frame_pending_ = transmitting_ = false;
+  sent_ = frame_.size();
 }
 
 }  // namespace absenc::raa38::serial

@@ -41,6 +41,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void set_zero(Time at);
   void send(std::uint8_t second_byte, Time latched, Time at);
   void stream(Time now);
+  [[nodiscard]] Step<std::uint8_t> transmit();
   void violate(std::string_view rule, Time at);
   [[nodiscard]] std::uint32_t shaft_counts(Time at) const;
 
@@ -53,6 +54,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   Time due_{};  // timing: when the next frame begins
   FrameBytes heard_;
   FrameBytes frame_;
+  std::size_t sent_ = 0;  // characters of it that are out
   bool frame_pending_ = false;
   bool transmitting_ = false;
   Time frame_at_{};

@@ -47,6 +47,19 @@ TEST(RaaHandshake, T3IsAsOrdered) {
   EXPECT_NE(unknowing.advice().find("CLK"), std::string_view::npos);
 }
 
+TEST(RaaHandshake, AFrameTakesAsLongAsOrdered) {
+  Settings slow = handshake;
+  slow.transmission = 60ms;
+  Bench bench(slow);
+  EXPECT_EQ(converse(bench).error(), Error::none);
+  EXPECT_GT(bench.took, virtual_acquisition + 4 * slow.transmission / 5) << "T1 - T3";
+  EXPECT_LE(bench.took, virtual_acquisition + slow.transmission);
+  ReadPosition unknowing(handshake);
+  bench.run(unknowing);
+  EXPECT_EQ(unknowing.error(), Error::wrong_length);
+  EXPECT_EQ(bench.encoder().violation_count(), 0u);
+}
+
 TEST(RaaHandshake, T3MayBeShorterThanThePulse) {
   Settings fast = handshake;
   fast.acquisition = Time(1);

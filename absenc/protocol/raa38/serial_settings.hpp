@@ -18,7 +18,7 @@ struct Settings {
   Time period{};                  // of the refresh rate; 0: not known
   std::uint32_t maximum_rpm = 0;  // 0: positions may jump
   Time acquisition{};             // T3, or from a request to its answer; 0: not known
-  Time transmission{};            // T1 - T3; 0: not known
+  Time transmission{};            // T1 - T3, of a frame; 0: as long as its characters take
 
   /// Of frames that nobody asked for.
   [[nodiscard]] constexpr std::uint8_t second_byte() const {

@@ -71,7 +71,7 @@ constexpr std::array<Option, 10> options{{
      .maximum = most_us,
      .decimals = 3},
     {.name = "transmission_us",
-     .meaning = "T1 - T3, how long a frame takes, us; 0: not known",
+     .meaning = "T1 - T3, how long a frame takes, us; 0: as long as its characters",
      .default_value = 0,
      .minimum = 0,
      .maximum = most_us,
