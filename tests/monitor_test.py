@@ -235,6 +235,20 @@ class Screen(MonitorCase):
 
 
 class Lines(MonitorCase):
+    def test_the_closing_lines_agree_with_each_other(self):
+        """Also while the line fails now and then, and with one encoder that takes all the time there is."""
+        result = absenc("monitor", "sim:tformat", "sim:esl?fault=corrupt=0.05", "sim:ssi", "--rate", "0", "--for", "0.73",
+                        "--json", "--interval", "0.2")
+        closing = re.findall(r"^absenc: (sim:\S+): (\d+) readings; (\d+) good(.*)", result.stderr, re.MULTILINE)
+        self.assertEqual(len(closing), 3, result.stderr)
+        last = {line["encoder"]: line for line in json_lines(result.stdout)}
+        for name, readings, good, rest in closing:
+            beside = re.search(r"; (\d+) of the good ones confirmed", rest)
+            self.assertEqual(int(good), int(readings) + (int(beside[1]) if beside else 0), result.stderr)
+            self.assertGreaterEqual(int(readings), last[name]["readings"])
+            self.assertEqual("failed" in rest, "fault" in name)
+        self.assertIn(f"{sum(int(readings) for _, readings, _, _ in closing)} readings in ", result.stderr)
+
     def test_words(self):
         address = self.encoder("--singleturn", "65536", "--alarm", "battery_alarm")
         result = absenc("monitor", address, "--for", "1.2", "--interval", "0.3")

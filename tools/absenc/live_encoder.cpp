@@ -98,6 +98,7 @@ Sample LiveEncoder::take(Reading reading) {
   reading.latched += offset_;
   reading.received += offset_;
   rate_.add(reading.received);
+  ++readings_;
   Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = encoder_->confirmed()};
   sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
   sample.reading = reading = checked(reading, sample.confirmed);
@@ -111,6 +112,25 @@ Sample LiveEncoder::take(Reading reading) {
   sample.speed = speed_of(reading, velocity_.counts_per_second());
   sample.speed_delay = velocity_.delay();
   return sample;
+}
+
+std::string_view event_name(const Sample& sample) {
+  switch (sample.kind) {
+    case Sample::Kind::lost:
+      return "lost";
+    case Sample::Kind::back:
+      return "back";
+    case Sample::Kind::failed:
+      return text_of(sample.trouble.error).name;
+    default:
+      return "";
+  }
+}
+
+std::string exchanges_text(const host::Counters& counters, std::uint64_t readings) {
+  const std::string text = summary(counters);
+  if (counters.good <= readings) return text;
+  return fmt::format("{}; {} of the good ones confirmed a position, or were commands", text, counters.good - readings);
 }
 
 std::string_view speed_unit(const Reading& reading) { return reading.unit_um > 0 ? "mm/s" : "rpm"; }

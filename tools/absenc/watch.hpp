@@ -92,6 +92,7 @@ class Watch {
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
+  bool command_runs_ = false;  // it is not broken off
 
   std::jthread thread_;  // last: it uses all of the others
 };
