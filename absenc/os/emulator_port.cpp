@@ -7,11 +7,14 @@
 #include <sys/inotify.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <termios.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <utility>
@@ -32,6 +35,26 @@ constexpr std::size_t most_clients = 32;
 
 void check(bool good, const std::string& what) {
   if (!good) throw system_failure(what, errno);
+}
+
+// A socket whose name in the kernel is that of the pseudo-terminal: it lives as long as the process that bound it, so
+// that a link of an emulator that was killed is told from one in use, whoever has got its number since.
+Descriptor bind_name_of(const std::string& terminal) {
+  struct stat there {};
+  Descriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (!socket || ::stat(terminal.c_str(), &there) < 0) return {};
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string name = "absenc emulator " + std::to_string(there.st_dev) + " " + std::to_string(there.st_rdev);
+  std::copy(name.begin(), name.end(), address.sun_path + 1);  // behind a zero: no file
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  if (::bind(socket.get(), reinterpret_cast<sockaddr*>(&address), size) < 0) return {};
+  return socket;
+}
+
+bool is_served(const std::string& terminal) {
+  errno = 0;
+  return !bind_name_of(terminal) && errno == EADDRINUSE;
 }
 
 }  // namespace
@@ -61,6 +84,7 @@ void EmulatorPort::open_terminal() {
   terminal_ = name.data();
   slave_ = Descriptor(::open(terminal_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   check(static_cast<bool>(slave_), what);
+  name_ = bind_name_of(terminal_);
   termios settings{};
   check(::tcgetattr(slave_.get(), &settings) == 0, what);
   ::cfmakeraw(&settings);  // the echo of a terminal would send the host's requests back to it
@@ -93,10 +117,14 @@ void EmulatorPort::listen_on(std::uint16_t port) {
 void EmulatorPort::make_link() const {
   std::error_code error;
   if (const auto there = fs::symlink_status(link_, error); fs::exists(there)) {
-    const bool ours = fs::is_symlink(there) && fs::read_symlink(link_, error).native().starts_with("/dev/pts/");
-    if (!ours) {
+    const std::string target = fs::is_symlink(there) ? fs::read_symlink(link_, error).native() : "";
+    if (!target.starts_with("/dev/pts/")) {
       throw Failure(Failure::Kind::in_use,
                     link_ + " exists and is no link to a pseudo-terminal: remove it, or choose another path");
+    }
+    if (target != terminal_ && is_served(target)) {
+      throw Failure(Failure::Kind::in_use, link_ + " is in use by a virtual encoder that is running, at " + target +
+                                               ": end it, or choose another path");
     }
     fs::remove(link_, error);
   }

@@ -6,6 +6,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <array>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 
@@ -195,6 +197,33 @@ TEST(EmulatorPort, LinksToItself) {
     EXPECT_EQ(receive(device), request);
   }
   EXPECT_FALSE(fs::exists(fs::symlink_status(link)));
+}
+
+TEST(EmulatorPort, IsNotReplacedWhileItLives) {
+  const TemporaryDirectory directory;
+  const fs::path link = directory.path() / "encoder";
+  std::string terminal;
+  {
+    const EmulatorPort first(link);
+    terminal = fs::read_symlink(link);
+    try {
+      const EmulatorPort second(link);
+      FAIL();
+    } catch (const Failure& failure) {
+      EXPECT_EQ(failure.kind(), Failure::Kind::in_use);
+      EXPECT_NE(std::string(failure.what()).find("running"), std::string::npos);
+    }
+    EXPECT_EQ(fs::read_symlink(link), terminal);
+  }
+  // A program that is no emulator has got the number of one that was killed.
+  const Descriptor other(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
+  std::array<char, 64> name{};
+  ASSERT_EQ(::grantpt(other.get()), 0);
+  ASSERT_EQ(::unlockpt(other.get()), 0);
+  ASSERT_EQ(::ptsname_r(other.get(), name.data(), name.size()), 0);
+  fs::create_symlink(name.data(), link);
+  const EmulatorPort third(link);
+  EXPECT_NE(fs::read_symlink(link), name.data());
 }
 
 TEST(EmulatorPort, ReplacesNothingButLinksToPseudoTerminals) {

@@ -88,7 +88,7 @@ class Controls {
   void ask_for_zero() {
     const Command* command = find_command(*selected().uri().unit, Verb::zero);
     if (command == nullptr) return;
-    view_.question = fmt::format(" {}? y: yes, any other key: no   ({})", command->meaning, selected().name());
+    view_.question = fmt::format(" {}? y: yes, any other key: no", command->meaning);
   }
 
   Watches* watches_;
