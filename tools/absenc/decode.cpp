@@ -90,9 +90,7 @@ struct Counted final : capture::AnnotationSink {
 bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   bool damaged = false;
   for (const capture::Damage& damage : outcome.damages) {
-    print_message(fmt::format("{}byte {}, {} {}: {}", damage.note ? "note: " : "the capture is damaged at ",
-                              damage.offset, clock.has_time() ? "second" : "tick", clock.text(damage.tick),
-                              damage.what));
+    print_message(to_text(damage, clock));
     damaged = damaged || !damage.note;
   }
   return damaged;
