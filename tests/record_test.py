@@ -202,6 +202,19 @@ class Gaps(RecordCase):
         self.assertIn(f"{missed} readings that were due were not taken", message)
         self.assertEqual(rows[-1]["event"], "gap")
 
+    def test_stopped_and_then_ended(self):
+        path = self.output()
+        process = self.start("record", "sim:tformat", "--output", path, "--rate", "200")
+        wait_until(lambda: len(rows_so_far(path)) > 20, "readings")
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGTERM)
+        messages = end(process, signal.SIGCONT)[2]
+        rows = read_csv(path)[1]
+        self.assertEqual(rows[-1]["event"], "gap", messages)
+        self.assertGreaterEqual(int(rows[-1]["missed"]), 80)
+        self.assertIn("readings that were due were not taken", messages)
+
     def test_a_line_too_slow_for_the_rate(self):
         address = self.encoder("--fault", "silence=1", latency=25)
         result = absenc("record", address, "--output", self.output(), "--rate", "100", "--for", "1")

@@ -40,7 +40,7 @@ class EmulatorPort final : public StreamPort {
 
   void open_terminal();
   void listen_on(std::uint16_t port);
-  void make_link() const;
+  void make_link();
   void users_changed();
   [[nodiscard]] bool understands_terminal() const;
   void accept_client();
@@ -49,7 +49,7 @@ class EmulatorPort final : public StreamPort {
 
   Descriptor master_;
   Descriptor slave_;  // kept open: without it the master fails whenever no program has the slave open
-  Descriptor name_;   // says to others that this terminal is served
+  Descriptor name_;   // says to others that the link is served
   Descriptor watch_;  // inotify: programs that open or close the slave
   Descriptor listener_;
   std::vector<Descriptor> clients_;

@@ -224,6 +224,11 @@ TEST(EmulatorPort, IsNotReplacedWhileItLives) {
   fs::create_symlink(name.data(), link);
   const EmulatorPort third(link);
   EXPECT_NE(fs::read_symlink(link), name.data());
+  // So has an emulator on another link.
+  const fs::path stale = directory.path() / "stale";
+  fs::create_symlink(fs::read_symlink(link), stale);
+  const EmulatorPort fourth(stale);
+  EXPECT_NE(fs::read_symlink(stale), fs::read_symlink(link));
 }
 
 TEST(EmulatorPort, ReplacesNothingButLinksToPseudoTerminals) {

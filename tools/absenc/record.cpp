@@ -53,23 +53,28 @@ void tell(const Sample& sample, Report& report) {
 
 // Returns whether the last reading was good.
 bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limits& limits, Report& report) {
-  bool good = false;
+  Sample sample;
+  const auto tell_missed = [&] {
+    const std::uint64_t missed = pace.take_missed();
+    // While the port is away, that it was lost says so.
+    const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
+    if (was_there) recording.miss(missed);
+  };
   try {
     while (os::now() < limits.end && !os::interrupted()) {
-      const Sample sample = live.next();
-      good = sample.kind == Sample::Kind::reading;
+      sample = live.next();
       recording.take(sample);
       tell(sample, report);
       report.show(recording, live);
       if (limits.count != 0 && recording.readings() >= limits.count) break;
-      const std::uint64_t missed = pace.wait(limits.end);
-      // While the port is away, that it was lost says so.
-      if (good || sample.kind == Sample::Kind::failed) recording.miss(missed);
+      pace.wait(limits.end);
+      tell_missed();
     }
   } catch (const os::Interrupted&) {
   } catch (const os::Ended&) {
   }
-  return good;
+  tell_missed();
+  return sample.kind == Sample::Kind::reading;
 }
 
 RecordingSettings settings_of(const Invocation& invocation) {
