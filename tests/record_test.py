@@ -132,6 +132,9 @@ class Files(RecordCase):
                 for verb in (["record", "--output", self.output("b.csv")], ["monitor"], ["read"]):
                     self.assert_wrong_usage(absenc(*verb, "sim:tformat", "--rate", rate), *words)
         self.assertFalse(os.path.exists(self.output("b.csv")))
+        for verb in (["record", "--output", self.output("c.csv")], ["monitor"]):
+            self.assertIn("note: at --rate 0.5 a reading comes every 2 s, so --for 0.6 ends after the first",
+                          absenc(*verb, "sim:tformat", "--rate", "0.5", "--for", "0.6").stderr)
 
     def test_parts_by_size(self):
         result = absenc("record", "sim:tformat?motion=rpm=60", "--output", self.output(), "--rate", "0", "--count", "300",

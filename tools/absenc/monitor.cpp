@@ -13,6 +13,7 @@
 #include "tools/absenc/monitor_view.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/rate.hpp"
 #include "tools/absenc/shared_link.hpp"
 #include "tools/absenc/subcommand.hpp"
 

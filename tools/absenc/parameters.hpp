@@ -2,9 +2,6 @@
 // Parameters that many subcommands share, so that they read the same everywhere.
 #pragma once
 
-#include <fmt/format.h>
-
-#include "tools/absenc/error.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool::parameter {
@@ -31,19 +28,3 @@ inline constexpr Parameter arguments{
     "arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true};
 
 }  // namespace absenc::tool::parameter
-
-namespace absenc::tool {
-
-/// --rate of whoever reads again and again; 0: as fast as can be. Throws UsageError, also for a rate at which hardly
-/// anybody would live to see the second reading.
-[[nodiscard]] inline double readings_a_second(const Invocation& invocation, double fallback) {
-  constexpr double a_day = 1.0 / 86'400;
-  const double rate = invocation.real("--rate", fallback, 0, 1e6);
-  if (rate == 0 || rate >= a_day) return rate;
-  throw UsageError(fmt::format(
-      "--rate is {}, one reading in {:.3g} days: too few to mean anything. Give one a day ({:.3g}) at least, "
-      "or 0 for as many as the line allows",
-      invocation.text("--rate"), a_day / rate, a_day));
-}
-
-}  // namespace absenc::tool

@@ -12,6 +12,7 @@
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/pace.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/rate.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 

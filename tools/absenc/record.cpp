@@ -11,6 +11,7 @@
 #include "tools/absenc/pace.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
+#include "tools/absenc/rate.hpp"
 #include "tools/absenc/recording.hpp"
 #include "tools/absenc/subcommand.hpp"
 
