@@ -132,6 +132,9 @@ class Decode(Case):
 
     def test_nothing_to_decode(self):
         self.assert_wrong_usage(absenc("decode", "tformat"), "nothing to decode", "--hex")
+        for empty in ("", " ", ","):
+            with self.subTest(empty):
+                self.assert_wrong_usage(absenc("decode", "tformat", "--request", "1A", "--hex", empty), "--hex is empty")
 
 
 class Encode(Case):

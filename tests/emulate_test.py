@@ -2,6 +2,7 @@
 """`absenc emulate tformat` against a T-format client that shares no code with it."""
 import fcntl
 import itertools
+import json
 import os
 import re
 import select
@@ -518,6 +519,20 @@ class Life(EmulateCase):
         self.assert_failed(absenc("emulate", "tformat", "--pty", path, "--for", "60"), path, "remove it")
         with open(path, encoding="utf-8") as file:
             self.assertEqual(file.read(), "data")
+
+    def test_a_path_of_an_emulator_that_runs(self):
+        with Emulator(self.directory, "--singleturn", "7") as first:
+            for protocol in ("tformat", "raa38-can"):
+                result = absenc("emulate", protocol, "--pty", first.path, "--for", "60")
+                self.assert_failed(result, first.path, "is in use by a virtual encoder that is running")
+                self.assertEqual(result.stdout, "")
+            address = f"tformat:{first.path}?latency=300"
+            self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 7)
+            first.end(signal.SIGKILL)
+        self.assertTrue(os.path.islink(first.path))
+        with Emulator(self.directory, "--singleturn", "8"):
+            self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 8)
+        self.assertFalse(os.path.lexists(first.path))
 
     def test_two_programs_beside_each_other(self):
         with Emulator(self.directory, "--singleturn", "1", name="one") as one, \

@@ -112,7 +112,7 @@ class Client:
 
 class Encolink(Case):
     def client(self, *arguments, turns=True):
-        emulator = Emulator(self.directory, *arguments, protocol="encolink")
+        emulator = Emulator(self.directory, *arguments, protocol="encolink", name=f"turns-{turns}")
         self.addCleanup(emulator.end)
         return Client(self, emulator.path, turns)
 
@@ -122,7 +122,6 @@ class Encolink(Case):
     def test_positions(self):
         for turns in (True, False):
             with self.subTest(turns=turns):
-                os.makedirs(os.path.join(self.directory, str(turns)))
                 client = self.client(*self.options(turns), "--singleturn", "123456", *(["--multiturn", "77"] if turns else []),
                                      turns=turns)
                 for _ in range(20):

@@ -77,8 +77,8 @@ class Screen(MonitorCase):
         self.assert_screen(
             screen,
             f" absenc monitor   {re.escape(address[:62])}.*",
-            "  encoder              state     degrees    turns       rpm a second  failed",
-            rf"> {re.escape(address[:20])} live      180\.000       12       0\.0 +\d+\.\d       0 !",
+            "  encoder                  state     degrees   turns       rpm a second failed",
+            rf"> {re.escape(address[:11])}\.\.{re.escape(address[-11:])} live      180\.000      12       0\.0 +\d+\.\d      0 !",
             "",
             "  180.000 deg    65536 counts      12 turns   alarms: over_heat",
             r"  0 \|-{17}\+-{16}O-{16}\+-{16}\| 360",
@@ -98,7 +98,7 @@ class Screen(MonitorCase):
         screen = terminal.wait_for(r"live .* \d\d\.\d")
         self.assertRegex(screen, r"(?m)^> sim:\S+ +live +0\.000")
         self.assertRegex(screen, r"(?m)^  sim:\S+ +live +90\.000")
-        self.assertRegex(screen, r"(?m)^  tformat:/dev/nothing opening +- +- +- +0\.0")
+        self.assertRegex(screen, r"(?m)^  tformat:/dev/nothing +opening +- +- +- +0\.0")
         terminal.press("Tab")
         self.assertIn("  90.000 deg    32768 counts", terminal.wait_for(r"^> sim:\S+ +live +90\.000"))
         terminal.press("Down")
@@ -189,6 +189,26 @@ class Screen(MonitorCase):
         screen = terminal.wait_for(r"battery_alarm: the battery is below 3\.1 V")
         self.assertEqual(screen.splitlines()[15].rstrip(), KEYS)
 
+    def test_names_that_do_not_fit(self):
+        """What tells encoders apart is shown at every width, and so is the mark of alarms."""
+        path = self.emulator_of_two().path
+        addresses = [f"esl:{path}?latency=300&address={number}" for number in (0, 3)]
+        terminal = Terminal(self, *addresses, columns=64, rows=20)
+        for columns in (64, 80, 100):
+            terminal.resize(columns, 20)
+            screen = terminal.wait_for(r"^> es\S*\.\.\S*0 +live +0\.000 .* !$")
+            self.assertEqual(terminal.wait_for(rf"^ +es\S*\.\.\S*3 +live .* !$").count("!"), 2, screen)
+        terminal.resize(64, 20)
+        terminal.press("Tab", "z")
+        terminal.wait_for(r"y: yes.*\(\S*s=3\)$")
+        terminal.wait_for(r"^ absenc monitor   es\S*\.\.\S*=3$")
+
+    def emulator_of_two(self):
+        emulator = Emulator(self.directory, "--alarm", "multiturn_error", "--also", "address=3&alarm=multiturn_error",
+                            protocol="esl", name="a-name-that-is-much-too-long-for-the-list")
+        self.addCleanup(emulator.end)
+        return emulator
+
     def test_fields_that_the_reading_lacks(self):
         terminal = Terminal(self, "sim:esl?singleturn=0xABCDEF&alarm=multiturn_error")
         screen = terminal.wait_for(r"ch2_alarms multiturn_error")
@@ -235,6 +255,20 @@ class Screen(MonitorCase):
 
 
 class Lines(MonitorCase):
+    def test_the_closing_lines_agree_with_each_other(self):
+        """Also while the line fails now and then, and with one encoder that takes all the time there is."""
+        result = absenc("monitor", "sim:tformat", "sim:esl?fault=corrupt=0.05", "sim:ssi", "--rate", "0", "--for", "0.73",
+                        "--json", "--interval", "0.2")
+        closing = re.findall(r"^absenc: (sim:\S+): (\d+) readings; (\d+) good(.*)", result.stderr, re.MULTILINE)
+        self.assertEqual(len(closing), 3, result.stderr)
+        last = {line["encoder"]: line for line in json_lines(result.stdout)}
+        for name, readings, good, rest in closing:
+            beside = re.search(r"; (\d+) of the good ones confirmed", rest)
+            self.assertEqual(int(good), int(readings) + (int(beside[1]) if beside else 0), result.stderr)
+            self.assertGreaterEqual(int(readings), last[name]["readings"])
+            self.assertEqual("failed" in rest, "fault" in name)
+        self.assertIn(f"{sum(int(readings) for _, readings, _, _ in closing)} readings in ", result.stderr)
+
     def test_words(self):
         address = self.encoder("--singleturn", "65536", "--alarm", "battery_alarm")
         result = absenc("monitor", address, "--for", "1.2", "--interval", "0.3")

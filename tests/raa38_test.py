@@ -252,8 +252,9 @@ class Settings(RaaCase):
         self.assert_trouble(result, "invalid_argument", "command of a bus", "mode=bus")
 
     def test_parity_and_baud_of_a_virtual_line(self):
+        path = self.emulator().path
         for settings in ("parity=even", "parity=odd&baud=9600"):
-            result = absenc("read", f"raa38:{self.emulator().path}?{settings}")
+            result = absenc("read", f"raa38:{path}?{settings}")
             self.assert_good(result)
         self.assert_good(absenc("read", "sim:raa38?parity=even"))
 

@@ -47,10 +47,34 @@ class Readings(EncoderCase):
         self.assert_good(result)
         header, *rows = [line.split(",") for line in result.stdout.splitlines()]
         self.assertEqual(header, ["time_s", "angle_deg", "singleturn", "singleturn_valid", "multiturn",
-                                  "multiturn_valid", "status", "alarms"])
+                                  "multiturn_valid", "status", "alarms", "event"])
         self.assertEqual(len(rows), 2)
-        self.assertEqual(rows[0][1:], ["0", "0", "true", "7", "false", "", "over_speed"])
+        self.assertEqual(rows[0][1:], ["0", "0", "true", "7", "false", "", "over_speed", ""])
         self.assertEqual(result.stderr, "")
+
+    def test_csv_has_a_row_for_a_failed_reading(self):
+        for place in ("sim:tformat?", "sim:esl?", "sim:biss?model=linear-32-0.05um&"):
+            with self.subTest(place):
+                result = absenc("read", place + "fault=silence=1", "--csv", "--count", "3", "--rate", "0")
+                self.assertEqual(result.returncode, 1)
+                header, *rows = [line.split(",") for line in result.stdout.splitlines()]
+                self.assertEqual(len(rows), 3, result.stderr)
+                for row in rows:
+                    self.assertEqual(len(row), len(header))
+                    self.assertGreater(float(row[0]), 0)
+                    self.assertEqual(set(row[1:-1]), {""})
+                    self.assertIn(f"absenc: {row[-1]}: ", result.stderr)
+
+    def test_a_missing_port_is_json(self):
+        for verb in ("read", "info", "alarms", "temperature", "bench"):
+            with self.subTest(verb):
+                result = absenc(verb, "tformat:/dev/nothing", "--json")
+                self.assertEqual((result.returncode, result.stderr), (1, ""))
+                answer = json.loads(result.stdout)
+                self.assertEqual((answer["ok"], answer["error"]), (False, "not_found"))
+                self.assertIn("there is no port /dev/nothing", answer["message"])
+        result = absenc("zero", "tformat:tcp:127.0.0.1:1", "--json", "--yes")
+        self.assertEqual((result.returncode, json.loads(result.stdout)["ok"]), (1, False))
 
     def test_alarms_are_explained_once(self):
         result = absenc("read", self.encoder("--alarm", "battery_alarm"), "--count", "3", "--rate", "0")
@@ -453,7 +477,7 @@ class Run(EncoderCase):
                 self.assertIn("make this the zero of the turn", shown)
                 self.assertIn("nothing was changed", shown)
         self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 1000)
-        for answer in (b"y\n", b"yes\n"):
+        for answer in (b"y\n", b"yes\n", b"Y\n", b"Yes\n", b"YES\n", b" y \n"):
             self.assertEqual(self.ask(address, answer)[0], 0)
         self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 0)
 

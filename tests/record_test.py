@@ -7,6 +7,7 @@ import json
 import os
 import pty
 import random
+import re
 import signal
 import subprocess
 import time
@@ -15,7 +16,7 @@ import unittest
 from command_support import ABSENC, PATIENCE, Emulator, EncoderCase, absenc, end
 
 COLUMNS = ["time_s", "angle_deg", "singleturn", "singleturn_valid", "multiturn", "multiturn_valid", "status", "alarms",
-           "position", "speed_rpm", "speed_delay_s", "event"]
+           "position", "speed_rpm", "speed_delay_s", "missed", "event"]
 
 
 def wait_until(condition, what):
@@ -81,8 +82,9 @@ class Files(RecordCase):
         self.assertEqual(header["singleturn"], "counts")
         started = datetime.datetime.fromisoformat(header["started"].replace("Z", "+00:00"))
         self.assertLess(abs((started - before).total_seconds()), PATIENCE)
-        self.assertEqual(len(rows), 20)
         self.assert_rising(times(rows))
+        rows = [row for row in rows if row["event"] != "gap"]  # of a busy machine
+        self.assertEqual(len(rows), 20)
         for row in rows:
             self.assertEqual((row["singleturn"], row["singleturn_valid"], row["multiturn"], row["multiturn_valid"],
                               row["alarms"], row["position"], row["event"]),
@@ -105,7 +107,7 @@ class Files(RecordCase):
     def test_speed_and_position_past_the_wrap(self):
         result = absenc("record", "sim:tformat?motion=rpm=-90", "--output", self.output(), "--for", "1.2")
         self.assert_good(result)
-        _, rows = read_csv(self.output())
+        rows = [row for row in read_csv(self.output())[1] if row["event"] == ""]
         self.assertLess(float(rows[-1]["position"]), float(rows[0]["position"]) - 1.5 * 2**17)
         self.assertIn("65535", [row["multiturn"] for row in rows])
         for row in rows[5:]:
@@ -117,14 +119,22 @@ class Files(RecordCase):
     def test_decimation(self):
         self.assert_good(absenc("record", "sim:tformat?motion=rpm=60", "--output", self.output(), "--rate", "1000",
                                 "--every", "10", "--count", "20"))
-        _, rows = read_csv(self.output())
+        rows = [row for row in read_csv(self.output())[1] if row["event"] != "gap"]
         self.assertEqual(len(rows), 20)
         self.assertGreaterEqual(times(rows)[-1] - times(rows)[0], 0.189)
 
     def test_rate(self):
         self.assert_good(absenc("record", "sim:tformat", "--output", self.output(), "--rate", "50", "--for", "1"))
         _, rows = read_csv(self.output())
-        self.assertLessEqual(len(rows), 51)
+        self.assertEqual(sum(int(row["missed"] or 1) for row in rows), 50)
+        for rate, words in (("1e-9", ["one reading in 1.16e+04 days"]), ("1e-300", ["too few"]), ("-1", ["--rate"])):
+            with self.subTest(rate):
+                for verb in (["record", "--output", self.output("b.csv")], ["monitor"], ["read"]):
+                    self.assert_wrong_usage(absenc(*verb, "sim:tformat", "--rate", rate), *words)
+        self.assertFalse(os.path.exists(self.output("b.csv")))
+        for verb in (["record", "--output", self.output("c.csv")], ["monitor"]):
+            self.assertIn("note: at --rate 0.5 a reading comes every 2 s, so --for 0.6 ends after the first",
+                          absenc(*verb, "sim:tformat", "--rate", "0.5", "--for", "0.6").stderr)
 
     def test_parts_by_size(self):
         result = absenc("record", "sim:tformat?motion=rpm=60", "--output", self.output(), "--rate", "0", "--count", "300",
@@ -157,7 +167,122 @@ class Files(RecordCase):
         self.assert_rising(times(together))
 
 
+class Gaps(RecordCase):
+    """Readings that were due and were not taken."""
+
+    def record_and_stop(self, name, stopped, *arguments):
+        """Its message at the end; meanwhile it was stopped for so many seconds."""
+        path = self.output(name)
+        process = self.start("record", "sim:tformat", "--output", path, "--rate", "200", "--for", "3", *arguments)
+        wait_until(lambda: os.path.exists(path) and os.path.getsize(path) > 3000, "readings")
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(stopped)
+        process.send_signal(signal.SIGCONT)
+        status, _, messages = process.wait(PATIENCE), *process.communicate(timeout=PATIENCE)
+        self.assertEqual(status, 0, messages)
+        return messages.decode()
+
+    def test_stopped(self):
+        message = self.record_and_stop("log.csv", 1)
+        _, rows = read_csv(self.output())
+        self.assert_rising(times(rows))
+        gaps = [row for row in rows if row["event"] == "gap"]
+        missed = [int(row["missed"]) for row in gaps]
+        self.assertGreaterEqual(max(missed), 150)
+        readings = [row for row in rows if row["event"] == ""]
+        self.assertTrue(all(row["missed"] == "" for row in readings))
+        self.assertEqual(len(readings) + sum(missed), 600)
+        self.assertIn(f"{len(readings)} readings and 0 failures", message)
+        self.assertIn(f"{sum(missed)} readings that were due were not taken, in {len(gaps)} gap", message)
+        before = rows.index(gaps[missed.index(max(missed))]) - 1
+        self.assertGreaterEqual(times(rows)[before + 2] - times(rows)[before], 0.9)
+
+    def test_stopped_until_behind_the_end(self):
+        message = self.record_and_stop("log.jsonl", 3.2)
+        _, rows = read_json_lines(self.output("log.jsonl"))
+        missed = sum(row["missed"] for row in rows if row.get("event") == "gap")
+        self.assertEqual(sum(row["ok"] for row in rows) + missed, 600)
+        self.assertIn(f"{missed} readings that were due were not taken", message)
+        self.assertEqual(rows[-1]["event"], "gap")
+
+    def test_stopped_and_then_ended(self):
+        path = self.output()
+        process = self.start("record", "sim:tformat", "--output", path, "--rate", "200")
+        wait_until(lambda: len(rows_so_far(path)) > 20, "readings")
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGTERM)
+        messages = end(process, signal.SIGCONT)[2]
+        rows = read_csv(path)[1]
+        self.assertEqual(rows[-1]["event"], "gap", messages)
+        self.assertGreaterEqual(int(rows[-1]["missed"]), 80)
+        self.assertIn("readings that were due were not taken", messages)
+
+    def test_a_line_too_slow_for_the_rate(self):
+        address = self.encoder("--fault", "silence=1", latency=25)
+        result = absenc("record", address, "--output", self.output(), "--rate", "100", "--for", "1")
+        self.assertEqual(result.returncode, 1)
+        _, rows = read_csv(self.output())
+        failed = [row for row in rows if row["event"] == "timeout"]
+        missed = sum(int(row["missed"]) for row in rows if row["event"] == "gap")
+        self.assertGreater(missed, len(failed))
+        self.assertIn(f"0 readings and {len(failed)} failures", result.stderr)
+        self.assertIn(f"{missed} readings that were due were not taken", result.stderr)
+
+
 class Trouble(RecordCase):
+    def lose(self, change, *words):
+        """Records, does something to the file, and expects an error at once."""
+        path = self.output(f"{len(os.listdir(self.directory))}.csv")
+        process = self.start("record", "sim:tformat", "--output", path, "--every", "1000", "--rate", "100")
+        wait_until(lambda: len(rows_so_far(path)) > 0, "readings")
+        change(path)
+        self.assertEqual(process.wait(PATIENCE), 1)
+        messages = process.communicate()[1].decode()
+        self.assert_sentence(messages, path, *words)
+        self.assertNotIn("are in", messages)
+        self.assertNotIn("is whole", messages)
+
+    def test_removed(self):
+        self.lose(os.remove, "was removed")
+
+    def test_replaced(self):
+        def replace(path):
+            other = self.file("other", "precious\n")
+            os.rename(other, path)
+            self.addCleanup(lambda: self.assertEqual(open(path, encoding="utf-8").read(), "precious\n"))
+
+        self.lose(replace, "was replaced by another")
+
+    def test_moved_away(self):
+        self.lose(lambda path: os.rename(path, path + ".1"), "was moved away")
+
+    def test_cut(self):
+        self.lose(lambda path: os.truncate(path, 10), "was cut by another program")
+
+    def test_the_log_of_frames_is_removed(self):
+        log = self.output("bus.log")
+        process = self.start("record", f"sim:raa38-can?log={log}", "--output", self.output())
+        wait_until(lambda: len(rows_so_far(self.output())) > 3, "readings")
+        os.remove(log)
+        self.assertEqual(process.wait(PATIENCE), 1)
+        self.assert_sentence(process.communicate()[1].decode(), log, "was removed", "what is written so far is whole")
+
+    def test_the_tally_is_that_of_the_file(self):
+        with Emulator(self.directory) as first:
+            process = self.start("record", f"tformat:{first.path}?latency=300", "--output", self.output())
+            wait_until(lambda: len(rows_so_far(self.output())) > 5, "readings")
+            first.end(signal.SIGKILL)
+            wait_until(lambda: read_csv(self.output())[1][-1]["event"] == "lost", "the loss in the file")
+        messages = end(process, signal.SIGINT)[2]
+        events = [row["event"] for row in read_csv(self.output())[1]]
+        readings = events.count("")
+        self.assertIn(f"{readings} readings and 0 failures", messages)
+        self.assertIn("the port went away: 1", messages)
+        good = int(re.search(r"exchanges: (\d+) good", messages)[1])
+        beside = re.search(r"; (\d+) of the good ones confirmed a position", messages)
+        self.assertEqual(good, readings + (int(beside[1]) if beside else 0))
+
     def test_no_file_is_overwritten(self):
         with open(self.output(), "w", encoding="utf-8") as file:
             file.write("precious")
@@ -277,7 +402,8 @@ class Trouble(RecordCase):
                 wait_until(lambda p=path: len(rows_so_far(p)) > 2, "readings")
                 status, _, messages = end(process, number)
                 self.assertEqual(status, 0)
-                self.assertIn(f"{len(read_csv(path)[1])} readings", messages)
+                readings = [row for row in read_csv(path)[1] if row["event"] == ""]
+                self.assertIn(f"{len(readings)} readings", messages)
 
     def test_progress_is_for_terminals(self):
         terminal, ours = pty.openpty()

@@ -2,9 +2,10 @@
 #include "absenc/capture/hex_line.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <string>
+
+#include "absenc/capture/log_line.hpp"
 
 namespace absenc::capture {
 
@@ -23,7 +24,7 @@ std::optional<Number> whole(std::string_view text, int base) {
 }
 
 // A group of digits, after its prefix.
-bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes) {
+bool append_digits(std::string_view group, std::vector<std::uint8_t>& bytes) {
   bool prefixed = true;
   if (group.starts_with("0x") || group.starts_with("0X") || group.starts_with("\\x")) {
     group.remove_prefix(2);
@@ -55,74 +56,6 @@ bool append_groups(std::string_view text, std::vector<std::uint8_t>& bytes) {
     if (!append_group(group, bytes)) return false;
     text.remove_prefix(group.size());
   }
-}
-
-std::string_view unwrap(std::string_view word) {
-  if (word.ends_with(':')) word.remove_suffix(1);
-  const bool brackets = word.starts_with('[') && word.ends_with(']');
-  const bool parentheses = word.starts_with('(') && word.ends_with(')');
-  return brackets || parentheses ? word.substr(1, word.size() - 2) : word;
-}
-
-int direction(std::string_view word) {
-  constexpr std::array<std::array<std::string_view, 7>, 2> words = {
-      {{"tx", "out", "host", ">", ">>", "->", "-->"}, {"rx", "in", "device", "<", "<<", "<-", "<--"}}};
-  std::string lower(unwrap(word).substr(0, 8));
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (std::find(words[i].begin(), words[i].end(), lower) != words[i].end()) return static_cast<int>(i);
-  }
-  return -1;
-}
-
-// "12.000250", "250us", "17:55:24.123", "2026-11-21T17:55:24Z".
-std::optional<Instant> parse_time(std::string_view word) {
-  word = unwrap(word);
-  if (word.find(':') != std::string_view::npos) return parse_clock(word);
-  struct Unit {
-    std::string_view suffix;
-    std::string_view power;
-  };
-  constexpr std::array<Unit, 4> units = {{{"ms", "e-3"}, {"us", "e-6"}, {"ns", "e-9"}, {"s", ""}}};
-  for (const Unit& unit : units) {
-    if (!word.ends_with(unit.suffix) || word.size() > 40) continue;
-    std::string number(word.substr(0, word.size() - unit.suffix.size()));
-    return parse_seconds(number + std::string(unit.power));
-  }
-  return word.find('.') == std::string_view::npos ? std::nullopt : parse_seconds(word);
-}
-
-// A clock may be of two words: "2026-11-21 17:55:24".
-std::optional<Instant> take_time(std::string_view& text) {
-  std::string_view rest = text;
-  std::string_view word = take_word(rest);
-  if (word.starts_with('[') && word.find(']') == std::string_view::npos) {
-    const std::size_t close = rest.find(']');
-    if (close == std::string_view::npos) return std::nullopt;
-    word = std::string_view(word.data(), static_cast<std::size_t>(rest.data() + close + 1 - word.data()));
-    rest.remove_prefix(close + 1);
-    std::string_view inner = trim(word.substr(1, word.size() - 2));  // "[   12.345]"
-    if (const auto at = parse_time(inner)) {
-      text = rest;
-      return at;
-    }
-  }
-  std::optional<Instant> at = parse_time(word);
-  if (!at && word.size() == 10 && word[4] == '-') {
-    const std::string_view second = take_word(rest);
-    at = parse_clock(std::string(word) + " " + std::string(unwrap(second)));
-  }
-  if (at) text = rest;
-  return at;
-}
-
-bool parse_plain(std::string_view line, HexLine& parsed) {
-  parsed.at = take_time(line);
-  std::string_view rest = line;
-  parsed.channel = direction(take_word(rest));
-  if (parsed.channel >= 0) line = rest;
-  return append_groups(line, parsed.bytes);
 }
 
 // "00000010  48 65 6c  |Hel|"
@@ -190,6 +123,13 @@ bool is_offset(std::string_view word, std::string_view line) {
 
 }  // namespace
 
+bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes) {
+  const std::size_t before = bytes.size();
+  if (append_digits(group, bytes)) return true;
+  bytes.resize(before);
+  return false;
+}
+
 std::string_view strip_comment(std::string_view line) {
   const std::size_t hash = line.find('#');
   const std::size_t slashes = line.find("//");
@@ -220,10 +160,11 @@ bool parse_hex_line(HexForm form, std::string_view line, HexLine& parsed) {
   parsed.channel = -1;
   parsed.offset.reset();
   parsed.bytes.clear();
-  parsed.trouble = nullptr;
+  parsed.source.clear();
+  parsed.trouble.clear();
   switch (form) {
     case HexForm::plain:
-      return parse_plain(line, parsed);
+      return parse_log_line(line, parsed);
     case HexForm::dump:
       return parse_dump(line, parsed);
     case HexForm::xxd:

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -21,8 +22,12 @@ struct HexLine {
   int channel = -1;  // 0: tx, 1: rx, -1: not told
   std::optional<std::uint64_t> offset;
   std::vector<std::uint8_t> bytes;
-  const char* trouble = nullptr;  // what is wrong with it
+  std::string source;   // the port or whatever a terminal calls it; "": not told
+  std::string trouble;  // what is wrong with it
 };
+
+/// Two digits, or more of them with a prefix: 1A, 1A00, 0x1A, \x1A, $1A. False: `bytes` is as before.
+bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes);
 
 /// The line without its comment and without blanks around it.
 [[nodiscard]] std::string_view strip_comment(std::string_view line);

@@ -50,6 +50,7 @@ class HexTextReader final : public ParsedReader {
     if (clock_ == Clock::samples) layout_.ticks_per_second = samples_per_second;
     if (line_.at) origin_ = *line_.at;
     told_ = line_.channel >= 0;
+    told_source_ = line_.source;
     if (told_) layout_.channels = {"tx", "rx"};
   }
 
@@ -70,7 +71,7 @@ class HexTextReader final : public ParsedReader {
  private:
   enum class Clock : std::uint8_t { none, times, samples };
 
-  bool fail(const char* what) {
+  bool fail(const std::string& what) {
     damages_.add({.offset = lines_.offset(), .tick = at_, .what = what});
     return false;
   }
@@ -81,7 +82,7 @@ class HexTextReader final : public ParsedReader {
     line = content_of(line, form_);
     if (line.empty()) return true;
     if (!parse_hex_line(form_, line, line_)) {
-      return fail(line_.trouble != nullptr
+      return fail(!line_.trouble.empty()
                       ? line_.trouble
                       : "this line does not hold bytes in the form of the first: is the file cut here?");
     }
@@ -109,6 +110,10 @@ class HexTextReader final : public ParsedReader {
         clock_ == Clock::times ? line_.at.has_value() : line_.begin.has_value() == (clock_ == Clock::samples);
     if (!timed || (clock_ != Clock::times && line_.at)) return fail("some lines have a time and some have none");
     if (told_ != (line_.channel >= 0)) return fail("some lines have a direction and some have none");
+    if (line_.source != told_source_) {
+      return fail("this line is of \"" + line_.source + "\", the first of \"" + told_source_ +
+                  "\": keep those of one, as with grep");
+    }
     Tick begin = at_;
     if (clock_ == Clock::times) {
       const auto ticks = ticks_between(origin_, *line_.at, nanosecond);
@@ -134,6 +139,7 @@ class HexTextReader final : public ParsedReader {
   HexForm form_ = HexForm::plain;
   Clock clock_ = Clock::none;
   bool told_ = false;
+  std::string told_source_;
   bool jumped_ = false;
   bool done_ = false;
   Instant origin_;
@@ -145,6 +151,17 @@ class HexTextReader final : public ParsedReader {
 };
 
 }  // namespace
+
+std::string hex_text_trouble(std::string_view head) {
+  for (std::size_t lines = 0; !head.empty() && lines < 100; ++lines) {
+    const std::string_view whole = head.substr(0, head.find('\n'));
+    const std::string_view line = strip_comment(whole);
+    HexLine parsed;
+    if (!line.empty()) return parse_hex_line(HexForm::plain, line, parsed) ? "" : parsed.trouble;
+    head.remove_prefix(std::min(whole.size() + 1, head.size()));
+  }
+  return "";
+}
 
 bool is_hex_text(std::string_view head) {
   while (!head.empty()) {

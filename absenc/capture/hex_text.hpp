@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <string_view>
 
 #include "absenc/capture/signal.hpp"
@@ -14,14 +15,15 @@ namespace absenc::capture {
 /// True when the first line that is not empty and no comment is one that `read_hex_text` reads.
 [[nodiscard]] bool is_hex_text(std::string_view head);
 
+/// What stands in the way in the first line that counts; "" when nothing does.
+[[nodiscard]] std::string hex_text_trouble(std::string_view head);
+
 /// Reads lines of one of these forms; the first line decides which. Empty lines, and what stands behind `#` or `//`, do
 /// not count. HEX is any number of bytes: pairs of digits, together or apart by blanks, commas or semicolons, each
 /// group perhaps with `0x`, `\x` or `$` before it; `0x` alone also before a single digit.
 ///
-/// - `[TIME] [DIRECTION] HEX`. TIME: seconds with a point (`12.000250`), a number with a unit (`250us`; s, ms, us, ns),
-///   or a clock (`17:55:24.123`, ISO 8601), also in `[]` or `()`, or with a colon behind. DIRECTION: `tx`, `out`,
-///   `host`, `>`, `>>`, `->`, `-->` and `rx`, `in`, `device`, `<`, `<<`, `<-`, `<--`, in any case, also in `[]`, or
-///   with a colon behind.
+/// - what people type and terminal programs log, log_line.hpp: a time, a port and a direction in any order, the bytes,
+///   and their text. All lines are of one port.
 /// - dumps of `hexdump -C`, `od -A x -t x1` and `xxd`: an offset, bytes (of xxd also in groups), then text. That
 /// offsets
 ///   jump is noted once. A `*` for repeated lines is a damage: write the dump with -v.

@@ -88,6 +88,92 @@ TEST(HexText, TimesAndDirections) {
   EXPECT_EQ(values("> 1A\n< 1A 00"), (Bytes{0x1A, 0x1A, 0x00}));
 }
 
+TEST(HexText, LogsOfTerminals) {
+  const Bytes expected = {0x1A, 0x00, 0x35};
+  for (const char* line : {
+           "COM3: 1A 00 35",
+           "[COM3] 1A 00 35",
+           "COM3 1A,00,35",
+           "COM3> 1A 00 35",
+           "17:55:24.123 COM3 RX 1A 00 35",
+           "17:55:24,123 [COM3] <- 0x1A 0x00 0x35",
+           "17:55:24:123 COM3: << 1A0035",
+           "[17:55:24.123] [COM3] [RX] 1A 00 35",
+           "[17:55:24.123 COM3 RX] 1A 00 35",
+           "[2026-11-21 17:55:24.123] COM3 Rx: 1a 00 35   ..5",
+           "21.11.2026 17:55:24.123 COM3 [RX] - 1A 00 35",
+           "11/21/2026 5:55:24 PM COM3 Received 1A 00 35",
+           "2026/11/21 17:55:24 (COM3) read 3 bytes: 1A 00 35",
+           "17:55:24.123;COM3;RX;1A 00 35;",
+           "17:55:24,COM3,RX,1A,00,35",
+           "17:55:24,1A,00,35",
+           "17:55:24.123 | COM3 | RX | 1A 00 35 | ..5 |",
+           "2026-11-21T17:55:24.123Z COM3 RX len=3 1A-00-35",
+           "COM3 RX [3] 1A:00:35",
+           "12: COM3 RX 1A 00 35 |..5|",
+           "12 17:55:24.123 COM3 RX 1A 00 35",
+           "/dev/ttyUSB0 rx 1A 00 35  \"..5\"",
+           "RX1: 1A 00 35\t\xC2\xB7\xC2\xB7"
+           "5",
+           "17:55:24.123 DEBUG: COM3 > 1A 00 35 // a comment",
+           "0.000123 COM3 < 1A 00 35",
+       }) {
+    EXPECT_EQ(values(line), expected) << line;
+  }
+  EXPECT_EQ(values("COM3: 20 3D 20   = "), (Bytes{0x20, 0x3D, 0x20}));
+  EXPECT_EQ(values("COM3: 1A 23 35  .#5"), (Bytes{0x1A, 0x23, 0x35}));
+}
+
+TEST(HexText, TimesOfTerminals) {
+  for (const char* text :
+       {"17:55:24,100 COM3 RX 1A\n17:55:25,350 COM3 RX 35\n", "5:59:59.750 AM: 1A\n6:00:01 AM: 35\n",
+        "11:59:59.750 PM rx 1A\n11:60:01 PM rx 35\n", "11/21/2026 11:59:59.750 PM 1A\n11/22/2026 12:00:01 AM 35\n",
+        "[21.11.2026 23:59:59:750] 1A\n[22.11.2026 00:00:01] 35\n"}) {
+    const auto reader = open_text(text);
+    const Contents contents = read_all(*reader);
+    if (std::string_view(text).find("11:60") != std::string_view::npos) {
+      EXPECT_EQ(reader->damages().size(), 1u) << text;
+      continue;
+    }
+    EXPECT_TRUE(reader->damages().empty()) << text;
+    ASSERT_EQ(contents.bytes.size(), 2u) << text;
+    EXPECT_EQ(contents.bytes[1].begin, 1'250'000'000u) << text;
+  }
+}
+
+TEST(HexText, LogsThatMayMeanTwoThings) {
+  const auto why = [](const char* text) -> std::string {
+    try {
+      const auto reader = open_text(text);
+      static_cast<void>(read_all(*reader));
+      return reader->damages().empty() ? "" : reader->damages()[0].what;
+    } catch (const OpenError& error) {
+      return error.what();
+    }
+  };
+  struct Ambiguous {
+    const char* text;
+    const char* word;
+  };
+  for (const Ambiguous& one : {Ambiguous{"12:00:35", "may be a time or bytes"},
+                               {"31 32  12", "may be bytes, or the text"},
+                               {"31 32\t12", "may be bytes, or the text"},
+                               {"RX <- 1A\nRX -> 1A\n", "two directions"},
+                               {"[1A 00] 35", "in brackets"},
+                               {"[COM3 1A 00 35", "nothing closes"},
+                               {"COM3 hello 1A 00", "\"hello\" before the bytes"},
+                               {"COM3 opened at 115200 8N1", "\"opened\" before the bytes"},
+                               {"COM3: 1A 00  zz", "neither bytes nor the text"},
+                               {"COM3: 1A 00  ...", "neither bytes nor the text"},
+                               {"COM3: 1A 00\nCOM4: 35\n", "of \"COM4\", the first of \"COM3\""},
+                               {"COM3: 1A 00\n35\n", "of \"\""},
+                               {"35 34 4", "neither bytes"},
+                               {"35 34  4", "neither bytes"},
+                               {"COM3: 1A 0\n", "neither bytes"}}) {
+    EXPECT_NE(why(one.text).find(one.word), std::string::npos) << one.text << ": " << why(one.text);
+  }
+}
+
 TEST(HexText, SigroksDecoder) {
   EXPECT_EQ(values("uart-1: 1A\nuart-1: 35\n"), (Bytes{0x1A, 0x35}));
   const auto reader = open_text(

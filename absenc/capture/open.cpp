@@ -30,6 +30,15 @@ bool is_candump(std::string_view head) {
   return parse_candump(head.substr(first, head.find('\n', first) - first), line);
 }
 
+// Its first line, at least.
+bool is_text(std::string_view head) {
+  const std::string_view line = head.substr(0, head.find_first_of("\r\n"));
+  return std::all_of(line.begin(), line.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return c == '\t' || (byte >= ' ' && byte < 0x7F);
+  });
+}
+
 // What names its channels by itself; nullptr: none of them.
 std::unique_ptr<Reader> open_logic(std::unique_ptr<Source>& source, std::string_view head, std::string_view name,
                                    const OpenChoices& choices) {
@@ -92,6 +101,11 @@ std::unique_ptr<Reader> open_capture(std::unique_ptr<Source> source, std::string
   if (choices.channels != 0) return read_raw(std::move(source), name, choices.channels, choices.samples_per_second);
   if (is_candump(head)) return read_candump(std::move(source), name);
   if (is_hex_text(head)) return read_hex_text(std::move(source), name, choices.samples_per_second);
+  if (is_text(head)) {
+    if (const std::string trouble = hex_text_trouble(head); !trouble.empty()) {
+      throw OpenError(std::string(name) + " is no capture that is known, and no bytes as text, because " + trouble);
+    }
+  }
   throw OpenError(
       std::string(name) +
       " is no capture that is known: neither a session of sigrok, VCD, CSV or binary export of Saleae Logic 2, "

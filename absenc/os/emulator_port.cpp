@@ -7,11 +7,14 @@
 #include <sys/inotify.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <termios.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <utility>
@@ -32,6 +35,25 @@ constexpr std::size_t most_clients = 32;
 
 void check(bool good, const std::string& what) {
   if (!good) throw system_failure(what, errno);
+}
+
+// A socket whose name in the kernel is that of the link: it lives as long as the process that bound it, so that the
+// link of an emulator that was killed is told from one in use, whoever has got the number of its terminal since.
+Descriptor bind_name_of(const fs::path& link) {
+  struct stat folder {};
+  Descriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  const fs::path parent = link.has_parent_path() ? link.parent_path() : fs::path(".");
+  if (!socket || ::stat(parent.c_str(), &folder) < 0) return {};
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::string name = "absenc " + std::to_string(folder.st_dev) + " " + std::to_string(folder.st_ino) + " ";
+  const std::string file = link.filename();
+  const std::size_t room = sizeof address.sun_path - 1 - name.size();
+  name += file.substr(file.size() - std::min(file.size(), room));
+  std::copy(name.begin(), name.end(), address.sun_path + 1);  // behind a zero: no file
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  if (::bind(socket.get(), reinterpret_cast<sockaddr*>(&address), size) < 0) return {};
+  return socket;
 }
 
 }  // namespace
@@ -91,13 +113,20 @@ void EmulatorPort::listen_on(std::uint16_t port) {
   tcp_port_ = ntohs(address.sin_port);
 }
 
-void EmulatorPort::make_link() const {
+void EmulatorPort::make_link() {
   std::error_code error;
+  errno = 0;
+  name_ = bind_name_of(link_);
+  const bool served = !name_ && errno == EADDRINUSE;
   if (const auto there = fs::symlink_status(link_, error); fs::exists(there)) {
-    const bool ours = fs::is_symlink(there) && fs::read_symlink(link_, error).native().starts_with("/dev/pts/");
-    if (!ours) {
+    const std::string target = fs::is_symlink(there) ? fs::read_symlink(link_, error).native() : "";
+    if (!target.starts_with("/dev/pts/")) {
       throw Failure(Failure::Kind::in_use,
                     link_ + " exists and is no link to a pseudo-terminal: remove it, or choose another path");
+    }
+    if (served && fs::exists(target)) {
+      throw Failure(Failure::Kind::in_use, link_ + " is in use by a virtual encoder that is running, at " + target +
+                                               ": end it, or choose another path");
     }
     fs::remove(link_, error);
   }

@@ -21,8 +21,8 @@ namespace absenc::os {
 class EmulatorPort final : public StreamPort {
  public:
   /// `link`: path of a symbolic link to the pseudo-terminal, removed at the end; empty: none. It replaces a link to a
-  /// pseudo-terminal and nothing else. `tcp_port`: listens there on 127.0.0.1; 0: on a free one.
-  /// Throws Failure: `in_use` for either, `system`.
+  /// pseudo-terminal that no other EmulatorPort has, and nothing else. `tcp_port`: listens there on 127.0.0.1; 0: on a
+  /// free one. Throws Failure: `in_use` for either, `system`.
   explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
   ~EmulatorPort() override;
 
@@ -41,7 +41,7 @@ class EmulatorPort final : public StreamPort {
 
   void open_terminal();
   void listen_on(std::uint16_t port);
-  void make_link() const;
+  void make_link();
   void users_changed();
   [[nodiscard]] bool understands_terminal() const;
   void accept_client();
@@ -50,6 +50,7 @@ class EmulatorPort final : public StreamPort {
 
   Descriptor master_;
   Descriptor slave_;  // kept open: without it the master fails whenever no program has the slave open
+  Descriptor name_;   // says to others that the link is served
   Descriptor watch_;  // inotify: programs that open or close the slave
   Descriptor listener_;
   std::vector<Descriptor> clients_;

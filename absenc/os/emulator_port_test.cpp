@@ -6,6 +6,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <array>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 
@@ -206,6 +208,38 @@ TEST(EmulatorPort, LinksToItself) {
     EXPECT_EQ(receive(device), request);
   }
   EXPECT_FALSE(fs::exists(fs::symlink_status(link)));
+}
+
+TEST(EmulatorPort, IsNotReplacedWhileItLives) {
+  const TemporaryDirectory directory;
+  const fs::path link = directory.path() / "encoder";
+  std::string terminal;
+  {
+    const EmulatorPort first(link);
+    terminal = fs::read_symlink(link);
+    try {
+      const EmulatorPort second(link);
+      FAIL();
+    } catch (const Failure& failure) {
+      EXPECT_EQ(failure.kind(), Failure::Kind::in_use);
+      EXPECT_NE(std::string(failure.what()).find("running"), std::string::npos);
+    }
+    EXPECT_EQ(fs::read_symlink(link), terminal);
+  }
+  // A program that is no emulator has got the number of one that was killed.
+  const Descriptor other(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
+  std::array<char, 64> name{};
+  ASSERT_EQ(::grantpt(other.get()), 0);
+  ASSERT_EQ(::unlockpt(other.get()), 0);
+  ASSERT_EQ(::ptsname_r(other.get(), name.data(), name.size()), 0);
+  fs::create_symlink(name.data(), link);
+  const EmulatorPort third(link);
+  EXPECT_NE(fs::read_symlink(link), name.data());
+  // So has an emulator on another link.
+  const fs::path stale = directory.path() / "stale";
+  fs::create_symlink(fs::read_symlink(link), stale);
+  const EmulatorPort fourth(stale);
+  EXPECT_NE(fs::read_symlink(stale), fs::read_symlink(link));
 }
 
 TEST(EmulatorPort, ReplacesNothingButLinksToPseudoTerminals) {

@@ -2,6 +2,7 @@
 #include "absenc/os/line_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -40,7 +41,25 @@ LineFile::LineFile(const std::string& path)
   throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
 }
 
+void LineFile::require_there() const {
+  struct stat ours {};
+  struct stat there {};
+  if (::fstat(file_.get(), &ours) < 0) throw system_failure("looking at " + path_, errno);
+  const bool found = ::stat(path_.c_str(), &there) == 0;
+  if (!found && errno != ENOENT && errno != ENOTDIR) throw system_failure("looking at " + path_, errno);
+  const bool same = found && there.st_dev == ours.st_dev && there.st_ino == ours.st_ino;
+  const auto lose = [this](const std::string& what) {
+    throw Failure(Failure::Kind::lost, "the file " + path_ + " was " + what);
+  };
+  if (ours.st_nlink == 0) {
+    lose(std::string(found ? "replaced by another" : "removed") + " while it was written: what was in it is gone");
+  }
+  if (!same) lose("moved away while it was written: it goes no further than that");
+  if (static_cast<std::uint64_t>(ours.st_size) < size_) lose("cut by another program while it was written");
+}
+
 void LineFile::append(std::string_view lines) {
+  require_there();
   std::string_view rest = lines;
   while (!rest.empty()) {
     const ssize_t written = ::write(file_.get(), rest.data(), rest.size());
@@ -56,6 +75,7 @@ void LineFile::append(std::string_view lines) {
 }
 
 void LineFile::sync() {
+  require_there();
   // What cannot be synchronised, a pipe or /dev/null, needs not be.
   if (::fsync(file_.get()) < 0 && errno != EINVAL && errno != EROFS) throw system_failure("writing " + path_, errno);
 }

@@ -16,10 +16,13 @@ class LineFile {
   explicit LineFile(const std::string& path);
 
   /// Hands `lines` to the system at once, so that they survive the end of this process (not of the power: `sync`).
-  /// When they do not all fit, none of them stays. Throws Failure.
+  /// When they do not all fit, none of them stays. Throws Failure, as `require_there` too.
   void append(std::string_view lines);
-  /// Waits for the disk. Throws Failure.
+  /// Waits for the disk. Throws as `append`.
   void sync();
+  /// Throws Failure, `lost`, when the file is no longer what its path leads to, or was cut: what is written then is
+  /// nowhere to be found.
+  void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::uint64_t size() const { return size_; }

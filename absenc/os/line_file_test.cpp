@@ -79,5 +79,37 @@ TEST(LineFile, TakesBackWhatDoesNotFit) {
   EXPECT_EQ(content(file.path()), "whole line\nagain\n");
 }
 
+TEST(LineFile, IsLostWhenItsPathLeadsElsewhere) {
+  const Directory directory;
+  const auto sentence = [&](const std::string& name, auto&& change) -> std::string {
+    LineFile file(directory.path / name);
+    file.append("one\n");
+    file.require_there();
+    change(directory.path / name);
+    EXPECT_THROW(file.require_there(), Failure);
+    EXPECT_THROW(file.sync(), Failure);
+    try {
+      file.append("two\n");
+    } catch (const Failure& failure) {
+      EXPECT_EQ(failure.kind(), Failure::Kind::lost);
+      return failure.what();
+    }
+    return "";
+  };
+  EXPECT_NE(sentence("a", [](const fs::path& path) { fs::remove(path); }).find("was removed"), std::string::npos);
+  EXPECT_NE(sentence("b",
+                     [](const fs::path& path) {
+                       std::ofstream(path.string() + ".new") << "other\n";
+                       fs::rename(path.string() + ".new", path);
+                     })
+                .find("replaced"),
+            std::string::npos);
+  EXPECT_EQ(content(directory.path / "b"), "other\n");
+  EXPECT_NE(sentence("c", [](const fs::path& path) { fs::rename(path, path.string() + ".1"); }).find("moved away"),
+            std::string::npos);
+  EXPECT_EQ(content(directory.path / "c.1"), "one\n");
+  EXPECT_NE(sentence("d", [](const fs::path& path) { fs::resize_file(path, 0); }).find("cut"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace absenc::os

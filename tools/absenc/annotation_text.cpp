@@ -68,6 +68,11 @@ std::string TickClock::text(capture::Tick tick) const {
   return has_time() ? fmt::format("{:.{}f}", seconds(tick), digits_) : fmt::format("{}", tick);
 }
 
+std::string to_text(const capture::Damage& damage, const TickClock& clock) {
+  return fmt::format("{}byte {}, {} {}: {}", damage.note ? "note: " : "the capture is damaged at ", damage.offset,
+                     clock.has_time() ? "second" : "tick", clock.text(damage.tick), damage.what);
+}
+
 std::string_view name_of(Kind kind) {
   static constexpr std::array<std::string_view, 4> names{"exchange", "request", "reply", "noise"};
   return names[static_cast<std::size_t>(kind)];

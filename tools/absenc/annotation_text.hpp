@@ -28,6 +28,9 @@ class TickClock {
   int digits_ = 0;
 };
 
+/// "the capture is damaged at byte 600, second 0.005: the file is cut off", or "note: byte 600, ..."
+[[nodiscard]] std::string to_text(const capture::Damage& damage, const TickClock& clock);
+
 /// "exchange"
 [[nodiscard]] std::string_view name_of(capture::Annotation::Kind kind);
 

@@ -6,6 +6,9 @@
 
 #include <chrono>
 
+#include "absenc/os/error.hpp"
+#include "tools/absenc/error.hpp"
+
 namespace absenc::tool {
 
 std::string candump_line(Time since_1970, const std::string& interface, const CanFrame& frame) {
@@ -28,11 +31,20 @@ void CanLog::begin(const Step<CanFrame>& step) {
   port_->begin(step);
 }
 
+// What os::Failure would say is that the port is lost, which is waited for.
+void CanLog::write(const std::string& line) {
+  try {
+    file_->append(line);
+  } catch (const os::Failure& failure) {
+    throw ToolFailure(failure.what());
+  }
+}
+
 Event<CanFrame> CanLog::wait(const Step<CanFrame>& step) {
   const Event<CanFrame> event = port_->wait(step);
   const bool sent = event.kind == Event<CanFrame>::Kind::sent;
   const std::span<const CanFrame> frames = sent ? std::span<const CanFrame>(sending_) : event.items;
-  for (const CanFrame& frame : frames) file_->append(candump_line(event.at + offset_, interface_, frame));
+  for (const CanFrame& frame : frames) write(candump_line(event.at + offset_, interface_, frame));
   if (sent) sending_.clear();
   return event;
 }

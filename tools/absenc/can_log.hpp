@@ -16,7 +16,7 @@ namespace absenc::tool {
 
 class CanLog final : public Port<CanFrame> {
  public:
-  /// `owner` keeps `port`. `begin` and `wait` throw os::Failure when the file cannot be written.
+  /// `owner` keeps `port`. `wait` throws ToolFailure when the file cannot be written, or is no longer there.
   CanLog(Port<CanFrame>& port, std::shared_ptr<void> owner, std::shared_ptr<os::LineFile> file, std::string interface);
 
   Time now() override { return port_->now(); }
@@ -24,6 +24,8 @@ class CanLog final : public Port<CanFrame> {
   Event<CanFrame> wait(const Step<CanFrame>& step) override;
 
  private:
+  void write(const std::string& line);
+
   Port<CanFrame>* port_;
   std::shared_ptr<void> owner_;
   std::shared_ptr<os::LineFile> file_;

@@ -15,6 +15,7 @@
 #include "absenc/capture/can_line.hpp"
 #include "absenc/capture/open.hpp"
 #include "absenc/capture/pipeline.hpp"
+#include "tools/absenc/annotation_text.hpp"
 #include "tools/absenc/capture_channels.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/stdin_source.hpp"
@@ -90,6 +91,14 @@ void require_link(const Unit& unit, Content content) {
   if (content == Content::bytes && !uart) refuse(unit, "bytes", "record the levels of its wires, or CAN frames");
 }
 
+// A damage is the reason, whatever the little that precedes it lacks.
+std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
+  for (const capture::Damage& damage : outcome.damages) {
+    if (!damage.note) return to_text(damage, clock);
+  }
+  return outcome.problem;
+}
+
 // Reads blocks that need no decoding.
 template <class Take>
 void read_all(capture::Reader& reader, Take&& take) {
@@ -138,6 +147,7 @@ CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::functio
                            : unit_.link == LinkKind::can ? run_bus(sink, progress)
                                                          : run_characters(sink, progress);
   outcome.damages = reader_->damages();
+  if (!outcome.problem.empty()) throw ToolFailure(why_nothing(outcome, TickClock(ticks_per_second())));
   return outcome;
 }
 
@@ -215,9 +225,7 @@ double CaptureRun::likely_baud(const Lines& lines) const {
 
 CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const Lines lines = find_lines();
-  CaptureOutcome outcome = decode_lines(*reader_, lines, likely_baud(lines), SIZE_MAX, sink, progress);
-  if (!outcome.problem.empty()) throw ToolFailure(outcome.problem);
-  return outcome;
+  return decode_lines(*reader_, lines, likely_baud(lines), SIZE_MAX, sink, progress);
 }
 
 CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
@@ -240,7 +248,7 @@ CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::
   };
   const capture::ClockedOutcome decoded = capture::decode_clocked(*reader_, line, threads(), take);
   guard.rethrow();
-  if (!decoded.problem.empty()) throw ToolFailure(decoded.problem);
+  outcome.problem = decoded.problem;
   return outcome;
 }
 
@@ -291,7 +299,8 @@ CaptureOutcome CaptureRun::run_bus(capture::AnnotationSink& sink, const std::fun
     frames.clear();
   };
   capture::LevelReader reader(*reader_, {*wires.wires[0]});
-  if (const std::string problem = reader.problem(); !problem.empty()) throw ToolFailure(problem);
+  outcome.problem = reader.problem();
+  if (!outcome.problem.empty()) return outcome;
   capture::Block block;
   capture::Levels levels;
   while (reader.claim(block)) {

@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <iostream>
+#include <string>
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -11,6 +14,17 @@
 #include "tools/absenc/output.hpp"
 
 namespace absenc::tool {
+
+namespace {
+
+bool is_yes(std::string_view answer) {
+  std::string word(answer.substr(std::min(answer.find_first_not_of(" \t"), answer.size())));
+  word.erase(word.find_last_not_of(" \t\r") + 1);
+  std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::tolower(c); });
+  return word == "y" || word == "yes";
+}
+
+}  // namespace
 
 bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_view what, std::string_view meaning) {
   // The virtual encoder of sim: is gone afterwards anyway.
@@ -32,7 +46,7 @@ bool confirmed(const EncoderUri& uri, std::string_view meaning) {
   }
   std::string answer;
   std::getline(std::cin, answer);
-  return answer == "y" || answer == "yes";
+  return is_yes(answer);
 }
 
 }  // namespace absenc::tool

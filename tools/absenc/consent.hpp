@@ -13,7 +13,7 @@ namespace absenc::tool {
 [[nodiscard]] bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_view what,
                             std::string_view meaning);
 
-/// Asks; only y and yes go on. Throws os::Interrupted.
+/// Asks; only y and yes go on, in upper or lower case. Throws os::Interrupted.
 [[nodiscard]] bool confirmed(const EncoderUri& uri, std::string_view meaning);
 
 }  // namespace absenc::tool

@@ -27,6 +27,9 @@ WireFrame frame_of(const Unit& unit, const Invocation& invocation, std::string_v
 int decode_one(const Invocation& invocation, const Unit& unit, const Options& options) {
   const WireFrame request = frame_of(unit, invocation, "--request");
   const WireFrame reply = frame_of(unit, invocation, "--hex");
+  if (invocation.has("--hex") && reply.frame().empty()) {
+    throw UsageError("--hex is empty: a reply has at least one byte; without --hex the request itself is decoded");
+  }
   if (request.frame().empty() && reply.frame().empty()) {
     throw UsageError(
         "there is nothing to decode: name a capture, or give one frame with --hex, and what was asked "
@@ -87,9 +90,7 @@ struct Counted final : capture::AnnotationSink {
 bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   bool damaged = false;
   for (const capture::Damage& damage : outcome.damages) {
-    print_message(fmt::format("{}byte {}, {} {}: {}", damage.note ? "note: " : "the capture is damaged at ",
-                              damage.offset, clock.has_time() ? "second" : "tick", clock.text(damage.tick),
-                              damage.what));
+    print_message(to_text(damage, clock));
     damaged = damaged || !damage.note;
   }
   return damaged;

@@ -69,6 +69,7 @@ class EncoderOn final : public Encoder {
     session_.set_options(options);
   }
 
+  void end_when(std::function<bool()> over) override { port_.over = std::move(over); }
   void report(FieldSink& sink) const override { last_->report(sink); }
   void report_left(FieldSink& sink) const override { session_.report_left(sink); }
   bool confirmed() const override { return session_.confirmed(); }

@@ -85,6 +85,10 @@ class Encoder {
   /// The clock of the readings.
   [[nodiscard]] virtual Time now() = 0;
 
+  /// What waits on the line throws os::Ended from the moment on in which `over` is true, also when the line is never
+  /// silent. Empty: never.
+  virtual void end_when(std::function<bool()> over) = 0;
+
   /// From now on, without opening it again: it was set to something else itself.
   virtual void set_options(const Options& options) { uri_.options = options; }
 

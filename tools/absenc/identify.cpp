@@ -12,6 +12,7 @@
 #include "tools/absenc/identify_capture.hpp"
 #include "tools/absenc/identify_line.hpp"
 #include "tools/absenc/identify_text.hpp"
+#include "tools/absenc/nearest.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
@@ -164,6 +165,7 @@ int identify_capture(const Invocation& invocation) {
     return choices.baud > 0 ? text + fmt::format(" --baud {}", choices.baud) : text;
   };
   const int status = show_candidates(findings.candidates, command, invocation.has("--json"));
+  for (const std::string& damage : findings.damages) print_message(fmt::format("note: {}", damage));
   if (findings.candidates.empty()) {
     for (const std::string& refusal : findings.refusals) print_message(fmt::format("note: {}", refusal));
     print_message(
@@ -173,9 +175,30 @@ int identify_capture(const Invocation& invocation) {
   return status;
 }
 
+// A folder may be an export of a logic analyser.
 bool is_capture(std::string_view where) {
   std::error_code error;
-  return std::filesystem::is_regular_file(where, error);
+  return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
+}
+
+// What is written like a file and is not there would be taken for a port. Interfaces of CAN have names like can0, and
+// ports of this machine are below /dev.
+void refuse_missing_file(std::string_view where) {
+  const std::filesystem::path path(where);
+  std::error_code error;
+  if (where.find(':') != std::string_view::npos || where.find('?') != std::string_view::npos || !path.has_extension()) {
+    return;
+  }
+  if (where.starts_with("/dev/") || std::filesystem::exists(path, error)) return;
+  std::vector<std::string> files;
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    files.push_back(path.has_parent_path() ? entry.path().string() : entry.path().filename().string());
+  }
+  const std::vector<std::string_view> names(files.begin(), files.end());
+  const std::string_view near = nearest(where, names);
+  throw ToolFailure(fmt::format("there is no file {}, and no port of that name{}", where,
+                                near.empty() ? "" : fmt::format("; did you mean {}?", near)));
 }
 
 int run_identify(const Invocation& invocation) {
@@ -187,6 +210,7 @@ int run_identify(const Invocation& invocation) {
   if (frames && !invocation.has("--hex")) throw UsageError("requests alone do not tell: give the replies with --hex");
   if (frames) return identify_frames(invocation);
   if (is_capture(invocation.text("where"))) return identify_capture(invocation);
+  refuse_missing_file(invocation.text("where"));
   for (const std::string_view option : {"--channel", "--baud", "--raw-channels", "--rate"}) {
     if (invocation.has(option)) throw UsageError(fmt::format("{} is about a capture: name its file", option));
   }

@@ -8,6 +8,7 @@
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
+#include "tools/absenc/annotation_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/unit_text.hpp"
 
@@ -50,11 +51,17 @@ struct Collector final : capture::AnnotationSink {
   std::size_t noise = 0;
 };
 
-std::vector<HeardExchange> heard_as(const Unit& unit, const Options& options, const CaptureChoices& choices) {
+using Sentences = std::vector<std::string>;
+
+std::vector<HeardExchange> heard_as(const Unit& unit, const Options& options, const CaptureChoices& choices,
+                                    Sentences& damages) {
   CaptureRun run(unit, options, choices);
   Collector collector;
   try {
-    static_cast<void>(run.run(collector, [](capture::Tick) {}));
+    const CaptureOutcome outcome = run.run(collector, [](capture::Tick) {});
+    for (const capture::Damage& damage : outcome.damages) {
+      if (!damage.note) damages.push_back(to_text(damage, TickClock(run.ticks_per_second())));
+    }
   } catch (const Enough&) {
   }
   return std::move(collector.exchanges);
@@ -79,19 +86,19 @@ std::vector<Options> bases(const Unit& unit) {
 
 // Where frames begin and end depends on the options, and the options on the frames: what is found by the frames of one
 // model is looked for again.
-std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices) {
+std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, Sentences& damages) {
   std::vector<Hypothesis> best;
   const auto better = [&](std::vector<Hypothesis>& found) {
     return !found.empty() && (best.empty() || found.front().chance() < best.front().chance());
   };
   for (const Options& options : bases(unit)) {
     if (options.model == nullptr && !best.empty() && best.front().chance() <= capture::is_found) break;
-    std::vector<Hypothesis> found = capture::explain(unit, {}, heard_as(unit, options, choices));
+    std::vector<Hypothesis> found = capture::explain(unit, {}, heard_as(unit, options, choices, damages));
     if (!better(found)) continue;
     const Hypothesis first = found.front();
     best = std::move(found);
     if (first.options.values == options.values) continue;
-    std::vector<Hypothesis> again = capture::explain(unit, {}, heard_as(unit, first.options, choices));
+    std::vector<Hypothesis> again = capture::explain(unit, {}, heard_as(unit, first.options, choices, damages));
     if (better(again)) best = std::move(again);
   }
   return best;
@@ -104,7 +111,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
   for (const Unit* unit : all_units()) {
     progress(fmt::format("{}: {} found so far", unit->id, findings.candidates.size()));
     try {
-      for (Hypothesis& one : search_unit(*unit, choices)) {
+      for (Hypothesis& one : search_unit(*unit, choices, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
     } catch (const UsageError& error) {  // it is spoken on another kind of wire
@@ -113,8 +120,13 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
       findings.refusals.emplace_back(failure.what());
     }
   }
-  std::sort(findings.refusals.begin(), findings.refusals.end());
-  findings.refusals.erase(std::unique(findings.refusals.begin(), findings.refusals.end()), findings.refusals.end());
+  for (Sentences* sentences : {&findings.damages, &findings.refusals}) {
+    std::sort(sentences->begin(), sentences->end());
+    sentences->erase(std::unique(sentences->begin(), sentences->end()), sentences->end());
+  }
+  std::erase_if(findings.refusals, [&](const std::string& refusal) {
+    return std::binary_search(findings.damages.begin(), findings.damages.end(), refusal);
+  });
   rank(findings.candidates);
   return findings;
 }

@@ -13,6 +13,7 @@ namespace absenc::tool {
 
 struct CaptureFindings {
   std::vector<Candidate> candidates{};
+  std::vector<std::string> damages{};   // of the capture, as far as it was read, each once
   std::vector<std::string> refusals{};  // why a protocol could not be looked for, each once
 };
 

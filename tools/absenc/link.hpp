@@ -2,11 +2,13 @@
 // Opens the way to an encoder and owns it; a port in front of a port remembers the last exchange as it was on the wire.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "absenc/link/port.hpp"
+#include "absenc/os/error.hpp"
 #include "tools/absenc/encoder_uri.hpp"
 
 namespace absenc::tool {
@@ -49,6 +51,7 @@ class WatchedPort final : public Port<Item> {
   }
 
   Event<Item> wait(const Step<Item>& step) override {
+    if (over && over()) throw os::Ended{};
     const Event<Item> event = port_->wait(step);
     if (event.kind == Event<Item>::Kind::sent) sent_at = event.at;
     if (event.kind == Event<Item>::Kind::received) {
@@ -60,6 +63,7 @@ class WatchedPort final : public Port<Item> {
     return event;
   }
 
+  std::function<bool()> over;  // ends all waiting
   std::vector<Item> sent;
   std::vector<Item> received;
   std::size_t clocks = 0;  // of a clocked link, which sends nothing else

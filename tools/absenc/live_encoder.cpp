@@ -100,6 +100,7 @@ Sample LiveEncoder::take(Reading reading) {
   reading.latched += offset_;
   reading.received += offset_;
   rate_.add(reading.received);
+  ++readings_;
   Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = encoder_->confirmed()};
   sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
   sample.reading = reading = checked(reading, sample.confirmed);
@@ -125,6 +126,27 @@ void LiveEncoder::note_restart(Sample& sample, const Reading& reading) {
       "from the encoder's own{}",
       to_text(reading.latched - unwrapped_at_), limit_text(encoder_->uri(), reading),
       reading.unit_um > 0 ? "" : ". If the shaft is slower, say so with max_rpm=RPM");
+}
+
+std::string_view event_name(const Sample& sample) {
+  switch (sample.kind) {
+    case Sample::Kind::lost:
+      return "lost";
+    case Sample::Kind::back:
+      return "back";
+    case Sample::Kind::failed:
+      return text_of(sample.trouble.error).name;
+    case Sample::Kind::reading:
+      return sample.restarted ? "restarted" : "";
+    default:
+      return "";
+  }
+}
+
+std::string exchanges_text(const host::Counters& counters, std::uint64_t readings) {
+  const std::string text = summary(counters);
+  if (counters.good <= readings) return text;
+  return fmt::format("{}; {} of the good ones confirmed a position, or were commands", text, counters.good - readings);
 }
 
 std::string_view speed_unit(const Reading& reading) { return reading.unit_um > 0 ? "mm/s" : "rpm"; }

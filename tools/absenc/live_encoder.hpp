@@ -57,6 +57,8 @@ class LiveEncoder {
   /// Connected unless the last sample said otherwise.
   [[nodiscard]] Encoder& encoder() { return *encoder_; }
   [[nodiscard]] const Encoder& encoder() const { return *encoder_; }
+  /// Good ones so far.
+  [[nodiscard]] std::uint64_t readings() const { return readings_; }
   /// How often the port went away.
   [[nodiscard]] std::uint64_t losses() const { return losses_; }
   /// How often the position started again, because a pause was too long to know how often the shaft turned.
@@ -82,10 +84,17 @@ class LiveEncoder {
   Time lost_at_{};
   Time next_try_{};
   bool was_there_ = false;
+  std::uint64_t readings_ = 0;
   std::uint64_t losses_ = 0;
   Time unwrapped_at_{};  // of the last valid position
   std::uint64_t restarts_ = 0;
 };
+
+/// "" of a reading; "lost", "back"; of a failed attempt the name of the error
+[[nodiscard]] std::string_view event_name(const Sample& sample);
+
+/// `summary`, and why there are more exchanges than readings.
+[[nodiscard]] std::string exchanges_text(const host::Counters& counters, std::uint64_t readings);
 
 /// "rpm", or of linear encoders "mm/s"
 [[nodiscard]] std::string_view speed_unit(const Reading& reading);

@@ -4,9 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
-#include <map>
-#include <memory>
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absenc/os/error.hpp"
@@ -27,27 +30,26 @@ namespace {
 /// so that a wrong name is reported before what is missing because of it.
 class Parser {
  public:
-  /// `parent` is the command itself or the first word of a verb of two.
-  Parser(CLI::App& parent, const Subcommand& subcommand)
-      : subcommand_(&subcommand), app_(parent.add_subcommand(std::string(last_word(subcommand)))) {
-    app_->allow_extras();
+  explicit Parser(const Subcommand& subcommand) : subcommand_(&subcommand) {
+    app_.allow_extras();
     for (const Parameter& parameter : subcommand.parameters) add(parameter);
   }
 
-  [[nodiscard]] const Subcommand& subcommand() const { return *subcommand_; }
-  [[nodiscard]] bool parsed() const { return app_->parsed(); }
-
-  [[nodiscard]] Invocation invocation() const {
+  /// `arguments[0]` is the last word of the verb. Nothing when help was asked for. Throws UsageError.
+  [[nodiscard]] std::optional<Invocation> parse(std::span<char*> arguments) {
+    try {
+      app_.parse(static_cast<int>(arguments.size()), arguments.data());
+    } catch (const CLI::CallForHelp&) {
+      return std::nullopt;
+    } catch (const CLI::ArgumentMismatch& error) {
+      const std::string text = error.what();  // "--hex: 1 required  missing"
+      throw UsageError(text.substr(0, text.find(':')) + " needs a value");
+    } catch (const CLI::ParseError& error) {
+      throw UsageError(error.what());
+    }
     refuse_extras();
     Invocation invocation;
-    for (const auto& [parameter, option] : options_) {
-      if (parameter->required && option->count() == 0) throw UsageError(missing(*parameter));
-      const bool is_flag = parameter->is_option() && parameter->value.empty();
-      if (is_flag && option->count() > 0 && option->results().front() != "true") {
-        throw UsageError(fmt::format("{} takes no value", parameter->name));
-      }
-      for (const std::string& value : option->results()) invocation.add(parameter->name, value);
-    }
+    for (const auto& [parameter, option] : options_) take(*parameter, *option, invocation);
     return invocation;
   }
 
@@ -56,32 +58,44 @@ class Parser {
     const std::string name(parameter.name);
     CLI::Option* option = nullptr;
     if (parameter.is_option() && parameter.value.empty()) {
-      option = app_->add_flag(name);
+      option = app_.add_flag(name);
     } else {
-      option = app_->add_option(name);
+      option = app_.add_option(name);
       option->type_name("")->allow_extra_args(false);
-      if (parameter.repeatable) {
-        option->expected(parameter.is_option() ? 1 : -1)->take_all();
-      } else {
-        option->expected(1)->take_last();
-      }
+      option->expected(parameter.repeatable && !parameter.is_option() ? -1 : 1);
     }
+    if (parameter.repeatable || parameter.is_option()) option->take_all();
     options_.emplace_back(&parameter, option);
   }
 
+  void take(const Parameter& parameter, const CLI::Option& option, Invocation& invocation) const {
+    if (parameter.required && option.count() == 0) throw UsageError(missing(parameter));
+    if (!parameter.repeatable && option.count() > 1) {
+      throw UsageError(fmt::format("{} is given {} times: which is meant?", parameter.name, option.count()));
+    }
+    const bool is_flag = parameter.is_option() && parameter.value.empty();
+    if (is_flag && option.count() > 0 && option.results().front() != "true") {
+      throw UsageError(fmt::format("{} takes no value", parameter.name));
+    }
+    for (const std::string& value : option.results()) invocation.add(parameter.name, value);
+  }
+
+  // Behind the first "--" nothing is an option.
   void refuse_extras() const {
-    for (const std::string& extra : app_->remaining()) {
-      if (extra.size() < 2 || extra[0] != '-') continue;
-      const std::string name = extra.substr(0, extra.find('='));
+    const std::vector<std::string> extras = app_.remaining();
+    const auto mark = std::find(extras.begin(), extras.end(), "--");
+    for (auto extra = extras.begin(); extra != mark; ++extra) {
+      if (extra->size() < 2 || (*extra)[0] != '-') continue;
+      const std::string name = extra->substr(0, extra->find('='));
       std::vector<std::string_view> names{"--help"};
       for (const Parameter& parameter : subcommand_->parameters) {
         if (parameter.is_option()) names.push_back(parameter.name);
       }
       throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
     }
-    if (!app_->remaining().empty()) {
-      throw UsageError(fmt::format("\"{}\" is too much: usage is {}", app_->remaining().front(), usage(*subcommand_)));
-    }
+    const auto first = mark == extras.begin() && mark != extras.end() ? mark + 1 : extras.begin();
+    if (first == extras.end()) return;
+    throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *first, usage(*subcommand_)));
   }
 
   [[nodiscard]] std::string missing(const Parameter& parameter) const {
@@ -90,109 +104,113 @@ class Parser {
   }
 
   const Subcommand* subcommand_;
-  CLI::App* app_;
+  CLI::App app_;
   std::vector<std::pair<const Parameter*, CLI::Option*>> options_;
 };
 
-// Where words end before they make a verb; `group` is the first of two, or "".
-[[noreturn]] void refuse(const CLI::App& app, std::string_view group, std::span<const std::string_view> options) {
-  const std::vector<std::string_view> words = words_after(group);
-  const std::vector<std::string> remaining = app.remaining();
-  if (remaining.empty()) {
+bool asks_for_help(std::string_view word) { return word == "--help" || word == "-h"; }
+
+// No verb begins with these words; `group` is the first of two, or "".
+[[noreturn]] void refuse_verb(std::string_view group, std::span<char*> words) {
+  const std::vector<std::string_view> verbs = words_after(group);
+  if (words.empty()) {
     throw UsageError(fmt::format("what shall be done{}? Usage: absenc {}{}<verb> ..., where the verb is one of {}",
                                  group.empty() ? "" : fmt::format(" with the {}", group), group,
-                                 group.empty() ? "" : " ", fmt::join(words, ", ")));
+                                 group.empty() ? "" : " ", fmt::join(verbs, ", ")));
   }
-  const std::string& word = remaining.front();
+  const std::string_view word = words.front();
   const std::string of_group = group.empty() ? "" : fmt::format(" of {}", group);
-  if (word.starts_with('-')) {
-    throw UsageError(fmt::format("there is no option {}{}{}", word, of_group, suggestion(word, options)));
+  if (!word.starts_with('-')) {
+    throw UsageError(fmt::format("there is no verb \"{}\"{}{}", word, of_group, suggestion(word, verbs)));
   }
-  throw UsageError(fmt::format("there is no verb \"{}\"{}{}", word, of_group, suggestion(word, words)));
+  const std::string_view name = word.substr(0, word.find('='));
+  const std::string verb = group.empty() ? "<verb>" : fmt::format("{} <verb>", group);
+  for (const Subcommand* subcommand : all_subcommands()) {
+    for (const Parameter& parameter : subcommand->parameters) {
+      if (parameter.name != name) continue;
+      throw UsageError(fmt::format("{0} stands before the verb: write absenc {1} ... {0}", name, verb));
+    }
+  }
+  const std::array<std::string_view, 2> options{"--help", "--version"};
+  throw UsageError(fmt::format("there is no option {}{}{}", name, of_group,
+                               suggestion(name, std::span(options).first(group.empty() ? 2 : 1))));
 }
 
-/// All subcommands in CLI11.
-class CommandLine {
- public:
-  CommandLine() {
-    app_.set_help_flag("-h,--help");
-    app_.add_flag("--version");
-    accept_one(app_);
+// --help and --version in the place of a verb stand alone.
+void require_last(std::span<char*> words) {
+  if (words.size() == 1) return;
+  throw UsageError(fmt::format("\"{}\" is too much behind {}", words[1], words[0]));
+}
+
+/// The verb at the beginning of `words`, which are then those from its last word on; null when it was help or the
+/// version that was asked for, and is done. `understood` is as much of the verb as was found, also when this throws:
+/// whatever is no verb must not be passed over, because the next word may be one that changes an encoder.
+const Subcommand* find_verb(std::span<char*>& words, std::string& understood) {
+  for (;;) {
+    if (words.empty()) refuse_verb(understood, words);
+    const std::string_view word = words.front();
+    if (asks_for_help(word)) {
+      require_last(words);
+      print_line(understood.empty() ? help() : help(understood));
+      return nullptr;
+    }
+    if (understood.empty() && word == "--version") {
+      require_last(words);
+      print_line("absenc " ABSENC_VERSION);
+      return nullptr;
+    }
+    bool is_group = false;
     for (const Subcommand* subcommand : all_subcommands()) {
       const std::string_view group = first_word(*subcommand);
-      parsers_.push_back(std::make_unique<Parser>(group.empty() ? app_ : group_of(group), *subcommand));
+      if (group == understood && last_word(*subcommand) == word) {
+        understood = subcommand->name;
+        return subcommand;
+      }
+      is_group = is_group || (understood.empty() && !group.empty() && group == word);
     }
+    if (!is_group) refuse_verb(understood, words);
+    understood = word;
+    words = words.subspan(1);
   }
+}
 
-  /// `understood` is the verb as far as it was found, also when this throws.
-  int run(int argument_count, char** arguments, std::string& understood) {
-    try {
-      app_.parse(argument_count, arguments);
-      find(understood);
-    } catch (const CLI::CallForHelp&) {
-      find(understood);
-      print_line(chosen_ != nullptr ? help(chosen_->subcommand()) : understood.empty() ? help() : help(understood));
-      return exit_good;
-    } catch (const CLI::ArgumentMismatch& error) {
-      find(understood);
-      const std::string text = error.what();  // "--hex: 1 required  missing"
-      throw UsageError(text.substr(0, text.find(':')) + " needs a value");
-    } catch (const CLI::ParseError& error) {
-      find(understood);
-      throw UsageError(error.what());
-    }
-    if (app_.count("--version") > 0) {
-      print_line("absenc " ABSENC_VERSION);
-      return exit_good;
-    }
-    if (chosen_ != nullptr) return run_chosen();
-    const std::vector<std::string_view> options{"--help", "--version"};
-    if (understood.empty()) refuse(app_, {}, options);
-    refuse(*groups_.at(understood), understood, std::span(options).first(1));
+std::string_view name_of(os::Failure::Kind kind) {
+  static constexpr std::array<std::string_view, 7> names{"not_found", "no_permission", "in_use", "unsupported",
+                                                         "bad_rate",  "lost",          "system"};
+  return names[static_cast<std::size_t>(kind)];
+}
+
+Json failure(std::string_view name, std::string_view message) {
+  return Json::object().set("ok", false).set("error", name).set("message", message);
+}
+
+// Whoever reads JSON gets the end in JSON, too.
+int run(const Subcommand& subcommand, const Invocation& invocation) {
+  const bool json = invocation.has("--json");
+  try {
+    return subcommand.run(invocation);
+  } catch (const CommandFailure& failed) {
+    if (!json) throw;
+    print_line(failed.trouble.json().line());
+  } catch (const os::Failure& failed) {
+    if (!json) throw;
+    print_line(failure(name_of(failed.kind()), failed.what()).line());
+  } catch (const ToolFailure& failed) {
+    if (!json) throw;
+    print_line(failure("failed", failed.what()).line());
   }
+  return exit_failed;
+}
 
- private:
-  static void accept_one(CLI::App& app) {
-    app.require_subcommand(0, 1);
-    app.allow_extras();
-  }
-
-  CLI::App& group_of(std::string_view name) {
-    CLI::App*& group = groups_[std::string(name)];
-    if (group == nullptr) {
-      group = app_.add_subcommand(std::string(name));
-      accept_one(*group);
-    }
-    return *group;
-  }
-
-  void find(std::string& understood) {
-    for (const auto& [name, group] : groups_) {
-      if (group->parsed()) understood = name;
-    }
-    for (const auto& parser : parsers_) {
-      if (!parser->parsed()) continue;
-      chosen_ = parser.get();
-      understood = parser->subcommand().name;
-    }
-  }
-
-  int run_chosen() {
-    const Invocation invocation = chosen_->invocation();
-    try {
-      return chosen_->subcommand().run(invocation);
-    } catch (const CommandFailure& failure) {
-      if (!invocation.has("--json")) throw;
-      print_line(failure.trouble.json().line());
-      return exit_failed;
-    }
-  }
-
-  CLI::App app_;
-  std::map<std::string, CLI::App*> groups_;  // by the first of two words
-  std::vector<std::unique_ptr<Parser>> parsers_;
-  const Parser* chosen_ = nullptr;
-};
+/// `understood` is the verb as far as it was found, also when this throws.
+int run_command_line(std::span<char*> words, std::string& understood) {
+  const Subcommand* subcommand = find_verb(words, understood);
+  if (subcommand == nullptr) return exit_good;
+  const std::optional<Invocation> invocation = Parser(*subcommand).parse(words);
+  if (invocation) return run(*subcommand, *invocation);
+  print_line(help(*subcommand));
+  return exit_good;
+}
 
 }  // namespace
 
@@ -203,7 +221,7 @@ int main(int argument_count, char** arguments) {
   std::string understood;
   try {
     absenc::os::protect_standard_streams();
-    return CommandLine().run(argument_count, arguments, understood);
+    return run_command_line(std::span(arguments, static_cast<std::size_t>(argument_count)).subspan(1), understood);
   } catch (const UsageError& error) {
     print_message(error.what());
     print_note(fmt::format("Try: absenc {}{}--help", understood, understood.empty() ? "" : " "));

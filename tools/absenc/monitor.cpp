@@ -13,6 +13,7 @@
 #include "tools/absenc/monitor_view.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/rate.hpp"
 #include "tools/absenc/shared_link.hpp"
 #include "tools/absenc/subcommand.hpp"
 
@@ -88,7 +89,7 @@ class Controls {
   void ask_for_zero() {
     const Command* command = find_command(*selected().uri().unit, Verb::zero);
     if (command == nullptr) return;
-    view_.question = fmt::format(" {}? y: yes, any other key: no   ({})", command->meaning, selected().name());
+    view_.question = fmt::format(" {}? y: yes, any other key: no", command->meaning);
   }
 
   Watches* watches_;
@@ -150,7 +151,7 @@ bool summarize(const Watches& watches, Time start, Time processor) {
     readings += snapshot.readings;
     all_read = all_read && snapshot.readings != 0 && snapshot.state != Snapshot::State::ended;
     print_message(fmt::format("{}: {} readings; {}; the port went away: {}{}", watch->name(), snapshot.readings,
-                              summary(snapshot.counters), snapshot.losses,
+                              exchanges_text(snapshot.counters, snapshot.readings), snapshot.losses,
                               snapshot.readings == 0 ? "; " + snapshot.message : ""));
   }
   if (readings != 0) {
@@ -187,7 +188,7 @@ Watches make_watches(const Invocation& invocation, double rate) {
 
 int run_monitor(const Invocation& invocation) {
   os::catch_interrupts();
-  const double rate = invocation.real("--rate", 50, 0, 1e6);
+  const double rate = readings_a_second(invocation, 50);
   const double interval = invocation.real("--interval", 1, 0.1, 1e6);
   const double seconds = invocation.real("--for", 0, 0.001, 1e9);
   const bool json = invocation.has("--json");

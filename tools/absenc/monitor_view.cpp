@@ -9,6 +9,7 @@
 
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/short_names.hpp"
 #include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
@@ -40,11 +41,11 @@ double unit_um(const Shown& shown) {
 }
 
 // With fewer decimals, where it would not fit into a column of the list.
-std::string short_text(double value, int decimals) {
-  constexpr std::size_t width = 9;
+std::string short_text(double value, int decimals, std::size_t width = 9) {
   while (decimals > 0 && fmt::formatted_size("{:.{}f}", value, decimals) > width) --decimals;
-  const std::string text = fmt::format("{:.{}f}", value, decimals);
-  return text.size() <= width ? text : fmt::format("{:.2e}", value);
+  std::string text = fmt::format("{:.{}f}", value, decimals);
+  for (int digits = 2; text.size() > width && digits >= 0; --digits) text = fmt::format("{:.{}e}", value, digits);
+  return text;
 }
 
 std::string position_text(const Snapshot& snapshot) {
@@ -58,7 +59,7 @@ std::string position_text(const Snapshot& snapshot) {
 std::string turns_text(const Snapshot& snapshot) {
   const Reading& reading = snapshot.last.reading;
   if (!is_live(snapshot) || reading.multiturn_bits == 0) return "-";
-  return reading.multiturn_valid ? fmt::format("{}", reading.multiturn) : "INVALID";
+  return reading.multiturn_valid ? short_text(static_cast<double>(reading.multiturn), 0, 7) : "INVALID";
 }
 
 std::string speed_text(const Snapshot& snapshot) {
@@ -85,20 +86,33 @@ std::uint64_t failures(const Snapshot& snapshot) { return snapshot.counters.bad(
 
 // ---- The list
 
-int name_width(const Screen& screen) { return std::clamp(screen.columns() - 60, 8, 40); }
+constexpr std::size_t turns_width = 7;
+constexpr std::size_t failures_width = 6;
+constexpr int values_width = 43;  // of all columns behind the state
 
-void draw_list_line(Screen& screen, int row, const Shown& shown, bool selected) {
+std::vector<std::string> names_in(const View& view, int width) {
+  std::vector<std::string> names;
+  for (const Shown& shown : view.encoders) names.push_back(shown.watch->name());
+  return short_names(names, static_cast<std::size_t>(std::max(width, 8)));
+}
+
+// What a mark of alarms behind the values leaves.
+int name_width(const Screen& screen) { return std::clamp(screen.columns() - values_width - 13, 8, 40); }
+
+void draw_list_line(Screen& screen, int row, const Shown& shown, const std::string& name, bool selected) {
   const Snapshot& snapshot = shown.snapshot;
   const int width = name_width(screen);
   screen.put(row, 0, selected ? ">" : " ", Style::bold);
-  screen.put(row, 2, shown.watch->name().substr(0, static_cast<std::size_t>(width)),
-             selected ? Style::bold : Style::plain);
+  screen.put(row, 2, name, selected ? Style::bold : Style::plain);
   screen.put(row, width + 3, name_of(snapshot.state), style_of(snapshot.state));
-  const std::string values =
-      fmt::format("{:>9} {:>8} {:>9} {:>8} {:>7}", position_text(snapshot), turns_text(snapshot), speed_text(snapshot),
-                  fmt::format("{:.1f}", snapshot.rate), failures(snapshot));
-  screen.put(row, width + 11, values);
-  if (is_live(snapshot) && !alarm_names(shown).empty()) screen.put(row, width + 57, "!", Style::bad);
+  const auto failed = static_cast<double>(failures(snapshot));
+  screen.put(row, width + 11,
+             fmt::format("{:>9} {:>{}} {:>9} {:>8} {:>{}}", position_text(snapshot), turns_text(snapshot), turns_width,
+                         speed_text(snapshot), short_text(snapshot.rate, 1, 8), short_text(failed, 0, failures_width),
+                         failures_width));
+  if (is_live(snapshot) && !alarm_names(shown).empty()) {
+    screen.put(row, width + 12 + values_width, "!", Style::bad);
+  }
 }
 
 // What the columns of position and speed hold.
@@ -117,11 +131,13 @@ int draw_list(Screen& screen, int row, const View& view) {
   const std::size_t first = std::min(view.selected - std::min(view.selected, count / 2), view.encoders.size() - count);
   const auto [position, speed] = units_of(view);
   screen.put(row++, 2,
-             fmt::format("{:<{}} {:<7} {:>9} {:>8} {:>9} {:>8} {:>7}", "encoder", name_width(screen), "state", position,
-                         "turns", speed, "a second", "failed"),
+             fmt::format("{:<{}} {:<7} {:>9} {:>{}} {:>9} {:>8} {:>{}}", "encoder", name_width(screen), "state",
+                         position, "turns", turns_width, speed, "a second", "failed", failures_width),
              Style::faint);
-  for (std::size_t i = first; i < first + count; ++i)
-    draw_list_line(screen, row++, view.encoders[i], i == view.selected);
+  const std::vector<std::string> names = names_in(view, name_width(screen));
+  for (std::size_t i = first; i < first + count; ++i) {
+    draw_list_line(screen, row++, view.encoders[i], names[i], i == view.selected);
+  }
   if (count < view.encoders.size()) {
     screen.put(row++, 2, fmt::format("{} to {} of {}", first + 1, first + count, view.encoders.size()), Style::faint);
   }
@@ -288,6 +304,14 @@ void draw_help(Screen& screen, int row, int end) {
              Style::plain);
 }
 
+// Of whom: never cut off.
+std::string question_in(const View& view, int columns) {
+  const std::string name = names_in(view, columns - static_cast<int>(view.question.size()) - 5)[view.selected];
+  const std::string who = fmt::format("  ({})", name);
+  const std::size_t room = static_cast<std::size_t>(columns) - std::min<std::size_t>(columns, who.size());
+  return view.question.substr(0, room) + who;
+}
+
 }  // namespace
 
 void draw(Screen& screen, const View& view) {
@@ -299,7 +323,9 @@ void draw(Screen& screen, const View& view) {
     return screen.show();
   }
   const Shown& selected = view.encoders[view.selected];
-  screen.fill(0, fmt::format(" absenc monitor   {}{}", selected.watch->name(), view.paused ? "   PAUSED" : ""),
+  const std::string_view paused = view.paused ? "   PAUSED" : "";
+  const int title_width = screen.columns() - 18 - static_cast<int>(paused.size());
+  screen.fill(0, fmt::format(" absenc monitor   {}{}", names_in(view, title_width)[view.selected], paused),
               Style::title);
   const int last = screen.rows() - 1;
   const int row = draw_list(screen, 1, view) + 1;
@@ -309,7 +335,7 @@ void draw(Screen& screen, const View& view) {
     draw_encoder(screen, row, last, selected, view.below == View::Below::errors);
   }
   const std::string_view keys = " q quit   space pause   z zero   tab next   e errors   h help";
-  screen.fill(last, view.question.empty() ? keys : std::string_view(view.question), Style::title);
+  screen.fill(last, view.question.empty() ? std::string(keys) : question_in(view, screen.columns()), Style::title);
   screen.show();
 }
 

@@ -22,7 +22,7 @@ struct View {
   std::size_t selected = 0;
   bool paused = false;
   enum class Below : std::uint8_t { trace, errors, help } below = Below::trace;
-  std::string question{};  // to be answered with y; "" when nothing is asked
+  std::string question{};  // about the selected one, to be answered with y; "" when nothing is asked
 };
 
 inline constexpr int least_rows = 16;

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times of equal distance that do not drift: one that was missed is skipped.
+// Times of equal distance that do not drift: one that was missed is left out.
 #pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
 
 #include "absenc/core/time.hpp"
 #include "absenc/os/signals.hpp"
@@ -22,11 +26,48 @@ class Pace {
     return next_;
   }
 
+  /// Sleeps until the next time, or `end`. Throws as os::sleep_until.
+  void wait(Time end = never) {
+    if (period_ == Time{}) return;
+    next_ += period_;
+    leave_out(end);
+    try {
+      os::sleep_until(std::min(next_, end));
+    } catch (...) {
+      leave_out(end);
+      throw;
+    }
+    leave_out(end);
+  }
+
+  /// How many times before the end `wait` has left out since this was last asked, because they were over: whoever took
+  /// longer than a period, or was stopped, has missed them.
+  [[nodiscard]] std::uint64_t take_missed() { return std::exchange(missed_, 0); }
+
+  /// The first time, again.
+  void start_at(Time start) { next_ = start; }
+
   [[nodiscard]] Time period() const { return period_; }
 
  private:
+  // One that is over by less than a period is late, and not missed unless the end has come.
+  void leave_out(Time end) {
+    const Time now = os::now();
+    if (now < next_) return;
+    const Time first = next_;
+    const auto over = (now - next_) / period_;
+    next_ += over * period_;
+    if (now < end) {
+      missed_ += static_cast<std::uint64_t>(over);
+      return;
+    }
+    next_ = std::max(next_, end);
+    if (first < end) missed_ += static_cast<std::uint64_t>((end - first - Time{1}) / period_ + 1);
+  }
+
   Time period_;
   Time next_;
+  std::uint64_t missed_ = 0;
 };
 
 }  // namespace absenc::tool

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <string>
 
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -10,6 +12,7 @@
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/pace.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/rate.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 
@@ -25,7 +28,9 @@ class Display {
   Display(const LiveEncoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
     const EncoderUri& uri = live.encoder().uri();
     const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
-    if (format == Format::csv) print_line(linear ? linear_csv_header : csv_header);
+    const std::string_view header = linear ? linear_csv_header : csv_header;
+    if (format == Format::csv) print_line(fmt::format("{},event", header));
+    commas_ = std::string(static_cast<std::size_t>(std::count(header.begin(), header.end(), ',')) + 1, ',');
   }
 
   void show(const Sample& sample) {
@@ -37,8 +42,7 @@ class Display {
         return show_trouble(sample);
       case Sample::Kind::lost:
         print_message(fmt::format("{}\n  Waiting for it to come back.", sample.message));
-        if (format_ == Format::json) print_line(event("lost", sample).line());
-        return;
+        return show_event(sample);
       case Sample::Kind::absent:
         if (sample.message != last_absence_) print_message(sample.message);
         last_absence_ = sample.message;
@@ -46,8 +50,7 @@ class Display {
       case Sample::Kind::back:
         last_absence_.clear();
         print_message(sample.message);
-        if (format_ == Format::json) print_line(event("back", sample).line());
-        return;
+        return show_event(sample);
     }
   }
 
@@ -56,12 +59,19 @@ class Display {
     return std::chrono::duration<double>(sample.at - start_).count();
   }
 
-  [[nodiscard]] Json event(std::string_view name, const Sample& sample) const {
-    return Json::object()
-        .set("time_s", seconds(sample))
-        .set("ok", false)
-        .set("event", name)
-        .set("message", sample.message);
+  void show_event(const Sample& sample) const {
+    if (format_ == Format::csv) print_event_row(sample);
+    if (format_ != Format::json) return;
+    print_line(Json::object()
+                   .set("time_s", seconds(sample))
+                   .set("ok", false)
+                   .set("event", event_name(sample))
+                   .set("message", sample.message)
+                   .line());
+  }
+
+  void print_event_row(const Sample& sample) const {
+    print_line(fmt::format("{:.6f}{}{}", seconds(sample), commas_, event_name(sample)));
   }
 
   void show_reading(const Sample& sample) {
@@ -72,7 +82,7 @@ class Display {
     }
     told_doubt_ = sample.doubtful;
     if (format_ == Format::json) return print_line(to_json(unit, reading, seconds(sample), sample.confirmed).line());
-    if (format_ == Format::csv) return print_line(to_csv(unit, reading, seconds(sample)));
+    if (format_ == Format::csv) return print_line(to_csv(unit, reading, seconds(sample)) + ',');
     print_line(to_text(unit, reading));
     if (reading.alarms != alarms_) {
       print_note(reading.alarms != 0 ? alarms_in_words(unit, reading) : "  the alarms are gone");
@@ -83,6 +93,7 @@ class Display {
   void show_trouble(const Sample& sample) {
     Trouble trouble = sample.trouble;
     if (format_ == Format::json) return print_line(trouble.json().line());
+    if (format_ == Format::csv) print_event_row(sample);
     if (trouble.error == last_trouble_) trouble.advice.clear();
     last_trouble_ = trouble.error;
     print_message(trouble.text());
@@ -90,6 +101,7 @@ class Display {
 
   const LiveEncoder* live_;
   Format format_;
+  std::string commas_;  // between the time and the event, where there is no reading
   Time start_;
   std::uint32_t alarms_ = 0;
   bool told_doubt_ = false;
@@ -109,7 +121,7 @@ void read_all(LiveEncoder& live, Display& display, std::uint64_t count, Pace& pa
     if (i > 0) os::sleep_until(pace.next());
     if (os::interrupted()) throw os::Interrupted{};
     const Sample sample = live.next();
-    if (sample.kind == Sample::Kind::lost && count != 0) throw ToolFailure(sample.message);
+    if (sample.kind == Sample::Kind::lost && count != 0) throw os::Failure(os::Failure::Kind::lost, sample.message);
     tally.last_good = sample.kind == Sample::Kind::reading;
     tally.good += tally.last_good ? 1 : 0;
     tally.bad += sample.kind == Sample::Kind::failed ? 1 : 0;
@@ -121,7 +133,7 @@ int run_read(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
   const auto count = static_cast<std::uint64_t>(invocation.number("--count", 1, 0, INT64_MAX));
-  Pace pace(invocation.real("--rate", 10, 0, 1e6));
+  Pace pace(readings_a_second(invocation, 10));
   if (invocation.has("--json") && invocation.has("--csv")) throw UsageError("--json and --csv exclude each other");
   const Format format = invocation.has("--json") ? Format::json : invocation.has("--csv") ? Format::csv : Format::human;
 
@@ -140,8 +152,8 @@ int run_read(const Invocation& invocation) {
   } catch (const os::Interrupted&) {
   }
   print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}; the port went away: {}",
-                            tally.good, tally.bad, to_text(os::now() - start), summary(live.encoder().counters()),
-                            live.losses()));
+                            tally.good, tally.bad, to_text(os::now() - start),
+                            exchanges_text(live.encoder().counters(), live.readings()), live.losses()));
   return tally.last_good ? exit_good : exit_failed;
 }
 
@@ -168,6 +180,8 @@ const Subcommand read_subcommand{
     "read the position, the turns and the alarms",
     "Readings go to standard output, messages to standard error. What the encoder says is not valid is\n"
     "shown as INVALID, and in JSON and CSV by the _valid fields; there the angle is then null or empty.\n"
+    "In CSV, event is empty for a reading; otherwise the row stands for the error of that name that came in its\n"
+    "place, or for the port: lost, back.\n"
     "Linear encoders, those with a unit_um, have millimetres and micrometres in place of degrees.\n"
     "Settings of the port: baud=RATE, rs485=auto|on|off, latency=MS, echo=auto|on|off; of sim also\n"
     "motion=, singleturn=, multiturn=, alarm=, fault=. `absenc list <protocol>` shows the protocol's options.\n"

@@ -11,6 +11,7 @@
 #include "tools/absenc/pace.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
+#include "tools/absenc/rate.hpp"
 #include "tools/absenc/recording.hpp"
 #include "tools/absenc/subcommand.hpp"
 
@@ -57,27 +58,35 @@ void tell(const Sample& sample, const LiveEncoder& live, Report& report) {
 
 // Returns whether the last reading was good.
 bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limits& limits, Report& report) {
-  bool good = false;
+  Sample sample;
+  const auto tell_missed = [&] {
+    const std::uint64_t missed = pace.take_missed();
+    // While the port is away, that it was lost says so.
+    const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
+    if (was_there) recording.miss(missed);
+  };
   try {
-    while ((limits.count == 0 || recording.readings() < limits.count) && os::now() < limits.end) {
-      if (os::interrupted()) break;
-      const Sample sample = live.next();
-      good = sample.kind == Sample::Kind::reading;
+    while (os::now() < limits.end && !os::interrupted()) {
+      sample = live.next();
       recording.take(sample);
       tell(sample, live, report);
       report.show(recording, live);
-      os::sleep_until(std::min(pace.next(), limits.end));
+      if (limits.count != 0 && recording.readings() >= limits.count) break;
+      pace.wait(limits.end);
+      tell_missed();
     }
   } catch (const os::Interrupted&) {
+  } catch (const os::Ended&) {
   }
-  return good;
+  tell_missed();
+  return sample.kind == Sample::Kind::reading;
 }
 
 RecordingSettings settings_of(const Invocation& invocation) {
   RecordingSettings settings;
   settings.path = invocation.text("--output");
   settings.encoder = invocation.text("encoder");
-  settings.rate = invocation.real("--rate", 100, 0, 1e6);
+  settings.rate = readings_a_second(invocation, 100);
   settings.every = static_cast<std::uint64_t>(invocation.number("--every", 1, 1, INT64_MAX));
   if (invocation.has("--part-size")) {
     settings.part_size = static_cast<std::uint64_t>(1e6 * invocation.real("--part-size", 0, 0.001, 1e9));
@@ -86,6 +95,23 @@ RecordingSettings settings_of(const Invocation& invocation) {
     settings.part_time = Time(static_cast<std::int64_t>(1e9 * invocation.real("--part-time", 0, 0.01, 1e9)));
   }
   return settings;
+}
+
+// `whole`: what was written is in the files.
+void summarize(const Recording& recording, const LiveEncoder& live, bool whole) {
+  std::string text = fmt::format("{} readings and {} failures in {} {}", recording.readings(), recording.failures(),
+                                 to_text(os::now() - recording.start()),
+                                 whole ? fmt::format("are in {}", recording.names()) : "were written");
+  if (recording.gaps() != 0) {
+    text += fmt::format("; {} readings that were due were not taken, in {} gap{}", recording.missed(), recording.gaps(),
+                        recording.gaps() == 1 ? "" : "s");
+  }
+  if (live.restarts() != 0) {
+    text += fmt::format("; the position started again {} times (event restarted): turns are only right between",
+                        live.restarts());
+  }
+  if (live.losses() != 0) text += fmt::format("; the port went away: {}", live.losses());
+  print_message(fmt::format("{}; exchanges: {}", text, exchanges_text(live.encoder().counters(), live.readings())));
 }
 
 int run_record(const Invocation& invocation) {
@@ -101,28 +127,28 @@ int run_record(const Invocation& invocation) {
   print_notes(live.encoder());
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
   Recording recording(settings, uri);
+  pace.start_at(recording.start());
   const Limits limits{count, seconds > 0 ? recording.start() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never};
+  live.encoder().end_when([&limits] { return os::now() >= limits.end; });
   Report report;
-  const auto summarize = [&] {
-    report.clear();
-    print_message(fmt::format("{} readings and {} failures in {} are in {}; exchanges: {}", recording.readings(),
-                              recording.failures(), to_text(os::now() - recording.start()), recording.names(),
-                              summary(live.encoder().counters())));
-    if (live.restarts() > 0) {
-      print_message(fmt::format("the position started again {} times (event restarted): turns are only right between",
-                                live.restarts()));
-    }
-  };
   bool good = false;
+  bool whole = true;
+  const auto end_early = [&](std::string_view why) {
+    report.clear();
+    print_message(fmt::format("{}: the recording has ended{}", why, whole ? "; what is written so far is whole" : ""));
+    good = false;
+  };
   try {
     good = record_all(live, recording, pace, limits, report);
     recording.finish();
   } catch (const os::Failure& failure) {
-    report.clear();
-    print_message(fmt::format("{}: the recording has ended; what is written so far is whole", failure.what()));
-    good = false;
+    whole = failure.kind() != os::Failure::Kind::lost;
+    end_early(failure.what());
+  } catch (const ToolFailure& failure) {
+    end_early(failure.what());
   }
-  summarize();
+  report.clear();
+  summarize(recording, live, whole);
   return good ? exit_good : exit_failed;
 }
 
@@ -152,7 +178,9 @@ const Subcommand record_subcommand{
     "write readings to files, for hours",
     "Each file begins with the encoder, its model and options, the start time and the units. Lines are handed to\n"
     "the system as they come: nothing is lost when the command is killed, and a full disk leaves whole lines. When\n"
-    "the port goes away, that is a line, the command waits for it to come back, and that is another line.\n"
+    "the port goes away, that is a line, the command waits for it to come back, and that is another line. Readings\n"
+    "that --rate asked for and that could not be taken are a line with their number. A file that is removed or\n"
+    "replaced ends the recording at once, with status 1.\n"
     "After a pause in which the shaft may have turned too far to know, the position starts again: the event of that\n"
     "reading is restarted. max_rpm=RPM behind ? says how fast the shaft turns at most.\n"
     "In CSV, lines before the column names begin with #.",

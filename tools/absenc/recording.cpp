@@ -10,6 +10,7 @@
 #include <cctype>
 #include <chrono>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 #include "absenc/os/signals.hpp"
@@ -53,10 +54,10 @@ Columns columns_of(bool linear) {
   }
   add({{"speed_delay_s",
         linear ? "how long before time_s it was so fast" : "how long before time_s the shaft had that speed"},
+       {"missed", "of a gap: how many readings were due and were not taken"},
        {"event",
         "empty for a reading; restarted: a reading so long after the one before that the way between them is not "
-        "known: "
-        "position starts again; lost or back: the port; otherwise the error that came in its place"}});
+        "known: position starts again; lost or back: the port; gap; otherwise the error that came in its place"}});
   return columns;
 }
 
@@ -65,21 +66,6 @@ std::string date_and_time() {
   const auto milliseconds = now.time_since_epoch().count() % 1000;
   return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(std::chrono::system_clock::to_time_t(now)),
                      milliseconds);
-}
-
-std::string_view event_of(const Sample& sample) {
-  switch (sample.kind) {
-    case Sample::Kind::lost:
-      return "lost";
-    case Sample::Kind::back:
-      return "back";
-    case Sample::Kind::failed:
-      return text_of(sample.trouble.error).name;
-    case Sample::Kind::reading:
-      return sample.restarted ? "restarted" : "";
-    default:
-      return "";
-  }
 }
 
 }  // namespace
@@ -169,29 +155,44 @@ std::string Recording::line_of(const Sample& sample) const {
   const double delay = std::chrono::duration<double>(sample.speed_delay).count();
   const bool is_reading = sample.kind == Sample::Kind::reading;
   if (format_ == Format::csv) {
-    if (!is_reading) {
-      const std::string commas(columns_of(unit_um_ > 0).size() - 1, ',');
-      return fmt::format("{:.6f}{}{}\n", seconds, commas, event_of(sample));
-    }
+    if (!is_reading) return event_line(sample.at, event_name(sample), "");
     std::string position = sample.position_valid ? fmt::format("{}", sample.position) : "";
     if (unit_um_ > 0) position += ",";
     if (unit_um_ > 0 && sample.position_valid) {
       position += fmt::format("{}", micrometres(sample.position, unit_um_) / 1000);
     }
     const std::string speed = sample.speed_valid ? fmt::format("{:.6g},{:.6f}", sample.speed, delay) : ",";
-    return fmt::format("{},{},{},{}\n", to_csv(*unit_, sample.reading, seconds), position, speed, event_of(sample));
+    return fmt::format("{},{},{},,{}\n", to_csv(*unit_, sample.reading, seconds), position, speed, event_name(sample));
   }
   if (is_reading) {
     Json json = to_json(*unit_, sample.reading, seconds, sample.confirmed);
     set_motion(json, sample, unit_um_);
     json.set("speed_delay_s", sample.speed_valid ? Json(delay) : Json());
-    if (sample.restarted) json.set("event", event_of(sample));
+    if (sample.restarted) json.set("event", event_name(sample));
     return json.line() + '\n';
   }
-  Json json = Json::object().set("time_s", seconds).set("ok", false).set("event", event_of(sample));
+  Json json = Json::object().set("time_s", seconds).set("ok", false).set("event", event_name(sample));
   if (sample.kind != Sample::Kind::failed) return json.set("message", sample.message).line() + '\n';
   json.set("message", sample.trouble.message).set("sent", sample.trouble.sent).set("received", sample.trouble.received);
   return json.line() + '\n';
+}
+
+// In CSV: what is no reading.
+std::string Recording::event_line(Time at, std::string_view event, std::string_view missed) const {
+  const std::string commas(columns_of(unit_um_ > 0).size() - 2, ',');
+  return fmt::format("{:.6f}{}{},{}\n", std::chrono::duration<double>(at - start_).count(), commas, missed, event);
+}
+
+std::string Recording::gap_line() const {
+  if (format_ == Format::csv) return event_line(gap_at_, "gap", fmt::format("{}", gap_));
+  return Json::object()
+             .set("time_s", std::chrono::duration<double>(gap_at_ - start_).count())
+             .set("ok", false)
+             .set("event", "gap")
+             .set("missed", gap_)
+             .set("message", "readings were due and were not taken: the line or this computer was too slow, or stopped")
+             .line() +
+         '\n';
 }
 
 // Of the readings every so manieth, but none with other alarms is left out; of what went wrong everything but waiting.
@@ -203,13 +204,33 @@ bool Recording::wanted(const Sample& sample) {
   return seen_++ % settings_.every == 0 || other_alarms;
 }
 
+void Recording::miss(std::uint64_t readings) {
+  if (readings == 0) return;
+  gap_ += readings;
+  gap_at_ = os::now();
+}
+
+void Recording::write_gap() {
+  if (gap_ == 0) return;
+  file_->append(gap_line());
+  ++gaps_;
+  missed_ += std::exchange(gap_, 0);
+}
+
+void Recording::finish() {
+  write_gap();
+  file_->sync();
+}
+
 void Recording::take(const Sample& sample) {
-  if (!wanted(sample)) return;
+  if (!wanted(sample)) return file_->require_there();
   const bool full = settings_.part_size && file_->size() >= *settings_.part_size;
   const bool over = settings_.part_time && os::now() - part_start_ >= *settings_.part_time;
   if (full || over) open_part();
+  write_gap();
   file_->append(line_of(sample));
-  ++(sample.kind == Sample::Kind::reading ? readings_ : failures_);
+  readings_ += sample.kind == Sample::Kind::reading ? 1 : 0;
+  failures_ += sample.kind == Sample::Kind::failed ? 1 : 0;
 }
 
 std::string Recording::names() const {

@@ -28,11 +28,15 @@ class Recording {
 
   /// Writes a line at once, whole or not at all. Throws os::Failure.
   void take(const Sample& sample);
+  /// So many readings were due and were not taken: a line of its own, before the next that is written.
+  void miss(std::uint64_t readings);
   /// Waits for the disk. Throws os::Failure.
-  void finish() { file_->sync(); }
+  void finish();
 
   [[nodiscard]] std::uint64_t readings() const { return readings_; }  // written
-  [[nodiscard]] std::uint64_t failures() const { return failures_; }  // written
+  [[nodiscard]] std::uint64_t failures() const { return failures_; }  // written: attempts to read
+  [[nodiscard]] std::uint64_t gaps() const { return gaps_; }          // written
+  [[nodiscard]] std::uint64_t missed() const { return missed_; }      // readings, in these gaps
   [[nodiscard]] std::uint64_t bytes() const { return finished_bytes_ + file_->size(); }
   [[nodiscard]] Time start() const { return start_; }
   /// "log.csv", or "log-0001.csv to log-0003.csv"
@@ -46,7 +50,10 @@ class Recording {
   void open_part();
   [[nodiscard]] std::string header() const;
   [[nodiscard]] std::string line_of(const Sample& sample) const;
+  [[nodiscard]] std::string gap_line() const;
+  [[nodiscard]] std::string event_line(Time at, std::string_view event, std::string_view missed) const;
   [[nodiscard]] bool wanted(const Sample& sample);
+  void write_gap();
 
   RecordingSettings settings_;
   const Unit* unit_;
@@ -62,6 +69,10 @@ class Recording {
   std::uint64_t seen_ = 0;
   std::uint64_t readings_ = 0;
   std::uint64_t failures_ = 0;
+  std::uint64_t gaps_ = 0;
+  std::uint64_t missed_ = 0;
+  std::uint64_t gap_ = 0;  // missed, and not written yet
+  Time gap_at_{};
   std::uint32_t alarms_ = 0;
 };
 

@@ -71,6 +71,7 @@ Key key_of(int key) {
     case '?':
       return Key::help;
     case 'y':
+    case 'Y':
       return Key::yes;
     case KEY_RESIZE:
       return Key::resized;

@@ -104,6 +104,7 @@ void Watch::work(const std::stop_token& stop) {
   try {
     Pace pace(rate_, offset_);
     LiveEncoder live(uri_, pace.period());
+    live.encoder().end_when([&] { return stop.stop_requested() && !command_runs_; });
     Time next = start_ + offset_;
     for (;;) {
       std::optional<Command> command;
@@ -115,13 +116,16 @@ void Watch::work(const std::stop_token& stop) {
       }
       if (stop.stop_requested()) return;
       if (command) {
+        command_runs_ = true;
         run_command(live, *command);
+        command_runs_ = false;
       } else {
         publish(live, live.next());
         next = pace.next();
       }
     }
   } catch (const os::Interrupted&) {  // everybody ends: os::interrupted() tells the others
+  } catch (const os::Ended&) {        // asked to, while the line was never silent
   } catch (const std::exception& error) {
     end(error.what());
   }
@@ -160,22 +164,22 @@ void Watch::publish(const LiveEncoder& live, const Sample& sample) {
     case Sample::Kind::back:
       break;
   }
+  const Encoder& encoder = live.encoder();
+  if (encoder.counters().bad() != known_.counters.bad()) known_.bad = live.bad_exchanges();
+  known_.counters = encoder.counters();
+  known_.losses = live.losses();
   if (now < next_summary_ && sample.kind == Sample::Kind::reading) return;
   next_summary_ = now + between_summaries;
-  const Encoder& encoder = live.encoder();
   if (sample.kind == Sample::Kind::reading) {
     OtherFields fields(encoder.unit());
     encoder.report(fields);
     known_.fields = std::move(fields.texts);
   }
-  known_.losses = live.losses();
   known_.restarts = live.restarts();
   known_.rate = live.rate();
   known_.median = encoder.latencies().percentile(0.5);
   known_.percentile_99 = encoder.latencies().percentile(0.99);
   known_.longest = encoder.latencies().longest();
-  if (encoder.counters().bad() != known_.counters.bad()) known_.bad = live.bad_exchanges();
-  known_.counters = encoder.counters();
 }
 
 void Watch::trace(const LiveEncoder& live, const Sample& sample) {
@@ -227,6 +231,7 @@ void Watch::run_command(LiveEncoder& live, const Command& command) {
   add_line(os::now(), notice);
   const std::lock_guard lock(mutex_);
   known_.notice = notice;
+  known_.counters = live.encoder().counters();
 }
 
 }  // namespace absenc::tool

@@ -94,6 +94,7 @@ class Watch {
   Time next_line_{};
   std::uint32_t alarms_ = 0;
   bool restarted_ = false;  // by the reading before
+  bool command_runs_ = false;  // it is not broken off
 
   std::jthread thread_;  // last: it uses all of the others
 };

@@ -23,6 +23,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::IsSupersetOf;
 using testing::Not;
 using testing::UnorderedElementsAre;
 
@@ -44,7 +45,19 @@ constexpr Subcommand read = make("read");
 constexpr Subcommand memory = make("memory");
 constexpr Subcommand memory_read = make("memory read", "One line,\n.another line.\n\nAnd `absenc list`.");
 constexpr Subcommand memory_write = make("memory write");
-constexpr std::array<const Subcommand*, 4> subcommands{&read, &memory, &memory_read, &memory_write};
+
+constexpr std::array<Parameter, 2> of_encoder{{{"encoder", "", "who", "", true}, {"command", "", "what", "", true}}};
+constexpr std::array<Parameter, 3> of_protocol{{{"protocol", "", "which", "", true},
+                                                {"--model", "NAME", "of it"},
+                                                {"--option", "NAME=VALUE", "of it", "", false, true}}};
+constexpr std::array<Parameter, 2> of_setting{{{"encoder", "", "who", "", true}, {"name", "", "of a setting"}}};
+constexpr std::array<Parameter, 1> of_place{{{"where", "", "a port or a capture"}}};
+constexpr Subcommand run{"run", "do it", "", of_encoder, examples, run_nothing};
+constexpr Subcommand emulate{"emulate", "do it", "", of_protocol, examples, run_nothing};
+constexpr Subcommand identify{"identify", "do it", "", of_place, examples, run_nothing};
+constexpr Subcommand config_get{"config get", "do it", "", of_setting, examples, run_nothing};
+constexpr std::array<const Subcommand*, 8> subcommands{&read, &memory,  &memory_read, &memory_write,
+                                                       &run,  &emulate, &identify,    &config_get};
 
 std::string page() { return man_page("1.2-3", subcommands, all_units()); }
 
@@ -54,6 +67,8 @@ std::vector<std::string> complete(const std::string& words) {
   if (::mkdtemp(folder.data()) == nullptr) return {"no folder"};
   const std::string script = folder + "/completion";
   std::ofstream(script) << bash_completion(subcommands, all_units()) << "compopt() { :; }\nCOMP_WORDBREAKS=' :='\n"
+                        << "absenc() { [[ \"$*\" == 'list --names' ]] && printf '%s\\n' 'NAME   ENCODER   MODEL' "
+                        << "'elbow  tformat:/dev/x  23-bit' 'desk   sim:esl' '' 'They are written in absenc.toml.'; }\n"
                         << "COMP_WORDS=(" << words << ")\nCOMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n"
                         << "_absenc absenc\n((${#COMPREPLY[@]})) && printf '%s\\n' \"${COMPREPLY[@]}\"\n";
   std::vector<std::string> replies;
@@ -96,7 +111,8 @@ TEST(ManPage, HasASectionForAVerbOfTwoWords) {
 TEST(ManPage, HasNoEmptyLine) { EXPECT_THAT(page(), Not(HasSubstr("\n\n"))); }
 
 TEST(Completion, OffersEachFirstWordOnce) {
-  EXPECT_THAT(complete("absenc ''"), ElementsAre("read", "memory", "--help", "--version"));
+  EXPECT_THAT(complete("absenc ''"),
+              ElementsAre("read", "memory", "run", "emulate", "identify", "config", "--help", "--version"));
   EXPECT_THAT(complete("absenc me"), ElementsAre("memory"));
   EXPECT_THAT(complete("absenc --v"), ElementsAre("--version"));
 }
@@ -124,6 +140,31 @@ TEST(Completion, OffersArgumentsByTheirPlace) {
   EXPECT_THAT(complete("absenc memory write \\\"sim:" + id), ElementsAre("sim:" + id));
 }
 
+TEST(Completion, OffersTheNamesOfAbsencToml) {
+  EXPECT_THAT(complete("absenc read ''"), IsSupersetOf({"elbow", "desk", "tformat:", "sim:tformat"}));
+  EXPECT_THAT(complete("absenc read el"), ElementsAre("elbow"));
+  EXPECT_THAT(complete("absenc read They"), IsEmpty());
+  EXPECT_THAT(complete("absenc run desk position-"), ElementsAre("position-short"));
+}
+
+TEST(Completion, OffersModelsCommandsAndSettings) {
+  EXPECT_THAT(complete("absenc emulate tformat --model ''"), ElementsAre("TS5700N8500", "23-bit"));
+  EXPECT_THAT(complete("absenc emulate tformat --model = 2"), ElementsAre("23-bit"));
+  EXPECT_THAT(complete("absenc emulate tformat --option model = 2"), ElementsAre("23-bit"));
+  EXPECT_THAT(complete("absenc emulate nothing --model ''"), IsEmpty());
+  EXPECT_THAT(complete("absenc run sim : tformat memory-"), ElementsAre("memory-read", "memory-write"));
+  EXPECT_THAT(complete("absenc run \\\"sim:tformat?model=23-bit\\\" memory-r"), ElementsAre("memory-read"));
+  EXPECT_THAT(complete("absenc run elbow memory-r"), ElementsAre("memory-read"));
+  EXPECT_THAT(complete("absenc read sim : tformat?model = 2"), ElementsAre("23-bit"));
+  EXPECT_THAT(complete("absenc config get elbow over"), ElementsAre("overheat-threshold"));
+}
+
+TEST(Completion, OffersWhereToIdentify) {
+  EXPECT_THAT(complete("absenc identify t"), ElementsAre("tcp:"));
+  EXPECT_THAT(complete("absenc identify /de"), ElementsAre("/dev"));
+  EXPECT_THAT(complete("absenc identify spi : /de"), ElementsAre("/dev"));
+}
+
 TEST(Completion, RunsNothingOfWhatIsWritten) {
   const std::vector<std::string> commands{"'$(echo x >&2)'",    "'$(echo x >&2):'",  "'sim:$(echo x >&2)'",
                                           "'x:/$(echo x >&2)'", "'--$(echo x >&2)'", "'--order=$(echo x >&2)'",
@@ -133,6 +174,10 @@ TEST(Completion, RunsNothingOfWhatIsWritten) {
     EXPECT_THAT(complete("absenc read " + word), Not(Contains("x")));
     EXPECT_THAT(complete("absenc read " + word + " ?"), Not(Contains("x")));
     EXPECT_THAT(complete("absenc memory " + word + " ?"), Not(Contains("x")));
+    EXPECT_THAT(complete("absenc identify " + word), Not(Contains("x")));
+    EXPECT_THAT(complete("absenc run " + word + " ?"), Not(Contains("x")));
+    EXPECT_THAT(complete("absenc emulate " + word + " --model ?"), Not(Contains("x")));
+    EXPECT_THAT(complete("absenc emulate " + word + " --option model=?"), Not(Contains("x")));
   }
 }
 
