@@ -378,6 +378,35 @@ class Run(EncoderCase):
         result = absenc("run", address, "temperature", "--json")
         self.assertEqual(json.loads(result.stdout), {"ok": True, "fields": {"temperature_c": 35}})
 
+    def test_what_does_not_hold_is_shown_so(self):
+        for encoder, command, field, words in [
+                ("sim:tformat?singleturn=74565&alarm=full_absolute_status", "singleturn", "singleturn",
+                 "INVALID (only the top 5 of 17 bits hold: 73728 counts)"),
+                ("sim:tformat?singleturn=74565&alarm=counting_error", "singleturn", "singleturn", "INVALID (74565 counts)"),
+                ("sim:tformat?multiturn=5&alarm=over_speed", "multiturn", "multiturn", "INVALID (5 revolutions)"),
+                ("sim:tformat?multiturn=5&alarm=battery_error", "position", "multiturn", "INVALID (5 revolutions)"),
+                ("sim:esl?singleturn=70000&alarm=memory_error", "calibration", "redundant_singleturn", "INVALID (273 counts)"),
+                ("sim:esl?multiturn=5&alarm=xc_error", "position", "multiturn", "INVALID (5 revolutions)"),
+                ("sim:encolink?singleturn=7&alarm=signal_lost", "position", "singleturn", "INVALID (7 counts)"),
+                ("sim:biss?singleturn=7&alarm=error", "position", "singleturn", "INVALID (7 counts)"),
+        ]:
+            with self.subTest(encoder, command=command):
+                result = absenc("run", encoder, command)
+                self.assert_good(result)
+                self.assertRegex(result.stdout, rf"(?m)^{field} +{re.escape(words)}")
+                fields = json.loads(absenc("run", encoder, command, "--json").stdout)["fields"]
+                self.assertIs(fields[f"{field}_valid"], False)
+                good = json.loads(absenc("run", encoder.split("&alarm")[0], command, "--json").stdout)["fields"]
+                self.assertIs(good[f"{field}_valid"], True)
+        fields = json.loads(absenc("run", "sim:biss?alarm=error", "position", "--json").stdout)["fields"]
+        self.assertIsNone(fields["angle_deg"])
+
+    def test_results_of_changes_show_what_does_not_hold(self):
+        result = absenc("zero", "sim:tformat?multiturn=5&alarm=over_speed", "--yes")
+        self.assert_good(result)
+        self.assertRegex(result.stdout, r"(?m)^multiturn +INVALID \(5 revolutions\)")
+        self.assertRegex(result.stdout, r"(?m)^singleturn +0 counts")
+
     def test_memory(self):
         address = self.encoder()
         for value, written in (("0x42", True), ("66", False)):

@@ -51,9 +51,9 @@ struct Command {
   std::string_view meaning;
   std::span<const Argument> arguments{};
   bool changes_encoder = false;
-  bool repeatable = true;             // whether the same request may be sent again after an error
-  std::string_view reads_back{};      // config_set: the name of the config_get command that reads this setting; "": none
-                                      // can, and the setting has the name of this command
+  bool repeatable = true;         // whether the same request may be sent again after an error
+  std::string_view reads_back{};  // config_set: the name of the config_get command that reads this setting; "": none
+                                  // can, and the setting has the name of this command
   std::string_view changes_option{};  // config_set: the option that must follow its first argument
 };
 
@@ -190,8 +190,11 @@ struct Unit {
   std::span<const MemoryArea> memory{};       // what the commands memory_read and memory_write reach, in order
   std::span<const RegisterInfo> registers{};  // the same of an encoder that has registers instead of bytes
   std::span<const Vector> vectors;
-  const FieldInfo* status;     // the flags of Reading::status; null when the unit has none
-  const FieldInfo* alarms;     // the flags of Reading::alarms
+  const FieldInfo* status;  // the flags of Reading::status; null when the unit has none
+  const FieldInfo* alarms;  // the flags of Reading::alarms
+  // Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first.
+  const FieldInfo* second_status = nullptr;
+  const FieldInfo* second_alarms = nullptr;
   std::size_t host_storage;    // bytes that `host` needs, suitably aligned for any type
   std::size_t device_storage;  // bytes that `device` needs
 

@@ -68,7 +68,10 @@ class EncoderOn final : public Encoder {
     session_.set_options(options);
   }
 
-  void report(FieldSink& sink) const override { last_->report(sink); }
+  void report(FieldSink& sink) const override {
+    last_->report(sink);
+    if (const Reading* reading = last_->reading()) sink.put_reading(*reading);
+  }
   void report_left(FieldSink& sink) const override { session_.report_left(sink); }
   bool confirmed() const override { return session_.confirmed(); }
   const host::Counters& counters() const override { return session_.counters(); }

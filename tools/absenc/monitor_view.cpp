@@ -70,14 +70,14 @@ std::string speed_text(const Snapshot& snapshot) {
 std::string alarm_names(const Shown& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
+  const std::vector<Flags> channels = unit.alarms != nullptr ? alarms_of(unit, reading) : status_of(unit, reading);
   std::string text;
-  const auto add = [&](const FieldInfo* field, std::uint32_t bits) {
-    if (field == nullptr) return;
-    for (const std::string_view name : flag_names(*field, bits))
-      text += fmt::format("{}{}", text.empty() ? "" : " ", name);
-  };
-  add(unit.alarms, reading.alarms);
-  if (unit.alarms == nullptr) add(unit.status, reading.status);
+  for (const Flags& flags : channels) {
+    const std::vector<std::string_view> names = flag_names(*flags.field, flags.bits);
+    if (names.empty()) continue;
+    if (channels.size() > 1) text += fmt::format("{}{}:", text.empty() ? "" : " ", flags.field->name);
+    for (const std::string_view name : names) text += fmt::format("{}{}", text.empty() ? "" : " ", name);
+  }
   return text;
 }
 

@@ -25,7 +25,7 @@ class Display {
   Display(const LiveEncoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
     const EncoderUri& uri = live.encoder().uri();
     const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
-    if (format == Format::csv) print_line(linear ? linear_csv_header : csv_header);
+    if (format == Format::csv) print_line(csv_header(*uri.unit, linear));
   }
 
   void show(const Sample& sample) {
