@@ -166,6 +166,16 @@ class Trouble(EncoderCase):
         result = absenc("read", self.encoder(latency=20, more="&echo=on"))
         self.assert_failed(result, "if no echo is taken from it", "set echo=off")
 
+    def test_a_refusal_is_explained(self):
+        for alarm, words in [(0x40, "ca0: it received the request with a parity error"),
+                             (0x80, "ca1: it received a damaged character")]:
+            reply = bytes([0x1A, alarm, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x1A ^ alarm ^ 0x11])
+            with FakeEncoder(reply) as fake:
+                result = absenc("read", f"tformat:{fake.path}?latency=100&echo=off")
+            self.assert_failed(result, "request_rejected", words, "Try: send the same request again")
+            self.assert_failed(absenc("decode", "tformat", "--request", "1A", "--hex", reply.hex()), "request_rejected",
+                               words, "send the same request again")
+
     def test_only_echo(self):
         for echo in ("auto", "on", "off"):
             with self.subTest(echo), FakeEncoder([0x1A]) as fake:

@@ -82,9 +82,10 @@ enum FieldIndex : std::size_t {
   field_answering,
   field_disturbed,
   field_clash,
+  field_page_left,
 };
 
-inline constexpr std::array<FieldInfo, 29> fields{{
+inline constexpr std::array<FieldInfo, 30> fields{{
     {"data_id", FieldInfo::Kind::number, "", "which data was asked for (Table 3)"},
     {"control_field", FieldInfo::Kind::number, "", "CF: encoder address, data id, parity"},
     {"encoder_address", FieldInfo::Kind::number, "", "EAD: which encoder on the line"},
@@ -121,6 +122,8 @@ inline constexpr std::array<FieldInfo, 29> fields{{
      "addresses whose answer is damaged: check the line, and whether two encoders share the address", address_flags},
     {"clash", FieldInfo::Kind::boolean, "",
      "yes: its answer is damaged every time; two encoders share the address, or the line is bad"},
+    {"page_left", FieldInfo::Kind::number, "",
+     "memory page that is left selected, also for whoever reads next: which one was before is not known"},
 }};
 
 constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }

@@ -56,9 +56,10 @@ enum FieldIndex : std::size_t {
   field_temperature,
   field_overheat_enabled,
   field_overheat_threshold,
+  field_page_left,
 };
 
-inline constexpr std::array<FieldInfo, 16> fields{{
+inline constexpr std::array<FieldInfo, 17> fields{{
     {"data_id", FieldInfo::Kind::number, "", "which data was asked for (Table 1)"},
     {"control_field", FieldInfo::Kind::number, "", "first byte of the request: sync code, data id, parity"},
     {"status", FieldInfo::Kind::flags, "", "SF", status_flags},
@@ -80,6 +81,8 @@ inline constexpr std::array<FieldInfo, 16> fields{{
     {"temperature_c", FieldInfo::Kind::number, "degC", "of the encoder's board, within 3 degC"},
     {"overheat_enabled", FieldInfo::Kind::boolean, "", "whether over_heat is watched"},
     {"overheat_threshold_c", FieldInfo::Kind::number, "degC", "over_heat above this"},
+    {"page_left", FieldInfo::Kind::number, "",
+     "memory page that is left selected, also for whoever reads next: which one was before is not known"},
 }};
 
 constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }
