@@ -155,6 +155,19 @@ class Wire(EslCase):
             self.assertEqual(client.receive(1, 0.1), b"")
         self.check_position(client.exchange(POSITION, address=2), 0, 0, address=2)
 
+    def test_a_wrong_parity_is_reported_at_every_address(self):
+        for address in range(8):
+            emulator = Emulator(self.directory, "--option", f"address={address}", protocol="esl", name=f"at{address}")
+            self.addCleanup(emulator.end)
+            client = Client(emulator.path)
+            self.addCleanup(client.close)
+            field = control_field(POSITION, address) ^ 0x80
+            client.send(bytes([field]) + crc8([field]))
+            reply = client.receive(18)
+            self.assertEqual(len(reply), 18, address)
+            self.assertEqual((reply[0], reply[11]), (field, field))
+            self.assertEqual((reply[1] & 3, reply[12] & 3), (1, 1), address)
+
     def test_several_on_one_line(self):
         client = self.client("--singleturn", "1000", "--also", "address=3&singleturn=70000&multiturn=7",
                              "--also", "address=5&alarm=multiturn_error", "--also", "address=6&singleturn=0x5555",
@@ -433,6 +446,37 @@ class OneLine(EslCase):
         self.assert_good(result)
         last = {line["encoder"]: line for line in json_lines(result.stdout)}
         self.assertEqual([last[name]["reading"]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
+
+    def test_memory_is_for_one_encoder_on_its_line(self):
+        """By the encoder, which knows that others are there, and by the host, where its file says so."""
+        emulator = self.emulator("--also", "address=3")
+        encoder = f"esl:{emulator.path}?latency=20"
+        self.assert_failed(absenc("memory", "read", encoder, "0"), "timeout", "others share its line")
+        config = self.file("absenc.toml", f"""
+            [bus.arm]
+            port = "{emulator.path}"
+            latency = 20
+            [encoder.shoulder]
+            protocol = "esl"
+            bus = "arm"
+            [encoder.elbow]
+            protocol = "esl"
+            bus = "arm"
+            address = 3
+            [bus.leg]
+            port = "sim"
+            [encoder.knee]
+            protocol = "esl"
+            bus = "leg"
+            """)
+        env = dict(os.environ, ABSENC_CONFIG=config)
+        for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"],
+                        ["run", "elbow", "led-or-lissajous"]):
+            self.assert_failed(absenc(*command, env=env), "unsupported", "several encoders on the line", "nothing was sent")
+        self.assert_good(absenc("memory", "read", "knee", "0", env=env))
+        self.assert_failed(absenc("memory", "read", "elbow?bus=false", "0", env=env), "timeout")
+        summary = emulator.end()[2]
+        self.assertIn("memory access with several encoders on the line", summary)
 
     def test_what_cannot_share_a_line(self):
         self.assert_wrong_usage(absenc("monitor", "esl:/dev/x", "esl:/dev/x?address=1&baud=115200"), "/dev/x", "baud")

@@ -54,6 +54,7 @@ class EncoderOn final : public Encoder {
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
+    if (link_.use_count() > 1) tell_of_company();
     return outcome(command, link_->take_turn([&] {
       return session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
         last_ = &conversation;
@@ -111,6 +112,13 @@ class EncoderOn final : public Encoder {
   }
 
  private:
+  // Others have the same line open.
+  void tell_of_company() {
+    Options options = uri().options;
+    tell_shared(unit(), options);
+    set_options(options);
+  }
+
   Outcome outcome(const Command& command, const Conversation<Item>* conversation) {
     if (conversation == nullptr) {
       throw UsageError(fmt::format("{} cannot run {} with these options", unit().id, command.name));
