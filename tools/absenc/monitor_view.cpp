@@ -154,14 +154,16 @@ void draw_bar(Screen& screen, int row, const Shown& shown) {
 
 void draw_position(Screen& screen, int row, const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
+  const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    std::string text = to_text(*shown.watch->uri().unit, snapshot.last.reading);
+    const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;  // or else they are below
+    const std::string text = has_room ? to_text(unit, snapshot.last.reading) : place_text(snapshot.last.reading);
     const bool good = has_position(snapshot);
     return screen.put(row, 2, text, good ? Style::bold : Style::bad);
   }
   std::string text = fmt::format("{}: no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   if (snapshot.has_reading) {
-    text += fmt::format("; the last was: {}", to_text(*shown.watch->uri().unit, snapshot.last.reading));
+    text += fmt::format("; the last was: {}", to_text(unit, snapshot.last.reading));
   }
   screen.put(row, 2, text, style_of(snapshot.state));
 }

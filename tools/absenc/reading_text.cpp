@@ -99,19 +99,29 @@ std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
   return both(unit.status, unit.second_status, reading.status);
 }
 
+namespace {
+
+// The alarms, of encoders without any the status; of two channels both.
 std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   if (has_channels(unit)) return status_and_alarms(unit, reading);
   return unit.alarms != nullptr ? alarms_of(unit, reading) : status_of(unit, reading);
 }
 
-std::string to_text(const Unit& unit, const Reading& reading) {
+}  // namespace
+
+std::string place_text(const Reading& reading) {
   std::string text;
-  const auto add = [&text](const std::string& part) { text += text.empty() ? part : "   " + part; };
-  if (reading.singleturn_bits != 0) add(position_text(reading));
-  if (reading.multiturn_bits != 0) add(turns_text(reading));
+  if (reading.singleturn_bits != 0) text = position_text(reading);
+  if (reading.multiturn_bits != 0) text += (text.empty() ? "" : "   ") + turns_text(reading);
+  return text;
+}
+
+std::string to_text(const Unit& unit, const Reading& reading) {
+  std::string text = place_text(reading);
   for (const Flags& flags : flags_in_line(unit, reading)) {
     const std::string names = flags_text(flags);
-    add(names.empty() ? fmt::format("no {}", flags.field->name) : fmt::format("{}: {}", flags.field->name, names));
+    if (!text.empty()) text += "   ";
+    text += names.empty() ? fmt::format("no {}", flags.field->name) : fmt::format("{}: {}", flags.field->name, names);
   }
   return text;
 }

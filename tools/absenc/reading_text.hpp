@@ -22,12 +22,13 @@ struct Flags {
 /// One for each channel that the unit has flags of; none when it has no such field.
 [[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
 [[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
-/// What `to_text` shows of them: the alarms, of encoders without any the status; of two channels both.
-[[nodiscard]] std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading);
 
 /// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"; of a linear encoder
 /// "  78.96355 mm      78963.55 um   1579271 counts   no alarms"
 [[nodiscard]] std::string to_text(const Unit& unit, const Reading& reading);
+
+/// Its first part: position and turns.
+[[nodiscard]] std::string place_text(const Reading& reading);
 
 /// What each flag that is set means and what to do, a line each; "" when there is none.
 [[nodiscard]] std::string flags_in_words(const Flags& flags);

@@ -278,11 +278,7 @@ void JsonFields::put(const FieldValue& value) {
 void JsonFields::put_reading(const Reading& reading) {
   for (Judged& judged : judged_) {
     judged.holds = judged.holds && holds(*judged.info, reading);
-    if (judged.info->kind != FieldInfo::Kind::real) {
-      fields.set(fmt::format("{}_valid", judged.info->name), judged.holds);
-    } else if (!judged.holds) {
-      fields.set(judged.info->name, Json());
-    }
+    if (!judged.holds) fields.set(fmt::format("{}_valid", judged.info->name), false);
   }
 }
 

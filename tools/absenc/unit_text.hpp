@@ -71,8 +71,8 @@ struct NamedArgument {
 /// The value of such a field: as it is, or "INVALID (74565 counts)".
 [[nodiscard]] std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading);
 
-/// Puts fields into a JSON object; with a reading, of each count that it knows whether it holds (`singleturn_valid`).
-/// What is computed from one that does not hold is null.
+/// Puts fields into a JSON object; with a reading, behind what it knows not to hold `singleturn_valid` and the like,
+/// false. What has no such field holds.
 struct JsonFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;

@@ -37,9 +37,9 @@ class OtherFields final : public FieldSink {
 
   void put(const FieldValue& value) override {
     const FieldInfo& info = *value.info;
-    const std::vector<Flags> in_line = flags_in_line(*unit_, {});
-    const bool is_in_line =
-        std::any_of(in_line.begin(), in_line.end(), [&](const Flags& one) { return one.field == &info; });
+    // Of two channels the line has no room for the flags.
+    const FieldInfo* in_line = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
+    const bool is_in_line = &info == in_line && unit_->second_status == nullptr && unit_->second_alarms == nullptr;
     if (is_in_line || info.name == "singleturn" || info.name == "multiturn") return;
     const std::string shown = fmt::format("{}{}{}", to_text(value), info.unit.empty() ? "" : " ", info.unit);
     fields_.emplace_back(info, shown);
