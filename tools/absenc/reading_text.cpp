@@ -144,6 +144,9 @@ std::string flags_in_words(const Flags& flags) {
 
 std::string alarms_in_words(const Unit& unit, const Reading& reading) {
   const std::vector<Flags> alarms = alarms_of(unit, reading);
+  if (alarms.size() == 2 && alarms[0].bits == alarms[1].bits && alarms[0].bits != 0) {
+    return fmt::format("{}, {}:\n{}", alarms[0].field->name, alarms[1].field->name, flags_in_words(alarms[0]));
+  }
   std::string lines;
   for (const Flags& flags : alarms) {
     const std::string words = flags_in_words(flags);

@@ -32,7 +32,7 @@ struct Flags {
 
 /// What each flag that is set means and what to do, a line each; "" when there is none.
 [[nodiscard]] std::string flags_in_words(const Flags& flags);
-/// Of two channels under the name of each.
+/// Of two channels under the name of each; what both raise once.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
 /// Sets everything but the time.
