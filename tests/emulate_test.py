@@ -499,6 +499,26 @@ class Life(EmulateCase):
                 self.assertRegex(err, r"^absenc: 3 requests answered in ")
                 self.assertFalse(os.path.lexists(emulator.path))
 
+    def test_a_refused_request_is_one_request(self):
+        """ID D with a wrong parity bit, in one write: refused once, when it has ended, and no rule is broken."""
+        emulator = self.emulator()
+        with Client.open(emulator.path) as client:
+            client.send([0x6A, 0x05, 0xEF])
+            reply = client.receive(11)
+            self.assertEqual((len(reply), reply[:2]), (11, bytes([0x1A, 0x40])))
+        err = emulator.end()[2]
+        self.assertIn("1 requests answered", err)
+        self.assertNotIn("rules", err)
+
+    def test_the_help_says_what_a_fault_is_counted_by(self):
+        words = " ".join(absenc("emulate", "--help").stdout.split())
+        self.assertIn("request_corrupt: how often a byte (CAN: a frame) of the requests that it hears is", words)
+        emulator = self.emulator("--fault", "request_corrupt=1")
+        with Client.open(emulator.path) as client:
+            client.send([0xEA, 0x05, 0xEF])
+            client.receive(11, 0.2)
+        self.assertIn("3 request_corrupt", emulator.end()[2])  # each byte
+
     def test_violations(self):
         emulator = self.emulator()
         with Client.open(emulator.path) as client:

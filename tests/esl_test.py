@@ -155,6 +155,19 @@ class Wire(EslCase):
             self.assertEqual(client.receive(1, 0.1), b"")
         self.check_position(client.exchange(POSITION, address=2), 0, 0, address=2)
 
+    def test_a_wrong_parity_is_reported_at_every_address(self):
+        for address in range(8):
+            emulator = Emulator(self.directory, "--option", f"address={address}", protocol="esl", name=f"at{address}")
+            self.addCleanup(emulator.end)
+            client = Client(emulator.path)
+            self.addCleanup(client.close)
+            field = control_field(POSITION, address) ^ 0x80
+            client.send(bytes([field]) + crc8([field]))
+            reply = client.receive(18)
+            self.assertEqual(len(reply), 18, address)
+            self.assertEqual((reply[0], reply[11]), (field, field))
+            self.assertEqual((reply[1] & 3, reply[12] & 3), (1, 1), address)
+
     def test_several_on_one_line(self):
         client = self.client("--singleturn", "1000", "--also", "address=3&singleturn=70000&multiturn=7",
                              "--also", "address=5&alarm=multiturn_error", "--also", "address=6&singleturn=0x5555",
@@ -178,7 +191,8 @@ class Command(EslCase):
         self.assertTrue(info["ok"])
         self.assertEqual(info["answers"]["encoder-id"]["fields"]["encoder_id"], 0xD8)
         alarms = self.good_json("alarms", encoder)
-        self.assertEqual([alarm["name"] for alarm in alarms["ch1_alarms"]], ["multiturn_error"])
+        for channel in ("ch1_alarms", "ch2_alarms"):
+            self.assertEqual([alarm["name"] for alarm in alarms[channel]], ["multiturn_error"])
         self.assertIn("temperature_c", self.good_json("temperature", encoder)["fields"])
         safe = self.good_json("run", encoder, "safe-position")["fields"]
         self.assertEqual(safe["safe_singleturn"], 0xABCDEF)
@@ -324,6 +338,75 @@ class Sentences(EslCase):
         self.assert_failed(absenc("memory", "read", encoder, "0"), "busy", "not executed")
 
 
+class TwoChannels(EslCase):
+    """What only one channel says, wherever readings are shown."""
+
+    NONE = {"ch1_status": ["ready"], "ch1_alarms": [], "ch2_status": ["channel_2", "ready"], "ch2_alarms": [],
+            "alarms": []}
+
+    def fake(self, status_2=READY | CHANNEL_2, alarms_2=0):
+        """IDs 1 and 2 with flags in channel 2 alone."""
+        replies = {}
+        for data_id, turns in ((POSITION, b"\x34\x12"), (0x2, b"")):
+            field = control_field(data_id)
+            one = bytes([field, READY, 0, 0xEF, 0xCD, 0xAB]) + turns + bytes([0x56])
+            two = bytes([field, status_2, alarms_2, 0xAB, 0x80 | 0x56])
+            replies[field] = one + crc16(one, 0x0000) + two + crc16(two, 0xFFFF)
+        fake = FakeEncoder(replies)
+        fake.__enter__()
+        self.addCleanup(fake.__exit__)
+        return f"esl:{fake.path}?latency=200&echo=off"
+
+    def flags_of(self, reading):
+        return {name: reading[name] for name in self.NONE}
+
+    def test_an_alarm_of_channel_2(self):
+        encoder = self.fake(alarms_2=0x20)
+        wanted = dict(self.NONE, ch2_alarms=["singleturn_error"], alarms=["singleturn_error"])
+        reading = self.good_json("read", encoder)
+        self.assertEqual(self.flags_of(reading), wanted)
+        self.assertFalse(reading["singleturn_valid"])
+        info = json.loads(absenc("info", encoder, "--json").stdout)  # the fake answers nothing else
+        self.assertEqual(self.flags_of(info["answers"]["position"]), wanted)
+        text = absenc("read", encoder).stdout
+        self.assertIn("no ch1_alarms", text)
+        self.assertIn("ch2_alarms: singleturn_error", text)
+        alarms = self.good_json("alarms", encoder)
+        self.assertEqual((alarms["ch1_alarms"], [one["name"] for one in alarms["ch2_alarms"]]), ([], ["singleturn_error"]))
+        self.assertRegex(absenc("alarms", encoder).stdout, r"no ch1_alarms\nch2_alarms:\n +singleturn_error: .*stop the drive")
+
+    def test_a_status_of_channel_2(self):
+        encoder = self.fake(status_2=CHANNEL_2 | 0x04)
+        reading = self.good_json("read", encoder)
+        self.assertEqual(self.flags_of(reading), dict(self.NONE, ch2_status=["safety_error", "channel_2"]))
+        self.assertFalse(reading["singleturn_valid"])
+        self.assertIn("ch2_status: safety_error channel_2", absenc("read", encoder).stdout)
+        self.assertRegex(absenc("alarms", encoder).stdout, r"no ch1_alarms\nno ch2_alarms\n(.*\n)*ch2_status:\n +safety_error:")
+
+    def test_csv_and_recordings(self):
+        encoder = self.fake(alarms_2=0x20)
+        names, row = absenc("read", encoder, "--csv").stdout.splitlines()
+        values = dict(zip(names.split(","), row.split(",")))
+        self.assertEqual((values["ch1_alarms"], values["ch2_alarms"]), ("", "singleturn_error"))
+        self.assertEqual((values["ch1_status"], values["ch2_status"]), ("ready", "channel_2 ready"))
+        for path in (self.file("log.csv"), self.file("log.jsonl")):
+            self.assert_good(absenc("record", encoder, "--output", path, "--rate", "5", "--for", "1"))
+            with open(path, encoding="utf-8") as file:
+                lines = [line.rstrip("\n") for line in file if not line.startswith("#")]
+            if path.endswith("csv"):
+                last = dict(zip(lines[0].split(","), lines[-1].split(",")))
+                self.assertEqual((last["ch1_alarms"], last["ch2_alarms"]), ("", "singleturn_error"))
+                self.assertEqual(len(lines[0].split(",")), len(lines[-1].split(",")))
+            else:
+                self.assertEqual(json.loads(lines[-1])["ch2_alarms"], ["singleturn_error"])
+
+    def test_monitor(self):
+        encoder = self.fake(alarms_2=0x20)
+        result = absenc("monitor", encoder, "--for", "2", "--interval", "0.5", "--json")
+        self.assertEqual(self.flags_of(json_lines(result.stdout)[-1]["reading"]),
+                         dict(self.NONE, ch2_alarms=["singleturn_error"], alarms=["singleturn_error"]))
+
+
 class OneLine(EslCase):
     def lines(self, *arguments):
         result = absenc("monitor", *arguments, "--for", "2", "--interval", "0.5", "--json")
@@ -363,6 +446,37 @@ class OneLine(EslCase):
         self.assert_good(result)
         last = {line["encoder"]: line for line in json_lines(result.stdout)}
         self.assertEqual([last[name]["reading"]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
+
+    def test_memory_is_for_one_encoder_on_its_line(self):
+        """By the encoder, which knows that others are there, and by the host, where its file says so."""
+        emulator = self.emulator("--also", "address=3")
+        encoder = f"esl:{emulator.path}?latency=20"
+        self.assert_failed(absenc("memory", "read", encoder, "0"), "timeout", "others share its line")
+        config = self.file("absenc.toml", f"""
+            [bus.arm]
+            port = "{emulator.path}"
+            latency = 20
+            [encoder.shoulder]
+            protocol = "esl"
+            bus = "arm"
+            [encoder.elbow]
+            protocol = "esl"
+            bus = "arm"
+            address = 3
+            [bus.leg]
+            port = "sim"
+            [encoder.knee]
+            protocol = "esl"
+            bus = "leg"
+            """)
+        env = dict(os.environ, ABSENC_CONFIG=config)
+        for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"],
+                        ["run", "elbow", "led-or-lissajous"]):
+            self.assert_failed(absenc(*command, env=env), "unsupported", "several encoders on the line", "nothing was sent")
+        self.assert_good(absenc("memory", "read", "knee", "0", env=env))
+        self.assert_failed(absenc("memory", "read", "elbow?bus=false", "0", env=env), "timeout")
+        summary = emulator.end()[2]
+        self.assertIn("memory access with several encoders on the line", summary)
 
     def test_what_cannot_share_a_line(self):
         self.assert_wrong_usage(absenc("monitor", "esl:/dev/x", "esl:/dev/x?address=1&baud=115200"), "/dev/x", "baud")

@@ -3,9 +3,12 @@
 import json
 import os
 import re
+import select
+import time
+import tty
 import unittest
 
-from command_support import Case, Emulator, absenc, json_lines
+from command_support import PATIENCE, Case, Emulator, absenc, json_lines
 
 
 class OnTheBus(Case):
@@ -44,6 +47,34 @@ class OnTheBus(Case):
         self.assertEqual(self.fields("run", address, "listen")["singleturn"], 9799)
         self.assertEqual(self.fields("run", address, "start", "--yes")["singleturn"], 9799)
         self.assert_no_rule_broken()
+
+    def burst(self, count):
+        """So many requests in one write: how many the adapter took, refused, and how many the node answered."""
+        descriptor = os.open(self.node.path, os.O_RDWR | os.O_NOCTTY)
+        self.addCleanup(os.close, descriptor)
+        tty.setraw(descriptor)
+        os.write(descriptor, b"S5\rO\r" + b"t22088020000000000000\r" * count)
+        text = b""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            taken, refused = text.count(b"z\r"), text.count(b"\a")
+            if taken + refused == count and text.count(b"t120") == taken:
+                break
+            if select.select([descriptor], [], [], 0.1)[0]:
+                text += os.read(descriptor, 4096)
+        return text.count(b"z\r"), text.count(b"\a"), text.count(b"t120")
+
+    def test_fifty_requests_at_once(self):
+        self.bus("--option", "cyclic=0")
+        self.assertEqual(self.burst(50), (50, 0, 50))
+        self.assert_no_rule_broken()
+
+    def test_more_requests_than_an_adapter_keeps(self):
+        self.bus("--option", "cyclic=0")
+        taken, refused, answered = self.burst(150)
+        self.assertEqual((taken + refused, answered), (150, taken))
+        self.assertGreater(refused, 0)
+        self.assertIn(f"frames refused because too many waited for the bus: {refused}", self.node.end()[2])
 
     def test_twenty_one_bits(self):
         address = self.bus("--singleturn", "1223629", "--option", "bits=21")

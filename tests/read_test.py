@@ -190,6 +190,16 @@ class Trouble(EncoderCase):
         result = absenc("read", self.encoder(latency=20, more="&echo=on"))
         self.assert_failed(result, "if no echo is taken from it", "set echo=off")
 
+    def test_a_refusal_is_explained(self):
+        for alarm, words in [(0x40, "ca0: it received the request with a parity error"),
+                             (0x80, "ca1: it received a damaged character")]:
+            reply = bytes([0x1A, alarm, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x1A ^ alarm ^ 0x11])
+            with FakeEncoder(reply) as fake:
+                result = absenc("read", f"tformat:{fake.path}?latency=100&echo=off")
+            self.assert_failed(result, "request_rejected", words, "Try: send the same request again")
+            self.assert_failed(absenc("decode", "tformat", "--request", "1A", "--hex", reply.hex()), "request_rejected",
+                               words, "send the same request again")
+
     def test_only_echo(self):
         for echo in ("auto", "on", "off"):
             with self.subTest(echo), FakeEncoder([0x1A]) as fake:
@@ -401,6 +411,35 @@ class Run(EncoderCase):
         self.assertRegex(absenc("run", address, "temperature").stdout, r"^temperature_c +35 degC ")
         result = absenc("run", address, "temperature", "--json")
         self.assertEqual(json.loads(result.stdout), {"ok": True, "fields": {"temperature_c": 35}})
+
+    def test_what_does_not_hold_is_shown_so(self):
+        for encoder, command, field, words in [
+                ("sim:tformat?singleturn=74565&alarm=full_absolute_status", "singleturn", "singleturn",
+                 "INVALID (only the top 5 of 17 bits hold: 73728 counts)"),
+                ("sim:tformat?singleturn=74565&alarm=counting_error", "singleturn", "singleturn", "INVALID (74565 counts)"),
+                ("sim:tformat?multiturn=5&alarm=over_speed", "multiturn", "multiturn", "INVALID (5 revolutions)"),
+                ("sim:tformat?multiturn=5&alarm=battery_error", "position", "multiturn", "INVALID (5 revolutions)"),
+                ("sim:esl?singleturn=70000&alarm=memory_error", "calibration", "redundant_singleturn", "INVALID (273 counts)"),
+                ("sim:esl?multiturn=5&alarm=xc_error", "position", "multiturn", "INVALID (5 revolutions)"),
+                ("sim:encolink?singleturn=7&alarm=signal_lost", "position", "singleturn", "INVALID (7 counts)"),
+                ("sim:biss?singleturn=7&alarm=error", "position", "singleturn", "INVALID (7 counts)"),
+        ]:
+            with self.subTest(encoder, command=command):
+                result = absenc("run", encoder, command)
+                self.assert_good(result)
+                self.assertRegex(result.stdout, rf"(?m)^{field} +{re.escape(words)}")
+                fields = json.loads(absenc("run", encoder, command, "--json").stdout)["fields"]
+                self.assertIs(fields[f"{field}_valid"], False)
+                good = json.loads(absenc("run", encoder.split("&alarm")[0], command, "--json").stdout)["fields"]
+                self.assertNotIn(f"{field}_valid", good)
+        fields = json.loads(absenc("run", "sim:biss?alarm=error", "position", "--json").stdout)["fields"]
+        self.assertIs(fields["angle_deg_valid"], False)
+
+    def test_results_of_changes_show_what_does_not_hold(self):
+        result = absenc("zero", "sim:tformat?multiturn=5&alarm=over_speed", "--yes")
+        self.assert_good(result)
+        self.assertRegex(result.stdout, r"(?m)^multiturn +INVALID \(5 revolutions\)")
+        self.assertRegex(result.stdout, r"(?m)^singleturn +0 counts")
 
     def test_memory(self):
         address = self.encoder()

@@ -19,8 +19,8 @@ struct Reading {
   bool multiturn_valid = false;
   double unit_um = 0;        // linear encoders: micrometres a count of `singleturn`; 0: a rotation
   bool ready = true;         // false while the encoder says that it is starting
-  std::uint32_t status = 0;  // bits named by the unit's status field
-  std::uint32_t alarms = 0;  // bits named by the unit's alarms field
+  std::uint32_t status = 0;  // bits named by the unit's status field, then those of its second
+  std::uint32_t alarms = 0;  // bits named by the unit's alarms field, then those of its second
   Time latched{};            // when the encoder took the position
   Time received{};           // when the last byte of the reply was there
 

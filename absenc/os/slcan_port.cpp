@@ -19,7 +19,8 @@ namespace {
 
 constexpr Time answer_time = 300ms;  // an adapter on USB takes 1 or 2
 constexpr Time settling_time = 20ms;
-constexpr unsigned most_reads = 1024;  // so that a line that is never silent does not hold anybody up
+constexpr std::size_t most_waiting = 64;  // frames, as common adapters keep
+constexpr unsigned most_reads = 1024;     // so that a line that is never silent does not hold anybody up
 
 Bytes bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
 
@@ -31,13 +32,17 @@ void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::trans
 
 void SlcanLine::collect(Time deadline) {
   collected_ = false;
+  deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
   // Without a wait everything that is there, however many reads that takes; with one until there is something.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !collected_); ++reads) {
     const Time now = bytes_->now();
     // A port of bytes reports a timer only when it lies ahead; what is there already comes before it.
     const ByteEvent event = bytes_->wait({.at = deadline <= now ? now + 1ns : deadline});
-    if (event.kind == ByteEvent::Kind::timer) return;
+    if (event.kind == ByteEvent::Kind::timer) {
+      if (!everything) reach(event.at);
+      return;
+    }
     if (event.kind != ByteEvent::Kind::received) continue;
     for (const std::uint8_t byte : event.items) {
       const Found found = reader_.feed(byte);
@@ -144,6 +149,7 @@ void SlcanAdapter::send(const CanFrame& frame) {
     ++lost_;
     return;
   }
+  bus_free_ = std::max(bus_free_, os::now()) + duration(frame);
   const auto milliseconds = std::chrono::duration_cast<std::chrono::milliseconds>(os::now()).count() % 60'000;
   write(with_time_ ? slcan::encode(frame, static_cast<std::uint16_t>(milliseconds)) : slcan::encode(frame));
 }
@@ -162,12 +168,33 @@ void SlcanAdapter::take_frame(Bytes line, Time at) {
   const Result<CanFrame> frame = slcan::decode(line);
   if (!frame) ++garbage_;
   if (!frame || !open_ || listen_only_) return answer("\a");
-  answer(frame->extended ? "Z\r" : "z\r");
-  if (connected()) {
-    push(*frame, at);
-  } else {
-    ++lost_;
+  if (waiting_.size() == most_waiting) {
+    ++overflowed_;
+    return answer("\a");
   }
+  answer(frame->extended ? "Z\r" : "z\r");
+  if (!connected()) {
+    ++lost_;
+    return;
+  }
+  if (waiting_.empty()) bus_free_ = std::max(bus_free_, at) + duration(*frame);
+  waiting_.push_back(*frame);
+}
+
+// The nodes hear a frame when it has ended; then the next one begins. One at a time, also when we come late: between
+// two of them a node can send what it has to.
+bool SlcanAdapter::reach(Time now) {
+  if (waiting_.empty() || bus_free_ > now) return false;
+  push(waiting_.front(), bus_free_);
+  waiting_.pop_front();
+  if (!waiting_.empty()) bus_free_ += duration(waiting_.front());
+  return true;
+}
+
+// Without stuff bits.
+Time SlcanAdapter::duration(const CanFrame& frame) const {
+  const std::int64_t bits = (frame.extended ? 67 : 47) + (frame.remote ? 0 : 8 * frame.size);
+  return Time(std::chrono::seconds(1)) * bits / std::max<std::int64_t>(1, rate_);
 }
 
 // False for what is no command, or not allowed now.

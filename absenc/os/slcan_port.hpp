@@ -3,6 +3,7 @@
 // of that: an adapter on a pseudo-terminal, behind which virtual nodes are.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,6 +22,10 @@ class SlcanLine : public FramePort {
   void collect(Time deadline) final;
   /// Collects until something came, or the deadline; whether something did.
   bool hears_until(Time deadline);
+  /// When something is to happen though nothing comes; `never`: no time.
+  [[nodiscard]] virtual Time due() const { return never; }
+  /// It may have come; whether something was pushed.
+  virtual bool reach(Time) { return false; }
   /// A line without its CR, a refusal, or garbage came.
   virtual void take(slcan::LineReader::Found found, Bytes line, Time at) = 0;
 
@@ -58,7 +63,8 @@ class SlcanPort final : public SlcanLine {
 };
 
 /// Plays the adapter: what a host sends reaches the device that is driven on this port, and the other way round, while
-/// the host has opened it at the bit rate that the device has.
+/// the host has opened it at the bit rate that the device has. Each frame takes its time on the bus: those that a host
+/// sends at once wait for it, as many as an adapter keeps, and the others are refused (BEL).
 class SlcanAdapter final : public SlcanLine {
  public:
   SlcanAdapter(std::shared_ptr<Port<std::uint8_t>> bytes, const LineSettings& settings)
@@ -66,6 +72,8 @@ class SlcanAdapter final : public SlcanLine {
 
   /// Frames that were lost because the host had the adapter closed or at another bit rate.
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
+  /// Frames that were refused because too many waited for the bus.
+  [[nodiscard]] std::uint64_t overflowed() const { return overflowed_; }
   /// Lines that are no command.
   [[nodiscard]] std::uint64_t garbage() const { return garbage_; }
 
@@ -73,7 +81,10 @@ class SlcanAdapter final : public SlcanLine {
   void send(const CanFrame& frame) override;
   void apply(const LineSettings& settings) override { device_rate_ = settings.rate; }
   void take(slcan::LineReader::Found found, Bytes line, Time at) override;
+  [[nodiscard]] Time due() const override { return waiting_.empty() ? never : bus_free_; }
+  bool reach(Time now) override;
   void take_frame(Bytes line, Time at);
+  [[nodiscard]] Time duration(const CanFrame& frame) const;
   bool execute(Bytes line);
   void answer(std::string_view text);
   [[nodiscard]] bool connected() const { return open_ && rate_ == device_rate_; }
@@ -83,7 +94,10 @@ class SlcanAdapter final : public SlcanLine {
   bool open_ = false;
   bool listen_only_ = false;
   bool with_time_ = false;
+  std::deque<CanFrame> waiting_;  // of the host; the first is on the bus
+  Time bus_free_{};               // when that, or the last one, has ended
   std::uint64_t lost_ = 0;
+  std::uint64_t overflowed_ = 0;
   std::uint64_t garbage_ = 0;
 };
 

@@ -189,6 +189,33 @@ TEST_F(Adapter, NothingPassesAtAnotherBitRate) {
   EXPECT_EQ(port.lost(), 2u);
 }
 
+constexpr Time frame_time = 111 * 4us;  // 47 + 8 * 8 bits at 250 kbit/s
+
+TEST_F(Adapter, FramesSentAtOnceComeOneAfterTheOther) {
+  say("S5\rO\r");
+  const Time before = os::now();
+  host->coming = "t22088020000000000000\rt22088020000000000000\rt22088020000000000000\r";
+  std::vector<Time> times;
+  while (times.size() < 3) {
+    const FrameEvent event = port.wait({.at = before + 60s});
+    ASSERT_EQ(event.kind, EventKind::received);
+    times.push_back(event.at);
+  }
+  EXPECT_GE(times[0] - before, frame_time);
+  EXPECT_EQ(times[1] - times[0], frame_time);
+  EXPECT_EQ(times[2] - times[1], frame_time);
+}
+
+TEST_F(Adapter, RefusesAndCountsWhatItCannotKeep) {
+  say("S5\rO\r");
+  std::string all;
+  for (unsigned i = 0; i < 100; ++i) all += "t22088020000000000000\r";
+  const std::string answers = say(all);
+  EXPECT_EQ(std::count(answers.begin(), answers.end(), 'z'), 64);
+  EXPECT_EQ(std::count(answers.begin(), answers.end(), '\a'), 36);
+  EXPECT_EQ(port.overflowed(), 36u);
+}
+
 TEST_F(Adapter, ListensOnly) {
   say("S5\rL\r");
   EXPECT_EQ(say("t22088020000000000000\r"), "\a");

@@ -18,6 +18,9 @@ struct FlagInfo {
   std::string_view action;   // what the operator must do; "" when nothing
 };
 
+/// What of a reading a field shows: it holds as long as that does.
+enum class Shows : std::uint8_t { other, position, turns };
+
 struct FieldInfo {
   enum class Kind : std::uint8_t {
     number,
@@ -33,6 +36,7 @@ struct FieldInfo {
   std::string_view unit;  // "" for a plain number; "counts", "revolutions", "degC" ...
   std::string_view meaning;
   std::span<const FlagInfo> flags{};
+  Shows shows = Shows::other;
 };
 
 struct FieldValue {
@@ -44,7 +48,8 @@ struct FieldValue {
 
 struct FieldSink {
   constexpr virtual void put(const FieldValue& value) = 0;
-  /// The position in a good reply that carries one, or only its turns, and what of it holds; without times.
+  /// The position in a good reply that carries one, or only its turns, and what of it holds: behind the fields that
+  /// show it. May come again with the same.
   constexpr virtual void put_reading(const Reading&) {}
 
  protected:

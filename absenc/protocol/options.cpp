@@ -86,6 +86,13 @@ bool agrees(const Model& model, std::span<const bool> set, const Options& option
 
 }  // namespace
 
+void tell_shared(const Unit& unit, Options& options) {
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const bool asks = unit.options[i].choices.data() == sharing_choices.data();
+    if (asks && options[i] == sharing_automatic) options.values[i] = sharing_yes;
+  }
+}
+
 OptionError resolve_options(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
                             Options& resolved) {
   Options options;

@@ -15,6 +15,11 @@ namespace absenc {
 
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
+/// Of an option that says whether other encoders are on the line. `auto`: they are where somebody knows it
+/// (`tell_shared`).
+inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
+enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
+
 /// A number in a range, or one of `choices` (then the value is the index into it). With `decimals`, the user writes up
 /// to so many digits behind a point, and all values are in the unit of the last one.
 struct Option {
@@ -84,6 +89,9 @@ struct Unit;
 /// With a word no model is taken.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
+
+/// There are other encoders on the line: options that leave that open learn it.
+void tell_shared(const Unit& unit, Options& options);
 
 /// A whole number, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.
 [[nodiscard]] Result<std::int64_t> parse_number(std::string_view text);

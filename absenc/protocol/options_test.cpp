@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absenc/protocol/biss/unit.hpp"
+#include "absenc/protocol/esl/unit.hpp"
 #include "absenc/protocol/ssi/unit.hpp"
 
 namespace absenc {
@@ -68,6 +69,23 @@ TEST(Options, AWordExcludesWhatSaysTheSame) {
     }
     EXPECT_EQ(resolve(*unit, unit->models[0].name, {{"word", word}}).error.kind, OptionError::Kind::beside_word);
   }
+}
+
+TEST(Options, WhoeverKnowsTheLineTells) {
+  const auto bus = [](std::vector<std::pair<std::string_view, std::string_view>> settings) {
+    std::vector<OptionText> texts;
+    for (const auto& [name, value] : settings) texts.push_back({name, value});
+    Options options;
+    EXPECT_EQ(resolve_options(esl::unit, {}, texts, options).kind, OptionError::Kind::none);
+    const Options before = options;
+    tell_shared(esl::unit, options);
+    std::size_t changed = 0;
+    for (std::size_t i = 0; i < esl::unit.options.size(); ++i) changed += before[i] != options[i];
+    EXPECT_EQ(changed, settings.empty() ? 1u : 0u);
+  };
+  bus({});
+  bus({{"bus", "true"}});
+  bus({{"bus", "false"}});  // who says so knows better
 }
 
 TEST(Options, WhatIsNoWordIsToldWithItsPlace) {

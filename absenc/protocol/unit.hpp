@@ -191,8 +191,11 @@ struct Unit {
   std::span<const MemoryArea> memory{};       // what the commands memory_read and memory_write reach, in order
   std::span<const RegisterInfo> registers{};  // the same of an encoder that has registers instead of bytes
   std::span<const Vector> vectors;
-  const FieldInfo* status;     // the flags of Reading::status; null when the unit has none
-  const FieldInfo* alarms;     // the flags of Reading::alarms
+  const FieldInfo* status;  // the flags of Reading::status; null when the unit has none
+  const FieldInfo* alarms;  // the flags of Reading::alarms
+  // Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first.
+  const FieldInfo* second_status = nullptr;
+  const FieldInfo* second_alarms = nullptr;
   std::size_t host_storage;    // bytes that `host` needs, suitably aligned for any type
   std::size_t device_storage;  // bytes that `device` needs
 

@@ -31,7 +31,7 @@ inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt
 /// How often each fault was injected, by FaultKind.
 using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 
-/// How often each fault is injected: 0 to 1, per reply, `request_corrupt` per byte received.
+/// How often each fault is injected: 0 to 1, per reply, `request_corrupt` per byte (CAN: frame) received.
 struct FaultRates {
   std::array<double, fault_names.size()> rates{};
   Time delay = std::chrono::microseconds(200);  // how late a delayed reply is

@@ -17,18 +17,17 @@ namespace absenc::tool {
 
 namespace {
 
-// A field of flags of the unit, with what the encoder set in it.
-struct Flags {
-  const FieldInfo* field;
-  std::uint32_t bits;
+struct Shown {
+  Flags flags;
+  bool told_when_none;
 };
 
-// Alarms first.
-std::vector<Flags> flags_of(const Unit& unit, const Reading& reading) {
-  std::vector<Flags> flags;
-  if (unit.alarms != nullptr) flags.push_back({unit.alarms, reading.alarms});
-  if (unit.status != nullptr) flags.push_back({unit.status, reading.status});
-  return flags;
+// Alarms first. Of encoders without alarms the status says that there is nothing.
+std::vector<Shown> flags_of(const Unit& unit, const Reading& reading) {
+  std::vector<Shown> all;
+  for (const Flags& flags : alarms_of(unit, reading)) all.push_back({flags, true});
+  for (const Flags& flags : status_of(unit, reading)) all.push_back({flags, unit.alarms == nullptr});
+  return all;
 }
 
 Json in_words(const Flags& flags) {
@@ -42,18 +41,16 @@ Json in_words(const Flags& flags) {
 }
 
 void show(const Unit& unit, const Reading& reading) {
-  bool is_first = true;
-  for (const Flags& flags : flags_of(unit, reading)) {
-    const std::string words = flags_in_words(flags.field, flags.bits);
+  for (const auto& [flags, told_when_none] : flags_of(unit, reading)) {
+    const std::string words = flags_in_words(flags);
     if (!words.empty()) print_line(fmt::format("{}:\n{}", flags.field->name, words));
-    if (words.empty() && is_first) print_line(fmt::format("no {}", flags.field->name));
-    is_first = false;
+    if (words.empty() && told_when_none) print_line(fmt::format("no {}", flags.field->name));
   }
 }
 
 void show_json(const Unit& unit, const Reading& reading) {
   Json json = Json::object().set("ok", true).set("protocol", unit.id);
-  for (const Flags& flags : flags_of(unit, reading)) json.set(flags.field->name, in_words(flags));
+  for (const auto& [flags, told] : flags_of(unit, reading)) json.set(flags.field->name, in_words(flags));
   print_line(json.line());
 }
 

@@ -45,8 +45,8 @@ bool has_fields(const Annotation& annotation) {
          annotation.remark != Remark::undocumented;
 }
 
-std::string_view csv_columns(bool linear) {
-  const std::string_view all = linear ? linear_csv_header : csv_header;
+std::string csv_columns(const Unit& unit, bool linear) {
+  const std::string all = csv_header(unit, linear);
   return all.substr(all.find(',') + 1);
 }
 
@@ -100,7 +100,7 @@ AnnotationPrinter::AnnotationPrinter(const Unit& unit, const Options& options, c
   if (format != AnnotationFormat::csv) return;
   const bool linear = unit.resolution(options).unit_um > 0;
   kept_ = fmt::format("{},kind,request,reply,turnaround_us,{},fields,error,message\n",
-                      clock.has_time() ? "time_s" : "tick", csv_columns(linear));
+                      clock.has_time() ? "time_s" : "tick", csv_columns(unit, linear));
 }
 
 void AnnotationPrinter::put(const Annotation& annotation) {
@@ -186,7 +186,7 @@ std::string AnnotationPrinter::csv(const Annotation& annotation) const {
     const std::string columns = to_csv(unit_, *annotation.reading, 0);
     row += columns.substr(columns.find(','));
   } else {
-    const std::string_view columns = csv_columns(unit_.resolution(options_).unit_um > 0);
+    const std::string columns = csv_columns(unit_, unit_.resolution(options_).unit_um > 0);
     row += std::string(static_cast<std::size_t>(std::count(columns.begin(), columns.end(), ',')) + 1, ',');
   }
   FieldWords fields;

@@ -244,6 +244,7 @@ Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const 
   serve(machine, port);
   Notes notes;
   note_count(notes, "frames lost while the adapter was closed or at another bit rate", port.lost());
+  note_count(notes, "frames refused because too many waited for the bus", port.overflowed());
   note_count(notes, "lines that are no command of the adapter", port.garbage());
   note_count(notes, "bytes that nobody read", bytes->dropped());
   return notes;
@@ -289,8 +290,8 @@ constexpr std::array<Parameter, 19> parameters{{
     {"--motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV (lines of seconds,degrees)", "still"},
     {"--alarm", "NAME", "raise this alarm", "", false, true},
     {"--fault", "KIND=RATE",
-     "how often a reply is damaged, from 0 to 1; kinds: drop, corrupt, truncate, delay, echo, "
-     "garbage, silence, repeat, request_corrupt",
+     "how often a reply is damaged, from 0 to 1; kinds: drop, corrupt, truncate, delay, echo, garbage, silence, "
+     "repeat; and request_corrupt: how often a byte (CAN: a frame) of the requests that it hears is",
      "", false, true},
     {"--seed", "N", "another series of faults", "1"},
     {"--also", "SETTINGS",

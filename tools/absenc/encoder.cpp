@@ -55,6 +55,7 @@ class EncoderOn final : public Encoder {
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
+    if (link_.use_count() > 1) tell_of_company();
     return outcome(command, link_->take_turn([&] {
       return session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
         last_ = &conversation;
@@ -70,7 +71,10 @@ class EncoderOn final : public Encoder {
   }
 
   void end_when(std::function<bool()> over) override { port_.over = std::move(over); }
-  void report(FieldSink& sink) const override { last_->report(sink); }
+  void report(FieldSink& sink) const override {
+    last_->report(sink);
+    if (const Reading* reading = last_->reading()) sink.put_reading(*reading);
+  }
   void report_left(FieldSink& sink) const override { session_.report_left(sink); }
   bool confirmed() const override { return session_.confirmed(); }
   const host::Counters& counters() const override { return session_.counters(); }
@@ -111,6 +115,13 @@ class EncoderOn final : public Encoder {
   }
 
  private:
+  // Others have the same line open.
+  void tell_of_company() {
+    Options options = uri().options;
+    tell_shared(unit(), options);
+    set_options(options);
+  }
+
   Outcome outcome(const Command& command, const Conversation<Item>* conversation) {
     if (conversation == nullptr) {
       throw UsageError(fmt::format("{} cannot run {} with these options", unit().id, command.name));

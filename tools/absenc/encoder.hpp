@@ -68,7 +68,7 @@ class Encoder {
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
   /// `on_emit` is called for each result but the last; `report` then tells of it.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
-  /// The fields of the last outcome.
+  /// The fields of the last outcome, and its reading.
   virtual void report(FieldSink& sink) const = 0;
   /// After `run` threw: what the encoder was left with. Nothing for most commands.
   virtual void report_left(FieldSink& sink) const = 0;

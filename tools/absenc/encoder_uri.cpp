@@ -282,6 +282,7 @@ EncoderUri parse_named(std::string_view name, std::span<const OptionText> writte
   });
   all.insert(all.end(), written.begin(), written.end());
   take_settings(uri, all);
+  if (named.has_company) tell_shared(*uri.unit, uri.options);
   return uri;
 }
 

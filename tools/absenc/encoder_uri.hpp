@@ -55,7 +55,10 @@ inline constexpr std::array<LinkParameter, 21> link_parameters{{
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
     {"multiturn", "TURNS", "turns at the start", "sim"},
     {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", true},
-    {"fault", "KIND=RATE", "a fault to inject, with its probability; may be given more than once", "sim", true},
+    {"fault", "KIND=RATE",
+     "a fault to inject, with its probability for each reply (request_corrupt: for each byte heard); may be given more "
+     "than once",
+     "sim", true},
     {"seed", "N", "another series of faults", "sim"},
 }};
 

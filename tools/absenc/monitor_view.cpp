@@ -71,14 +71,14 @@ std::string speed_text(const Snapshot& snapshot) {
 std::string alarm_names(const Shown& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
+  const std::vector<Flags> channels = unit.alarms != nullptr ? alarms_of(unit, reading) : status_of(unit, reading);
   std::string text;
-  const auto add = [&](const FieldInfo* field, std::uint32_t bits) {
-    if (field == nullptr) return;
-    for (const std::string_view name : flag_names(*field, bits))
-      text += fmt::format("{}{}", text.empty() ? "" : " ", name);
-  };
-  add(unit.alarms, reading.alarms);
-  if (unit.alarms == nullptr) add(unit.status, reading.status);
+  for (const Flags& flags : channels) {
+    const std::vector<std::string_view> names = flag_names(*flags.field, flags.bits);
+    if (names.empty()) continue;
+    if (channels.size() > 1) text += fmt::format("{}{}:", text.empty() ? "" : " ", flags.field->name);
+    for (const std::string_view name : names) text += fmt::format("{}{}", text.empty() ? "" : " ", name);
+  }
   return text;
 }
 
@@ -170,14 +170,16 @@ void draw_bar(Screen& screen, int row, const Shown& shown) {
 
 void draw_position(Screen& screen, int row, const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
+  const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    std::string text = to_text(*shown.watch->uri().unit, snapshot.last.reading);
+    const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;  // or else they are below
+    const std::string text = has_room ? to_text(unit, snapshot.last.reading) : place_text(snapshot.last.reading);
     const bool good = has_position(snapshot);
     return screen.put(row, 2, text, good ? Style::bold : Style::bad);
   }
   std::string text = fmt::format("{}: no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   if (snapshot.has_reading) {
-    text += fmt::format("; the last was: {}", to_text(*shown.watch->uri().unit, snapshot.last.reading));
+    text += fmt::format("; the last was: {}", to_text(unit, snapshot.last.reading));
   }
   screen.put(row, 2, text, style_of(snapshot.state));
 }

@@ -133,10 +133,16 @@ NamedEncoder require_encoder(const Config& config, std::string_view name) {
 
   const std::string& protocol = encoder.find("protocol")->values[0];
   const std::string& where = port.values[0];
-  NamedEncoder named{where == "sim" ? "sim:" + protocol : protocol + ":" + where, port.place, encoder.settings, {}};
+  NamedEncoder named{
+      where == "sim" ? "sim:" + protocol : protocol + ":" + where, port.place, encoder.settings, {}, false};
   if (bus != nullptr) {
     for (ConfigSetting& setting : not_overridden(line, encoder.settings)) named.settings.push_back(std::move(setting));
   }
+  named.has_company =
+      bus != nullptr && std::any_of(config.encoders.begin(), config.encoders.end(), [&](const ConfigSection& other) {
+        const ConfigSetting* its = other.find("bus");
+        return other.name != encoder.name && its != nullptr && its->values[0] == bus->values[0];
+      });
   named.defaults = not_overridden(config.defaults, named.settings);
   std::erase_if(named.settings, [](const ConfigSetting& setting) {
     return setting.name == "protocol" || setting.name == "bus" || setting.name == "port";

@@ -16,6 +16,7 @@ struct NamedEncoder {
   std::string place;                    // where the file says where it is connected
   std::vector<ConfigSetting> settings;  // its own, and those of its bus that it does not override
   std::vector<ConfigSetting> defaults;  // that it may be given, where they fit
+  bool has_company = false;             // other encoders are on its bus
 };
 
 /// Throws UsageError, which names the place in the file: settings that do not exist, protocols and buses that do not

@@ -28,7 +28,7 @@ class Display {
   Display(const LiveEncoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
     const EncoderUri& uri = live.encoder().uri();
     const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
-    const std::string_view header = linear ? linear_csv_header : csv_header;
+    const std::string header = csv_header(*uri.unit, linear);
     if (format == Format::csv) print_line(fmt::format("{},event", header));
     commas_ = std::string(static_cast<std::size_t>(std::count(header.begin(), header.end(), ',')) + 1, ',');
   }

@@ -30,8 +30,33 @@ int linear_decimals(double unit_um) {
 // The digits of the largest number of so many bits.
 int digits(unsigned bits) { return static_cast<int>(fmt::formatted_size("{}", low_mask(bits))); }
 
-std::string flags_text(const FieldInfo* field, std::uint32_t bits) {
-  return field == nullptr ? "" : fmt::format("{}", fmt::join(flag_names(*field, bits), " "));
+std::string flags_text(const Flags& flags) {
+  return fmt::format("{}", fmt::join(flag_names(*flags.field, flags.bits), " "));
+}
+
+std::uint32_t flag_mask(const FieldInfo& field) {
+  return static_cast<std::uint32_t>(low_mask(static_cast<unsigned>(field.flags.size())));
+}
+
+std::vector<Flags> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits) {
+  std::vector<Flags> flags;
+  if (first != nullptr) flags.push_back({first, bits & flag_mask(*first)});
+  if (second != nullptr) flags.push_back({second, bits >> first->flags.size()});
+  return flags;
+}
+
+bool has_channels(const Unit& unit) { return unit.second_status != nullptr || unit.second_alarms != nullptr; }
+
+// Channel by channel.
+std::vector<Flags> status_and_alarms(const Unit& unit, const Reading& reading) {
+  const std::vector<Flags> status = status_of(unit, reading);
+  const std::vector<Flags> alarms = alarms_of(unit, reading);
+  std::vector<Flags> all;
+  for (std::size_t i = 0; i < std::max(status.size(), alarms.size()); ++i) {
+    if (i < status.size()) all.push_back(status[i]);
+    if (i < alarms.size()) all.push_back(alarms[i]);
+  }
+  return all;
 }
 
 std::string linear_text(const Reading& reading) {
@@ -66,15 +91,38 @@ std::string turns_text(const Reading& reading) {
 
 }  // namespace
 
-std::string to_text(const Unit& unit, const Reading& reading) {
+std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading) {
+  return both(unit.alarms, unit.second_alarms, reading.alarms);
+}
+
+std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
+  return both(unit.status, unit.second_status, reading.status);
+}
+
+namespace {
+
+// The alarms, of encoders without any the status; of two channels both.
+std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
+  if (has_channels(unit)) return status_and_alarms(unit, reading);
+  return unit.alarms != nullptr ? alarms_of(unit, reading) : status_of(unit, reading);
+}
+
+}  // namespace
+
+std::string place_text(const Reading& reading) {
   std::string text;
-  const auto add = [&text](const std::string& part) { text += text.empty() ? part : "   " + part; };
-  if (reading.singleturn_bits != 0) add(position_text(reading));
-  if (reading.multiturn_bits != 0) add(turns_text(reading));
-  const FieldInfo* field = unit.alarms != nullptr ? unit.alarms : unit.status;
-  const std::string flags = flags_text(field, unit.alarms != nullptr ? reading.alarms : reading.status);
-  if (field != nullptr)
-    add(flags.empty() ? fmt::format("no {}", field->name) : fmt::format("{}: {}", field->name, flags));
+  if (reading.singleturn_bits != 0) text = position_text(reading);
+  if (reading.multiturn_bits != 0) text += (text.empty() ? "" : "   ") + turns_text(reading);
+  return text;
+}
+
+std::string to_text(const Unit& unit, const Reading& reading) {
+  std::string text = place_text(reading);
+  for (const Flags& flags : flags_in_line(unit, reading)) {
+    const std::string names = flags_text(flags);
+    if (!text.empty()) text += "   ";
+    text += names.empty() ? fmt::format("no {}", flags.field->name) : fmt::format("{}: {}", flags.field->name, names);
+  }
   return text;
 }
 
@@ -82,11 +130,11 @@ std::string millimetres_text(double millimetres, double unit_um) {
   return fmt::format("{:.{}f}", millimetres, linear_decimals(unit_um));
 }
 
-std::string flags_in_words(const FieldInfo* field, std::uint32_t bits) {
+std::string flags_in_words(const Flags& flags) {
   std::string lines;
-  for (std::size_t i = 0; field != nullptr && i < field->flags.size(); ++i) {
-    const FlagInfo& flag = field->flags[i];
-    if ((bits >> i & 1) == 0 || flag.name.empty()) continue;
+  for (std::size_t i = 0; i < flags.field->flags.size(); ++i) {
+    const FlagInfo& flag = flags.field->flags[i];
+    if ((flags.bits >> i & 1) == 0 || flag.name.empty()) continue;
     if (!lines.empty()) lines += '\n';
     lines += fmt::format("  {}: {}", flag.name, flag.meaning);
     if (!flag.action.empty()) lines += fmt::format(". What to do: {}", flag.action);
@@ -95,8 +143,39 @@ std::string flags_in_words(const FieldInfo* field, std::uint32_t bits) {
 }
 
 std::string alarms_in_words(const Unit& unit, const Reading& reading) {
-  return flags_in_words(unit.alarms, reading.alarms);
+  const std::vector<Flags> alarms = alarms_of(unit, reading);
+  if (alarms.size() == 2 && alarms[0].bits == alarms[1].bits && alarms[0].bits != 0) {
+    return fmt::format("{}, {}:\n{}", alarms[0].field->name, alarms[1].field->name, flags_in_words(alarms[0]));
+  }
+  std::string lines;
+  for (const Flags& flags : alarms) {
+    const std::string words = flags_in_words(flags);
+    if (words.empty()) continue;
+    if (!lines.empty()) lines += '\n';
+    lines += alarms.size() > 1 ? fmt::format("{}:\n{}", flags.field->name, words) : words;
+  }
+  return lines;
 }
+
+namespace {
+
+// Of two channels each under its own name, and `alarms` all the same: those that either has, for whoever knows no
+// channels.
+void set_flags(Json& json, const Unit& unit, const Reading& reading) {
+  if (!has_channels(unit)) {
+    for (const Flags& flags : status_of(unit, reading)) json.set("status", flags_to_json(*flags.field, flags.bits));
+    for (const Flags& flags : alarms_of(unit, reading)) json.set("alarms", flags_to_json(*flags.field, flags.bits));
+    return;
+  }
+  for (const Flags& flags : status_and_alarms(unit, reading)) {
+    json.set(flags.field->name, flags_to_json(*flags.field, flags.bits));
+  }
+  std::uint32_t either = 0;
+  for (const Flags& flags : alarms_of(unit, reading)) either |= flags.bits;
+  if (unit.alarms != nullptr) json.set("alarms", flags_to_json(*unit.alarms, either));
+}
+
+}  // namespace
 
 void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed) {
   if (reading.singleturn_bits != 0) {
@@ -114,8 +193,7 @@ void set_reading(Json& json, const Unit& unit, const Reading& reading, bool conf
     json.set("multiturn", reading.multiturn).set("multiturn_bits", reading.multiturn_bits);
     json.set("multiturn_valid", reading.multiturn_valid);
   }
-  if (unit.status != nullptr) json.set("status", flags_to_json(*unit.status, reading.status));
-  if (unit.alarms != nullptr) json.set("alarms", flags_to_json(*unit.alarms, reading.alarms));
+  set_flags(json, unit, reading);
   json.set("confirmed", confirmed).set("ok", true);
 }
 
@@ -130,6 +208,18 @@ Reading checked(Reading reading, bool confirmed) {
   reading.singleturn_valid_bits = 0;
   reading.multiturn_valid = false;
   return reading;
+}
+
+std::vector<std::string_view> csv_flag_names(const Unit& unit) {
+  if (!has_channels(unit)) return {"status", "alarms"};
+  std::vector<std::string_view> names;
+  for (const Flags& flags : status_and_alarms(unit, {})) names.push_back(flags.field->name);
+  return names;
+}
+
+std::string csv_header(const Unit& unit, bool linear) {
+  return fmt::format("time_s,{},singleturn,singleturn_valid,multiturn,multiturn_valid,{}",
+                     linear ? "position_mm,position_um" : "angle_deg", fmt::join(csv_flag_names(unit), ","));
 }
 
 std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
@@ -150,7 +240,14 @@ std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
   } else {
     row += ",,";
   }
-  return row + fmt::format(",{},{}", flags_text(unit.status, reading.status), flags_text(unit.alarms, reading.alarms));
+  if (has_channels(unit)) {
+    for (const Flags& flags : status_and_alarms(unit, reading)) row += ',' + flags_text(flags);
+    return row;
+  }
+  for (const std::vector<Flags>& flags : {status_of(unit, reading), alarms_of(unit, reading)}) {
+    row += ',' + (flags.empty() ? std::string() : flags_text(flags.front()));
+  }
+  return row;
 }
 
 }  // namespace absenc::tool

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/core/angle.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -12,12 +13,26 @@
 
 namespace absenc::tool {
 
+/// What one field of flags of the unit says.
+struct Flags {
+  const FieldInfo* field;
+  std::uint32_t bits;
+};
+
+/// One for each channel that the unit has flags of; none when it has no such field.
+[[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
+[[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
+
 /// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"; of a linear encoder
 /// "  78.96355 mm      78963.55 um   1579271 counts   no alarms"
 [[nodiscard]] std::string to_text(const Unit& unit, const Reading& reading);
 
-/// What each flag that is set means and what to do, a line each; "" when there is none, or no such field.
-[[nodiscard]] std::string flags_in_words(const FieldInfo* field, std::uint32_t bits);
+/// Its first part: position and turns.
+[[nodiscard]] std::string place_text(const Reading& reading);
+
+/// What each flag that is set means and what to do, a line each; "" when there is none.
+[[nodiscard]] std::string flags_in_words(const Flags& flags);
+/// Of two channels under the name of each; what both raise once.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
 /// Sets everything but the time.
@@ -30,10 +45,11 @@ void set_reading(Json& json, const Unit& unit, const Reading& reading, bool conf
 /// "0.125" without more decimals than the unit of a count has.
 [[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);
 
-inline constexpr std::string_view csv_header =
-    "time_s,angle_deg,singleturn,singleturn_valid,multiturn,multiturn_valid,status,alarms";
-inline constexpr std::string_view linear_csv_header =
-    "time_s,position_mm,position_um,singleturn,singleturn_valid,multiturn,multiturn_valid,status,alarms";
+/// The names of the columns of `to_csv`: "time_s,angle_deg,singleturn,...,status,alarms". Two channels have columns of
+/// their own in the place of the last two.
+[[nodiscard]] std::string csv_header(const Unit& unit, bool linear);
+/// Those of the flags alone.
+[[nodiscard]] std::vector<std::string_view> csv_flag_names(const Unit& unit);
 /// Flags are separated by spaces; what the reply does not carry is empty, and so is what is not valid in degrees or
 /// millimetres.
 [[nodiscard]] std::string to_csv(const Unit& unit, const Reading& reading, double seconds);

@@ -32,7 +32,7 @@ struct Column {
 using Columns = std::vector<Column>;
 
 // Those of `read --csv` and more.
-Columns columns_of(bool linear) {
+Columns columns_of(const Unit& unit, bool linear) {
   Columns columns{{"time_s", "seconds after `started`"}};
   const auto add = [&columns](const Columns& more) { columns.insert(columns.end(), more.begin(), more.end()); };
   if (linear) {
@@ -43,10 +43,9 @@ Columns columns_of(bool linear) {
   add({{"singleturn", "counts"},
        {"singleturn_valid", ""},
        {"multiturn", "revolutions as the encoder counts them"},
-       {"multiturn_valid", ""},
-       {"status", "names, separated by spaces"},
-       {"alarms", "names, separated by spaces"},
-       {"position", "counts, continued past the end of the encoder's own counter"}});
+       {"multiturn_valid", ""}});
+  for (const std::string_view flags : csv_flag_names(unit)) add({{flags, "names, separated by spaces"}});
+  add({{"position", "counts, continued past the end of the encoder's own counter"}});
   if (linear) {
     add({{"unwrapped_mm", "the same in millimetres"}, {"speed_mm_s", "mean over twice speed_delay_s"}});
   } else {
@@ -126,7 +125,7 @@ void Recording::open_part() {
 
 std::string Recording::header() const {
   const std::vector<std::string> options = option_texts(*unit_, options_);
-  const Columns columns = columns_of(unit_um_ > 0);
+  const Columns columns = columns_of(*unit_, unit_um_ > 0);
   const std::string_view model = options_.model != nullptr ? options_.model->name : "none";
   if (format_ == Format::json_lines) {
     Json json = Json::object().set("absenc_record", 1).set("encoder", settings_.encoder).set("protocol", unit_->id);
@@ -179,7 +178,7 @@ std::string Recording::line_of(const Sample& sample) const {
 
 // In CSV: what is no reading.
 std::string Recording::event_line(Time at, std::string_view event, std::string_view missed) const {
-  const std::string commas(columns_of(unit_um_ > 0).size() - 2, ',');
+  const std::string commas(columns_of(*unit_, unit_um_ > 0).size() - 2, ',');
   return fmt::format("{:.6f}{}{},{}\n", std::chrono::duration<double>(at - start_).count(), commas, missed, event);
 }
 

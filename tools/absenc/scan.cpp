@@ -35,6 +35,12 @@ struct Records final : FieldSink {
     record.json.put(value);
   }
 
+  void put_reading(const Reading& reading) override {
+    Record& record = all.back();
+    for (auto& [info, text] : record.texts) text = marked(*info, text, reading);
+    record.json.put_reading(reading);
+  }
+
   [[nodiscard]] std::string text() const {
     std::vector<std::vector<std::string>> rows(1);
     for (const FieldInfo* field : fields) rows.front().emplace_back(field->name);

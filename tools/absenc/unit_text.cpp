@@ -256,10 +256,37 @@ std::string to_text(const FieldValue& value) {
   return fmt::format("{}", value.number);
 }
 
+bool holds(const FieldInfo& field, const Reading& reading) {
+  if (field.shows == Shows::position && reading.singleturn_bits != 0)
+    return reading.ready && reading.singleturn_valid();
+  return field.shows != Shows::turns || reading.multiturn_bits == 0 || reading.multiturn_valid;
+}
+
+std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading) {
+  if (holds(field, reading)) return value;
+  if (!reading.ready) return fmt::format("INVALID ({}: the encoder is starting)", value);
+  const unsigned valid = reading.singleturn_valid_bits;
+  if (field.shows == Shows::turns || valid == 0) return fmt::format("INVALID ({})", value);
+  return fmt::format("INVALID (only the top {} of {} bits hold: {})", valid, reading.singleturn_bits, value);
+}
+
+void JsonFields::put(const FieldValue& value) {
+  fields.set(value.info->name, to_json(value));
+  if (value.info->shows != Shows::other) judged_.push_back({value.info, true});
+}
+
+void JsonFields::put_reading(const Reading& reading) {
+  for (Judged& judged : judged_) {
+    judged.holds = judged.holds && holds(*judged.info, reading);
+    if (!judged.holds) fields.set(fmt::format("{}_valid", judged.info->name), false);
+  }
+}
+
 void FieldTable::put(const FieldValue& value) {
   const FieldInfo& info = *value.info;
   std::string shown = to_text(value);
   if (!info.unit.empty()) shown += fmt::format(" {}", info.unit);
+  if (info.shows != Shows::other) judged_.push_back({&info, rows.size()});
   rows.push_back({std::string(info.name), shown, std::string(info.meaning)});
   if (info.kind != FieldInfo::Kind::flags) return;
   for (std::size_t i = 0; i < info.flags.size(); ++i) {
@@ -274,6 +301,14 @@ void FieldTable::put(const FieldValue& value) {
 std::string life_of(const MemoryArea& area) {
   if (area.write_life == 0) return "";
   return fmt::format("{} {}", area.write_life, area.life_in_total ? "writes in total" : "writing cycles");
+}
+
+void FieldTable::put_reading(const Reading& reading) {
+  std::erase_if(judged_, [&](const Judged& judged) {
+    if (holds(*judged.info, reading)) return false;
+    rows[judged.row][1] = marked(*judged.info, rows[judged.row][1], reading);
+    return true;  // once
+  });
 }
 
 std::string_view name_of(LinkKind link) {

@@ -69,16 +69,38 @@ struct NamedArgument {
 [[nodiscard]] std::string line_of(LinkKind link, const LineSettings& line);
 [[nodiscard]] std::string_view name_of(Verb verb);
 
-/// Puts fields into a JSON object.
+/// Whether what this field shows of the position holds; what is no part of it does.
+[[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
+/// The value of such a field: as it is, or "INVALID (74565 counts)".
+[[nodiscard]] std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading);
+
+/// Puts fields into a JSON object; with a reading, behind what it knows not to hold `singleturn_valid` and the like,
+/// false. What has no such field holds.
 struct JsonFields final : FieldSink {
-  void put(const FieldValue& value) override { fields.set(value.info->name, to_json(value)); }
+  void put(const FieldValue& value) override;
+  void put_reading(const Reading& reading) override;
   Json fields = Json::object();
+
+ private:
+  struct Judged {
+    const FieldInfo* info;
+    bool holds;
+  };
+  std::vector<Judged> judged_;
 };
 
 /// Puts fields into the rows of a table: name, value, unit or meaning; a row for each flag that is set.
 struct FieldTable final : FieldSink {
   void put(const FieldValue& value) override;
+  void put_reading(const Reading& reading) override;
   std::vector<std::vector<std::string>> rows;
+
+ private:
+  struct Judged {
+    const FieldInfo* info;
+    std::size_t row;
+  };
+  std::vector<Judged> judged_;
 };
 
 }  // namespace absenc::tool

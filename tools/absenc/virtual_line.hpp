@@ -27,9 +27,12 @@ class VirtualLine {
   VirtualLine(const Unit& unit, const Options& options, const Invocation& invocation)
       : further_(invocation.texts("--also")) {
     const DeviceSettings settings = device_settings(invocation);
-    devices_.push_back(std::make_unique<VirtualDevice>(unit, options, settings));
+    Options first = options;
+    if (!further_.empty()) tell_shared(unit, first);
+    devices_.push_back(std::make_unique<VirtualDevice>(unit, first, settings));
     for (const std::string& further : further_) {
-      const EncoderUri uri = further_encoder(unit, invocation, further, settings);
+      EncoderUri uri = further_encoder(unit, invocation, further, settings);
+      tell_shared(unit, uri.options);
       devices_.push_back(std::make_unique<VirtualDevice>(unit, uri.options, uri.device));
     }
     std::vector<Machine<Item>*> machines;

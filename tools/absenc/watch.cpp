@@ -37,15 +37,26 @@ class OtherFields final : public FieldSink {
 
   void put(const FieldValue& value) override {
     const FieldInfo& info = *value.info;
-    const FieldInfo* shown = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
-    if (&info == shown || info.name == "singleturn" || info.name == "multiturn") return;
-    texts.push_back(fmt::format("{} {}{}{}", info.name, to_text(value), info.unit.empty() ? "" : " ", info.unit));
+    // Of two channels the line has no room for the flags.
+    const FieldInfo* in_line = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
+    const bool is_in_line = &info == in_line && unit_->second_status == nullptr && unit_->second_alarms == nullptr;
+    if (is_in_line || info.name == "singleturn" || info.name == "multiturn") return;
+    const std::string shown = fmt::format("{}{}{}", to_text(value), info.unit.empty() ? "" : " ", info.unit);
+    fields_.emplace_back(info, shown);
   }
+  void put_reading(const Reading& reading) override { reading_ = reading; }
 
-  std::vector<std::string> texts;
+  [[nodiscard]] std::vector<std::string> texts() const {
+    std::vector<std::string> texts;
+    for (const auto& [info, shown] : fields_)
+      texts.push_back(fmt::format("{} {}", info.name, marked(info, shown, reading_)));
+    return texts;
+  }
 
  private:
   const Unit* unit_;
+  std::vector<std::pair<FieldInfo, std::string>> fields_;
+  Reading reading_{};
 };
 
 }  // namespace
@@ -173,7 +184,7 @@ void Watch::publish(const LiveEncoder& live, const Sample& sample) {
   if (sample.kind == Sample::Kind::reading) {
     OtherFields fields(encoder.unit());
     encoder.report(fields);
-    known_.fields = std::move(fields.texts);
+    known_.fields = fields.texts();
   }
   known_.restarts = live.restarts();
   known_.rate = live.rate();

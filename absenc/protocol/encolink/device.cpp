@@ -71,7 +71,11 @@ void VirtualEncoder::feed(const ByteEvent& event) {
 void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
   update(at);
   if (power_ == Power::off || build_.stream_rate > 0) return;
-  if (transmitting_) return violate("request before the reply was complete", at);
+  if (transmitting_) {
+    if (interruption_.begins_request(request_bytes, at, uart_settings.character()))
+      violate("request before the reply was complete", at);
+    return;
+  }
   request_.push_back(byte);
   if (request_.size() < request_bytes) return;
   const std::uint8_t config = request_[0];
@@ -103,6 +107,7 @@ void VirtualEncoder::stopped_clocking(const ByteEvent& event) {
 
 void VirtualEncoder::make_frame(Time now) {
   frame_pending_ = transmitting_ = true;
+  interruption_.begin();
   ++answered_;
   if (power_ == Power::starting) {
     frame_ = encode_position(format_, {});

@@ -12,6 +12,7 @@
 #include "absenc/protocol/encolink/procedures.hpp"
 #include "absenc/protocol/encolink/registers.hpp"
 #include "absenc/protocol/encolink/timing.hpp"
+#include "absenc/protocol/interruption.hpp"
 
 namespace absenc::encolink {
 
@@ -124,6 +125,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   ReplyBytes frame_;
   bool frame_pending_ = false;
   bool transmitting_ = false;
+  Interruption interruption_;
   Time frame_at_{};
   Time next_frame_{};  // of those it sends by itself
   Time pause_since_{};

@@ -113,8 +113,8 @@ TEST(EncolinkDevice, ARequestCutShortIsForgotten) {
 
 TEST(EncolinkDevice, ARequestDuringTheReplyIsAViolation) {
   Bench bench(testing::single);
-  ask(bench, {{0x00, 0x00, 0x00, 0x00}});
-  ASSERT_EQ(bench.encoder.violation_count(), 2u);
+  ask(bench, {{0x00, 0x00, 0x00, 0x00, 0x00, 0x00}});
+  ASSERT_EQ(bench.encoder.violation_count(), 2u);  // requests, not bytes
   EXPECT_EQ(bench.encoder.violations()[0].rule, "request before the reply was complete");
 }
 

@@ -108,8 +108,8 @@ constexpr std::array<FieldInfo, field_count> make_fields() {
   std::array<FieldInfo, field_count> fields{{
       {"general_status", Kind::flags, "", "the two low bits of a position frame, active low", general_flags},
       {"alarms", Kind::flags, "", "detailed status", alarm_flags},
-      {"singleturn", Kind::number, "counts", "position within the turn"},
-      {"multiturn", Kind::number, "revolutions", "turn counter"},
+      {"singleturn", Kind::number, "counts", "position within the turn", {}, Shows::position},
+      {"multiturn", Kind::number, "revolutions", "turn counter", {}, Shows::turns},
       {"error", Kind::boolean, "", "the position is not valid"},
       {"warning", Kind::boolean, "", "the position is valid, but something is near its limit"},
       {"channel2", Kind::number, "", "one byte of channel 2; the checksum does not cover it"},

@@ -119,6 +119,7 @@ void Scan::report(FieldSink& sink) const {
     if (!answers) continue;
     put(sink, field_ch1_status, reply.one.status);
     put(sink, field_singleturn, reply.singleturn);
+    sink.put_reading(to_reading(reply));
   }
 }
 

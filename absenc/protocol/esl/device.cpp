@@ -35,7 +35,7 @@ ByteStep VirtualEncoder::next(Time) {
   step.expect = 1;
   if (ignoring_ || !request_.empty()) {
     step.gap = idle_time;
-    if (!ignoring_) step.expect = request_length(profile_, *data_id(request_[0])) - request_.size();
+    if (!ignoring_ && !stop_wrong_) step.expect = request_length(profile_, *data_id(request_[0])) - request_.size();
   }
   if (ignoring_) step.expect = foreign_end_ > heard_ ? foreign_end_ - heard_ : 0;
   return step;
@@ -52,16 +52,16 @@ void VirtualEncoder::feed(const ByteEvent& event) {
     case ByteEvent::Kind::sent:
       transmitting_ = false;
       break;
-    case ByteEvent::Kind::silence:  // a missing start bit ends the frame set: what was cut short is no request
-      ignoring_ = false;
-      request_.clear();
+    case ByteEvent::Kind::silence:
+      frame_set_ended();
       break;
     case ByteEvent::Kind::line_error:
+      heard_at_ = event.at;
       if (!on_ || transmitting_ || ignoring_) break;
       if (request_.empty()) {
         ignore();
       } else {
-        report_bad_request(status::stop_error, event.at);
+        stop_wrong_ = true;  // answered when the host has ended
       }
       break;
     default:
@@ -72,8 +72,9 @@ void VirtualEncoder::feed(const ByteEvent& event) {
 void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
   if (!on_) return;
   update(at);
-  if (transmitting_) return violate("something was sent during the encoder's transmission", at);
-  if (ignoring_) return;
+  if (transmitting_) return interrupted(byte, at);
+  heard_at_ = at;
+  if (ignoring_ || stop_wrong_) return;
   request_.push_back(byte);
   if (request_.size() == 1 && (address_of(byte) != profile_.address || !data_id(byte))) return ignore_request(byte);
   if (request_.size() == request_length(profile_, *data_id(request_[0]))) request_complete(at);
@@ -84,6 +85,23 @@ void VirtualEncoder::ignore_request(std::uint8_t control_field) {
   const auto id = data_id(control_field);
   foreign_end_ = heard_ + (id ? request_length(profile_, *id) - 1 : 0);
   ignore();
+}
+
+// A missing start bit ends the frame set: what was cut short is no request.
+void VirtualEncoder::frame_set_ended() {
+  ignoring_ = false;
+  if (stop_wrong_) report_bad_request(status::stop_error, heard_at_);
+  stop_wrong_ = ignoring_ = false;
+  request_.clear();
+}
+
+void VirtualEncoder::interrupted(std::uint8_t byte, Time at) {
+  const auto id = data_id(byte);
+  const bool is_request = id && byte == control_field(profile_, address_of(byte), *id);
+  const std::size_t length = is_request ? request_length(profile_, *id) : 0;
+  if (interruption_.begins_request(length, at, line_settings.character())) {
+    violate("something was sent during the encoder's transmission", at);
+  }
 }
 
 void VirtualEncoder::request_complete(Time at) {
@@ -99,7 +117,7 @@ void VirtualEncoder::request_complete(Time at) {
   report_bad_request(status::parity_error, at);
 }
 
-// Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF.
+// Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF. CF is echoed as it came.
 void VirtualEncoder::report_bad_request(std::uint8_t status_bit, Time at) {
   in_a_row_ = 0;
   const std::uint8_t field = request_[0];
@@ -108,24 +126,16 @@ void VirtualEncoder::report_bad_request(std::uint8_t status_bit, Time at) {
   Reply reply = reply_to(id, at);
   reply.one.status |= status_bit;
   reply.two.status |= status_bit;
-  // The control field is echoed as it came: that of the other parity scope.
-  Profile as_came = profile_;
-  if (field != control_field(profile_, address_of(field), id)) {
-    as_came.parity_scope = profile_.parity_scope == ParityScope::all ? ParityScope::command : ParityScope::all;
-  }
-  if (field != control_field(as_came, address_of(field), id)) return ignore();
-  const Profile own = profile_;
-  profile_ = as_came;
-  send(reply, at);
-  profile_ = own;
+  send(encode_reply(profile_, reply, field), at);
 }
 
-void VirtualEncoder::send(const Reply& reply, Time at) {
+void VirtualEncoder::send(const ReplyBytes& reply, Time at) {
   request_.clear();
-  reply_ = encode_reply(profile_, reply);
+  reply_ = reply;
   reply_at_ = at + answer_time;
   reply_pending_ = true;
   transmitting_ = true;
+  interruption_.begin();
   ++answered_;
 }
 
@@ -150,7 +160,7 @@ void VirtualEncoder::answer(const Request& request, Time at) {
     for (std::uint8_t& counter : counters_) ++counter;
   }
   if (is_memory_access(request.id)) return answer_memory(request, at);
-  send(reply_to(request.id, at), at);
+  send(encode_reply(profile_, reply_to(request.id, at)), at);
   if (is_reset(request.id)) count_reset(request.id, at);  // after the reply, which still shows the old state
 }
 
@@ -180,7 +190,7 @@ void VirtualEncoder::answer_memory(const Request& request, Time at) {
     read_byte(request, reply, at);
   }
   if (reply.busy) reply.value = 0;
-  send(reply, at);
+  send(encode_reply(profile_, reply), at);
 }
 
 void VirtualEncoder::read_byte(const Request& request, Reply& reply, Time at) {
@@ -364,7 +374,7 @@ void VirtualEncoder::power_off(Time) {
   on_ = false;
   latches_ &= alarms::turns_wrong;  // the others need a power cycle; these an ID C
   turns_cleared_ = false;
-  byte_pending_ = ignoring_ = reply_pending_ = transmitting_ = false;
+  byte_pending_ = ignoring_ = stop_wrong_ = reply_pending_ = transmitting_ = false;
   request_.clear();
   in_a_row_ = 0;
 }

@@ -11,6 +11,7 @@
 #include "absenc/protocol/conversation.hpp"
 #include "absenc/protocol/esl/frame.hpp"
 #include "absenc/protocol/esl/timing.hpp"
+#include "absenc/protocol/interruption.hpp"
 
 namespace absenc::esl {
 
@@ -76,13 +77,15 @@ class VirtualEncoder final : public Device<std::uint8_t> {
 
   void byte_received(std::uint8_t byte, Time at);
   void request_complete(Time at);
+  void frame_set_ended();
+  void interrupted(std::uint8_t byte, Time at);
   void ignore() {
     request_.clear();
     ignoring_ = true;
   }
   void ignore_request(std::uint8_t control_field);
   void report_bad_request(std::uint8_t status_bit, Time at);
-  void send(const Reply& reply, Time at);
+  void send(const ReplyBytes& reply, Time at);
 
   void answer(const Request& request, Time at);
   void answer_memory(const Request& request, Time at);
@@ -134,8 +137,11 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   RequestBytes request_;
   ReplyBytes reply_;
   bool ignoring_ = false;          // until the line is idle
+  bool stop_wrong_ = false;        // a character of the request had a wrong stop bit: told when the line is idle
+  Time heard_at_{};                // the last character
   std::uint64_t heard_ = 0;        // bytes so far
   std::uint64_t foreign_end_ = 0;  // of them, when another encoder's request is over
+  Interruption interruption_;
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Time reply_at_{};

@@ -78,23 +78,54 @@ TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
   EXPECT_EQ(bench.encoder.answered(), 1u);
 }
 
-TEST(EslDevice, AWrongParityBitIsReportedOrNot) {
-  const Wire wrong = [] {
-    Wire bytes{0x88};
-    bytes.push_back(checksum8(CrcBitOrder::lsb, bytes));
-    return bytes;
-  }();
+TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {
+  for (std::uint8_t address = 0; address < 8; ++address) {
+    for (const ParityScope scope : {ParityScope::command, ParityScope::all}) {
+      Bench bench({.parity_scope = scope, .address = address});
+      Wire wrong = wire(encode_request(bench.profile, {DataId::position, address}));
+      wrong[0] ^= 0x80;
+      wrong[1] = checksum8(CrcBitOrder::lsb, Bytes(wrong).first(1));
+      const Wire reply = bench.raw(wrong);
+      ASSERT_EQ(reply.size(), 18u) << int{address};
+      EXPECT_EQ(reply[0], wrong[0]);
+      EXPECT_EQ(reply[11], wrong[0]);
+      EXPECT_EQ(reply[1] & status::rejected, status::parity_error);
+      EXPECT_EQ(reply[12] & status::rejected, status::parity_error);
+      Bench silent({.parity_scope = scope, .address = address, .bad_request = BadRequest::silent});
+      EXPECT_TRUE(silent.raw(wrong).empty()) << int{address};
+    }
+  }
+}
+
+// A request of three characters, the second of them damaged: the answer waits for the end of the frame set.
+TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
+  const testing::TestShaft shaft;
+  VirtualEncoder encoder({}, shaft);
+  encoder.power_on(Time{}, PowerOn::skip);
+  using Happening = Event<std::uint8_t>;
+  const Wire first{control_field({}, 0, DataId::position)};
+  const Wire last{0x55};
+  encoder.feed({.kind = Happening::Kind::received, .at = 1us, .items = first});
+  encoder.feed({.kind = Happening::Kind::line_error, .at = 2us});
+  EXPECT_EQ(encoder.next(2us).kind, Step<std::uint8_t>::Kind::wait);
+  encoder.feed({.kind = Happening::Kind::received, .at = 3us, .items = last});
+  EXPECT_EQ(encoder.next(3us).kind, Step<std::uint8_t>::Kind::wait);
+  encoder.feed({.kind = Happening::Kind::silence, .at = 3us + idle_time});
+  const Step<std::uint8_t> step = encoder.next(3us + idle_time);
+  ASSERT_EQ(step.kind, Step<std::uint8_t>::Kind::transfer);
+  EXPECT_EQ(step.at, 3us + answer_time);
+  EXPECT_EQ(step.out[1] & status::rejected, status::stop_error);
+  EXPECT_EQ(encoder.violation_count(), 0u);
+}
+
+TEST(EslDevice, ARequestDuringItsTransmissionIsOneViolation) {
   Bench bench;
-  EXPECT_TRUE(bench.raw(wrong).empty());  // address 0: no other scope makes this bit
-  Bench scope({.address = 1});
-  Profile other{.parity_scope = ParityScope::all, .address = 1};
-  const RequestBytes request = encode_request(other, {DataId::position, 1});
-  const Wire reply = scope.raw(wire(request));
-  ASSERT_EQ(reply.size(), 18u);
-  EXPECT_EQ(reply[0], request[0]);
-  EXPECT_EQ(reply[1] & status::parity_error, status::parity_error);
-  Bench silent({.address = 1, .bad_request = BadRequest::silent});
-  EXPECT_TRUE(silent.raw(wire(request)).empty());
+  Wire requests = wire(encode_request({}, {DataId::position}));
+  const Wire memory = wire(encode_request({}, memory_write(0x20, 7)));
+  requests.insert(requests.end(), memory.begin(), memory.end());
+  testing::RawHost host(requests);
+  bench.run(host);
+  EXPECT_EQ(bench.encoder.violation_count(), 1u);
 }
 
 TEST(EslDevice, ReadyOnlyAfterStartUp) {

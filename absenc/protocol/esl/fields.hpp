@@ -82,16 +82,17 @@ enum FieldIndex : std::size_t {
   field_answering,
   field_disturbed,
   field_clash,
+  field_page_left,
 };
 
-inline constexpr std::array<FieldInfo, 29> fields{{
+inline constexpr std::array<FieldInfo, 30> fields{{
     {"data_id", FieldInfo::Kind::number, "", "which data was asked for (Table 3)"},
     {"control_field", FieldInfo::Kind::number, "", "CF: encoder address, data id, parity"},
     {"encoder_address", FieldInfo::Kind::number, "", "EAD: which encoder on the line"},
     {"ch1_status", FieldInfo::Kind::flags, "", "SF of channel 1", status_flags},
     {"ch1_alarms", FieldInfo::Kind::flags, "", "ALM of channel 1", alarm_flags},
-    {"singleturn", FieldInfo::Kind::number, "counts", "ABS: position within the turn"},
-    {"multiturn", FieldInfo::Kind::number, "revolutions", "ABM"},
+    {"singleturn", FieldInfo::Kind::number, "counts", "ABS: position within the turn", {}, Shows::position},
+    {"multiturn", FieldInfo::Kind::number, "revolutions", "ABM", {}, Shows::turns},
     {"ch1_sequence", FieldInfo::Kind::number, "", "SC1: counts the replies, 0 to 255"},
     {"encoder_id", FieldInfo::Kind::number, "", "ENID: D8 multi-turn, 98 single-turn"},
     {"safety", FieldInfo::Kind::number, "", "1: a safety encoder (ENID bit 7)"},
@@ -100,7 +101,12 @@ inline constexpr std::array<FieldInfo, 29> fields{{
     {"temperature_c", FieldInfo::Kind::number, "degC", "inside the encoder"},
     {"ch2_status", FieldInfo::Kind::flags, "", "SF of channel 2", status_flags},
     {"ch2_alarms", FieldInfo::Kind::flags, "", "ALM of channel 2", alarm_flags},
-    {"redundant_singleturn", FieldInfo::Kind::number, "counts", "RS: the position of channel 2, 9 bits (ID 6: 16)"},
+    {"redundant_singleturn",
+     FieldInfo::Kind::number,
+     "counts",
+     "RS: the position of channel 2, 9 bits (ID 6: 16)",
+     {},
+     Shows::position},
     {"ch2_sequence", FieldInfo::Kind::number, "", "SC2: counts the replies, 0 to 127"},
     {"memory_address", FieldInfo::Kind::number, "", "ADF: 0 to 126; 127 selects the page"},
     {"busy", FieldInfo::Kind::number, "", "1 while the memory is read or written: the request was not executed"},
@@ -116,6 +122,8 @@ inline constexpr std::array<FieldInfo, 29> fields{{
      "addresses whose answer is damaged: check the line, and whether two encoders share the address", address_flags},
     {"clash", FieldInfo::Kind::boolean, "",
      "yes: its answer is damaged every time; two encoders share the address, or the line is bad"},
+    {"page_left", FieldInfo::Kind::number, "",
+     "memory page that is left selected, also for whoever reads next: which one was before is not known"},
 }};
 
 constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }

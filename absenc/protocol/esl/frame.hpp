@@ -216,11 +216,12 @@ constexpr void encode_part(const Profile& profile, Part part, const Reply& reply
   }
 }
 
-constexpr void encode_channel(const Profile& profile, const Reply& reply, Channel number, ReplyBytes& bytes) {
+constexpr void encode_channel(const Profile& profile, const Reply& reply, std::uint8_t field, Channel number,
+                              ReplyBytes& bytes) {
   const Layout& layout = layout_of(reply.id);
   const bool first = number == Channel::one;
   const std::size_t begin = bytes.size();
-  bytes.push_back(control_field(profile, reply.encoder_address, reply.id));
+  bytes.push_back(field);
   for (const Part part : first ? layout.one() : layout.two()) {
     encode_part(profile, part, reply, first ? reply.one : reply.two, bytes);
   }
@@ -237,11 +238,16 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, Channe
 
 }  // namespace detail
 
-[[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply) {
+/// With this control field: CF is that of the request, also where its parity is wrong.
+[[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply, std::uint8_t field) {
   ReplyBytes bytes;
-  detail::encode_channel(profile, reply, Channel::one, bytes);
-  if (layout_of(reply.id).has_two()) detail::encode_channel(profile, reply, Channel::two, bytes);
+  detail::encode_channel(profile, reply, field, Channel::one, bytes);
+  if (layout_of(reply.id).has_two()) detail::encode_channel(profile, reply, field, Channel::two, bytes);
   return bytes;
+}
+
+[[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply) {
+  return encode_reply(profile, reply, control_field(profile, reply.encoder_address, reply.id));
 }
 
 }  // namespace absenc::esl

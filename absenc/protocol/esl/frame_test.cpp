@@ -250,7 +250,7 @@ TEST(EslFrame, ValidityOfEachPart) {
       (first ? alarmed.one : alarmed.two).alarms = static_cast<std::uint8_t>(1u << bit);
       EXPECT_EQ(to_reading(alarmed).singleturn_valid(), bit == 0 || bit == 1 || bit == 3) << bit;
       EXPECT_EQ(to_reading(alarmed).multiturn_valid, bit > 1) << bit;
-      EXPECT_EQ(to_reading(alarmed).alarms, 1u << bit);
+      EXPECT_EQ(to_reading(alarmed).alarms, 1u << (first ? bit : 8 + bit));
     }
   }
   Reply starting = reply;

@@ -16,17 +16,50 @@ constexpr std::string_view unknown_area = "Table 11 lists no such page and addre
 
 }  // namespace
 
-MemoryProcedure::MemoryProcedure(const Profile& profile, std::uint8_t page)
-    : Procedure(profile, attempts), page_(page) {}
+MemoryProcedure::MemoryProcedure(const Profile& profile, std::uint8_t page, Page before)
+    : Procedure(profile, attempts), page_(page), before_(before) {}
 
 void MemoryProcedure::begin() {
   if (profile().bus) {
     return finish(
         Error::unsupported,
         "memory cannot be reached by broadcast or with several encoders on the line (Figure 18): connect this one "
-        "alone and set bus=false; nothing was sent");
+        "alone and say bus=false; nothing was sent");
   }
-  ask({DataId::write_memory, profile().address, page_select_address, page_});
+  if (before_ == Page::stays) return select(page_);
+  stage_ = Stage::asking;
+  ask({DataId::read_memory, profile().address, page_select_address});
+}
+
+void MemoryProcedure::asked(const Reply& reply) {
+  if (is_page(reply.value)) page_before_ = reply.value;
+  stage_ = Stage::working;
+  select(page_);
+}
+
+void MemoryProcedure::end() {
+  restored_ = page_before_ == page_;
+  if (!page_before_ || restored_) return finish();
+  stage_ = Stage::restoring;
+  give_up_ = Time{};
+  select(*page_before_);
+}
+
+void MemoryProcedure::failed(Error error) {
+  switch (stage_) {
+    case Stage::asking:  // its page cannot be read
+      stage_ = Stage::working;
+      return select(page_);
+    case Stage::working:
+      return finish(error, before_ == Page::restored ? "page 8 may be left selected, where it was another before" : "");
+    case Stage::restoring:
+    case Stage::verifying:  // what was asked for is known all the same
+      return finish();
+  }
+}
+
+void MemoryProcedure::report_page(FieldSink& sink) const {
+  if (before_ == Page::restored && !restored_) put(sink, field_page_left, page_);
 }
 
 bool MemoryProcedure::immediate(std::uint8_t address) const {
@@ -51,9 +84,16 @@ void MemoryProcedure::ask_while_busy(Time pause) {
 }
 
 void MemoryProcedure::answered(const Reply& reply) {
+  if (stage_ == Stage::asking && !reply.busy) return asked(reply);
+  if (stage_ == Stage::verifying && !reply.busy) {
+    restored_ = reply.value == page_before_;
+    return finish();
+  }
   if (request().id == DataId::write_memory && request().memory_address == page_select_address) {
     if (reply.busy) return ask_while_busy(page_time);
-    return page_selected(received_at() + page_time);
+    if (stage_ == Stage::working) return page_selected(received_at() + page_time);
+    stage_ = Stage::verifying;  // reading it back after that time is what the encoder's next user finds
+    return read_byte(page_select_address, received_at() + page_time);
   }
   if (request().id == DataId::write_memory) {
     if (reply.busy) return ask_while_busy(read_pause);
@@ -68,8 +108,8 @@ void MemoryProcedure::answered(const Reply& reply) {
 
 // ---- Read
 
-ReadMemory::ReadMemory(const Profile& profile, std::uint8_t page, std::uint8_t address, std::uint8_t count)
-    : MemoryProcedure(profile, page), address_(address), count_(count) {
+ReadMemory::ReadMemory(const Profile& profile, std::uint8_t page, std::uint8_t address, std::uint8_t count, Page before)
+    : MemoryProcedure(profile, page, before), address_(address), count_(count) {
   for (unsigned i = address; i < unsigned{address} + count; ++i) {
     if (find_area(page, i) != nullptr) continue;
     finish(Error::invalid_argument, unknown_area);
@@ -81,7 +121,7 @@ ReadMemory::ReadMemory(const Profile& profile, std::uint8_t page, std::uint8_t a
 
 void ReadMemory::byte_read(std::uint8_t value) {
   data_.push_back(value);
-  if (data_.size() == count_) return finish();
+  if (data_.size() == count_) return end();
   read_byte(static_cast<std::uint8_t>(address_ + data_.size()));
 }
 
@@ -97,6 +137,7 @@ void ReadErrorInfo::report(FieldSink& sink) const {
   if (error() != Error::none) return;
   put(sink, field_led_error, led_error() ? 1 : 0);
   put(sink, field_lissajous_error, lissajous_error() ? 1 : 0);
+  report_page(sink);
 }
 
 // ---- Write

@@ -68,6 +68,25 @@ TEST(EslMemory, WhatTable11LacksIsRefusedBeforeAnythingIsSent) {
   EXPECT_EQ(bench.encoder.answered(), 0u);
 }
 
+TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
+  for (const std::uint8_t before : std::to_array<std::uint8_t>({0, 8, 14})) {
+    Bench bench;
+    SelectPage select({}, before);
+    ASSERT_EQ(bench.run(select).error(), Error::none);
+    ReadErrorInfo info({});
+    EXPECT_EQ(bench.run(info).error(), Error::none);
+    EXPECT_EQ(testing::report(info).count("page_left"), 0u);
+    EXPECT_EQ(bench.raw(Request{DataId::read_memory, 0, page_select_address})[2], before);
+    EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  }
+  Bench mute({}, [](unsigned index, auto& reply) {
+    if (index < 3) reply.clear();  // it does not say which page is selected
+  });
+  ReadErrorInfo info({});
+  EXPECT_EQ(mute.run(info).error(), Error::none);
+  EXPECT_EQ(testing::report(info)["page_left"], 8);
+}
+
 TEST(EslMemory, MemoryOnABusIsRefused) {
   Bench bench({.bus = true});
   WriteMemory write(bench.profile, 0, 0, 1);

@@ -43,8 +43,7 @@ void Procedure::start(Time earliest) {
 void Procedure::finish(Error error, std::string_view detail) {
   error_ = error;
   if (error == Error::none) detail_.clear();
-  if (!detail.empty() && !detail_.empty()) detail_.add("; ");
-  detail_.add(detail);
+  detail_.add_part(detail);
   state_ = State::done;
   // What was not answered well may be going on in the encoder all the same: whoever comes next must find it ended.
   if (error != Error::none && is_memory_access(request_.id) && sent_at_ != Time{}) {
@@ -123,6 +122,8 @@ void Procedure::explain(Error error) {
   detail_.clear();
   if (error == Error::timeout) {
     detail_.add("it is also silent when request_crc, crc_bit_order or address is another");
+    if (is_memory_access(request_.id))
+      detail_.add_part("and to memory requests when others share its line (Figure 18)");
     return;
   }
   if (is_noisy()) {

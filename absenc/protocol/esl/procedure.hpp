@@ -8,24 +8,9 @@
 #include "absenc/protocol/esl/reply.hpp"
 #include "absenc/protocol/esl/timing.hpp"
 #include "absenc/protocol/request_reply.hpp"
+#include "absenc/protocol/sentence.hpp"
 
 namespace absenc::esl {
-
-/// A sentence put together from fixed texts.
-class Sentence {
- public:
-  /// What does not fit is left out.
-  Sentence& add(std::string_view text) {
-    static_cast<void>(text_.append({text.data(), text.size()}));
-    return *this;
-  }
-  void clear() { text_.clear(); }
-  [[nodiscard]] bool empty() const { return text_.empty(); }
-  [[nodiscard]] std::string_view view() const { return {text_.view().data(), text_.size()}; }
-
- private:
-  Buffer<char, 400> text_;
-};
 
 class Procedure : public RequestReply {
  public:

@@ -198,25 +198,26 @@ template <class Checksum16 = detail::TableChecksum>
   return reply;
 }
 
-/// The position in a good reply and what of it holds. IDs 4, 5 and 6 carry no alarms: SF alone tells then.
-/// This is not a safe position (safety.hpp).
+/// The position in a good reply and what of it holds, the flags of channel 2 above those of channel 1. IDs 4, 5 and 6
+/// carry no alarms: SF alone tells then. This is not a safe position (safety.hpp).
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) {
   const Layout& layout = layout_of(reply.id);
   const auto status = static_cast<std::uint8_t>(reply.one.status | (layout.has_two() ? reply.two.status : 0));
+  const auto raised = static_cast<std::uint8_t>(reply.one.alarms | reply.two.alarms);
   Reading reading;
-  reading.status = reply.one.status;
-  reading.alarms = reply.one.alarms | reply.two.alarms;
+  reading.status = reply.one.status | (layout.has_two() ? static_cast<std::uint32_t>(reply.two.status) << 8 : 0);
+  reading.alarms = reply.one.alarms | static_cast<std::uint32_t>(reply.two.alarms) << 8;
   reading.ready =
       (reply.one.status & status::ready) != 0 && (!layout.has_two() || (reply.two.status & status::ready) != 0);
   if (layout.has(Part::singleturn)) {
-    const bool valid = reading.ready && (status & status::safety_error) == 0 && (reading.alarms & alarms::unsafe) == 0;
+    const bool valid = reading.ready && (status & status::safety_error) == 0 && (raised & alarms::unsafe) == 0;
     reading.singleturn = reply.singleturn;
     reading.singleturn_bits = singleturn_bits;
     reading.singleturn_valid_bits = valid ? singleturn_bits : 0;
   }
   if (layout.has(Part::multiturn)) {
-    const bool wrong = layout.has(Part::alarms) ? (reading.alarms & alarms::turns_wrong) != 0
-                                                : (status & status::non_safety_error) != 0;
+    const bool wrong =
+        layout.has(Part::alarms) ? (raised & alarms::turns_wrong) != 0 : (status & status::non_safety_error) != 0;
     reading.multiturn = reply.multiturn;
     reading.multiturn_bits = multiturn_bits;
     reading.multiturn_valid = reading.ready && !wrong;

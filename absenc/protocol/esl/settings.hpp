@@ -99,9 +99,11 @@ inline constexpr std::array<Option, 15> options{{
      .probeable = true},
     {.name = "address", .meaning = "EAD of the encoder", .default_value = 0, .minimum = 0, .maximum = 7},
     {.name = "bus",
-     .meaning = "several encoders share the line: memory cannot be read or written then",
-     .default_value = 0,
-     .choices = boolean_choices},
+     .meaning =
+         "several encoders share the line: memory cannot be read or written then; auto: where it is known, as on "
+         "a bus of absenc.toml with more than one, in monitor, and of emulate --also",
+     .default_value = sharing_automatic,
+     .choices = sharing_choices},
     {.name = "require_forced_test",
      .meaning = "a safe position also needs forced_test_passed in both channels",
      .default_value = 0,
@@ -155,7 +157,7 @@ constexpr void set_option(Profile& profile, std::size_t option, std::int64_t val
       profile.address = static_cast<std::uint8_t>(value);
       break;
     case option_bus:
-      profile.bus = value != 0;
+      profile.bus = value == sharing_yes;
       break;
     case option_require_forced_test:
       profile.require_forced_test = value != 0;

@@ -205,6 +205,8 @@ constinit const Unit unit{
     .vectors = vectors,
     .status = &fields[field_ch1_status],
     .alarms = &fields[field_ch1_alarms],
+    .second_status = &fields[field_ch2_status],
+    .second_alarms = &fields[field_ch2_alarms],
     .host_storage = std::max({sizeof(Read), sizeof(ReadSafePosition), sizeof(Reset), sizeof(ReadMemory),
                               sizeof(ReadErrorInfo), sizeof(WriteMemory), sizeof(SelectPage), sizeof(Scan)}),
     .device_storage = sizeof(VirtualEncoder),

@@ -63,6 +63,7 @@ class Server : public Device<std::uint8_t> {
   FrameBytes reply_;
   bool reply_pending_ = false;
   bool transmitting_ = false;
+  bool interrupted_ = false;  // something came while it was
   Time reply_at_{};
   Buffer<Violation, 16> violations_;
   std::uint32_t violation_count_ = 0;

@@ -129,7 +129,8 @@ void VirtualNode::hear(const CanFrame& frame, Time at) {
 }
 
 void VirtualNode::answer(const CanFrame& frame, Time at) {
-  if (pending_.push_back({frame, at + answer_time})) ++answered_;
+  if (!pending_.push_back({frame, at + answer_time})) return violate("more requests than it can keep answers for", at);
+  ++answered_;
 }
 
 // ---- Commands

@@ -33,8 +33,8 @@ enum FieldIndex : std::size_t {
 
 inline constexpr std::array<FieldInfo, 16> fields{{
     {"node", FieldInfo::Kind::number, "", "number of the node"},
-    {"singleturn", FieldInfo::Kind::counts, "counts", "position within one revolution"},
-    {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle"},
+    {"singleturn", FieldInfo::Kind::counts, "counts", "position within one revolution", {}, Shows::position},
+    {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle", {}, Shows::position},
     {"function", FieldInfo::Kind::text, "", "what the identifier stands for in CANopen; this encoder does not use it"},
     {"data", FieldInfo::Kind::bytes, "", "its data"},
     {"command", FieldInfo::Kind::text, "", "what is asked, or answered"},

@@ -22,9 +22,9 @@ enum FieldIndex : std::size_t {
 };
 
 inline constexpr std::array<FieldInfo, 9> fields{{
-    {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn"},
+    {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Shows::position},
     {"second_byte", FieldInfo::Kind::number, "", "81, or on a bus Bx: the encoder's number"},
-    {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle"},
+    {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle", {}, Shows::position},
     {"command", FieldInfo::Kind::text, "", "read or zero_clear"},
     {"unit", FieldInfo::Kind::number, "", "the number behind B or C"},
     {"encoder_address", FieldInfo::Kind::number, "", "the number behind B"},

@@ -39,7 +39,10 @@ ByteStep VirtualEncoder::next(Time) {
     step.at = reply_at_;
     return step;
   }
-  if (!request_.empty()) {
+  if (refusing_) {
+    step.expect = 1;
+    step.gap = line_settings.character();
+  } else if (!request_.empty()) {
     step.expect = request_length(*data_id(request_[0])) - request_.size();
     step.gap = line_settings.character();
   } else {
@@ -56,12 +59,14 @@ void VirtualEncoder::feed(const ByteEvent& event) {
     case ByteEvent::Kind::sent:
       transmitting_ = false;
       break;
-    case ByteEvent::Kind::silence:  // a missing start bit ends the frame (9.2): it was cut short
-      if (!request_.empty()) refuse(0, event.at);
+    case ByteEvent::Kind::silence:  // a missing start bit ends the frame (9.2): it was cut short, or is refused
+      if (refusing_ || !request_.empty()) answer_refused(event.at);
       break;
     case ByteEvent::Kind::line_error:
       if (power_ == Power::starting) update(event.at);
-      if (power_ == Power::on && !transmitting_) refuse(status::delimiter_error, event.at);
+      if (power_ != Power::on || transmitting_) break;
+      heard_at_ = event.at;
+      refuse(status::delimiter_error);
       break;
     default:
       break;
@@ -71,14 +76,23 @@ void VirtualEncoder::feed(const ByteEvent& event) {
 void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
   update(at);
   if (power_ != Power::on) return;
-  if (transmitting_) return violate("request during the encoder's transmission", at);
+  if (transmitting_) return interrupted(byte, at);
+  heard_at_ = at;
+  if (refusing_) return;
   if (request_.empty()) {
     if (!has_sync_code(byte)) return;  // no answer: it looks for the next start (8.1)
-    if (byte != control_field(byte >> 3)) return refuse(status::parity_error, at);
-    if (!data_id(byte)) return refuse(0, at);
+    if (byte != control_field(byte >> 3)) return refuse(status::parity_error);
+    if (!data_id(byte)) return refuse(0);
   }
   request_.push_back(byte);
   if (request_.size() == request_length(*data_id(request_[0]))) request_complete(at);
+}
+
+void VirtualEncoder::interrupted(std::uint8_t byte, Time at) {
+  const auto id = byte == control_field(byte >> 3) ? data_id(byte) : std::nullopt;
+  if (interruption_.begins_request(id ? request_length(*id) : 0, at, line_settings.character())) {
+    violate("request during the encoder's transmission", at);
+  }
 }
 
 void VirtualEncoder::request_complete(Time at) {
@@ -86,7 +100,7 @@ void VirtualEncoder::request_complete(Time at) {
   if (request) {
     answer(*request, at);
   } else {
-    refuse(0, at);
+    refuse(0);
   }
 }
 
@@ -96,14 +110,24 @@ void VirtualEncoder::send(const Reply& reply, Time at) {
   reply_at_ = at + answer_time;
   reply_pending_ = true;
   transmitting_ = true;
+  interruption_.begin();
   ++answered_;
 }
 
-void VirtualEncoder::refuse(std::uint8_t status_bits, Time at) {
+// Where the frame ends is not known yet: a missing start bit tells (8.2, 9.2). Nothing is sent before.
+void VirtualEncoder::refuse(std::uint8_t status_bits) {
+  request_.clear();
+  refusing_ = true;
+  refused_status_ |= status_bits;
+}
+
+void VirtualEncoder::answer_refused(Time at) {
   reset_count_ = 0;
   Reply reply = everything(at);
-  reply.status |= status_bits;
-  send(reply, at);
+  reply.status |= refused_status_;
+  refusing_ = false;
+  refused_status_ = 0;
+  send(reply, heard_at_);
 }
 
 void VirtualEncoder::violate(std::string_view rule, Time at) {
@@ -142,7 +166,7 @@ void VirtualEncoder::answer_memory(const Request& request, Time at) {
   const bool temperature = page_ == service_page && request.address == temperature_address;
   const bool open = selecting ? !writing || request.value < user_pages || request.value == service_page
                               : is_open(page_, request.address) && !(writing && temperature);
-  if (!open) return refuse(0, at);
+  if (!open) return refuse(0);
 
   const std::size_t index =
       page_ == service_page ? threshold_at : std::size_t{page_} * page_addresses + request.address;
@@ -323,7 +347,8 @@ void VirtualEncoder::power_off(Time now) {
   zero_pending_ = false;
   latches_ &= static_cast<std::uint8_t>(~(alarms::counting_error | alarms::multiturn_error));
   request_.clear();
-  reply_pending_ = transmitting_ = false;
+  reply_pending_ = transmitting_ = refusing_ = false;
+  refused_status_ = 0;
   reset_count_ = 0;
 }
 

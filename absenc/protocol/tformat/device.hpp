@@ -7,6 +7,7 @@
 
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/interruption.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 #include "absenc/protocol/tformat/timing.hpp"
 
@@ -56,7 +57,9 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void answer(const Request& request, Time at);
   void answer_data(const Request& request, Time at);
   void answer_memory(const Request& request, Time at);
-  void refuse(std::uint8_t status_bits, Time at);
+  void interrupted(std::uint8_t byte, Time at);
+  void refuse(std::uint8_t status_bits);
+  void answer_refused(Time at);
   void send(const Reply& reply, Time at);
   void count_reset(DataId id, Time at);
   void execute_reset(DataId id, Time at);
@@ -101,8 +104,12 @@ class VirtualEncoder final : public Device<std::uint8_t> {
 
   RequestBytes request_;
   ReplyBytes reply_;
+  bool refusing_ = false;  // answered when the line is idle
+  std::uint8_t refused_status_ = 0;
+  Time heard_at_{};  // the last character
   bool reply_pending_ = false;
   bool transmitting_ = false;
+  Interruption interruption_;
   Time reply_at_{};
   Buffer<Violation, 16> violations_;
   std::uint32_t violation_count_ = 0;

@@ -92,6 +92,21 @@ TEST(TformatDevice, AbnormalRequestsAreAnsweredLikeId3) {
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 35}));
 }
 
+// ID D with a wrong parity bit: one refusal, when the frame has ended.
+TEST(TformatDevice, ARefusedFrameEndsBeforeItIsAnswered) {
+  Bench bench;
+  testing::RawHost host({0x6A, 0x05, 0xEF});
+  bench.run(host);
+  EXPECT_EQ(host.reply, wire(Reply{.status = status::parity_error, .encoder_id = 0x11}));
+  EXPECT_GE(host.first_byte_at - host.sent_at, answer_time);
+  EXPECT_EQ(bench.encoder.answered(), 1u);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  for (const Wire& request : {Wire{0xA2, 0x05, 0xEF, 0x01}, Wire{0x32, 0x81, 0x00, 0xB3, 0x00}}) {
+    EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));  // an unknown id; a busy bit, and one byte too many
+  }
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+}
+
 TEST(TformatDevice, ADamagedCharacterIsADelimiterError) {
   Bench bench;
   LineSettings slow = line_settings;
@@ -255,6 +270,16 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
   bench.run(host);
   ASSERT_EQ(bench.encoder.violation_count(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "request during the encoder's transmission");
+  Bench longer;
+  longer.raw({0x1A, 0xEA, 0x05, 0xEF});
+  EXPECT_EQ(longer.encoder.violation_count(), 1u);
+  // Where they come at once, as on a pseudo-terminal: two requests, not four bytes.
+  testing::TestShaft shaft;
+  VirtualEncoder encoder({}, shaft);
+  encoder.power_on(Time{}, PowerOn::skip);
+  const Wire all{0x1A, 0xEA, 0x05, 0xEF, 0x1A};
+  encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1us, .items = all});
+  EXPECT_EQ(encoder.violation_count(), 2u);
 }
 
 // ---- Alarms (6.5)

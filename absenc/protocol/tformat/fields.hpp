@@ -56,15 +56,21 @@ enum FieldIndex : std::size_t {
   field_temperature,
   field_overheat_enabled,
   field_overheat_threshold,
+  field_page_left,
 };
 
-inline constexpr std::array<FieldInfo, 16> fields{{
+inline constexpr std::array<FieldInfo, 17> fields{{
     {"data_id", FieldInfo::Kind::number, "", "which data was asked for (Table 1)"},
     {"control_field", FieldInfo::Kind::number, "", "first byte of the request: sync code, data id, parity"},
     {"status", FieldInfo::Kind::flags, "", "SF", status_flags},
-    {"singleturn", FieldInfo::Kind::number, "counts", "ABS: position within the turn, rising counter-clockwise"},
+    {"singleturn",
+     FieldInfo::Kind::number,
+     "counts",
+     "ABS: position within the turn, rising counter-clockwise",
+     {},
+     Shows::position},
     {"encoder_id", FieldInfo::Kind::number, "", "ENID"},
-    {"multiturn", FieldInfo::Kind::number, "revolutions", "ABM"},
+    {"multiturn", FieldInfo::Kind::number, "revolutions", "ABM", {}, Shows::turns},
     {"alarms", FieldInfo::Kind::flags, "", "ALMC", alarm_flags},
     {"page", FieldInfo::Kind::number, "", "memory page"},
     {"address", FieldInfo::Kind::number, "", "ADF: memory address; 127 selects the page"},
@@ -75,6 +81,8 @@ inline constexpr std::array<FieldInfo, 16> fields{{
     {"temperature_c", FieldInfo::Kind::number, "degC", "of the encoder's board, within 3 degC"},
     {"overheat_enabled", FieldInfo::Kind::boolean, "", "whether over_heat is watched"},
     {"overheat_threshold_c", FieldInfo::Kind::number, "degC", "over_heat above this"},
+    {"page_left", FieldInfo::Kind::number, "",
+     "memory page that is left selected, also for whoever reads next: which one was before is not known"},
 }};
 
 constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/tformat/host.hpp"
 
+#include "absenc/protocol/tformat/explain.hpp"
 #include "absenc/protocol/tformat/fields.hpp"
 
 namespace absenc::tformat {
@@ -11,9 +12,8 @@ using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
 constexpr unsigned attempts_in_procedures = 3;
-constexpr Time busy_pause = 1ms;              // between two looks at a busy encoder
-constexpr Time busy_limit = 2 * memory_time;  // the document's maximum is memory_time
-constexpr Time between_looks = 10ms;          // two positions that far apart show whether the shaft turns
+constexpr Time busy_pause = 1ms;      // between two looks at a busy encoder
+constexpr Time between_looks = 10ms;  // two positions that far apart show whether the shaft turns
 
 }  // namespace
 
@@ -31,9 +31,12 @@ void Procedure::start(Time earliest) {
   state_ = State::ready;
 }
 
-void Procedure::finish(Error error, std::string_view detail) {
+void Procedure::finish(Error error, std::string_view detail, std::string_view more) {
   error_ = error;
-  detail_ = detail;
+  const Explanation refusal = error == Error::request_rejected ? explain_refusal(reply_bytes_) : Explanation{};
+  detail_.clear();
+  detail_.add(refusal.found).add_part(detail).add_part(more);
+  advice_ = refusal.advice;
   state_ = State::done;
   // A page change that was not answered well may be going on all the same: whoever comes next must find it ended.
   if (error != Error::none && selects_page() && sent_at_ != Time{}) {
@@ -243,135 +246,6 @@ const Reading* Reset::reading() const { return error() == Error::none ? &reading
 
 void Reset::report(FieldSink& sink) const {
   if (error() == Error::none) put_fields(sink, reply_);
-}
-
-// ---- Memory
-
-ReadMemory::ReadMemory(const Format& format, std::uint8_t page, std::uint8_t address, std::uint8_t count)
-    : Procedure(format, attempts_in_procedures), page_(page), address_(address), count_(count) {
-  for (unsigned i = address; i < unsigned{address} + count; ++i) {
-    if (is_open(page, i)) continue;
-    finish(Error::invalid_argument,
-           "this area is closed: pages 0 to 5 have addresses 0 to 126, page 7 has 4 "
-           "(over-heat threshold) and 5 (temperature)");
-    return;
-  }
-  if (count == 0) {
-    finish(Error::invalid_argument, "nothing to read");
-    return;
-  }
-  ask({DataId::write_memory, page_select_address, page});
-}
-
-void ReadMemory::ask_next(Time earliest) {
-  ask({DataId::read_memory, static_cast<std::uint8_t>(address_ + data_.size())}, earliest);
-}
-
-void ReadMemory::answered(const Reply& reply) {
-  if (give_up_ == Time{}) give_up_ = received_at() + busy_limit;
-  if (reply.busy) {
-    if (received_at() > give_up_) return finish(Error::busy, "the encoder stays busy longer than a write may take");
-    return ask_again();
-  }
-  if (request().address == page_select_address) {
-    give_up_ = received_at() + memory_time + busy_limit;
-    return ask_next(received_at() + memory_time);
-  }
-  data_.push_back(reply.value);
-  if (data_.size() == count_) return finish();
-  ask_next();
-}
-
-void ReadMemory::report(FieldSink& sink) const {
-  if (error() != Error::none) return;
-  put(sink, field_page, page_);
-  put(sink, field_address, address_);
-  put(sink, field_value, data_[0]);
-  if (count_ > 1) sink.put({.info = &fields[field_data], .bytes = data_});
-}
-
-void ReadTemperature::report(FieldSink& sink) const {
-  if (error() == Error::none) put(sink, field_temperature, static_cast<std::int8_t>(data()[0]));
-}
-
-namespace {
-void put_threshold(FieldSink& sink, std::uint8_t value) {
-  put(sink, field_overheat_enabled, (value & 0x80) != 0 ? 1 : 0);
-  if ((value & 0x80) != 0) put(sink, field_overheat_threshold, value & 0x7F);
-}
-}  // namespace
-
-void ReadOverheatThreshold::report(FieldSink& sink) const {
-  if (error() == Error::none) put_threshold(sink, data()[0]);
-}
-
-WriteMemory::WriteMemory(const Format& format, std::uint8_t page, std::uint8_t address, std::uint8_t value, Wear wear)
-    : Procedure(format, attempts_in_procedures), page_(page), address_(address), value_(value), wear_(wear) {
-  if (!is_open(page, address) || (page == service_page && address == temperature_address)) {
-    finish(Error::invalid_argument,
-           "this address cannot be written: pages 0 to 5 have addresses 0 to 126, page 7 has "
-           "4 (over-heat threshold)");
-    return;
-  }
-  select(Phase::select, {});
-}
-
-void WriteMemory::select(Phase phase, Time earliest) {
-  phase_ = phase;
-  ask({DataId::write_memory, page_select_address, page_}, earliest);
-}
-
-void WriteMemory::answered(const Reply& reply) {
-  if (give_up_ == Time{}) give_up_ = received_at() + busy_limit;
-  if (reply.busy) {  // the request was not executed, so even a write may be sent again
-    if (received_at() > give_up_) return finish(Error::busy, "the encoder stays busy longer than a write may take");
-    return ask_again();
-  }
-  const Time settled = received_at() + memory_time;
-  give_up_ = settled + busy_limit;
-  switch (phase_) {
-    case Phase::select:
-      phase_ = Phase::compare;
-      ask({DataId::read_memory, address_}, settled);
-      break;
-    case Phase::compare:
-      if (reply.value == value_ && wear_ == Wear::avoid) return finish();
-      phase_ = Phase::write;
-      written_ = true;
-      ask({DataId::write_memory, address_, value_});
-      break;
-    case Phase::write:
-      select(Phase::select_again, settled);
-      break;
-    case Phase::select_again:
-      phase_ = Phase::read_back;
-      ask({DataId::read_memory, address_}, settled);
-      break;
-    case Phase::read_back:
-      if (reply.value == value_) return finish();
-      finish(Error::cross_check_failed, "reading back gave another value: the write has failed");
-      break;
-  }
-}
-
-void WriteMemory::failed(Error error) {
-  // A lost reply does not tell whether the write was done: reading back does.
-  if (phase_ == Phase::write) return select(Phase::select_again, received_at() + memory_time);
-  finish(error, written_ ? "the byte was written, but could not be read back" : "nothing was written");
-}
-
-void WriteMemory::report(FieldSink& sink) const {
-  if (error() != Error::none) return;
-  put(sink, field_page, page_);
-  put(sink, field_address, address_);
-  put(sink, field_value, value_);
-  put(sink, field_written, written_ ? 1 : 0);
-}
-
-void WriteOverheatThreshold::report(FieldSink& sink) const {
-  if (error() != Error::none) return;
-  put_threshold(sink, value());
-  put(sink, field_written, written() ? 1 : 0);
 }
 
 }  // namespace absenc::tformat

@@ -159,13 +159,92 @@ TEST(TformatHost, DamagedRepliesAreRefusedAfterSilence) {
 
 TEST(TformatHost, ARefusedRequestIsSentAgainInsideProcedures) {
   TamperedBench bench([](unsigned index, auto& reply) {
-    if (index != 1) return;  // the read behind the page select
+    if (index != 2) return;  // the read behind the page select
     const ReplyBytes refusal = encode_reply({.status = status::parity_error, .encoder_id = 0x11});
     reply.assign(refusal.view().begin(), refusal.view().end());
   });
   ReadTemperature read({});
   EXPECT_EQ(bench.run(read).error(), Error::none);
   EXPECT_EQ(report(read)["temperature_c"], 35);
+}
+
+// ca0 and ca1 by name, what else is answered so, and what to do (6.3.2).
+TEST(TformatHost, ARefusalIsExplained) {
+  struct Row {
+    std::uint8_t alarm;
+    DataId id;
+    std::string_view found;
+    std::string_view advice;
+  };
+  for (const Row& row :
+       {Row{status::parity_error, DataId::everything, "ca0: it received", "send the same request again"},
+        Row{status::delimiter_error, DataId::everything, "ca1: it received a damaged character",
+            "send the same request again"},
+        Row{status::rejected, DataId::encoder_id, "ca0 and ca1", "send the same request again"},
+        Row{0, DataId::encoder_id, "without a communication alarm", ""}}) {
+    TamperedBench bench([&](unsigned, auto& reply) {
+      const ReplyBytes refusal = encode_reply({.status = row.alarm, .encoder_id = 0x11});
+      reply.assign(refusal.view().begin(), refusal.view().end());
+    });
+    ReadPosition read({}, row.id);
+    EXPECT_EQ(bench.run(read).error(), Error::request_rejected);
+    EXPECT_NE(read.detail().find(row.found), std::string_view::npos) << read.detail();
+    EXPECT_EQ(read.advice().substr(0, row.advice.size()), row.advice);
+    EXPECT_EQ(read.advice().empty(), row.advice.empty());
+  }
+}
+
+TEST(TformatHost, ARefusalInTheMiddleOfAResetIsExplainedToo) {
+  TamperedBench bench([](unsigned index, auto& reply) {
+    if (index < 5) return;
+    const ReplyBytes refusal = encode_reply({.status = status::parity_error, .encoder_id = 0x11});
+    reply.assign(refusal.view().begin(), refusal.view().end());
+  });
+  Reset reset({}, DataId::clear_alarms);
+  EXPECT_EQ(bench.run(reset).error(), Error::request_rejected);
+  EXPECT_NE(reset.detail().find("ca0: "), std::string_view::npos) << reset.detail();
+  EXPECT_NE(reset.detail().find("one of the ten requests"), std::string_view::npos) << reset.detail();
+}
+
+std::uint8_t selected_page(Bench& bench) { return bench.raw({0xEA, 0x7F, 0x95})[2]; }
+
+TEST(TformatHost, ThePageThatADriveHadSelectedIsRestored) {
+  for (const std::uint8_t before : std::to_array<std::uint8_t>({0, 3, 7})) {
+    Bench bench;
+    bench.raw({0x32, 0x7F, before, static_cast<std::uint8_t>(0x32 ^ 0x7F ^ before)});
+    bench.pass(memory_time);
+    ReadTemperature temperature({});
+    EXPECT_EQ(bench.run(temperature).error(), Error::none);
+    EXPECT_EQ(report(temperature), (std::map<std::string, std::int64_t>{{"temperature_c", 35}}));
+    EXPECT_EQ(selected_page(bench), before);
+    ReadOverheatThreshold threshold({});
+    EXPECT_EQ(bench.run(threshold).error(), Error::none);
+    EXPECT_EQ(selected_page(bench), before);
+    WriteOverheatThreshold write({}, 80);
+    EXPECT_EQ(bench.run(write).error(), Error::none) << write.detail();
+    EXPECT_EQ(report(write)["overheat_threshold_c"], 80);
+    EXPECT_EQ(selected_page(bench), before);
+    EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  }
+}
+
+// An encoder that refuses to say which page is selected, as it does with a closed address (9.4).
+TEST(TformatHost, APageThatStaysSelectedIsTold) {
+  TamperedBench bench([](unsigned index, auto& reply) {
+    if (index >= 3) return;
+    const ReplyBytes refusal = encode_reply({.encoder_id = 0x11});
+    reply.assign(refusal.view().begin(), refusal.view().end());
+  });
+  ReadTemperature temperature({});
+  EXPECT_EQ(bench.run(temperature).error(), Error::none);
+  EXPECT_EQ(report(temperature), (std::map<std::string, std::int64_t>{{"temperature_c", 35}, {"page_left", 7}}));
+
+  TamperedBench silent([](unsigned index, auto& reply) {
+    if (index > 1) reply.clear();  // from the read behind the page select on
+  });
+  ReadTemperature lost({});
+  EXPECT_EQ(silent.run(lost).error(), Error::timeout);
+  EXPECT_NE(lost.detail().find("page 7 may be left selected"), std::string_view::npos) << lost.detail();
 }
 
 TEST(TformatHost, TemperatureBelowZero) {

@@ -6,6 +6,7 @@
 
 #include "absenc/protocol/make.hpp"
 #include "absenc/protocol/tformat/device.hpp"
+#include "absenc/protocol/tformat/explain.hpp"
 #include "absenc/protocol/tformat/fields.hpp"
 #include "absenc/protocol/tformat/host.hpp"
 #include "absenc/protocol/tformat/timing.hpp"
@@ -63,9 +64,10 @@ constexpr std::array<Command, 12> commands{{
      {},
      true,
      false},
-    {"memory-read", Verb::memory_read, id_of(DataId::read_memory), "read the user's EEPROM", read_arguments},
-    {"memory-write", Verb::memory_write, id_of(DataId::write_memory), "write a byte of the user's EEPROM",
-     write_arguments, true, false},
+    {"memory-read", Verb::memory_read, id_of(DataId::read_memory), "read the user's EEPROM; the page stays selected",
+     read_arguments},
+    {"memory-write", Verb::memory_write, id_of(DataId::write_memory),
+     "write a byte of the user's EEPROM; the page stays selected", write_arguments, true, false},
     {"temperature", Verb::temperature, id_of(DataId::read_memory), "temperature of the board"},
     {"overheat-threshold", Verb::config_get, id_of(DataId::read_memory), "temperature above which over_heat is raised"},
     {"set-overheat-threshold", Verb::config_set, id_of(DataId::write_memory), "set that temperature",
@@ -175,6 +177,10 @@ Resolution resolution(const Options& values) {
   return {format.singleturn_bits, format.multiturn_bits};
 }
 
+Explanation explain(const Options&, Error error, Frame, Frame reply) {
+  return error == Error::request_rejected ? explain_refusal(reply.bytes) : Explanation{};
+}
+
 }  // namespace
 
 Format to_format(const Options& values) {
@@ -206,6 +212,7 @@ constinit const Unit unit{
     .host = host,
     .device = device,
     .resolution = resolution,
+    .explain = explain,
     // Any pause ends a frame; some encoders may forgive one that is shorter than their own answer time.
     .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
