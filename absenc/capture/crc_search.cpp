@@ -166,6 +166,10 @@ class Search {
   void each_place(Shape shape) {
     for (shape.trailing = 0; shape.trailing + shape.check_size < frames_.shortest; ++shape.trailing) {
       if (!take_checks(shape)) continue;
+      if (never_changes(shape)) {
+        shapes_ += frames_.shortest - shape.trailing - shape.check_size;
+        continue;
+      }
       Firsts solutions;
       for (std::size_t first = 0; first < frames_.shortest - shape.trailing - shape.check_size; ++first) {
         ++shapes_;
@@ -173,6 +177,43 @@ class Search {
       }
       for (const auto& [poly, keys] : solutions) keep(shape, poly, keys);
     }
+  }
+
+  [[nodiscard]] bool never_changes(const Shape& shape) const {
+    return std::all_of(frames_.all.begin(), frames_.all.end(), [&](const CheckedFrame* frame) {
+      return check_of(*frame, shape) == check_of(*frames_.all.front(), shape);
+    });
+  }
+
+  // What the frames fix, in checks: each length fixes one, and each difference that is no combination of others.
+  [[nodiscard]] double known_checks(const Shape& shape, std::size_t first) {
+    Shape plain;
+    plain.trailing = shape.trailing;
+    const auto [known, is_new] = known_.try_emplace({plain.trailing, first});
+    if (!is_new) return known->second;
+    std::vector<Polynomial> basis;  // each of another degree
+    for (const auto& [length, frames] : frames_.lengths) {
+      const Polynomial base = content(*frames.front(), plain, first);
+      for (const CheckedFrame* frame : frames) {
+        Polynomial difference = content(*frame, plain, first);
+        difference ^= base;
+        for (bool reduced = true; reduced;) {
+          const auto same = std::find_if(basis.begin(), basis.end(),
+                                         [&](const Polynomial& one) { return one.degree() == difference.degree(); });
+          reduced = difference.degree() >= 0 && same != basis.end();
+          if (reduced) difference ^= *same;
+        }
+        if (difference.degree() >= 0) basis.push_back(difference);
+      }
+    }
+    return known->second = static_cast<double>(basis.size() + frames_.lengths.size());
+  }
+
+  // The covered bits and the check as they stand there.
+  static Polynomial content(const CheckedFrame& frame, const Shape& plain, std::size_t first) {
+    Polynomial word;
+    covered_bits(frame, plain, first, [&word](bool bit) { word.append(bit); });
+    return word;
   }
 
   // False: some frame has no such check there.
@@ -297,8 +338,9 @@ class Search {
     solution.first = std::move(firsts);
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
-    const auto frames = static_cast<double>(frames_.all.size());
-    solution.chance_log2 = shape.width - 1 + free_bits - frames * shape.width;
+    solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
+    // The same as an exclusive or.
+    if (!frames_.of_bits && shape.width == 8 && poly == 1) return;
     found_.solutions.push_back(std::move(solution));
   }
 
@@ -307,22 +349,27 @@ class Search {
     shape.width = 8;
     shape.check_size = 1;
     for (shape.trailing = 0; shape.trailing + 1 < frames_.shortest; ++shape.trailing) {
-      for (const CheckKind kind : {CheckKind::sum, CheckKind::difference}) {
+      const bool is_check = !never_changes(shape);
+      for (const CheckKind kind : {CheckKind::sum, CheckKind::difference, CheckKind::exclusive_or}) {
         std::map<std::uint8_t, std::vector<std::size_t>> firsts;  // by the constant
         for (std::size_t first = 0; first < frames_.shortest - shape.trailing - 1; ++first) {
           ++shapes_;
-          const std::optional<std::uint8_t> constant = sum_constant(kind, shape, first);
+          const std::optional<std::uint8_t> constant =
+              is_check ? sum_constant(kind, shape, first) : std::optional<std::uint8_t>();
           if (constant) firsts[*constant].push_back(first);
         }
+        // 00 and FF (the complement) are usual; another constant only where they do not fit.
+        const bool any_usual = firsts.contains(0) || firsts.contains(0xFF);
         for (auto& [constant, first] : firsts) {
-          if (constant != 0 && firsts.contains(0)) continue;
+          const bool is_usual = constant == 0 || constant == 0xFF;
+          if (any_usual && !is_usual) continue;
           CheckSolution solution;
           solution.kind = kind;
           solution.parameters = {8, 0, constant, false, false, 0};
           solution.first = std::move(first);
           solution.check_size = 1;
           solution.trailing = shape.trailing;
-          solution.chance_log2 = (constant == 0 ? 0 : 8) - 8 * static_cast<double>(frames_.all.size());
+          solution.chance_log2 = (is_usual ? 1 : 8) - 8 * known_checks(shape, solution.first.front());
           found_.solutions.push_back(std::move(solution));
         }
       }
@@ -334,9 +381,14 @@ class Search {
     for (const CheckedFrame* frame : frames_.all) {
       const std::size_t end = frame->bytes.size() - shape.trailing - 1;
       unsigned sum = 0;
-      for (std::size_t i = first; i < end; ++i) sum += frame->bytes[i];
+      for (std::size_t i = first; i < end; ++i) {
+        sum = kind == CheckKind::exclusive_or ? sum ^ frame->bytes[i] : sum + frame->bytes[i];
+      }
       const unsigned check = frame->bytes[end];
-      const auto needed = static_cast<std::uint8_t>(kind == CheckKind::sum ? check - sum : check + sum);
+      const unsigned rest = kind == CheckKind::exclusive_or ? check ^ sum
+                            : kind == CheckKind::sum        ? check - sum
+                                                            : check + sum;
+      const auto needed = static_cast<std::uint8_t>(rest);
       if (constant && *constant != needed) return std::nullopt;
       constant = needed;
     }
@@ -345,6 +397,8 @@ class Search {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
+  std::map<std::pair<std::size_t, std::size_t>, double>
+      known_;  // by what stands behind the check and the first covered
   std::size_t shapes_ = 0;
   CheckSearch found_;
 };

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -67,15 +68,61 @@ class Guard {
   std::exception_ptr thrown_;
 };
 
-// Those that a checksum or the like has proved.
-struct GoodFrames final : capture::AnnotationSink {
+// Those that a checksum or the like has proved, and those with characters that are none.
+struct Frames final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
+    if (annotation.remark == capture::Remark::damaged) ++damaged;
     if (annotation.error != Error::none || annotation.remark == capture::Remark::cut) return;
     if (annotation.kind == capture::Annotation::Kind::request) return;
-    ++count;
+    ++good;
   }
-  std::uint64_t count = 0;
+  std::uint64_t good = 0;
+  std::uint64_t damaged = 0;
 };
+
+/// Good replies with their requests, and an end when there are enough of them.
+struct Sample final : capture::AnnotationSink {
+  struct Enough {};
+
+  void put(const capture::Annotation& annotation) override {
+    if (annotation.error != Error::none || annotation.reply.empty()) return;
+    frames.push_back({{annotation.request.bytes.begin(), annotation.request.bytes.end()},
+                      {annotation.reply.bytes.begin(), annotation.reply.bytes.end()}});
+    if (frames.size() == enough) throw Enough{};
+  }
+  [[nodiscard]] std::vector<Capture> captures() const {
+    std::vector<Capture> all;
+    for (const auto& [request, reply] : frames) all.push_back({request, reply});
+    return all;
+  }
+
+  static constexpr std::size_t enough = 1000;
+  std::vector<std::pair<std::vector<std::uint8_t>, std::vector<std::uint8_t>>> frames;
+};
+
+/// Which values frames can have, of which options.
+struct Possible final : EvidenceSink {
+  void put(const OptionEvidence& evidence) override { values.insert({evidence.option, evidence.value}); }
+  [[nodiscard]] bool is_open(std::size_t option, std::int64_t value) const {
+    const auto first = values.lower_bound({option, INT64_MIN});
+    return first != values.end() && first->first == option && !values.contains({option, value});
+  }
+  std::set<std::pair<std::size_t, std::int64_t>> values;
+};
+
+constexpr std::array<std::string_view, 3> parities{"none", "odd", "even"};
+constexpr std::array<Parity, 3> parity_values{Parity::none, Parity::odd, Parity::even};
+
+Parity parse_parity(std::string_view text) {
+  const auto found = std::find(parities.begin(), parities.end(), text);
+  if (found == parities.end()) throw UsageError(fmt::format("--parity {}: it is none, odd or even", text));
+  return parity_values[static_cast<std::size_t>(found - parities.begin())];
+}
+
+std::string_view name_of(Parity parity) {
+  const auto found = std::find(parity_values.begin(), parity_values.end(), parity);
+  return parities[static_cast<std::size_t>(found - parity_values.begin())];
+}
 
 unsigned threads() { return std::max(1u, std::thread::hardware_concurrency()); }
 
@@ -110,6 +157,7 @@ CaptureChoices capture_choices(const Invocation& invocation, std::string_view pa
   choices.raw_channels = static_cast<unsigned>(invocation.number("--raw-channels", 0, 1, 64));
   choices.samples_per_second = static_cast<std::uint64_t>(invocation.number("--rate", 0, 1, fastest));
   choices.baud = invocation.real("--baud", 0, 1, 1e9);
+  if (invocation.has("--parity")) choices.parity = parse_parity(invocation.text("--parity"));
   if (choices.raw_channels != 0 && choices.samples_per_second == 0) {
     throw UsageError("raw samples have no rate: give the samples a second with --rate");
   }
@@ -161,12 +209,12 @@ CaptureRun::Lines CaptureRun::find_lines() const {
   return lines;
 }
 
-CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, double baud, std::size_t characters,
+CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                                         capture::AnnotationSink& sink,
                                         const std::function<void(Tick)>& progress) const {
   std::vector<capture::AsyncLine> settings;
   for (const unsigned channel : lines.channels) {
-    settings.push_back({channel, {.baud = baud, .parity = line_.parity, .stop_bits = line_.stop_bits}});
+    settings.push_back({channel, {.baud = speed.baud, .parity = speed.parity, .stop_bits = line_.stop_bits}});
   }
   CaptureOutcome outcome;
   Guard guard;
@@ -199,24 +247,64 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, do
   return outcome;
 }
 
-// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning; 0: the
-// latter.
-double CaptureRun::likely_baud(const Lines& lines) const {
+// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning. So with
+// the parity, where characters are damaged: a parity bit that is taken for a stop bit is wrong half of the time.
+CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
-  if (choices_.baud > 0 || choices_.path == "-" || line_.rate == 0) return choices_.baud;
-  const auto good_at = [&](double baud) {
-    GoodFrames frames;
+  Speed best{choices_.baud, choices_.parity.value_or(line_.parity)};
+  if (choices_.path == "-") return best;
+  const auto frames_at = [&](const Speed& speed) {
+    Frames frames;
     const auto reader = open(choices_);
-    static_cast<void>(decode_lines(*reader, lines, baud, enough_characters, frames, [](Tick) {}));
-    return frames.count;
+    static_cast<void>(decode_lines(*reader, lines, speed, enough_characters, frames, [](Tick) {}));
+    return frames;
   };
-  return good_at(line_.rate) >= std::max<std::uint64_t>(1, good_at(0)) ? line_.rate : 0;
+  const bool rate_is_open = choices_.baud == 0 && line_.rate != 0;
+  if (!rate_is_open && choices_.parity) return best;
+  Frames at_best = frames_at(best);
+  const auto try_at = [&](const Speed& speed, std::uint64_t handicap) {
+    const Frames frames = frames_at(speed);
+    if (frames.good < std::max<std::uint64_t>(1, at_best.good + handicap)) return;
+    best = speed;
+    at_best = frames;
+  };
+  if (rate_is_open) try_at({static_cast<double>(line_.rate), best.parity}, 0);
+  if (choices_.parity || at_best.damaged == 0) return best;
+  const Speed usual = best;
+  for (const Parity parity : parity_values) {
+    if (parity == usual.parity) continue;
+    try_at({usual.baud, parity}, 1);
+    if (rate_is_open) try_at({usual.baud == 0 ? static_cast<double>(line_.rate) : 0, parity}, 1);
+  }
+  return best;
+}
+
+const Options& CaptureRun::settle_options() {
+  if (unit_.probe == nullptr || choices_.path == "-") return options_;
+  Sample sample;
+  try {
+    static_cast<void>(CaptureRun(unit_, options_, choices_).run(sample, [](Tick) {}));
+  } catch (const Sample::Enough&) {
+  }
+  const std::vector<Capture> captures = sample.captures();
+  Possible possible;
+  Options told = options_;
+  if (!unit_.probe(told, captures, possible)) return options_;
+  for (std::size_t i = 0; i < unit_.options.size(); ++i) {
+    if (possible.is_open(i, options_[i])) options_.values[i] = told[i];
+  }
+  return options_;
 }
 
 CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const Lines lines = find_lines();
-  CaptureOutcome outcome = decode_lines(*reader_, lines, likely_baud(lines), SIZE_MAX, sink, progress);
+  const Speed speed = likely_speed(lines);
+  CaptureOutcome outcome = decode_lines(*reader_, lines, speed, SIZE_MAX, sink, progress);
   if (!outcome.problem.empty()) throw ToolFailure(outcome.problem);
+  if (!choices_.parity && speed.parity != line_.parity) {
+    outcome.notes.push_back(fmt::format("the characters have the parity {}, but those of {} usually {}",
+                                        name_of(speed.parity), unit_.id, name_of(line_.parity)));
+  }
   return outcome;
 }
 

@@ -11,6 +11,7 @@
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
+#include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
@@ -36,12 +37,15 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
   const bool json = invocation.has("--json");
   JsonFields fields;
   FieldTable rows;
-  FieldSink& sink = json ? static_cast<FieldSink&>(fields) : rows;
+  FieldsWithReading sink(json ? static_cast<FieldSink&>(fields) : rows);
   const Error error = unit.decode(options, request.frame(), reply.frame(), sink);
   if (error == Error::none) {
     if (json) {
-      print_line(Json::object().set("protocol", unit.id).set("ok", true).set("fields", fields.fields).line());
+      Json good = Json::object().set("protocol", unit.id).set("ok", true).set("fields", fields.fields);
+      if (sink.reading()) set_validity(good, *sink.reading());
+      print_line(good.line());
     } else {
+      mark_invalid(rows.rows, sink.invalid());
       print_line(table(rows.rows));
     }
     return exit_good;
@@ -69,7 +73,7 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
 
 // ---- A whole capture
 
-constexpr std::array<std::string_view, 6> capture_options{"--channel", "--baud", "--raw-channels",
+constexpr std::array<std::string_view, 7> capture_options{"--channel", "--baud", "--parity", "--raw-channels",
                                                           "--rate",    "--csv",  "--stats"};
 
 // Counts, and hands on what is to be printed.
@@ -95,13 +99,14 @@ bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   return damaged;
 }
 
-int decode_capture(const Invocation& invocation, const Unit& unit, const Options& options) {
+int decode_capture(const Invocation& invocation, const Unit& unit, const Options& asked_for) {
   const bool statistics_only = invocation.has("--stats");
   const bool json = invocation.has("--json");
   if (json && invocation.has("--csv")) throw UsageError("--json and --csv cannot be given together");
   if (statistics_only && invocation.has("--csv")) throw UsageError("--stats is text or, with --json, an object");
 
-  CaptureRun run(unit, options, capture_choices(invocation, invocation.text("file")));
+  CaptureRun run(unit, asked_for, capture_choices(invocation, invocation.text("file")));
+  const Options& options = run.settle_options();
   const TickClock clock(run.ticks_per_second());
   CaptureStatistics statistics(unit, options, clock);
   const AnnotationFormat format = json                      ? AnnotationFormat::json
@@ -121,6 +126,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   progress.clear();
   if (!statistics_only) printer.flush();
   if (statistics_only) print_line(json ? statistics.json(outcome).line() : statistics.text(outcome));
+  for (const std::string& note : outcome.notes) print_message(fmt::format("note: {}", note));
   const bool damaged = tell_damages(outcome, clock);
   if (statistics.good() == 0) {
     print_message(
@@ -145,7 +151,7 @@ int run_decode(const Invocation& invocation) {
   return decode_one(invocation, unit, options);
 }
 
-constexpr std::array<Parameter, 13> parameters{{
+constexpr std::array<Parameter, 14> parameters{{
     parameter::protocol,
     {"file", "",
      "a capture: a sigrok session, VCD, CSV or binary export of a logic analyser, a log of candump, bytes "
@@ -159,6 +165,7 @@ constexpr std::array<Parameter, 13> parameters{{
      "between",
      "by their names", false, true},
     {"--baud", "RATE", "of the line", "the protocol's own, or found from the capture"},
+    {"--parity", "none|odd|even", "of its characters", "the protocol's own, or found from the capture"},
     {"--raw-channels", "COUNT", "the file is raw samples of so many channels, channel 0 in bit 0"},
     {"--rate", "HZ", "samples a second, where the file does not tell"},
     {"--stats", "", "only what it comes to: counts, errors, turn-around times, the way of the position"},

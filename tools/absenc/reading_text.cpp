@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "absenc/core/bits.hpp"
@@ -151,6 +153,34 @@ std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
     row += ",,";
   }
   return row + fmt::format(",{},{}", flags_text(unit.status, reading.status), flags_text(unit.alarms, reading.alarms));
+}
+
+bool holds(const FieldInfo& field, const Reading& reading) {
+  static constexpr std::array<std::string_view, 5> positions{"singleturn", "angle_deg", "position", "position_um",
+                                                             "position_mm"};
+  if (field.name == "multiturn") return reading.multiturn_bits == 0 || reading.multiturn_valid;
+  const bool is_position = std::find(positions.begin(), positions.end(), field.name) != positions.end();
+  return !is_position || reading.singleturn_bits == 0 || (reading.singleturn_valid() && reading.ready);
+}
+
+void set_validity(Json& json, const Reading& reading) {
+  if (reading.singleturn_bits != 0) json.set("singleturn_valid", reading.singleturn_valid() && reading.ready);
+  if (reading.multiturn_bits != 0) json.set("multiturn_valid", reading.multiturn_valid);
+}
+
+std::vector<std::string_view> FieldsWithReading::invalid() const {
+  std::vector<std::string_view> names;
+  for (const FieldInfo* info : names_) {
+    if (reading_ && !holds(*info, *reading_)) names.push_back(info->name);
+  }
+  return names;
+}
+
+void mark_invalid(std::vector<std::vector<std::string>>& rows, std::span<const std::string_view> invalid) {
+  for (std::vector<std::string>& row : rows) {
+    const bool is_invalid = row.size() > 1 && std::find(invalid.begin(), invalid.end(), row[0]) != invalid.end();
+    if (is_invalid) row[1] = fmt::format("INVALID ({})", row[1]);
+  }
 }
 
 }  // namespace absenc::tool

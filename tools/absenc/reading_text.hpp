@@ -3,8 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/core/angle.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -23,6 +26,35 @@ namespace absenc::tool {
 /// Sets everything but the time.
 void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed);
 [[nodiscard]] Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed);
+
+/// Whether the value of a field holds, by the reading that its frame makes: positions as the single turn does, the
+/// turns as they do; nothing is said against others.
+[[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
+/// Sets singleturn_valid and multiturn_valid, as far as the reading carries them.
+void set_validity(Json& json, const Reading& reading);
+
+/// Hands fields on, and keeps the reading that says which of them hold.
+class FieldsWithReading final : public FieldSink {
+ public:
+  explicit FieldsWithReading(FieldSink& sink) : sink_(sink) {}
+  void put(const FieldValue& value) override {
+    names_.push_back(value.info);
+    sink_.put(value);
+  }
+  void put_reading(const Reading& one) override { reading_ = one; }
+
+  [[nodiscard]] const std::optional<Reading>& reading() const { return reading_; }
+  /// The fields that do not hold.
+  [[nodiscard]] std::vector<std::string_view> invalid() const;
+
+ private:
+  FieldSink& sink_;
+  std::vector<const FieldInfo*> names_;
+  std::optional<Reading> reading_;
+};
+
+/// In rows of name and value, as FieldTable has them: "INVALID (74565)" where a value does not hold.
+void mark_invalid(std::vector<std::vector<std::string>>& rows, std::span<const std::string_view> invalid);
 
 /// A position that no second one confirmed is not valid.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
