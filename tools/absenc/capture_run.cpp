@@ -269,12 +269,11 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
     at_best = frames;
   };
   if (rate_is_open) try_at({static_cast<double>(line_.rate), best.parity}, 0);
-  if (choices_.parity || at_best.damaged == 0) return best;
-  const Speed usual = best;
+  if (choices_.parity || (at_best.damaged == 0 && at_best.good != 0)) return best;
   for (const Parity parity : parity_values) {
-    if (parity == usual.parity) continue;
-    try_at({usual.baud, parity}, 1);
-    if (rate_is_open) try_at({usual.baud == 0 ? static_cast<double>(line_.rate) : 0, parity}, 1);
+    if (parity == line_.parity) continue;
+    if (rate_is_open) try_at({static_cast<double>(line_.rate), parity}, 1);
+    try_at({choices_.baud, parity}, 1);
   }
   return best;
 }

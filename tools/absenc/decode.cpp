@@ -12,6 +12,7 @@
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/sequence_watch.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
@@ -114,9 +115,10 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
                                                             : AnnotationFormat::text;
   AnnotationPrinter printer(unit, options, clock, format);
   Counted counted(statistics, statistics_only ? nullptr : &printer);
+  SequenceWatch watched(unit, options, counted);
   Progress progress;
   const bool live = invocation.text("file") == "-";
-  const CaptureOutcome outcome = run.run(counted, [&](capture::Tick tick) {
+  const CaptureOutcome outcome = run.run(watched, [&](capture::Tick tick) {
     if (live && !statistics_only) printer.flush();
     if (statistics_only && progress.visible()) {
       progress.show(

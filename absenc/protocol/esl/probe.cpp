@@ -151,6 +151,9 @@ ProbeResult probe(const Profile& base, std::span<const Capture> captures) {
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
+  // Of one frame it changes nothing.
+  best[option_sequence_step].fill(
+      best[option_sequence_step][static_cast<std::size_t>(get_option(result.best, option_sequence_step))]);
   for (std::size_t i = 0; i < open_options; ++i) {
     for (std::size_t value = 0; value < choice_count(i); ++value) {
       const Progress& progress = best[i][value];
