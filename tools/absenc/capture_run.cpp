@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <exception>
-#include <set>
 #include <thread>
 #include <utility>
 
@@ -30,23 +29,6 @@ using capture::Content;
 using capture::Part;
 using capture::Tick;
 
-std::unique_ptr<capture::Reader> open(const CaptureChoices& choices) {
-  const capture::OpenChoices how{.channels = choices.raw_channels, .samples_per_second = choices.samples_per_second};
-  try {
-    if (choices.path != "-") return capture::open_capture(choices.path, how);
-    auto source = std::make_unique<StdinSource>();
-    // Where binary files end matters, and some are read from there.
-    std::array<std::uint8_t, 64> head{};
-    const std::size_t size = source->read(0, head);
-    if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
-      throw UsageError("from standard input only text can be read: name the file");
-    }
-    return capture::open_capture(std::move(source), "standard input", how);
-  } catch (const capture::OpenError& error) {
-    throw ToolFailure(error.what());
-  }
-}
-
 // What the sink throws must not pass through a decoder that has threads.
 class Guard {
  public:
@@ -66,48 +48,6 @@ class Guard {
 
  private:
   std::exception_ptr thrown_;
-};
-
-// Those that a checksum or the like has proved, and those with characters that are none.
-struct Frames final : capture::AnnotationSink {
-  void put(const capture::Annotation& annotation) override {
-    if (annotation.remark == capture::Remark::damaged) ++damaged;
-    if (annotation.error != Error::none || annotation.remark == capture::Remark::cut) return;
-    if (annotation.kind == capture::Annotation::Kind::request) return;
-    ++good;
-  }
-  std::uint64_t good = 0;
-  std::uint64_t damaged = 0;
-};
-
-/// Good replies with their requests, and an end when there are enough of them.
-struct Sample final : capture::AnnotationSink {
-  struct Enough {};
-
-  void put(const capture::Annotation& annotation) override {
-    if (annotation.error != Error::none || annotation.reply.empty()) return;
-    frames.push_back({{annotation.request.bytes.begin(), annotation.request.bytes.end()},
-                      {annotation.reply.bytes.begin(), annotation.reply.bytes.end()}});
-    if (frames.size() == enough) throw Enough{};
-  }
-  [[nodiscard]] std::vector<Capture> captures() const {
-    std::vector<Capture> all;
-    for (const auto& [request, reply] : frames) all.push_back({request, reply});
-    return all;
-  }
-
-  static constexpr std::size_t enough = 1000;
-  std::vector<std::pair<std::vector<std::uint8_t>, std::vector<std::uint8_t>>> frames;
-};
-
-/// Which values frames can have, of which options.
-struct Possible final : EvidenceSink {
-  void put(const OptionEvidence& evidence) override { values.insert({evidence.option, evidence.value}); }
-  [[nodiscard]] bool is_open(std::size_t option, std::int64_t value) const {
-    const auto first = values.lower_bound({option, INT64_MIN});
-    return first != values.end() && first->first == option && !values.contains({option, value});
-  }
-  std::set<std::pair<std::size_t, std::int64_t>> values;
 };
 
 constexpr std::array<std::string_view, 3> parities{"none", "odd", "even"};
@@ -149,6 +89,23 @@ void read_all(capture::Reader& reader, Take&& take) {
 
 }  // namespace
 
+std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
+  const capture::OpenChoices how{.channels = choices.raw_channels, .samples_per_second = choices.samples_per_second};
+  try {
+    if (choices.path != "-") return capture::open_capture(choices.path, how);
+    auto source = std::make_unique<StdinSource>();
+    // Where binary files end matters, and some are read from there.
+    std::array<std::uint8_t, 64> head{};
+    const std::size_t size = source->read(0, head);
+    if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
+      throw UsageError("from standard input only text can be read: name the file");
+    }
+    return capture::open_capture(std::move(source), "standard input", how);
+  } catch (const capture::OpenError& error) {
+    throw ToolFailure(error.what());
+  }
+}
+
 CaptureChoices capture_choices(const Invocation& invocation, std::string_view path) {
   constexpr std::int64_t fastest = 1'000'000'000'000;
   CaptureChoices choices;
@@ -169,7 +126,7 @@ CaptureRun::CaptureRun(const Unit& unit, const Options& options, const CaptureCh
       options_(options),
       line_(unit.settings != nullptr ? unit.settings(options) : unit.line),
       choices_(choices),
-      reader_(open(choices)) {
+      reader_(open_capture(choices)) {
   require_link(unit, reader_->layout().content);
 }
 
@@ -188,12 +145,6 @@ CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::functio
   outcome.damages = reader_->damages();
   return outcome;
 }
-
-// The lines of the capture and who speaks on them.
-struct CaptureRun::Lines {
-  std::vector<unsigned> channels;
-  capture::Annotator::Settings settings;
-};
 
 CaptureRun::Lines CaptureRun::find_lines() const {
   const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
@@ -245,54 +196,6 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, Sp
     outcome.carries.push_back(fmt::format("{} is {}", reader.layout().channels[lines.channels[i]], whose));
   }
   return outcome;
-}
-
-// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning. So with
-// the parity, where characters are damaged: a parity bit that is taken for a stop bit is wrong half of the time.
-CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
-  constexpr std::size_t enough_characters = 20'000;
-  Speed best{choices_.baud, choices_.parity.value_or(line_.parity)};
-  if (choices_.path == "-") return best;
-  const auto frames_at = [&](const Speed& speed) {
-    Frames frames;
-    const auto reader = open(choices_);
-    static_cast<void>(decode_lines(*reader, lines, speed, enough_characters, frames, [](Tick) {}));
-    return frames;
-  };
-  const bool rate_is_open = choices_.baud == 0 && line_.rate != 0;
-  if (!rate_is_open && choices_.parity) return best;
-  Frames at_best = frames_at(best);
-  const auto try_at = [&](const Speed& speed, std::uint64_t handicap) {
-    const Frames frames = frames_at(speed);
-    if (frames.good < std::max<std::uint64_t>(1, at_best.good + handicap)) return;
-    best = speed;
-    at_best = frames;
-  };
-  if (rate_is_open) try_at({static_cast<double>(line_.rate), best.parity}, 0);
-  if (choices_.parity || (at_best.damaged == 0 && at_best.good != 0)) return best;
-  for (const Parity parity : parity_values) {
-    if (parity == line_.parity) continue;
-    if (rate_is_open) try_at({static_cast<double>(line_.rate), parity}, 1);
-    try_at({choices_.baud, parity}, 1);
-  }
-  return best;
-}
-
-const Options& CaptureRun::settle_options() {
-  if (unit_.probe == nullptr || choices_.path == "-") return options_;
-  Sample sample;
-  try {
-    static_cast<void>(CaptureRun(unit_, options_, choices_).run(sample, [](Tick) {}));
-  } catch (const Sample::Enough&) {
-  }
-  const std::vector<Capture> captures = sample.captures();
-  Possible possible;
-  Options told = options_;
-  if (!unit_.probe(told, captures, possible)) return options_;
-  for (std::size_t i = 0; i < unit_.options.size(); ++i) {
-    if (possible.is_open(i, options_[i])) options_.values[i] = told[i];
-  }
-  return options_;
 }
 
 CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {

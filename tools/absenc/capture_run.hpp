@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/capture/annotate.hpp"
 #include "absenc/capture/annotation.hpp"
 #include "absenc/capture/signal.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -40,6 +41,9 @@ struct CaptureOutcome {
   std::vector<capture::Damage> damages;
 };
 
+/// Throws UsageError, ToolFailure.
+[[nodiscard]] std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices);
+
 class CaptureRun {
  public:
   /// Opens it. Throws UsageError, ToolFailure.
@@ -56,7 +60,11 @@ class CaptureRun {
   CaptureOutcome run(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
 
  private:
-  struct Lines;
+  // The lines of the capture and who speaks on them.
+  struct Lines {
+    std::vector<unsigned> channels;
+    capture::Annotator::Settings settings;
+  };
 
   [[nodiscard]] Lines find_lines() const;
   struct Speed {
