@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The check of an encoder that nobody has a document for, found from its frames."""
+import functools
 import json
+import operator
 import random
 import unittest
 
@@ -61,6 +63,16 @@ class CrcFind(Case):
         frames = ["".join(f"{byte:08b}" for byte in word) + f"{crc(word, 6, 3, 0, 0x3F):06b}" for word in words]
         best = self.best("--bits", frames)
         self.assertEqual((best["width"], best["poly"], best["xorout"], best["covered_from"]), (6, "0x03", "0x3F", [0]))
+
+    def test_bytes_that_never_change_prove_nothing(self):
+        frames = [bytes((0x40, 0x42, 0, 0)) + (0xA5A5 + 311 * i).to_bytes(2, "big") for i in range(8)]
+        frames = [frame + bytes([functools.reduce(operator.xor, frame)]) for frame in frames]
+        self.assertEqual(frames[0].hex(), "40420000a5a502")
+        result = self.find("--hex", [frame.hex() for frame in frames], "--json")
+        self.assert_good(result)
+        solutions = json.loads(result.stdout)["solutions"]
+        self.assertEqual((solutions[0]["check"], solutions[0]["init"], solutions[0]["behind_check"]), ("xor", "0x00", 0))
+        self.assertEqual({solution["behind_check"] for solution in solutions}, {0})
 
     def test_for_people(self):
         result = self.find("--hex", self.encolink_frames(6))

@@ -96,6 +96,67 @@ def hex_text(data):
     return " ".join(f"{byte:02X}" for byte in data)
 
 
+class OwnWaveforms(Case):
+    def decode(self, encoder, *arguments, count=50):
+        path = self.file("own.vcd")
+        self.assert_good(absenc("wave", encoder, path, "--count", str(count), "--force"))
+        result = absenc("decode", encoder.partition("?")[0], path, "--json", *arguments)
+        return result, json_lines(result.stdout)
+
+    def test_the_identity_tells_the_length_of_the_frames(self):
+        result, lines = self.decode("encolink-spi?motion=rpm=600&resolution=20", count=1000)
+        self.assert_good(result)
+        positions = [line["fields"] for line in lines if "singleturn" in line["fields"]]
+        self.assertGreater(len(positions), 999)
+        for before, after in zip(positions, positions[1:]):
+            moved = (after["singleturn"] - before["singleturn"]) % 2**20
+            self.assertLess(moved, 2**20 // 50, f"{before} {after}")
+            self.assertIn("multiturn", after)
+
+    def test_a_parity_is_found(self):
+        for parity in ("odd", "even"):
+            with self.subTest(parity):
+                result, lines = self.decode(f"raa38?parity={parity}&motion=rpm=60")
+                self.assert_good(result)
+                self.assertIn(f"parity {parity}", result.stderr)
+                self.assertGreater(sum("singleturn" in line.get("fields", {}) for line in lines), 45)
+
+    def test_a_parity_is_given(self):
+        result, _ = self.decode("raa38?parity=odd&motion=rpm=60", "--parity", "odd")
+        self.assert_good(result)
+        self.assertEqual(result.stderr, "")
+        result, _ = self.decode("raa38?parity=odd&motion=rpm=60", "--parity", "none")
+        self.assertEqual(result.returncode, 1)
+        self.assert_wrong_usage(absenc("decode", "raa38", self.file("own.vcd"), "--parity", "mark"), "--parity")
+
+
+class Invalid(Case):
+    def alarm(self, alarm, *arguments):
+        path = self.file("alarm.vcd")
+        self.assert_good(absenc("wave", f"tformat?alarm={alarm}", path, "--count", "5", "--force"))
+        return absenc("decode", "tformat", path, *arguments)
+
+    def test_of_one_frame(self):
+        [line] = json_lines(self.alarm("full_absolute_status", "--json").stdout)[:1]
+        frames = ["--request", line["request"], "--hex", line["reply"]]
+        shown = absenc("decode", "tformat", *frames)
+        self.assert_good(shown)
+        self.assertRegex(shown.stdout, r"singleturn +INVALID \(0")
+        [one] = json_lines(absenc("decode", "tformat", *frames, "--json").stdout)
+        self.assertFalse(one["singleturn_valid"])
+        self.assertEqual(one["fields"]["singleturn"], 0)
+
+    def test_of_a_capture(self):
+        for alarm, fields in (("full_absolute_status", {"singleturn"}), ("over_speed", {"multiturn"})):
+            with self.subTest(alarm):
+                line = json_lines(self.alarm(alarm, "--json").stdout)[0]
+                for field in fields:
+                    self.assertFalse(line[f"{field}_valid"])
+                [row, *_] = csv.DictReader(io.StringIO(self.alarm(alarm, "--csv").stdout))
+                for field in fields:
+                    self.assertIn(f"{field}=INVALID(", row["fields"])
+
+
 class Text(Case):
     def capture(self, *exchanges):
         return self.file("capture.txt", "".join(f"{hex_text(a)}\n{hex_text(b)}\n" for a, b in exchanges))

@@ -259,6 +259,42 @@ class Command(EslCase):
         self.assert_wrong_usage(absenc("scan", "sim:tformat"), "one encoder")
 
 
+class Reasons(EslCase):
+    """What a host says of a bad reply, `decode` says too, of one frame and in a capture."""
+    ONE = bytes.fromhex("084000efcdab34125646b3")
+    TWO = bytes.fromhex("086000abd6cd84")
+
+    def test_are_those_of_a_host(self):
+        damaged = bytes([*self.ONE[:5], self.ONE[5] ^ 1, *self.ONE[6:]])
+        for reply, words in ((self.TWO + self.ONE, "the channels are swapped"),
+                             (self.ONE, "channel 2 is missing"),
+                             (damaged + self.TWO, "the CRC of channel 1 is wrong, channel 2 is good"),
+                             (self.ONE + bytes([*self.TWO[:-1], 0]), "the CRC of channel 2 is wrong, channel 1 is good")):
+            with self.subTest(words):
+                result = absenc("decode", "esl", "--hex", reply.hex())
+                self.assertEqual(result.returncode, 1)
+                self.assertIn(words, result.stderr)
+                request = absenc("encode", "esl", "position").stdout.strip()
+                good = f"{request}\n{(self.ONE + self.TWO).hex()}\n"
+                capture = self.file("reasons.txt", good + f"{request}\n{reply.hex()}\n")
+                lines = json_lines(absenc("decode", "esl", capture, "--json").stdout)
+                self.assertIn(words, " ".join(line.get("message", "") for line in lines))
+
+    def test_a_counter_that_stands_still(self):
+        request = absenc("encode", "esl", "position").stdout.strip()
+        reply = (self.ONE + self.TWO).hex()
+        capture = self.file("still.txt", f"{request}\n{reply}\n" * 2)
+        first, second = json_lines(absenc("decode", "esl", capture, "--json").stdout)
+        self.assertTrue(first["ok"])
+        self.assertEqual((second["ok"], second["error"]), (False, "sequence_mismatch"))
+
+    def test_probe_names_what_contradicts(self):
+        result = absenc("probe", "esl", "--request", "0858", "--hex", (self.ONE + self.TWO).hex())
+        self.assertEqual(result.returncode, 1)
+        self.assertNotIn("number of bytes", result.stdout + result.stderr)
+        self.assertIn("would not have answered", result.stderr)
+
+
 class Probe(EslCase):
     def test_one_reply(self):
         result = absenc("probe", "esl", "--request", MSB_REQUEST, "--hex", MSB_REPLY)

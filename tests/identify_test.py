@@ -121,6 +121,28 @@ class NobodyKnown(Case):
         self.assertFalse(found["ok"])
         self.assertFalse(any(candidate["found"] for candidate in found["candidates"]))
 
+    def test_a_stream_of_noise(self):
+        noise = random.Random(2)
+        stop = threading.Event()
+        os.set_blocking(self.master, False)
+
+        def send():
+            while not stop.is_set():
+                try:
+                    os.write(self.master, noise.randbytes(200))
+                except BlockingIOError:
+                    select.select([], [self.master], [], 0.01)
+        thread = threading.Thread(target=send)
+        thread.start()
+        try:
+            for _ in range(8):
+                result, found = identify(self.path, "--for", "3")
+                self.assertEqual(result.returncode, 1, result.stdout)
+                self.assertNotIn("at 0 baud", result.stderr)
+        finally:
+            stop.set()
+            thread.join()
+
     def test_only_echo(self):
         self.serve(lambda request: request)
         result = absenc("identify", self.path, "--for", "2")
@@ -138,6 +160,24 @@ class NobodyKnown(Case):
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
         self.assertIn("interrupted", err)
+
+
+class SeveralEncoders(EncoderCase):
+    def test_on_one_line(self):
+        more = [word for address in (3, 5) for word in ("--also", f"address={address}")]
+        with Emulator(self.directory, *more, protocol="esl") as emulator:
+            result = absenc("identify", emulator.path)
+        self.assert_good(result)
+        self.assertIn("3 encoders are on the line: address=0, address=3, address=5", result.stderr)
+        self.assertNotIn("equally well", result.stderr)
+        commands = [line.split("absenc read ")[1] for line in result.stdout.splitlines() if "absenc read " in line]
+        self.assertEqual(sorted(command.strip('"').partition("?")[2] for command in commands),
+                         ["", "address=3", "address=5"])
+
+    def test_who_sends_by_himself_on_can_has_his_number(self):
+        with Emulator(self.directory, "--option", "node=0x21", "--option", "cyclic=100", protocol="raa38-can") as emulator:
+            _, found = identify(f"slcan:{emulator.path}", "--for", "0.4")  # nobody can be asked in that time
+        self.assertEqual({one["options"]["node"] for one in found["candidates"]}, {0x21})
 
 
 class WrongUsage(Case):
@@ -173,14 +213,22 @@ class Frames(Case):
         result = absenc("identify", "--request", "1A", "--hex", "1A 00 45 23 01 11 34 12 00 00 4B")
         self.assert_failed(result, "no protocol explains")
 
-    def test_two_that_explain_a_frame(self):
-        # A word that only moves: whether there is an error bit behind it, nobody can tell.
+    def test_a_word_that_only_moves(self):
         moving = [f"{i:012b}" for i in range(100, 108)]
-        arguments = [argument for word in moving for argument in ("--hex", word)]
-        result, found = identify(*arguments)
+        result, found = identify(*[argument for word in moving for argument in ("--hex", word)])
         self.assertEqual(result.returncode, 0, result.stdout)
         self.assertEqual(found["candidates"][0]["protocol"], "ssi")
-        self.assertGreater(len(found["candidates"]), 1)
+        # Where the turns would stand is no other explanation of a word without turns.
+        ssi = [one["options"] for one in found["candidates"] if one["protocol"] == "ssi"]
+        self.assertEqual({options["multiturn_first"] for options in ssi}, {ssi[0]["multiturn_first"]})
+
+    def test_two_that_explain_a_frame(self):
+        # The same frames are sent by UART and SPI.
+        frames = ["0000000d131e00", "0000029c735600", "0000036a439e00", "0000052bd3ec00"]
+        arguments = [argument for frame in frames for argument in ("--hex", frame)]
+        result, found = identify(*arguments)
+        self.assertEqual(result.returncode, 0, result.stdout)
+        self.assertEqual({one["protocol"] for one in found["candidates"][:2]}, {"encolink", "encolink-spi"})
         self.assertIn("equally well", absenc("identify", *arguments).stderr)
 
     def test_what_noise_could_do_as_well(self):
@@ -203,6 +251,23 @@ class Capture(Case):
 
     def test_options_are_found(self):
         self.check("esl?crc_bit_order=msb&motion=rpm=60", "line.sr", "esl", {"crc_bit_order": "msb"})
+
+    def test_a_word_with_a_checksum_is_not_one_without(self):
+        self.check("biss?model=rotary-19&motion=rpm=60", "words.vcd", "biss", {"singleturn_bits": 19})
+
+    def test_random_bytes(self):
+        noise = random.Random(3)
+        for kind in ("bytes", "lines", "frames"):
+            for size in (20, 200, 4000):
+                text = noise.randbytes(size).hex(" ")
+                if kind == "lines":
+                    text = "".join(byte + noise.choice("     \n") for byte in text.split())
+                if kind == "frames":
+                    text = "".join(f"({i / 100:.6f}) can0 {noise.randrange(2048):03X}#{noise.randbytes(8).hex()}\n"
+                                   for i in range(size // 8))
+                with self.subTest(kind, size=size):
+                    result, found = identify(self.file(f"{kind}{size}.txt", text.rstrip() + "\n"))
+                    self.assertEqual(result.returncode, 1, result.stdout)
 
     def test_nothing_in_it(self):
         path = self.file("bytes.txt", "00 11 22 33 44 55 66 77\n")

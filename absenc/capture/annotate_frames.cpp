@@ -67,8 +67,11 @@ void CanAnnotator::put(const CanRecord& record) {
   const Frame frame{.bytes = record.frame.bytes(), .can = &record.frame};
   const Error as_reply = judge_.decode({}, frame);
   if (as_reply == Error::none) return tell(Kind::reply, record, Error::none, Remark::none, judge_.reading());
-  if (judge_.decode(frame, {}) != Error::none) return tell(Kind::noise, record, as_reply, Remark::none);
+  if (judge_.decode(frame, {}) != Error::none) {
+    return answers_badly(record) ? void() : tell(Kind::noise, record, as_reply, Remark::none);
+  }
   if (!judge_.answered(frame)) return tell(Kind::request, record, Error::none, Remark::none);
+  end_waits(record.frame);
   if (waiting_ == capacity) give_up(0, Remark::unanswered);
   asked_[waiting_++] = record;
 }
@@ -81,22 +84,57 @@ void CanAnnotator::finish(Tick end) {
 bool CanAnnotator::answers(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = 0; i < waiting_; ++i) {
-    const CanRecord asked = asked_[i];
-    const Frame request{.bytes = asked.frame.bytes(), .can = &asked.frame};
+    const Frame request{.bytes = asked_[i].frame.bytes(), .can = &asked_[i].frame};
     if (judge_.decode(request, reply) != Error::none) continue;
-    const auto first = asked_.begin() + static_cast<std::ptrdiff_t>(i);
-    std::copy(first + 1, asked_.begin() + static_cast<std::ptrdiff_t>(waiting_), first);
-    --waiting_;
-    sink_.put({.kind = Annotation::Kind::exchange,
-               .begin = asked.at,
-               .end = record.at,
-               .request = request,
-               .reply = reply,
-               .reading = judge_.reading(),
-               .turnaround = record.at - asked.at});
+    answer(i, record, Error::none);
     return true;
   }
   return false;
+}
+
+// The same of a frame that is no good reply to anything: the newest that it would answer if it were.
+bool CanAnnotator::answers_badly(const CanRecord& record) {
+  const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
+  for (std::size_t i = waiting_; i-- > 0;) {
+    const Error error = judge_.decode({.bytes = asked_[i].frame.bytes(), .can = &asked_[i].frame}, reply);
+    if (error == Error::unexpected_reply) continue;
+    answer(i, record, error);
+    return true;
+  }
+  return false;
+}
+
+// Who asks the same encoder again has given the reply before up: what comes now answers the new request.
+void CanAnnotator::end_waits(const CanFrame& request) {
+  for (std::size_t i = 0; i < waiting_;) {
+    const CanFrame& asked = asked_[i].frame;
+    const bool same = asked.id == request.id && asked.extended == request.extended;
+    if (same) {
+      give_up(i, Remark::unanswered);
+    } else {
+      ++i;
+    }
+  }
+}
+
+void CanAnnotator::answer(std::size_t index, const CanRecord& record, Error error) {
+  const CanRecord asked = take(index);
+  sink_.put({.kind = Annotation::Kind::exchange,
+             .error = error,
+             .begin = asked.at,
+             .end = record.at,
+             .request = {.bytes = asked.frame.bytes(), .can = &asked.frame},
+             .reply = {.bytes = record.frame.bytes(), .can = &record.frame},
+             .reading = error == Error::none ? judge_.reading() : nullptr,
+             .turnaround = record.at - asked.at});
+}
+
+CanRecord CanAnnotator::take(std::size_t index) {
+  const CanRecord asked = asked_[index];
+  const auto first = asked_.begin() + static_cast<std::ptrdiff_t>(index);
+  std::copy(first + 1, asked_.begin() + static_cast<std::ptrdiff_t>(waiting_), first);
+  --waiting_;
+  return asked;
 }
 
 void CanAnnotator::tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
@@ -109,10 +147,7 @@ void CanAnnotator::tell(Annotation::Kind kind, const CanRecord& record, Error er
 }
 
 void CanAnnotator::give_up(std::size_t index, Remark remark) {
-  const CanRecord asked = asked_[index];
-  const auto first = asked_.begin() + static_cast<std::ptrdiff_t>(index);
-  std::copy(first + 1, asked_.begin() + static_cast<std::ptrdiff_t>(waiting_), first);
-  --waiting_;
+  const CanRecord asked = take(index);
   tell(Annotation::Kind::request, asked, remark == Remark::cut ? Error::none : Error::timeout, remark);
 }
 

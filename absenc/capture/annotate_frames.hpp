@@ -44,6 +44,10 @@ class CanAnnotator {
   static constexpr std::size_t capacity = 16;
 
   bool answers(const CanRecord& record);
+  bool answers_badly(const CanRecord& record);
+  void end_waits(const CanFrame& request);
+  void answer(std::size_t index, const CanRecord& record, Error error);
+  CanRecord take(std::size_t index);
   void tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
             const Reading* reading = nullptr);
   void give_up(std::size_t index, Remark remark);

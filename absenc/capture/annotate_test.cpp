@@ -322,5 +322,40 @@ TEST(Can, NodesAnswerInAnyOrder) {
   EXPECT_EQ(finder.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
 }
 
+// Who asks again has given the others up, and what answers badly has answered.
+TEST(Can, EachReplyBelongsToTheNewestRequest) {
+  const Unit& unit = *find_unit("raa38-can");
+  Options options;
+  ASSERT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
+  Finder finder;
+  CanAnnotator annotator(unit, options, {.limit = 100'000}, finder);
+  const auto ask = [&](Tick at) {
+    CanRecord one = record(at, 0x220, 0xFF);
+    one.frame.data[0] = 0x80;
+    one.frame.data[1] = 0x20;
+    annotator.put(one);
+  };
+  const auto reply = [&](Tick at, bool good) {
+    CanRecord one = record(at, 0x120, 5);
+    one.frame.data[7] = good ? 0 : 1;
+    annotator.put(one);
+  };
+  for (Tick i = 0; i < 6; ++i) {
+    ask(1000 * i);
+    if (i != 3) reply(1000 * i + 70, i != 1);
+  }
+  annotator.finish(1'000'000);
+  ASSERT_EQ(finder.found.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const Found& one = finder.found[i];
+    EXPECT_EQ(one.begin, 1000 * i);
+    EXPECT_EQ(one.error, i == 1 ? Error::out_of_range : i == 3 ? Error::timeout : Error::none) << i;
+    EXPECT_EQ(one.kind, i == 3 ? Kind::request : Kind::exchange) << i;
+    if (i != 3) {
+      EXPECT_EQ(one.turnaround, 70u) << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace absenc::capture

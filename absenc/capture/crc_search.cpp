@@ -7,8 +7,7 @@
 #include <map>
 #include <optional>
 
-#include "absenc/capture/polynomial.hpp"
-#include "absenc/core/bits.hpp"
+#include "absenc/capture/crc_frames.hpp"
 
 namespace absenc::capture {
 
@@ -17,106 +16,6 @@ namespace {
 constexpr double settled_log2 = -20;    // one in a million
 constexpr int most_common_degree = 63;  // of a common divisor that is taken apart; a longer one says too little
 constexpr unsigned widest = 16;
-
-/// What of a frame is covered, where the check stands and how it is written there.
-struct Shape {
-  unsigned width = 0;  // 0: a sum
-  bool refin = false;
-  bool refout = false;
-  bool low_first = false;
-  bool padded = false;
-  std::size_t check_size = 0;
-  std::size_t trailing = 0;
-};
-
-/// Frames without those that stand there twice, and how to look at them.
-class Frames {
- public:
-  explicit Frames(std::span<const CheckedFrame> frames) {
-    for (const CheckedFrame& frame : frames) {
-      const auto same = [&](const CheckedFrame* one) { return one->bits == frame.bits && one->bytes == frame.bytes; };
-      if (std::none_of(all.begin(), all.end(), same)) all.push_back(&frame);
-    }
-    for (const CheckedFrame* frame : all) {
-      shortest = std::min(shortest, size(*frame));
-      lengths[size(*frame)].push_back(frame);
-    }
-    of_bits = !all.empty() && all.front()->bits != 0;
-  }
-
-  /// In bytes or bits.
-  [[nodiscard]] static std::size_t size(const CheckedFrame& frame) {
-    return frame.bits != 0 ? frame.bits : frame.bytes.size();
-  }
-
-  std::vector<const CheckedFrame*> all;
-  std::map<std::size_t, std::vector<const CheckedFrame*>> lengths;
-  std::size_t shortest = SIZE_MAX;
-  bool of_bits = false;
-};
-
-bool bit_of(const CheckedFrame& frame, std::size_t i) { return (frame.bytes[i / 8] >> (7 - i % 8) & 1) != 0; }
-
-/// The check as the encoder counts it; none when bits above its width are not 0.
-std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Shape& shape) {
-  const std::size_t at = Frames::size(frame) - shape.trailing - shape.check_size;
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < shape.check_size; ++i) {
-    if (frame.bits != 0) {
-      value = value << 1 | (bit_of(frame, at + i) ? 1u : 0u);
-    } else {
-      value = value << 8 | frame.bytes[at + (shape.low_first ? shape.check_size - 1 - i : i)];
-    }
-  }
-  if (value > low_mask(shape.width)) return std::nullopt;
-  return value;
-}
-
-/// Calls `take` for each covered bit from `first` on, in the order in which they enter the register. Returns how many.
-template <class Take>
-std::size_t covered_bits(const CheckedFrame& frame, const Shape& shape, std::size_t first, const Take& take) {
-  const std::size_t end = Frames::size(frame) - shape.trailing - shape.check_size;
-  if (frame.bits != 0) {
-    for (std::size_t i = first; i < end; ++i) take(bit_of(frame, i));
-    return end - first;
-  }
-  for (std::size_t i = first; i < end + (shape.padded ? 1 : 0); ++i) {
-    const std::uint8_t byte = i < end ? frame.bytes[i] : std::uint8_t{0};
-    for (unsigned bit = 0; bit < 8; ++bit) take((byte >> (shape.refin ? bit : 7 - bit) & 1) != 0);
-  }
-  return 8 * (end - first + (shape.padded ? 1 : 0));
-}
-
-std::uint32_t reflected_if(bool reflected, std::uint32_t value, unsigned width) {
-  return reflected ? static_cast<std::uint32_t>(reflect(value, width)) : value;
-}
-
-/// A multiple of the polynomial when the frame is good and init and xorout are right.
-Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t check,
-                    std::uint32_t init, std::uint32_t xorout) {
-  Polynomial word;
-  const std::size_t bits = covered_bits(frame, shape, first, [&word](bool bit) { word.append(bit); });
-  for (unsigned i = 0; i < shape.width; ++i) word.append(false);
-  word ^= Polynomial(reflected_if(shape.refout, check ^ xorout, shape.width));
-  if (init != 0) {
-    Polynomial start(init);
-    for (std::size_t i = 0; i < bits; ++i) start.append(false);
-    word ^= start;
-  }
-  return word;
-}
-
-/// The register behind the covered bits, as it would be written without xorout.
-std::uint32_t crc_of(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t poly,
-                     std::uint32_t init) {
-  const auto mask = static_cast<std::uint32_t>(low_mask(shape.width));
-  std::uint32_t remainder = init;
-  covered_bits(frame, shape, first, [&](bool bit) {
-    const bool feedback = ((remainder >> (shape.width - 1) & 1) != 0) != bit;
-    remainder = (remainder << 1 & mask) ^ (feedback ? poly : 0);
-  });
-  return reflected_if(shape.refout, remainder, shape.width);
-}
 
 class Search {
  public:
@@ -166,6 +65,10 @@ class Search {
   void each_place(Shape shape) {
     for (shape.trailing = 0; shape.trailing + shape.check_size < frames_.shortest; ++shape.trailing) {
       if (!take_checks(shape)) continue;
+      if (never_changes(shape)) {
+        shapes_ += frames_.shortest - shape.trailing - shape.check_size;
+        continue;
+      }
       Firsts solutions;
       for (std::size_t first = 0; first < frames_.shortest - shape.trailing - shape.check_size; ++first) {
         ++shapes_;
@@ -173,6 +76,43 @@ class Search {
       }
       for (const auto& [poly, keys] : solutions) keep(shape, poly, keys);
     }
+  }
+
+  [[nodiscard]] bool never_changes(const Shape& shape) const {
+    return std::all_of(frames_.all.begin(), frames_.all.end(), [&](const CheckedFrame* frame) {
+      return check_of(*frame, shape) == check_of(*frames_.all.front(), shape);
+    });
+  }
+
+  // What the frames fix, in checks: each length fixes one, and each difference that is no combination of others.
+  [[nodiscard]] double known_checks(const Shape& shape, std::size_t first) {
+    Shape plain;
+    plain.trailing = shape.trailing;
+    const auto [known, is_new] = known_.try_emplace({plain.trailing, first});
+    if (!is_new) return known->second;
+    std::vector<Polynomial> basis;  // each of another degree
+    for (const auto& [length, frames] : frames_.lengths) {
+      const Polynomial base = content(*frames.front(), plain, first);
+      for (const CheckedFrame* frame : frames) {
+        Polynomial difference = content(*frame, plain, first);
+        difference ^= base;
+        for (bool reduced = true; reduced;) {
+          const auto same = std::find_if(basis.begin(), basis.end(),
+                                         [&](const Polynomial& one) { return one.degree() == difference.degree(); });
+          reduced = difference.degree() >= 0 && same != basis.end();
+          if (reduced) difference ^= *same;
+        }
+        if (difference.degree() >= 0) basis.push_back(difference);
+      }
+    }
+    return known->second = static_cast<double>(basis.size() + frames_.lengths.size());
+  }
+
+  // The covered bits and the check as they stand there.
+  static Polynomial content(const CheckedFrame& frame, const Shape& plain, std::size_t first) {
+    Polynomial word;
+    covered_bits(frame, plain, first, [&word](bool bit) { word.append(bit); });
+    return word;
   }
 
   // False: some frame has no such check there.
@@ -297,8 +237,9 @@ class Search {
     solution.first = std::move(firsts);
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
-    const auto frames = static_cast<double>(frames_.all.size());
-    solution.chance_log2 = shape.width - 1 + free_bits - frames * shape.width;
+    solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
+    // The same as an exclusive or.
+    if (!frames_.of_bits && shape.width == 8 && poly == 1) return;
     found_.solutions.push_back(std::move(solution));
   }
 
@@ -307,22 +248,27 @@ class Search {
     shape.width = 8;
     shape.check_size = 1;
     for (shape.trailing = 0; shape.trailing + 1 < frames_.shortest; ++shape.trailing) {
-      for (const CheckKind kind : {CheckKind::sum, CheckKind::difference}) {
+      const bool is_check = !never_changes(shape);
+      for (const CheckKind kind : {CheckKind::sum, CheckKind::difference, CheckKind::exclusive_or}) {
         std::map<std::uint8_t, std::vector<std::size_t>> firsts;  // by the constant
         for (std::size_t first = 0; first < frames_.shortest - shape.trailing - 1; ++first) {
           ++shapes_;
-          const std::optional<std::uint8_t> constant = sum_constant(kind, shape, first);
+          const std::optional<std::uint8_t> constant =
+              is_check ? sum_constant(kind, shape, first) : std::optional<std::uint8_t>();
           if (constant) firsts[*constant].push_back(first);
         }
+        // 00 and FF (the complement) are usual; another constant only where they do not fit.
+        const bool any_usual = firsts.contains(0) || firsts.contains(0xFF);
         for (auto& [constant, first] : firsts) {
-          if (constant != 0 && firsts.contains(0)) continue;
+          const bool is_usual = constant == 0 || constant == 0xFF;
+          if (any_usual && !is_usual) continue;
           CheckSolution solution;
           solution.kind = kind;
           solution.parameters = {8, 0, constant, false, false, 0};
           solution.first = std::move(first);
           solution.check_size = 1;
           solution.trailing = shape.trailing;
-          solution.chance_log2 = (constant == 0 ? 0 : 8) - 8 * static_cast<double>(frames_.all.size());
+          solution.chance_log2 = (is_usual ? 1 : 8) - 8 * known_checks(shape, solution.first.front());
           found_.solutions.push_back(std::move(solution));
         }
       }
@@ -334,9 +280,14 @@ class Search {
     for (const CheckedFrame* frame : frames_.all) {
       const std::size_t end = frame->bytes.size() - shape.trailing - 1;
       unsigned sum = 0;
-      for (std::size_t i = first; i < end; ++i) sum += frame->bytes[i];
+      for (std::size_t i = first; i < end; ++i) {
+        sum = kind == CheckKind::exclusive_or ? sum ^ frame->bytes[i] : sum + frame->bytes[i];
+      }
       const unsigned check = frame->bytes[end];
-      const auto needed = static_cast<std::uint8_t>(kind == CheckKind::sum ? check - sum : check + sum);
+      const unsigned rest = kind == CheckKind::exclusive_or ? check ^ sum
+                            : kind == CheckKind::sum        ? check - sum
+                                                            : check + sum;
+      const auto needed = static_cast<std::uint8_t>(rest);
       if (constant && *constant != needed) return std::nullopt;
       constant = needed;
     }
@@ -345,6 +296,8 @@ class Search {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
+  std::map<std::pair<std::size_t, std::size_t>, double>
+      known_;  // by what stands behind the check and the first covered
   std::size_t shapes_ = 0;
   CheckSearch found_;
 };

@@ -25,15 +25,16 @@ inline constexpr std::size_t longest_checked_word = 128;  // bits of a frame of 
 
 enum class CheckKind : std::uint8_t {
   crc,
-  sum,         // 8 bits: constant + sum of the bytes
-  difference,  // 8 bits: constant - sum of the bytes
+  sum,           // 8 bits: constant + sum of the bytes
+  difference,    // 8 bits: constant - sum of the bytes
+  exclusive_or,  // 8 bits: constant ^ all bytes
 };
 
 /// Positions count bytes, or bits in frames of bits; the end of the covered part and the check itself count from the
 /// end of the frame, so that they mean the same in frames of all lengths.
 struct CheckSolution {
   CheckKind kind = CheckKind::crc;
-  CrcParameters parameters{};      // of a sum: width 8, init the constant
+  CrcParameters parameters{};      // of all but a CRC: width 8, init the constant
   bool low_first = false;          // width above 8, in frames of bytes: the check's low byte comes first
   bool padded = false;             // one byte 00 counts as covered behind the rest
   bool init_open = false;          // all frames have one length: any init fits with an xorout of its own
@@ -49,7 +50,8 @@ struct CheckSearch {
 };
 
 /// All checks of 3 to 16 bits that explain every frame. The frames are all of bytes or all of bits; those that stand
-/// there twice say nothing new.
+/// there twice say nothing new. So do bits that never change, alone or with others: what counts is in how many
+/// independent ways the frames differ in what is covered. A check that never changes is none.
 [[nodiscard]] CheckSearch find_checks(std::span<const CheckedFrame> frames);
 
 /// How many more frames with other data would leave only solutions that are no chance (below one in a million).

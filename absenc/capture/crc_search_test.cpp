@@ -138,6 +138,55 @@ TEST(CrcSearch, FindsASum) {
   EXPECT_EQ(search.solutions.front().first.front(), 0u);
 }
 
+// Frames as HIPERFACE has them, read while the shaft turns a little: most bytes hardly change, the last is the
+// exclusive or of all.
+std::vector<CheckedFrame> slow_positions(std::uint8_t check_from) {
+  std::vector<CheckedFrame> frames;
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    const std::uint32_t position = 0x0000A5A5 + 311 * i;
+    CheckedFrame frame{.bytes = {0x40, 0x42, static_cast<std::uint8_t>(position >> 24),
+                                 static_cast<std::uint8_t>(position >> 16), static_cast<std::uint8_t>(position >> 8),
+                                 static_cast<std::uint8_t>(position)}};
+    std::uint8_t check = check_from;
+    for (const std::uint8_t byte : frame.bytes) check = static_cast<std::uint8_t>(check ^ byte);
+    frame.bytes.push_back(check);
+    frames.push_back(frame);
+  }
+  return frames;
+}
+
+TEST(CrcSearch, BytesThatNeverChangeProveNothing) {
+  const CheckSearch search = find_checks(slow_positions(0));
+  ASSERT_FALSE(search.solutions.empty());
+  EXPECT_EQ(search.solutions.front().kind, CheckKind::exclusive_or);
+  EXPECT_EQ(search.solutions.front().parameters.init, 0);
+  EXPECT_EQ(search.solutions.front().first.front(), 0u);
+  for (const CheckSolution& solution : search.solutions) {
+    EXPECT_EQ(solution.trailing, 0u) << "the check at " << 6 - solution.trailing << " never changes";
+  }
+  const std::vector<CheckedFrame> few = slow_positions(0);
+  EXPECT_GT(find_checks(std::span(few).first(3)).solutions.front().chance_log2,
+            search.solutions.front().chance_log2 + 16);
+}
+
+TEST(CrcSearch, AnExclusiveOrIsFoundWithItsComplement) {
+  const CheckSearch search = find_checks(slow_positions(0xFF));
+  ASSERT_FALSE(search.solutions.empty());
+  EXPECT_EQ(search.solutions.front().kind, CheckKind::exclusive_or);
+  EXPECT_EQ(search.solutions.front().parameters.init, 0xFF);
+}
+
+// Eight frames that differ in one bit only are two frames.
+TEST(CrcSearch, FramesThatDifferInOneWayOnlyCountOnce) {
+  std::mt19937 random(9);
+  const Made made{.parameters = esl_8};
+  std::vector<CheckedFrame> frames = frames_of(made, 2, random);
+  const double two = find_checks(frames).solutions.front().chance_log2;
+  frames.push_back(frames[0]);
+  frames.push_back(frames[1]);
+  EXPECT_DOUBLE_EQ(find_checks(frames).solutions.front().chance_log2, two);
+}
+
 TEST(CrcSearch, NothingExplainsNoise) {
   std::mt19937 random(7);
   std::vector<CheckedFrame> frames(8);

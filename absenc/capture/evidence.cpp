@@ -12,7 +12,8 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr unsigned attempts = 1u << 14;
+constexpr unsigned many_attempts = 1u << 20;  // where only one or two frames have to tell
+constexpr unsigned enough_accepted = 256;     // to know a rate to some percent
 
 struct Nowhere final : FieldSink {
   void put(const FieldValue&) override {}
@@ -71,11 +72,15 @@ class Distinct {
     const auto same = [&](const HeardExchange* one) { return *one == exchange; };
     if (std::any_of(all_.begin(), all_.end(), same)) return;
     all_.push_back(&exchange);
-    sum_ += std::log10(acceptance_like(exchange));
   }
   [[nodiscard]] std::size_t count() const { return all_.size(); }
   /// The geometric mean.
-  [[nodiscard]] double each() const { return all_.empty() ? 1 : std::pow(10, sum_ / static_cast<double>(all_.size())); }
+  [[nodiscard]] double each() {
+    if (all_.empty()) return 1;
+    double sum = 0;
+    for (const HeardExchange* one : all_) sum += std::log10(acceptance_like(*one));
+    return std::pow(10, sum / static_cast<double>(all_.size()));
+  }
 
  private:
   struct Known {
@@ -90,7 +95,8 @@ class Distinct {
                          other.reply.bits == exchange.reply.bits && repeated(other) == repeated(exchange);
       if (alike) return known.acceptance;
     }
-    known_.push_back({&exchange, acceptance(unit_, options_, exchange)});
+    const unsigned attempts = all_.size() > 2 ? usual_attempts : many_attempts;
+    known_.push_back({&exchange, acceptance(unit_, options_, exchange, attempts)});
     return known_.back().acceptance;
   }
 
@@ -98,23 +104,20 @@ class Distinct {
   const Options& options_;
   std::vector<const HeardExchange*> all_;
   std::vector<Known> known_;
-  double sum_ = 0;
 };
 
 }  // namespace
 
-double Evidence::chance() const {
-  if (frames <= frames_say_enough || !motion || !explains_all()) return frames;
-  return frames + *motion;
-}
+double Evidence::chance() const { return motion && explains_all() ? frames + *motion : frames; }
 
-double acceptance(const Unit& unit, const Options& options, const HeardExchange& good) {
+double acceptance(const Unit& unit, const Options& options, const HeardExchange& good, unsigned attempts) {
   std::mt19937_64 random(good.reply.bytes.size());  // the same answer each time
   HeardExchange noise = good;
   const std::size_t kept = repeated(good);
   Nowhere nowhere;
   unsigned accepted = 0;
-  for (unsigned i = 0; i < attempts; ++i) {
+  unsigned tried = 0;
+  for (; tried < attempts && accepted < enough_accepted; ++tried) {
     std::uint64_t bits = 0;
     const auto fill = [&](auto from, auto to) {
       unsigned left = 0;
@@ -130,7 +133,7 @@ double acceptance(const Unit& unit, const Options& options, const HeardExchange&
     if (noise.reply.can) fill(noise.reply.can->data.begin(), noise.reply.can->data.begin() + noise.reply.can->size);
     if (unit.decode(options, noise.request.frame(), noise.reply.frame(), nowhere) == Error::none) ++accepted;
   }
-  return std::max(accepted, 1u) / static_cast<double>(attempts);
+  return std::max(accepted, 1u) / static_cast<double>(tried);
 }
 
 bool explains(const Unit& unit, const Options& options, const HeardExchange& exchange) {

@@ -40,7 +40,7 @@ struct Evidence {
   /// The same of positions that change as little from one to the next; empty: none changed.
   std::optional<double> motion{};
 
-  /// What there is against chance: the frames where they say enough, otherwise how the position moves.
+  /// What there is against chance: the frames, and how the position moves, which a wrong protocol sees as well.
   [[nodiscard]] double chance() const;
   [[nodiscard]] bool explains_all() const { return tried != 0 && explained == tried; }
 };
@@ -48,9 +48,13 @@ struct Evidence {
 /// From where on frames say enough by themselves.
 inline constexpr double frames_say_enough = -2;
 
+/// What random content is tried: enough where there are several frames, whose chances multiply.
+inline constexpr unsigned usual_attempts = 1u << 14;
+
 /// How often the unit takes random content for a good reply of this length to this request: at most 1, at least one in
 /// the number of attempts. What the reply repeats of the request from its beginning on stays as it is.
-[[nodiscard]] double acceptance(const Unit& unit, const Options& options, const HeardExchange& good);
+[[nodiscard]] double acceptance(const Unit& unit, const Options& options, const HeardExchange& good,
+                                unsigned attempts = usual_attempts);
 
 /// Whether the unit takes this reply for a good one.
 [[nodiscard]] bool explains(const Unit& unit, const Options& options, const HeardExchange& exchange);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "absenc/capture/hypotheses.hpp"
 #include "absenc/capture/stream.hpp"
@@ -112,6 +113,41 @@ TEST(Evidence, OfFramesThatSayNothingTheMotionTells) {
   EXPECT_DOUBLE_EQ(motion_of({9, 9, 9}).chance(), 0);
   EXPECT_LT(motion_of({254, 255, 0, 1, 2, 3}).chance(), -5);
   EXPECT_GT(motion_of({0, 130, 20, 190, 60, 180}).chance(), -0.7);
+}
+
+// Whatever length, no stream of random bytes is any encoder's.
+TEST(Stream, RandomBytesAreNobodys) {
+  for (const Unit* unit : all_units()) {
+    if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
+    for (unsigned seed = 0; seed < 40; ++seed) {
+      std::mt19937_64 random(seed);
+      std::vector<std::uint8_t> bytes(std::array<std::size_t, 4>{12, 100, 600, 2048}[seed % 4]);
+      for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+      for (const Hypothesis& one : explain_stream(*unit, bytes, std::chrono::milliseconds(100))) {
+        EXPECT_GT(one.chance(), is_found)
+            << unit->id << ", seed " << seed << ": " << one.evidence.explained << " of " << one.evidence.tried;
+      }
+    }
+  }
+}
+
+TEST(Hypotheses, WhatMeansTheSameIsListedOnce) {
+  static constexpr std::array<std::string_view, 2> names{"one", "other"};
+  static constexpr std::array<Option, 3> options{{Toy::options[0], Toy::options[1], {"name", "", 0, 0, 0, names}}};
+  Unit unit = Toy::unit();
+  unit.options = options;
+  const std::vector<HeardExchange> all{heard(254), heard(253), heard(250), heard(3, 8)};
+  const std::vector<Hypothesis> found = explain(unit, {}, all);
+  ASSERT_FALSE(found.empty());
+  for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
+}
+
+// What takes every word for good sees the words of a checked protocol move as well.
+TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
+  Hypothesis checked{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = -36}};
+  Hypothesis moving{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = 0, .motion = -114}};
+  EXPECT_TRUE(is_likelier(checked, moving));
+  EXPECT_FALSE(is_likelier(moving, checked));
 }
 
 TEST(Hypotheses, ModelsComeFirst) {

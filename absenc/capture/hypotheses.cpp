@@ -2,6 +2,7 @@
 #include "absenc/capture/hypotheses.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <optional>
 
@@ -28,6 +29,27 @@ bool contains(std::span<const Hypothesis> all, const Options& options) {
                      [&](const Hypothesis& one) { return one.options.values == options.values; });
 }
 
+/// What frames mean, as a number.
+class Meaning final : public FieldSink {
+ public:
+  void put(const FieldValue& value) override {
+    add(reinterpret_cast<std::uintptr_t>(value.info));
+    add(static_cast<std::uint64_t>(value.number));
+    add(std::bit_cast<std::uint64_t>(value.real));
+    for (const std::uint8_t byte : value.bytes) add(byte);
+  }
+  void put_reading(const Reading& reading) override {
+    add(reading.singleturn);
+    add(reading.multiturn);
+    add(reading.singleturn_bits << 16 | reading.multiturn_bits);
+  }
+  void add(std::uint64_t value) { hash_ = (hash_ ^ value) * 0x9E3779B97F4A7C15u ^ hash_ >> 29; }
+  [[nodiscard]] std::uint64_t hash() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0xCBF29CE484222325u;
+};
+
 class Search {
  public:
   Search(const Unit& unit, std::span<const HeardExchange> exchanges) : unit_(unit), exchanges_(exchanges) {}
@@ -38,8 +60,15 @@ class Search {
     ++tried_;
     const std::size_t count = explained(options);
     if (count == 0 || count < most_) return;
-    if (count > most_) best_.clear();
+    if (count > most_) {
+      best_.clear();
+      meanings_.clear();
+    }
     most_ = count;
+    // What says the same of all frames explains them no other way.
+    const std::uint64_t meaning = meaning_of(options);
+    if (std::find(meanings_.begin(), meanings_.end(), meaning) != meanings_.end()) return;
+    meanings_.push_back(meaning);
     best_.push_back({options, weigh(unit_, options, exchanges_), tried_, at_least});
   }
 
@@ -86,13 +115,21 @@ class Search {
 
   [[nodiscard]] bool explains_all() const { return most_ == exchanges_.size(); }
   std::vector<Hypothesis> take() {
-    std::stable_sort(best_.begin(), best_.end(),
-                     [](const Hypothesis& one, const Hypothesis& other) { return one.chance() < other.chance(); });
+    std::stable_sort(best_.begin(), best_.end(), is_likelier);
     return std::move(best_);
   }
   [[nodiscard]] std::span<const Hypothesis> best() const { return best_; }
 
  private:
+  [[nodiscard]] std::uint64_t meaning_of(const Options& options) const {
+    Meaning meaning;
+    for (const HeardExchange& one : exchanges_) {
+      meaning.add(explains(unit_, options, one) ? 1 : 0);
+      static_cast<void>(unit_.decode(options, one.request.frame(), one.reply.frame(), meaning));
+    }
+    return meaning.hash();
+  }
+
   [[nodiscard]] std::size_t explained(const Options& options) const {
     std::size_t count = 0;
     for (std::size_t i = 0; i < exchanges_.size(); ++i) {
@@ -146,6 +183,7 @@ class Search {
   const Unit& unit_;
   std::span<const HeardExchange> exchanges_;
   std::vector<Hypothesis> best_;
+  std::vector<std::uint64_t> meanings_;  // of each of them
   std::size_t most_ = 0;
   std::size_t tried_ = 0;
 };
@@ -153,6 +191,8 @@ class Search {
 }  // namespace
 
 double Hypothesis::chance() const { return std::min(0.0, evidence.chance() + std::log10(static_cast<double>(tried))); }
+
+bool Hypothesis::is_proven() const { return evidence.frames + std::log10(static_cast<double>(tried)) <= is_found; }
 
 std::vector<std::size_t> resolution_options(const Unit& unit) {
   Options defaults;
@@ -195,6 +235,7 @@ std::vector<Options> likely_options(const Unit& unit, std::span<const OptionText
 
 std::vector<Hypothesis> explain(const Unit& unit, std::span<const OptionText> settings,
                                 std::span<const HeardExchange> exchanges) {
+  if (exchanges.empty()) return {};
   Search search(unit, exchanges);
   const std::vector<Options> likely = likely_options(unit, settings);
   for (const Options& options : likely) {

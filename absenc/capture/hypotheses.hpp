@@ -18,10 +18,18 @@ struct Hypothesis {
 
   /// log10 of the probability that one of as many hypotheses is as good by chance.
   [[nodiscard]] double chance() const;
+  /// Whether the frames alone say enough: what takes any frame for good may still see all of them move like a position.
+  [[nodiscard]] bool is_proven() const;
 };
 
 /// From where on, by `Hypothesis::chance`, something is found and not only possible.
-inline constexpr double is_found = -2;
+inline constexpr double is_found = -3;
+
+/// Whether one goes before the other.
+[[nodiscard]] inline bool is_likelier(const Hypothesis& one, const Hypothesis& other) {
+  if (one.is_proven() != other.is_proven()) return one.is_proven();
+  return one.chance() < other.chance();
+}
 
 /// All that explain as much as any, the likeliest first; none when nothing is explained. Models are tried before single
 /// options. `settings` hold for all, as the address of the encoder that was asked.

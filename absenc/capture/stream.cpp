@@ -5,13 +5,14 @@
 #include <chrono>
 #include <cmath>
 #include <random>
+#include <utility>
 
 namespace absenc::capture {
 
 namespace {
 
 constexpr std::size_t noise_size = 1 << 15;
-constexpr std::size_t least_frames = 3;
+constexpr std::size_t least_frames = 3;  // good ones
 
 // The size of the good reply that the first byte begins, or 0.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
@@ -67,9 +68,11 @@ std::vector<Options> stream_options(const Unit& unit) {
   return all;
 }
 
-unsigned bits_of(const Unit& unit, const Hypothesis& hypothesis) {
+// Fewer is better: the fewest bits within the turn, of which more would not be told apart, and the most of turns, which
+// stand still while nobody turns the shaft that far.
+std::pair<unsigned, int> bits_of(const Unit& unit, const Hypothesis& hypothesis) {
   const Resolution resolution = unit.resolution(hypothesis.options);
-  return resolution.singleturn_bits + resolution.multiturn_bits;
+  return {resolution.singleturn_bits, -static_cast<int>(resolution.multiturn_bits)};
 }
 
 // Sets the option by which a host knows that it has only to listen.
@@ -92,29 +95,38 @@ void set_streaming(const Unit& unit, Options& options, double frames_per_second)
 
 std::vector<HeardExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes) {
   std::vector<HeardExchange> replies;
-  std::size_t end_of_good = 0;  // how many of them, up to the last good one
+  std::size_t longest = 0;        // good one
+  std::size_t begin_of_good = 0;  // how many are before the first good one,
+  std::size_t end_of_good = 0;    // and up to the last
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t size = reply_size(unit, options, bytes.subspan(at));
     const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
     const std::size_t count = std::max<std::size_t>(size, 1);
     at += count;
-    if (size == 0 && end_of_good == 0) continue;
     replies.push_back({.reply = {.bytes = {from, from + static_cast<std::ptrdiff_t>(count)}}});
-    if (size != 0) end_of_good = replies.size();
+    if (size == 0) continue;
+    if (longest == 0) begin_of_good = replies.size() - 1;
+    longest = std::max(longest, size);
+    end_of_good = replies.size();
   }
-  replies.resize(end_of_good);
+  if (replies.size() - end_of_good < longest) replies.resize(end_of_good);
+  if (begin_of_good < longest)
+    replies.erase(replies.begin(), replies.begin() + static_cast<std::ptrdiff_t>(begin_of_good));
   return replies;
 }
 
 std::vector<Hypothesis> explain_stream(const Unit& unit, Bytes bytes, Time duration) {
   std::vector<Hypothesis> found;
-  std::size_t tried = 0;
-  for (const Options& options : stream_options(unit)) {
-    if (bytes.empty()) break;
-    ++tried;
+  if (bytes.empty()) return found;
+  const std::vector<Options> all = stream_options(unit);
+  for (const Options& options : all) {
     const std::vector<HeardExchange> replies = split_stream(unit, options, bytes);
-    if (replies.size() < least_frames) continue;
-    found.push_back({.options = options, .evidence = weigh(unit, options, replies), .tried = tried});
+    Hypothesis one{.options = options, .evidence = weigh(unit, options, replies)};
+    if (one.evidence.explained < least_frames) continue;
+    // Where a frame begins was tried as well, from the first byte on.
+    for (const HeardExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
+    one.tried *= all.size();
+    found.push_back(std::move(one));
   }
   // The fewest bits that explain as much: of those with more, the frames cannot tell.
   std::stable_sort(found.begin(), found.end(), [&](const Hypothesis& one, const Hypothesis& other) {

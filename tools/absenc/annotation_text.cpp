@@ -24,14 +24,23 @@ using Kind = Annotation::Kind;
 
 constexpr std::size_t enough_to_print = 1 << 16;
 
-// "data_id=3 singleturn=74565"
-struct FieldWords final : FieldSink {
-  void put(const FieldValue& value) override {
-    if (!words.empty()) words += ' ';
-    words += fmt::format("{}={}", value.info->name, to_text(value));
-  }
+// "data_id=3 singleturn=74565"; "singleturn=INVALID(74565)" where it does not hold.
+std::string field_words(const Unit& unit, const Options& options, const Annotation& annotation) {
+  struct Values final : FieldSink {
+    void put(const FieldValue& value) override { all.push_back({std::string(value.info->name), to_text(value)}); }
+    std::vector<std::pair<std::string, std::string>> all;
+  };
+  Values values;
+  FieldsWithReading fields(values);
+  static_cast<void>(unit.decode(options, annotation.request, annotation.reply, fields));
+  const std::vector<std::string_view> invalid = fields.invalid();
   std::string words;
-};
+  for (const auto& [name, value] : values.all) {
+    const bool is_invalid = std::find(invalid.begin(), invalid.end(), name) != invalid.end();
+    words += (words.empty() ? "" : " ") + name + (is_invalid ? fmt::format("=INVALID({})", value) : "=" + value);
+  }
+  return words;
+}
 
 std::string quoted(std::string_view text) {
   if (text.find_first_of(",\"\n\r") == std::string_view::npos) return std::string(text);
@@ -129,9 +138,7 @@ std::string AnnotationPrinter::text(const Annotation& annotation) const {
   if (annotation.reading != nullptr) {
     line += "   " + to_text(unit_, *annotation.reading);
   } else if (has_fields(annotation)) {
-    FieldWords fields;
-    static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, fields));
-    line += "   " + fields.words;
+    line += "   " + field_words(unit_, options_, annotation);
   }
   const std::string message = message_of(unit_, options_, annotation);
   if (annotation.error != Error::none) line += fmt::format("   {}", text_of(annotation.error).name);
@@ -155,7 +162,8 @@ std::string AnnotationPrinter::json(const Annotation& annotation) const {
   json.set("ok", annotation.error == Error::none);
   if (has_fields(annotation)) {
     JsonFields fields;
-    static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, fields));
+    FieldsWithReading numbers(fields);  // whether they hold stands beside them
+    static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, numbers));
     json.set("fields", fields.fields);
   }
   if (annotation.reading != nullptr && annotation.reading->singleturn_bits != 0) {
@@ -167,6 +175,7 @@ std::string AnnotationPrinter::json(const Annotation& annotation) const {
     json.set(linear ? "position_mm" : "angle_deg", valid ? Json(position) : Json());
     if (reading.multiturn_bits != 0) json.set("turns", reading.multiturn_valid ? Json(reading.multiturn) : Json());
   }
+  if (annotation.reading != nullptr) set_validity(json, *annotation.reading);
   if (annotation.error != Error::none) json.set("error", text_of(annotation.error).name);
   const std::string message = message_of(unit_, options_, annotation);
   if (!message.empty()) json.set("message", message);
@@ -189,12 +198,9 @@ std::string AnnotationPrinter::csv(const Annotation& annotation) const {
     const std::string columns = csv_columns(unit_, unit_.resolution(options_).unit_um > 0);
     row += std::string(static_cast<std::size_t>(std::count(columns.begin(), columns.end(), ',')) + 1, ',');
   }
-  FieldWords fields;
-  if (has_fields(annotation)) {
-    static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, fields));
-  }
+  const std::string fields = has_fields(annotation) ? field_words(unit_, options_, annotation) : std::string();
   const std::string_view error = annotation.error == Error::none ? "" : text_of(annotation.error).name;
-  return row + fmt::format(",{},{},{}", quoted(fields.words), error, quoted(message_of(unit_, options_, annotation)));
+  return row + fmt::format(",{},{},{}", quoted(fields), error, quoted(message_of(unit_, options_, annotation)));
 }
 
 }  // namespace absenc::tool

@@ -30,23 +30,6 @@ using capture::Content;
 using capture::Part;
 using capture::Tick;
 
-std::unique_ptr<capture::Reader> open(const CaptureChoices& choices) {
-  const capture::OpenChoices how{.channels = choices.raw_channels, .samples_per_second = choices.samples_per_second};
-  try {
-    if (choices.path != "-") return capture::open_capture(choices.path, how);
-    auto source = std::make_unique<StdinSource>();
-    // Where binary files end matters, and some are read from there.
-    std::array<std::uint8_t, 64> head{};
-    const std::size_t size = source->read(0, head);
-    if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
-      throw UsageError("from standard input only text can be read: name the file");
-    }
-    return capture::open_capture(std::move(source), "standard input", how);
-  } catch (const capture::OpenError& error) {
-    throw ToolFailure(error.what());
-  }
-}
-
 // What the sink throws must not pass through a decoder that has threads.
 class Guard {
  public:
@@ -68,15 +51,19 @@ class Guard {
   std::exception_ptr thrown_;
 };
 
-// Those that a checksum or the like has proved.
-struct GoodFrames final : capture::AnnotationSink {
-  void put(const capture::Annotation& annotation) override {
-    if (annotation.error != Error::none || annotation.remark == capture::Remark::cut) return;
-    if (annotation.kind == capture::Annotation::Kind::request) return;
-    ++count;
-  }
-  std::uint64_t count = 0;
-};
+constexpr std::array<std::string_view, 3> parities{"none", "odd", "even"};
+constexpr std::array<Parity, 3> parity_values{Parity::none, Parity::odd, Parity::even};
+
+Parity parse_parity(std::string_view text) {
+  const auto found = std::find(parities.begin(), parities.end(), text);
+  if (found == parities.end()) throw UsageError(fmt::format("--parity {}: it is none, odd or even", text));
+  return parity_values[static_cast<std::size_t>(found - parities.begin())];
+}
+
+std::string_view name_of(Parity parity) {
+  const auto found = std::find(parity_values.begin(), parity_values.end(), parity);
+  return parities[static_cast<std::size_t>(found - parity_values.begin())];
+}
 
 unsigned threads() { return std::max(1u, std::thread::hardware_concurrency()); }
 
@@ -111,6 +98,23 @@ void read_all(capture::Reader& reader, Take&& take) {
 
 }  // namespace
 
+std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
+  const capture::OpenChoices how{.channels = choices.raw_channels, .samples_per_second = choices.samples_per_second};
+  try {
+    if (choices.path != "-") return capture::open_capture(choices.path, how);
+    auto source = std::make_unique<StdinSource>();
+    // Where binary files end matters, and some are read from there.
+    std::array<std::uint8_t, 64> head{};
+    const std::size_t size = source->read(0, head);
+    if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
+      throw UsageError("from standard input only text can be read: name the file");
+    }
+    return capture::open_capture(std::move(source), "standard input", how);
+  } catch (const capture::OpenError& error) {
+    throw ToolFailure(error.what());
+  }
+}
+
 CaptureChoices capture_choices(const Invocation& invocation, std::string_view path) {
   constexpr std::int64_t fastest = 1'000'000'000'000;
   CaptureChoices choices;
@@ -119,6 +123,7 @@ CaptureChoices capture_choices(const Invocation& invocation, std::string_view pa
   choices.raw_channels = static_cast<unsigned>(invocation.number("--raw-channels", 0, 1, 64));
   choices.samples_per_second = static_cast<std::uint64_t>(invocation.number("--rate", 0, 1, fastest));
   choices.baud = invocation.real("--baud", 0, 1, 1e9);
+  if (invocation.has("--parity")) choices.parity = parse_parity(invocation.text("--parity"));
   if (choices.raw_channels != 0 && choices.samples_per_second == 0) {
     throw UsageError("raw samples have no rate: give the samples a second with --rate");
   }
@@ -130,7 +135,7 @@ CaptureRun::CaptureRun(const Unit& unit, const Options& options, const CaptureCh
       options_(options),
       line_(unit.settings != nullptr ? unit.settings(options) : unit.line),
       choices_(choices),
-      reader_(open(choices)) {
+      reader_(open_capture(choices)) {
   require_link(unit, reader_->layout().content);
 }
 
@@ -151,12 +156,6 @@ CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::functio
   return outcome;
 }
 
-// The lines of the capture and who speaks on them.
-struct CaptureRun::Lines {
-  std::vector<unsigned> channels;
-  capture::Annotator::Settings settings;
-};
-
 CaptureRun::Lines CaptureRun::find_lines() const {
   const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
   Lines lines;
@@ -171,12 +170,12 @@ CaptureRun::Lines CaptureRun::find_lines() const {
   return lines;
 }
 
-CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, double baud, std::size_t characters,
+CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                                         capture::AnnotationSink& sink,
                                         const std::function<void(Tick)>& progress) const {
   std::vector<capture::AsyncLine> settings;
   for (const unsigned channel : lines.channels) {
-    settings.push_back({channel, {.baud = baud, .parity = line_.parity, .stop_bits = line_.stop_bits}});
+    settings.push_back({channel, {.baud = speed.baud, .parity = speed.parity, .stop_bits = line_.stop_bits}});
   }
   CaptureOutcome outcome;
   Guard guard;
@@ -209,23 +208,15 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, do
   return outcome;
 }
 
-// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning; 0: the
-// latter.
-double CaptureRun::likely_baud(const Lines& lines) const {
-  constexpr std::size_t enough_characters = 20'000;
-  if (choices_.baud > 0 || choices_.path == "-" || line_.rate == 0) return choices_.baud;
-  const auto good_at = [&](double baud) {
-    GoodFrames frames;
-    const auto reader = open(choices_);
-    static_cast<void>(decode_lines(*reader, lines, baud, enough_characters, frames, [](Tick) {}));
-    return frames.count;
-  };
-  return good_at(line_.rate) >= std::max<std::uint64_t>(1, good_at(0)) ? line_.rate : 0;
-}
-
 CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const Lines lines = find_lines();
-  return decode_lines(*reader_, lines, likely_baud(lines), SIZE_MAX, sink, progress);
+  const Speed speed = likely_speed(lines);
+  CaptureOutcome outcome = decode_lines(*reader_, lines, speed, SIZE_MAX, sink, progress);
+  if (!choices_.parity && speed.parity != line_.parity) {
+    outcome.notes.push_back(fmt::format("the characters have the parity {}, but those of {} usually {}",
+                                        name_of(speed.parity), unit_.id, name_of(line_.parity)));
+  }
+  return outcome;
 }
 
 CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {

@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "absenc/capture/annotate.hpp"
 #include "absenc/capture/annotation.hpp"
 #include "absenc/capture/signal.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -24,9 +26,10 @@ struct CaptureChoices {
   unsigned raw_channels = 0;             // 0: it is no raw file
   std::uint64_t samples_per_second = 0;  // 0: the file tells
   double baud = 0;                       // 0: found from the capture
+  std::optional<Parity> parity{};        // none: the protocol's own, or found from the capture
 };
 
-/// From --channel, --raw-channels, --rate and --baud. Throws UsageError.
+/// From --channel, --raw-channels, --rate, --baud and --parity. Throws UsageError.
 [[nodiscard]] CaptureChoices capture_choices(const Invocation& invocation, std::string_view path);
 
 struct CaptureOutcome {
@@ -34,8 +37,12 @@ struct CaptureOutcome {
   capture::Tick end = 0;             // of what was decoded
   std::vector<double> baud;          // measured, of each asynchronous line
   std::vector<std::string> carries;  // "D0 carries requests", where it was found out
+  std::vector<std::string> notes;    // sentences: what else was found out
   std::vector<capture::Damage> damages;
 };
+
+/// Throws UsageError, ToolFailure.
+[[nodiscard]] std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices);
 
 class CaptureRun {
  public:
@@ -45,17 +52,28 @@ class CaptureRun {
 
   /// 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
+  /// What the user did not say and only the encoder could be asked for, taken from the frames of the capture; the
+  /// options with it. Not from standard input, which can be read once only.
+  const Options& settle_options();
   /// Decodes all of it into `sink`; `progress` is called now and then with how far it is. Throws UsageError,
   /// ToolFailure and what `sink` throws.
   CaptureOutcome run(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
 
  private:
-  struct Lines;
+  // The lines of the capture and who speaks on them.
+  struct Lines {
+    std::vector<unsigned> channels;
+    capture::Annotator::Settings settings;
+  };
 
   [[nodiscard]] Lines find_lines() const;
-  [[nodiscard]] double likely_baud(const Lines& lines) const;
+  struct Speed {
+    double baud = 0;  // 0: that which the changes suggest
+    Parity parity = Parity::none;
+  };
+  [[nodiscard]] Speed likely_speed(const Lines& lines) const;
   /// At most so many characters.
-  CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, double baud, std::size_t characters,
+  CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                               capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
   CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
   CaptureOutcome run_bursts(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);

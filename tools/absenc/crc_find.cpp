@@ -99,7 +99,9 @@ std::vector<std::string> row(const CheckSolution& solution, const Positions& pos
   const CrcParameters& crc = solution.parameters;
   const std::string often = fmt::format("{:.1g}", chance(solution));
   if (solution.kind != CheckKind::crc) {
-    const std::string_view name = solution.kind == CheckKind::sum ? "sum" : "- sum";
+    const std::string_view name = solution.kind == CheckKind::sum          ? "sum"
+                                  : solution.kind == CheckKind::difference ? "- sum"
+                                                                           : "xor";
     return {std::string(name),
             "8",
             "-",
@@ -144,7 +146,10 @@ Json to_json(const CheckSolution& solution, const Positions& positions) {
     }
     json.set("padded", solution.padded);
   } else {
-    json.set("check", solution.kind == CheckKind::sum ? "sum" : "negative_sum").set("width", 8u);
+    const std::string_view name = solution.kind == CheckKind::sum          ? "sum"
+                                  : solution.kind == CheckKind::difference ? "negative_sum"
+                                                                           : "xor";
+    json.set("check", name).set("width", 8u);
     json.set("init", hex(crc.init, 8));
   }
   Json first = Json::array();

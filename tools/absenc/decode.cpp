@@ -11,6 +11,8 @@
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
+#include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/sequence_watch.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/wire_text.hpp"
@@ -39,12 +41,15 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
   const bool json = invocation.has("--json");
   JsonFields fields;
   FieldTable rows;
-  FieldSink& sink = json ? static_cast<FieldSink&>(fields) : rows;
+  FieldsWithReading sink(json ? static_cast<FieldSink&>(fields) : rows);
   const Error error = unit.decode(options, request.frame(), reply.frame(), sink);
   if (error == Error::none) {
     if (json) {
-      print_line(Json::object().set("protocol", unit.id).set("ok", true).set("fields", fields.fields).line());
+      Json good = Json::object().set("protocol", unit.id).set("ok", true).set("fields", fields.fields);
+      if (sink.reading()) set_validity(good, *sink.reading());
+      print_line(good.line());
     } else {
+      if (sink.reading()) rows.put_reading(*sink.reading());
       print_line(table(rows.rows));
     }
     return exit_good;
@@ -72,7 +77,7 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
 
 // ---- A whole capture
 
-constexpr std::array<std::string_view, 6> capture_options{"--channel", "--baud", "--raw-channels",
+constexpr std::array<std::string_view, 7> capture_options{"--channel", "--baud", "--parity", "--raw-channels",
                                                           "--rate",    "--csv",  "--stats"};
 
 // Counts, and hands on what is to be printed.
@@ -96,13 +101,14 @@ bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   return damaged;
 }
 
-int decode_capture(const Invocation& invocation, const Unit& unit, const Options& options) {
+int decode_capture(const Invocation& invocation, const Unit& unit, const Options& asked_for) {
   const bool statistics_only = invocation.has("--stats");
   const bool json = invocation.has("--json");
   if (json && invocation.has("--csv")) throw UsageError("--json and --csv cannot be given together");
   if (statistics_only && invocation.has("--csv")) throw UsageError("--stats is text or, with --json, an object");
 
-  CaptureRun run(unit, options, capture_choices(invocation, invocation.text("file")));
+  CaptureRun run(unit, asked_for, capture_choices(invocation, invocation.text("file")));
+  const Options& options = run.settle_options();
   const TickClock clock(run.ticks_per_second());
   CaptureStatistics statistics(unit, options, clock);
   const AnnotationFormat format = json                      ? AnnotationFormat::json
@@ -110,9 +116,10 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
                                                             : AnnotationFormat::text;
   AnnotationPrinter printer(unit, options, clock, format);
   Counted counted(statistics, statistics_only ? nullptr : &printer);
+  SequenceWatch watched(unit, options, counted);
   Progress progress;
   const bool live = invocation.text("file") == "-";
-  const CaptureOutcome outcome = run.run(counted, [&](capture::Tick tick) {
+  const CaptureOutcome outcome = run.run(watched, [&](capture::Tick tick) {
     if (live && !statistics_only) printer.flush();
     if (statistics_only && progress.visible()) {
       progress.show(
@@ -122,6 +129,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   progress.clear();
   if (!statistics_only) printer.flush();
   if (statistics_only) print_line(json ? statistics.json(outcome).line() : statistics.text(outcome));
+  for (const std::string& note : outcome.notes) print_message(fmt::format("note: {}", note));
   const bool damaged = tell_damages(outcome, clock);
   if (statistics.good() == 0) {
     print_message(
@@ -146,7 +154,7 @@ int run_decode(const Invocation& invocation) {
   return decode_one(invocation, unit, options);
 }
 
-constexpr std::array<Parameter, 13> parameters{{
+constexpr std::array<Parameter, 14> parameters{{
     parameter::protocol,
     {"file", "",
      "a capture: a sigrok session, VCD, CSV or binary export of a logic analyser, a log of candump, bytes "
@@ -160,6 +168,7 @@ constexpr std::array<Parameter, 13> parameters{{
      "between",
      "by their names", false, true},
     {"--baud", "RATE", "of the line", "the protocol's own, or found from the capture"},
+    {"--parity", "none|odd|even", "of its characters", "the protocol's own, or found from the capture"},
     {"--raw-channels", "COUNT", "the file is raw samples of so many channels, channel 0 in bit 0"},
     {"--rate", "HZ", "samples a second, where the file does not tell"},
     {"--stats", "", "only what it comes to: counts, errors, turn-around times, the way of the position"},

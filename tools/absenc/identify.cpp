@@ -59,10 +59,12 @@ int identify_frames(const Invocation& invocation) {
   std::vector<Candidate> candidates;
   std::optional<UsageError> unreadable;
   bool readable = false;
+  std::size_t searches = 0;
   for (const Unit* unit : all_units()) {
     try {
       const std::vector<HeardExchange> exchanges = frames_for(*unit, invocation);
       readable = true;
+      ++searches;
       for (capture::Hypothesis& one : capture::explain(*unit, {}, exchanges)) {
         candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
@@ -71,7 +73,7 @@ int identify_frames(const Invocation& invocation) {
     }
   }
   if (!readable) throw UsageError(*unreadable);
-  rank(candidates);
+  rank(candidates, searches);
   const auto command = [&](const Candidate& candidate) {
     std::string text = decode_command(candidate);
     if (requests != 0) text += fmt::format(" --request \"{}\"", invocation.texts("--request").front());
@@ -162,7 +164,8 @@ int identify_capture(const Invocation& invocation) {
     for (const std::string& channel : choices.channels) text += " --channel " + channel;
     if (choices.raw_channels != 0) text += fmt::format(" --raw-channels {}", choices.raw_channels);
     if (choices.samples_per_second != 0) text += fmt::format(" --rate {}", choices.samples_per_second);
-    return choices.baud > 0 ? text + fmt::format(" --baud {}", choices.baud) : text;
+    if (choices.baud > 0) text += fmt::format(" --baud {}", choices.baud);
+    return invocation.has("--parity") ? text + fmt::format(" --parity {}", invocation.text("--parity")) : text;
   };
   const int status = show_candidates(findings.candidates, command, invocation.has("--json"));
   for (const std::string& damage : findings.damages) print_message(fmt::format("note: {}", damage));
@@ -211,13 +214,13 @@ int run_identify(const Invocation& invocation) {
   if (frames) return identify_frames(invocation);
   if (is_capture(invocation.text("where"))) return identify_capture(invocation);
   refuse_missing_file(invocation.text("where"));
-  for (const std::string_view option : {"--channel", "--baud", "--raw-channels", "--rate"}) {
+  for (const std::string_view option : {"--channel", "--baud", "--parity", "--raw-channels", "--rate"}) {
     if (invocation.has(option)) throw UsageError(fmt::format("{} is about a capture: name its file", option));
   }
   return identify_line(invocation);
 }
 
-constexpr std::array<Parameter, 9> parameters{{
+constexpr std::array<Parameter, 10> parameters{{
     {"where", "",
      "a port: /dev/ttyUSB0, tcp:HOST:PORT, spi:/dev/spidev0.0, can0 or slcan:/dev/ttyACM0, with its settings behind ?; "
      "or a capture file, as for `absenc decode`"},
@@ -226,6 +229,7 @@ constexpr std::array<Parameter, 9> parameters{{
     {"--for", "SECONDS", "end the search on a port after that time", "60"},
     {"--channel", "[WIRE=]NAME", "of a capture: which channel is which wire", "by their names", false, true},
     {"--baud", "RATE", "of the line in a capture", "the protocol's own, or found from the capture"},
+    {"--parity", "none|odd|even", "of its characters", "the protocol's own, or found from the capture"},
     {"--raw-channels", "COUNT", "the file is raw samples of so many channels, channel 0 in bit 0"},
     {"--rate", "HZ", "samples a second, where the file does not tell"},
     parameter::json,

@@ -32,6 +32,9 @@ inline constexpr unsigned reads = 6;              // of each encoder that answer
 inline constexpr Time listening = 100ms;          // before anything is sent
 inline constexpr std::size_t stream_size = 2048;  // bytes: as much of a stream as is judged
 inline constexpr std::size_t most_ways = 8;       // in which a unit is asked
+inline constexpr unsigned most_unanswered = 3;    // of them, until it is given up
+inline constexpr Time settled = 5ms;              // without a byte: nothing of what was asked before is under way
+inline constexpr Time longest_settling = 200ms;   // on a line that is never silent
 
 using Settings = std::vector<std::string>;
 
@@ -94,14 +97,20 @@ inline std::vector<std::uint8_t> request_of(const Unit& unit, const Options& opt
   return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*size)};
 }
 
-/// The option that says which encoder is meant: named as the field ("address" of "encoder_address"), or else the number
-/// that changes the request.
-inline const Option* address_option(const Unit& unit, const Options& options, const Command& read,
-                                    const Addresses& addresses) {
+/// The option that is named as the field which says who sent something: "address" of "encoder_address".
+inline const Option* option_of(const Unit& unit, const Addresses& addresses) {
   if (addresses.address == nullptr) return nullptr;
   for (const Option& option : unit.options) {
     if (addresses.address->name.ends_with(option.name)) return &option;
   }
+  return nullptr;
+}
+
+/// The option that says which encoder is meant: named as the field, or else the number that changes the request.
+inline const Option* address_option(const Unit& unit, const Options& options, const Command& read,
+                                    const Addresses& addresses) {
+  if (addresses.address == nullptr) return nullptr;
+  if (const Option* named = option_of(unit, addresses)) return named;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
     const Option& option = unit.options[i];
     if (!option.choices.empty()) continue;
@@ -171,7 +180,10 @@ class Attempt {
       std::vector<Settings> targets = scanned(settings, options);
       if (targets.empty()) targets.push_back(settings);
       bool answered = false;
-      for (const Settings& target : targets) answered = ask_one(*read, target) || answered;
+      for (const Settings& target : targets) {
+        const std::string encoder = target.size() > settings.size() ? target.back() : std::string();
+        answered = ask_one(*read, target, encoder) || answered;
+      }
       if (answered && unit_.link != LinkKind::clocked) return;
     }
   }
@@ -210,6 +222,7 @@ class Attempt {
       conversation = made.bytes;
     }
     if (conversation == nullptr) return 0;
+    settle();
     const bool scans = command.verb == Verb::scan;
     const Time quiet = (scans ? patience_ : 500ms) + 5 * link_.latency;
     RecordedConversation<Item> recorded(
@@ -238,6 +251,17 @@ class Attempt {
     keep();
     const auto alive = [this](const HeardExchange& one) { return is_alive(one); };
     return std::any_of(recorded.exchanges.begin(), recorded.exchanges.end(), alive) ? recorded.heard : 0;
+  }
+
+  // What was asked before may be answered only now: that is no answer to what will be asked.
+  void settle() {
+    if (!std::exchange(asked_, true) || unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange) return;
+    const Time end = port().now() + longest_settling;
+    while (port().now() < end) {
+      const Step<Item> step{.at = port().now() + settled};
+      const Event<Item> event = port().wait(step);
+      if (event.kind == Event<Item>::Kind::timer || event.at >= step.at) return;
+    }
   }
 
   // Of one that goes on for ever the first result is enough.
@@ -307,8 +331,8 @@ class Attempt {
     return targets;
   }
 
-  // Returns whether anything came.
-  bool ask_one(const Command& read, const Settings& settings) {
+  // Returns whether anything came. `encoder`: which of those on the line is asked.
+  bool ask_one(const Command& read, const Settings& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
     std::vector<HeardExchange> exchanges;
@@ -317,33 +341,38 @@ class Attempt {
       if (converse(read, options, exchanges) == 0) return false;
     }
     read_all(read, options, exchanges);
+    ++findings_.searches;
     std::vector<Hypothesis> found = capture::explain(unit_, known, exchanges);
     // What explains more than what was asked with may also ask better.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
       std::vector<HeardExchange> again;
       read_all(read, found.front().options, again);
+      ++findings_.searches;
       std::vector<Hypothesis> better = capture::explain(unit_, known, again);
       if (!better.empty() && better.front().chance() < found.front().chance()) found = std::move(better);
     }
-    keep(found, settings);
+    keep(found, settings, encoder);
     return true;
   }
 
   void read_all(const Command& read, const Options& options, std::vector<HeardExchange>& exchanges) {
-    for (unsigned i = 1; i < reads; ++i) {
+    unsigned unanswered = 0;
+    for (unsigned i = 1; i < reads + unanswered; ++i) {
       if (os::interrupted()) throw os::Interrupted{};
-      if (converse(read, options, exchanges) == 0) break;
+      if (converse(read, options, exchanges) == 0 && ++unanswered == most_unanswered) break;
     }
+    // On a busy machine an answer may come too late for one of them.
+    std::erase_if(exchanges, [](const HeardExchange& one) { return one.reply.frame().empty(); });
   }
 
-  void keep(const std::vector<Hypothesis>& found, const Settings& settings) {
+  void keep(const std::vector<Hypothesis>& found, const Settings& settings, const std::string& encoder) {
     Settings of_port;
     for (const std::string& setting : settings) {
       if (find_link_parameter(split_setting(setting).name) != nullptr) of_port.push_back(setting);
     }
     for (const Hypothesis& one : found) {
-      findings_.candidates.push_back({&unit_, one, of_port, false, line_of(unit_.link, uri_.line)});
+      findings_.candidates.push_back({&unit_, one, of_port, false, line_of(unit_.link, uri_.line), encoder});
     }
   }
 
@@ -354,6 +383,7 @@ class Attempt {
   Time deadline_;
   LineFindings& findings_;
   bool cut_ = false;
+  bool asked_ = false;  // anything
   EncoderUri uri_;
   std::vector<std::vector<Item>> harmful_;
   std::unique_ptr<std::byte[]> storage_;

@@ -64,6 +64,7 @@ std::vector<HeardExchange> heard_as(const Unit& unit, const Options& options, co
     }
   } catch (const Enough&) {
   }
+  if (collector.replies == 0) return {};  // single bytes, which no options make a frame of
   return std::move(collector.exchanges);
 }
 
@@ -86,18 +87,21 @@ std::vector<Options> bases(const Unit& unit) {
 
 // Where frames begin and end depends on the options, and the options on the frames: what is found by the frames of one
 // model is looked for again.
-std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, Sentences& damages) {
+std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, std::size_t& searches,
+                                    Sentences& damages) {
   std::vector<Hypothesis> best;
   const auto better = [&](std::vector<Hypothesis>& found) {
     return !found.empty() && (best.empty() || found.front().chance() < best.front().chance());
   };
   for (const Options& options : bases(unit)) {
     if (options.model == nullptr && !best.empty() && best.front().chance() <= capture::is_found) break;
+    ++searches;
     std::vector<Hypothesis> found = capture::explain(unit, {}, heard_as(unit, options, choices, damages));
     if (!better(found)) continue;
     const Hypothesis first = found.front();
     best = std::move(found);
     if (first.options.values == options.values) continue;
+    ++searches;
     std::vector<Hypothesis> again = capture::explain(unit, {}, heard_as(unit, first.options, choices, damages));
     if (better(again)) best = std::move(again);
   }
@@ -108,10 +112,11 @@ std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choi
 
 CaptureFindings search_capture(const CaptureChoices& choices, const std::function<void(const std::string&)>& progress) {
   CaptureFindings findings;
+  std::size_t searches = 0;
   for (const Unit* unit : all_units()) {
     progress(fmt::format("{}: {} found so far", unit->id, findings.candidates.size()));
     try {
-      for (Hypothesis& one : search_unit(*unit, choices, findings.damages)) {
+      for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
     } catch (const UsageError& error) {  // it is spoken on another kind of wire
@@ -127,7 +132,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
   std::erase_if(findings.refusals, [&](const std::string& refusal) {
     return std::binary_search(findings.damages.begin(), findings.damages.end(), refusal);
   });
-  rank(findings.candidates);
+  rank(findings.candidates, searches);
   return findings;
 }
 

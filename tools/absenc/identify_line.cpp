@@ -28,6 +28,41 @@ constexpr double beyond_doubt = -3;     // log10 of chance: then no further rate
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
+/// Frames that one encoder sent by itself.
+struct Sender {
+  const Option* option = nullptr;  // that says which encoder is meant; null: there is none
+  std::string number{};            // its value
+  std::vector<HeardExchange> exchanges{};
+
+  [[nodiscard]] std::string name() const {
+    return option != nullptr ? fmt::format("{}={}", option->name, number) : std::string();
+  }
+};
+
+// Who is meant stands in the frames: one encoder's must not be taken for those of another.
+std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) {
+  const std::vector<Options> likely = capture::likely_options(unit, {});
+  std::vector<Sender> all;
+  for (const CanFrame& frame : frames) {
+    Sender sender{.exchanges = {{.reply = {.can = frame}}}};
+    Addresses addresses;
+    const Frame reply = sender.exchanges.front().reply.frame();
+    if (!likely.empty() && unit.decode(likely.front(), {}, reply, addresses) == Error::none) {
+      sender.option = option_of(unit, addresses);
+      if (sender.option != nullptr) sender.number = fmt::format("{}", addresses.all.front());
+    }
+    const auto same = std::find_if(all.begin(), all.end(), [&](const Sender& one) {
+      return one.option == sender.option && one.number == sender.number;
+    });
+    if (same == all.end()) {
+      all.push_back(std::move(sender));
+    } else {
+      same->exchanges.push_back(std::move(sender.exchanges.front()));
+    }
+  }
+  return all;
+}
+
 /// All attempts, the usual settings of every unit first.
 class Search {
  public:
@@ -50,7 +85,7 @@ class Search {
       findings_.interrupted = true;
     }
     if (!opened_ && failure_) throw os::Failure(*failure_);
-    rank(findings_.candidates);
+    rank(findings_.candidates, findings_.searches);
     drop_repeated();
     return std::move(findings_);
   }
@@ -134,19 +169,23 @@ class Search {
     }
     const bool busy = !std::is_same_v<Item, CanFrame> && items.size() >= busy_line;
     if (busy && findings_.candidates.size() == before) {
-      findings_.notes.push_back(fmt::format("nothing was sent at {} baud: somebody sends all the time", line.rate));
+      const std::string where = line.rate != 0 ? fmt::format(" at {} baud", line.rate) : std::string();
+      findings_.notes.push_back(fmt::format("nothing was sent{}: somebody sends all the time", where));
     }
     listened_.emplace_back(key, busy);
     return busy;
   }
 
   void explain_frames(std::span<const CanFrame> frames, const std::string& line) {
-    std::vector<HeardExchange> exchanges;
-    for (const CanFrame& frame : frames) exchanges.push_back({.reply = {.can = frame}});
     for (const Unit* unit : all_units()) {
-      if (!fits(*unit, search_) || exchanges.empty()) continue;
-      for (Hypothesis& one : capture::explain(*unit, {}, exchanges)) {
-        findings_.candidates.push_back({unit, std::move(one), search_.settings, true, line});
+      if (!fits(*unit, search_)) continue;
+      for (const Sender& sender : senders(*unit, frames)) {
+        ++findings_.searches;
+        std::vector<OptionText> settings;
+        if (sender.option != nullptr) settings.push_back({sender.option->name, sender.number});
+        for (Hypothesis& one : capture::explain(*unit, settings, sender.exchanges)) {
+          findings_.candidates.push_back({unit, std::move(one), search_.settings, true, line, sender.name()});
+        }
       }
     }
   }
@@ -155,7 +194,8 @@ class Search {
     for (const Unit* other : all_units()) {
       const bool same_line = fits(*other, search_) && hears(*other, line.rate, search_) &&
                              other->line.parity == line.parity && other->line.stop_bits == line.stop_bits;
-      if (!same_line) continue;
+      if (!same_line || bytes.empty()) continue;
+      ++findings_.searches;
       for (Hypothesis& one : capture::explain_stream(*other, bytes, listening)) {
         Settings settings = search_.settings;
         const bool needs_rate = other->line.rate != line.rate && way_of(search_) == Way::serial &&
@@ -200,9 +240,10 @@ class Search {
 
 }  // namespace
 
-void rank(std::vector<Candidate>& candidates) {
+void rank(std::vector<Candidate>& candidates, std::size_t searches) {
+  for (Candidate& one : candidates) one.hypothesis.tried *= std::max<std::size_t>(searches, 1);
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& one, const Candidate& other) {
-    return one.hypothesis.chance() < other.hypothesis.chance();
+    return capture::is_likelier(one.hypothesis, other.hypothesis);
   });
 }
 

@@ -21,10 +21,11 @@ struct Candidate {
   std::vector<std::string> link_settings{};  // "baud=9600"; those of the user too
   bool unasked = false;                      // the encoder sends by itself
   std::string line{};                        // "RS-485 half duplex, 2.5 Mbit/s"
+  std::string encoder{};                     // "address=3": which of those on the line; "": the only one
 };
 
-/// The likeliest first.
-void rank(std::vector<Candidate>& candidates);
+/// The likeliest first. `searches`: in which any of them could have been found by chance; each of them pays for all.
+void rank(std::vector<Candidate>& candidates, std::size_t searches);
 
 struct LineSearch {
   std::string place;                    // "/dev/ttyUSB0", "tcp:HOST:PORT", "spi:/dev/spidev0.0"
@@ -38,6 +39,7 @@ struct LineFindings {
   std::size_t requests = 0;        // sent
   std::size_t heard = 0;           // bytes that came, echo taken off
   std::size_t unasked = 0;         // of them, before anything was sent
+  std::size_t searches = 0;        // for what explains what came: protocols, settings, encoders
   bool only_echo = false;          // all that ever came back was what was sent
   std::set<std::string> lines{};   // that were tried
   std::vector<std::string> notes;  // what could not be tried, and why

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/json.hpp"
@@ -73,6 +74,7 @@ Json to_json(const Candidate& candidate, const std::string& command) {
   const Model* model = candidate.hypothesis.options.model;
   json.set("model", model != nullptr ? Json(model->name) : Json());
   json.set("options", options_to_json(*candidate.unit, candidate.hypothesis.options));
+  json.set("encoder", candidate.encoder.empty() ? Json() : Json(candidate.encoder));
   json.set("line", candidate.line).set("unasked", candidate.unasked);
   json.set("explained", evidence.explained).set("tried", evidence.tried).set("distinct", evidence.distinct);
   json.set("log10_chance", candidate.hypothesis.chance()).set("found", is_found(candidate));
@@ -90,6 +92,21 @@ void show_table(std::span<const Candidate> candidates) {
   print_line(table(rows));
 }
 
+bool same_encoder(const Candidate& one, const Candidate& other) {
+  return one.unit != other.unit || one.encoder == other.encoder || one.encoder.empty() || other.encoder.empty();
+}
+
+// The likeliest candidate of each encoder that was found: those of one protocol that answer to different addresses.
+std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
+  std::vector<const Candidate*> all;
+  for (const Candidate& one : candidates) {
+    const bool known =
+        std::any_of(all.begin(), all.end(), [&](const Candidate* other) { return same_encoder(one, *other); });
+    if (is_found(one) && !known) all.push_back(&one);
+  }
+  return all;
+}
+
 std::string advice(std::span<const Candidate> candidates) {
   const Candidate& best = candidates.front();
   if (!is_found(best)) {
@@ -97,11 +114,17 @@ std::string advice(std::span<const Candidate> candidates) {
            "  Try: turn the shaft a little while it is asked, so that the frames differ; capture more frames";
   }
   const auto equal = std::count_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
-    return one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;
+    return same_encoder(one, best) && one.hypothesis.is_proven() == best.hypothesis.is_proven() &&
+           one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;
   });
   if (equal > 1) {
-    return fmt::format(
-        "note: the first {} explain what came equally well: compare their positions while the shaft turns", equal);
+    return fmt::format("note: {} of them explain what came equally well: compare their positions while the shaft turns",
+                       equal);
+  }
+  if (const auto found = encoders(candidates); found.size() > 1) {
+    std::vector<std::string> names;
+    for (const Candidate* one : found) names.push_back(one->encoder);
+    return fmt::format("note: {} encoders are on the line: {}", found.size(), fmt::join(names, ", "));
   }
   if (best.hypothesis.at_least) {
     return "note: the position may have more bits: these are the fewest that hold all that came; turn the shaft once";
@@ -150,7 +173,10 @@ int show_candidates(std::span<const Candidate> candidates, const std::function<s
   if (candidates.empty()) return exit_failed;
   show_table(candidates.first(std::min(candidates.size(), most_shown)));
   const std::string more = advice(candidates);
-  if (found) print_line(fmt::format("\ngo on with: {}", command(candidates.front())));
+  std::string next = found ? "\ngo on with: " : "";
+  for (const Candidate* one : encoders(candidates)) {
+    print_line(std::exchange(next, "       and: ") + command(*one));
+  }
   if (!more.empty()) print_message(more);
   return found ? exit_good : exit_failed;
 }

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "absenc/core/bits.hpp"
@@ -248,6 +250,19 @@ std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
     row += ',' + (flags.empty() ? std::string() : flags_text(flags.front()));
   }
   return row;
+}
+
+void set_validity(Json& json, const Reading& reading) {
+  if (reading.singleturn_bits != 0) json.set("singleturn_valid", reading.singleturn_valid() && reading.ready);
+  if (reading.multiturn_bits != 0) json.set("multiturn_valid", reading.multiturn_valid);
+}
+
+std::vector<std::string_view> FieldsWithReading::invalid() const {
+  std::vector<std::string_view> names;
+  for (const FieldInfo* info : names_) {
+    if (reading_ && !holds(*info, *reading_)) names.push_back(info->name);
+  }
+  return names;
 }
 
 }  // namespace absenc::tool

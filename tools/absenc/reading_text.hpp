@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,6 +40,29 @@ struct Flags {
 /// Sets everything but the time.
 void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed);
 [[nodiscard]] Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed);
+
+/// Sets singleturn_valid and multiturn_valid, as far as the reading carries them.
+void set_validity(Json& json, const Reading& reading);
+
+/// Hands fields on, and keeps the reading that says which of them hold.
+class FieldsWithReading final : public FieldSink {
+ public:
+  explicit FieldsWithReading(FieldSink& sink) : sink_(sink) {}
+  void put(const FieldValue& value) override {
+    names_.push_back(value.info);
+    sink_.put(value);
+  }
+  void put_reading(const Reading& one) override { reading_ = one; }
+
+  [[nodiscard]] const std::optional<Reading>& reading() const { return reading_; }
+  /// The fields that do not hold.
+  [[nodiscard]] std::vector<std::string_view> invalid() const;
+
+ private:
+  FieldSink& sink_;
+  std::vector<const FieldInfo*> names_;
+  std::optional<Reading> reading_;
+};
 
 /// A position that no second one confirmed is not valid.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);

@@ -7,6 +7,7 @@
 #include "absenc/protocol/encolink/fields.hpp"
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
+#include "absenc/protocol/encolink/probe.hpp"
 #include "absenc/protocol/encolink/procedures.hpp"
 #include "absenc/protocol/encolink/timing.hpp"
 #include "absenc/protocol/encolink/vectors.hpp"
@@ -341,6 +342,7 @@ constexpr Unit make_unit(std::string_view id, std::string_view name, Wire wire, 
       .resolution = resolution,
       .covered = covered,
       .over_spi = spi ? nullptr : &spi_unit,
+      .probe = probe,
       .timing = {.turnaround_limit = answer_limit},
       .streams = streams,
   };

@@ -185,30 +185,30 @@ constexpr void put_fields(FieldSink& sink, const Reply& reply) {
   for (const Part part : layout_of(reply.id).two()) detail::put_part(sink, part, reply, reply.two, false);
 }
 
-/// Decodes a reply to `request`, or `request` alone when there is no reply. Without a request, the reply's own control
-/// field says what was asked, and the address of a memory access is taken as it comes.
-constexpr Error decode(const Profile& profile, Bytes request, Bytes reply, FieldSink& sink) {
-  Request asked;
-  if (!request.empty()) {
-    const Result<Request> result = decode_request(profile, request);
-    if (!result) return result.error();
-    asked = *result;
-  } else {
-    if (reply.empty()) return Error::wrong_length;
-    const auto id = data_id(reply[0]);
-    if (!id) return Error::unexpected_reply;
-    asked.id = *id;
-    asked.encoder_address = address_of(reply[0]);
-    if (is_memory_access(asked.id) && reply.size() == reply_length(asked.id)) {
-      asked.memory_address = detail::address_from_wire(profile, reply[1]);
-      asked.value = reply[2];
-    }
+/// What was asked: the request, or without one what the reply's own control field says; the address of a memory access
+/// is then taken as it comes.
+constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes reply) {
+  if (!request.empty()) return decode_request(profile, request);
+  if (reply.empty()) return Error::wrong_length;
+  const auto id = data_id(reply[0]);
+  if (!id) return Error::unexpected_reply;
+  Request asked{*id, address_of(reply[0])};
+  if (is_memory_access(asked.id) && reply.size() == reply_length(asked.id)) {
+    asked.memory_address = detail::address_from_wire(profile, reply[1]);
+    asked.value = reply[2];
   }
+  return asked;
+}
+
+/// Decodes a reply to `request`, or `request` alone when there is no reply.
+constexpr Error decode(const Profile& profile, Bytes request, Bytes reply, FieldSink& sink) {
+  const Result<Request> asked = asked_by(profile, request, reply);
+  if (!asked) return asked.error();
   if (reply.empty()) {
-    put_fields(sink, profile, asked);
+    put_fields(sink, profile, *asked);
     return Error::none;
   }
-  const Result<Reply> result = decode_reply(profile, asked, reply);
+  const Result<Reply> result = decode_reply(profile, *asked, reply);
   if (!result) return result.error();
   put_fields(sink, *result);
   const Reading reading = to_reading(*result);

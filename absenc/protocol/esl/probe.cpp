@@ -58,7 +58,7 @@ Asked asked_by(const Profile& profile, const Capture& capture) {
 Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
   const Asked asked = asked_by(profile, capture);
-  if (!asked.accepted) return Check::request_not_accepted;
+  if (!asked.accepted) return capture.request.empty() ? Check::other_command : Check::request_not_accepted;
   Profile as_sent = profile;
   if (asked.parity_wrong) {
     as_sent.parity_scope = profile.parity_scope == ParityScope::all ? ParityScope::command : ParityScope::all;
@@ -141,7 +141,7 @@ ProbeResult probe(const Profile& base, std::span<const Capture> captures) {
   ProbeResult result;
   result.best = nth_profile(base, 0);
   std::array<std::array<Progress, 3>, open_options> best{};
-  for (auto& option : best) option.fill({0, Check::length});
+  for (auto& option : best) option.fill({0, Check::request_not_accepted});  // explains least
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);
     const Progress progress = progress_of(profile, captures);
@@ -151,6 +151,9 @@ ProbeResult probe(const Profile& base, std::span<const Capture> captures) {
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
+  // Of one frame it changes nothing.
+  best[option_sequence_step].fill(
+      best[option_sequence_step][static_cast<std::size_t>(get_option(result.best, option_sequence_step))]);
   for (std::size_t i = 0; i < open_options; ++i) {
     for (std::size_t value = 0; value < choice_count(i); ++value) {
       const Progress& progress = best[i][value];

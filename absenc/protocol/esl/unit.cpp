@@ -181,6 +181,18 @@ bool probe_captures(Options& values, std::span<const Capture> captures, Evidence
   return result.profiles != 0;
 }
 
+// The same words as a host finds for what it refuses.
+Explanation explain_frame(const Options& values, Error error, Frame request, Frame reply) {
+  if (reply.empty()) return {};
+  const Profile profile = to_profile(values);
+  const Result<Request> asked = asked_by(profile, request.bytes, reply.bytes);
+  if (!asked) return {};
+  Reply ignored;
+  const Check check = check_reply(profile, *asked, reply.bytes, ignored);
+  if (check == Check::length || error_of(check) != error) return {};  // the error says all of it
+  return {.found = text_of(check).sentence};
+}
+
 Resolution resolution(const Options&) { return {singleturn_bits, multiturn_bits}; }
 
 }  // namespace
@@ -216,6 +228,7 @@ constinit const Unit unit{
     .host = host,
     .device = device,
     .resolution = resolution,
+    .explain = explain_frame,
     .probe = probe_captures,
     .timing = {.pause_bits = 1, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
