@@ -11,6 +11,7 @@ using namespace std::chrono_literals;
 
 constexpr int quiet_limits = 4;         // how many limits a line is quiet before a request is repeated
 constexpr Time longest_quiet = 2500ms;  // no reply that is later has been seen but on a line that is always late
+constexpr Time longest_way = 10s;       // what has not come by then is lost
 constexpr Time tick{1};
 
 struct Nowhere final : FieldSink {
@@ -99,10 +100,6 @@ template <class Item>
 void ReplyGuard<Item>::owe() {
   Owed* owed = find(request_);
   if (owed == nullptr) {
-    if (owed_.size() == most_owed) {
-      const auto older = [](const Owed& one, const Owed& other) { return newest(one) < newest(other); };
-      settle(*std::min_element(&owed_[0], &owed_[0] + most_owed, older));
-    }
     owed_.push_back({.request = request_, .expect = expect_});
     owed = &owed_[owed_.size() - 1];
   }
@@ -131,7 +128,7 @@ Time ReplyGuard<Item>::quiet_time() const {
 
 template <class Item>
 Time ReplyGuard<Item>::longest_wait() const {
-  return std::max(longest_quiet, lateness_ * 3 / 2);
+  return std::clamp(lateness_ * 3 / 2, longest_quiet, longest_way);
 }
 
 // ---- Steps
@@ -151,7 +148,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
       case Phase::before:
         if (now < until_) return {.at = until_, .gap = pending_.gap};
         // Never into what is still coming.
-        if (heard_at_ + pending_.gap > now && now < latest_) {
+        if (!is_can && heard_at_ + pending_.gap > now && now < latest_) {
           until_ = heard_at_ + pending_.gap;
           break;
         }
@@ -206,12 +203,18 @@ void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
   tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
   pending_ = request;
   reply_.clear();
+  for (std::size_t i = owed_.size(); i-- > 0;) {
+    if (now - newest(owed_[i]) > longest_way) settle(owed_[i]);
+  }
   heard_at_ = now - request.gap;
   latest_ = std::max(now, request.at) + 4 * longest_wait();
   // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
   until_ = request.at > now + 1ms ? request.at : now + tick;
-  const Owed* owed = find(request.out);
-  if (owed != nullptr) until_ = std::max(until_, newest(*owed) + quiet_time());
+  if (owed_.size() == most_owed) {  // no more can be kept apart: a silence ends them all
+    until_ = std::max(until_, sent_at_ + quiet_time());
+  } else if (const Owed* owed = find(request.out)) {
+    until_ = std::max(until_, newest(*owed) + quiet_time());
+  }
   phase_ = Phase::before;
 }
 
@@ -221,6 +224,7 @@ Step<Item> ReplyGuard<Item>::send(Time now) {
   request_.append(pending_.out);
   expect_ = pending_.expect;
   asked_ = true;
+  if (owed_.size() == most_owed) owed_.clear();
   if (Owed* const owed = find(request_)) {
     owed->lost_last = newest(*owed);
     owed->lost_first = std::max(oldest(*owed), owed->lost_last - longest_wait());
@@ -344,7 +348,7 @@ void ReplyGuard<Item>::count_late(Owed* owed, Time at) {
   ++late_;
   Time sent_at = sent_at_;
   if (owed != nullptr) sent_at = owed->sent_at.empty() ? owed->lost_last : owed->sent_at[0];
-  lateness_ = std::max(lateness_, at - sent_at);
+  lateness_ = std::max(lateness_, std::min(at - sent_at, longest_way));
   if (phase_ == Phase::holding) lateness_ = std::max(lateness_, suspected_);  // another one comes: it was
   latest_reply_ = std::max(latest_reply_, lateness_);
   if (owed == nullptr) return;

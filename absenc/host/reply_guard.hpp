@@ -45,7 +45,7 @@ class ReplyGuard final : public Machine<Item> {
 
  private:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
-  static constexpr std::size_t most_owed = 4;
+  static constexpr std::size_t most_owed = 8;
   using Request = Buffer<Item, is_can ? 1 : 16>;
   using Reply = Buffer<Item, is_can ? 1 : 64>;
 
