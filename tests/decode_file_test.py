@@ -141,7 +141,7 @@ class Invalid(Case):
         frames = ["--request", line["request"], "--hex", line["reply"]]
         shown = absenc("decode", "tformat", *frames)
         self.assert_good(shown)
-        self.assertRegex(shown.stdout, r"singleturn +INVALID \(0")
+        self.assertRegex(shown.stdout, r"singleturn +INVALID \(only the top 5 of 17 bits hold: 0 counts\)")
         [one] = json_lines(absenc("decode", "tformat", *frames, "--json").stdout)
         self.assertFalse(one["singleturn_valid"])
         self.assertEqual(one["fields"]["singleturn"], 0)

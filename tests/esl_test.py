@@ -229,7 +229,7 @@ class Command(EslCase):
         with open(dump, encoding="utf-8") as file:
             lines = [line for line in file if not line.startswith(("checksum", "#"))]
         self.assertTrue(all("page 0 " in line for line in lines if line.startswith("page")), lines)
-        text = "".join(lines) + "page 4 address 0x10: 11 22\n"
+        text = "".join(lines) + "page 4 address 0x10: 11 22\nchecksum: edited\n"
         changed = self.file("changed", text)
         self.assert_failed(absenc("memory", "load", encoder, changed, "--yes"), "page 4 address 0x10", "--force")
         self.assert_good(absenc("memory", "load", encoder, changed, "--yes", "--force"))

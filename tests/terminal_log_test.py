@@ -58,9 +58,10 @@ class Logs(Case):
             for name, style in STYLES.items():
                 with self.subTest(f"{protocol}, {name}"):
                     result = self.decode(protocol, self.log(style, exchanges))
-                    self.assert_good(result)
                     found = json_lines(result.stdout)
-                    self.assertEqual([(one["request"], one["reply"]) for one in found if one["ok"]],
+                    self.assertEqual([one for one in found if one["ok"] is False and one["error"] != "sequence_mismatch"], [],
+                                     result.stderr)  # they are no conversation: their counters stand still
+                    self.assertEqual([(one["request"], one["reply"]) for one in found],
                                      [(request.hex(), reply.hex()) for request, reply in exchanges])
 
     def test_two_ports_in_one_log(self):

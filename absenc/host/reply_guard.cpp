@@ -79,6 +79,13 @@ bool ReplyGuard<Item>::is_reply(std::span<const Item> request, std::span<const I
   return unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) == Error::none;
 }
 
+// Others send on a CAN bus too; a frame that is wrong may still be the answer.
+template <class Item>
+bool ReplyGuard<Item>::concerns(std::span<const Item> request, std::span<const Item> reply) const {
+  Nowhere nowhere;
+  return !is_can || unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) != Error::unexpected_reply;
+}
+
 template <class Item>
 auto ReplyGuard<Item>::find(std::span<const Item> request) -> Owed* {
   for (std::size_t i = 0; i < owed_.size(); ++i) {
@@ -213,7 +220,9 @@ void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
   if (owed_.size() == most_owed) {  // no more can be kept apart: a silence ends them all
     until_ = std::max(until_, sent_at_ + quiet_time());
   } else if (const Owed* owed = find(request.out)) {
-    until_ = std::max(until_, newest(*owed) + quiet_time());
+    // Who has not answered twice, on a line where nothing came late, is not there.
+    const bool absent = lateness_ == Time{} && owed->lost + owed->sent_at.size() > 1;
+    if (!absent) until_ = std::max(until_, newest(*owed) + quiet_time());
   }
   phase_ = Phase::before;
 }
@@ -266,13 +275,7 @@ template <class Item>
 void ReplyGuard<Item>::feed_passing(const Event<Item>& event) {
   using Kind = typename Event<Item>::Kind;
   if (event.kind == Kind::sent) sent_at_ = event.at;
-  if (event.kind == Kind::received && open_) {
-    if constexpr (is_can) {
-      heard_ = heard_ || is_reply(request_, event.items);  // others send too
-    } else {
-      heard_ = true;
-    }
-  }
+  if (event.kind == Kind::received && open_) heard_ = heard_ || concerns(request_, event.items);
   if constexpr (is_can) {
     // Whoever only listens is not answered: what comes of that was owed to others.
     if (event.kind == Kind::received && !open_ && !owed_.empty()) {
@@ -312,7 +315,7 @@ void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
   for (const Item& item : items) {
     if constexpr (is_can) {
       const std::span<const Item> one(&item, 1);
-      if (!is_reply(request_, one) && owed_to(one) == nullptr) continue;
+      if (!concerns(request_, one) && owed_to(one) == nullptr) continue;
     }
     if (reply_.empty()) first_at_ = at;
     reply_.push_back(item);

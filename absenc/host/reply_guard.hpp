@@ -70,6 +70,7 @@ class ReplyGuard final : public Machine<Item> {
   void close();
   [[nodiscard]] bool is_request(const Step<Item>& step) const;
   [[nodiscard]] bool is_reply(std::span<const Item> request, std::span<const Item> reply) const;
+  [[nodiscard]] bool concerns(std::span<const Item> request, std::span<const Item> reply) const;
   [[nodiscard]] Owed* find(std::span<const Item> request);
   [[nodiscard]] Owed* owed_to(std::span<const Item> reply);
   void owe();

@@ -147,8 +147,12 @@ class Session {
     return current_;
   }
 
-  // On a link whose clock is the host's nothing comes late.
-  [[nodiscard]] bool guarded() const { return unit_->link != LinkKind::exchange && unit_->link != LinkKind::clocked; }
+  // On a link whose clock is the host's nothing comes late. On a CAN bus others send too: what listens to all of them
+  // hears everything.
+  [[nodiscard]] bool guarded(const Command& command) const {
+    if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
+    return unit_->link != LinkKind::exchange && unit_->link != LinkKind::clocked;
+  }
 
   // What the port carries: the conversation, behind what keeps replies with their requests and what removes echo.
   Machine<Item>& machine() {
@@ -158,7 +162,7 @@ class Session {
     return inner();
   }
   Machine<Item>& inner() {
-    if (guarded()) return *guard_;
+    if (guarded_) return *guard_;
     return *current_;
   }
 
@@ -166,7 +170,8 @@ class Session {
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) {
-      if (guarded()) guard_->attach(conversation, *unit_, options_, command.repeatable && !command.changes_encoder);
+      guarded_ = guarded(command);
+      if (guarded_) guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
       if constexpr (std::is_same_v<Item, std::uint8_t>) echo_.attach(inner());
     }
     const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
@@ -181,6 +186,7 @@ class Session {
   Conversation<Item>* current_ = nullptr;  // in `storage_`
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
+  bool guarded_ = false;  // the present conversation
   EchoFilter echo_;
   unsigned attempts_;
   FirstReading first_;

@@ -154,11 +154,15 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
   ASSERT_EQ(fast.encoder.violation_count(), 1u);
   EXPECT_EQ(fast.encoder.violations()[0].rule, "clock faster than 4 MHz");
 
+  // How a controller selects is how its line was set up.
+  LineSettings settings = spi_settings;
+  settings.select_lead = 4999ns;
   Bench early(testing::single, Wire::spi);
+  sim::Line<std::uint8_t> line{LinkKind::exchange, settings};
+  line.attach(sim::Role::device, early.encoder);
   Hasty too_early;
   too_early.left = 1;
-  too_early.settings.select_lead = 4999ns;
-  early.run(too_early);
+  line.run(line.attach(sim::Role::host, too_early));
   ASSERT_EQ(early.encoder.violation_count(), 1u);
   EXPECT_EQ(early.encoder.violations()[0].rule, "clock less than 5 us after NCS went low");
 }

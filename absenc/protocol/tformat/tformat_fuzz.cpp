@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as request and reply of the decoder, as what a host conversation receives, and as requests to the device.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -75,8 +76,8 @@ void ask_device(Bytes input) {
     const auto step = encoder.next(now);
     if (step.kind != Step<std::uint8_t>::Kind::transfer) continue;
     require(!step.out.empty() && step.out.size() <= reply_capacity && checksum(step.out) == 0);
-    require(has_sync_code(step.out[0]) && step.at > now);
-    now = step.at + std::chrono::microseconds(44);
+    require(has_sync_code(step.out[0]));
+    now = std::max(now, step.at) + std::chrono::microseconds(44);  // a refusal is due when the frame has ended
     encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
   }
   require(encoder.answered() <= input.size());
