@@ -86,7 +86,9 @@ class LateReplyTest(unittest.TestCase):
         """An emulator behind a way, and the path of the host's end."""
         unit, _, _, _ = ENCODERS[encoder]
         options = [f"--option={option}" for option in ENCODERS[encoder][1].lstrip("?").split("&") if option]
-        emulator = Emulator(self.directory.name, "--motion", "rpm=6", *options, protocol=unit)
+        self.emulators = getattr(self, "emulators", 0) + 1
+        emulator = Emulator(self.directory.name, "--motion", "rpm=6", *options, protocol=unit,
+                            name=f"encoder{self.emulators}")
         self.addCleanup(end, emulator.process)
         master, slave = os.openpty()
         raw(slave)

@@ -222,7 +222,8 @@ void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
   } else if (const Owed* owed = find(request.out)) {
     // Who has not answered twice, on a line where nothing came late, is not there.
     const bool absent = lateness_ == Time{} && owed->lost + owed->sent_at.size() > 1;
-    if (!absent) until_ = std::max(until_, newest(*owed) + quiet_time());
+    const Time quiet = lateness_ == Time{} ? quiet_time() / 2 : quiet_time();
+    if (!absent) until_ = std::max(until_, newest(*owed) + quiet);
   }
   phase_ = Phase::before;
 }
