@@ -207,7 +207,10 @@ void expect_same(const std::vector<Kept>& found, const std::vector<Kept>& expect
     if (share == 1) ADD_FAILURE() << context << "\nfound " << to_text(found[next]);
     const std::size_t first = next;
     bool has_error = false;
+    // A host may ask again while a doubled reply is still coming: what is found as it was is not part of this one.
+    const std::string following = i + 1 < expected.size() ? to_text(expected[i + 1]) : "";
     for (; next < found.size() && found[next].begin >= one.begin && found[next].end <= one.end; ++next) {
+      if (to_text(found[next]) == following) break;
       has_error = has_error || found[next].error != Error::none;
     }
     ASSERT_TRUE(has_error) << context << "\nfound " << to_text(found[first]);
