@@ -71,16 +71,33 @@ class Emulator:
         self.end()
 
 
-class FakeEncoder:
-    """Answers requests on a pseudo-terminal by their first byte, always the same; `replies` alone: to 1A."""
+class FakeLine:
+    """A pseudo-terminal whose far end is a thread here: `serve` runs until `wake` can be read."""
 
-    def __init__(self, replies=b""):
-        self.replies = replies if isinstance(replies, dict) else {0x1A: bytes(replies)}
+    def __init__(self):
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
         self.path = os.ttyname(self.slave)
         self.wake, self.waker = os.pipe()
         self.thread = threading.Thread(target=self.serve)
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        os.write(self.waker, b"x")
+        self.thread.join()
+        for descriptor in (self.master, self.slave, self.wake, self.waker):
+            os.close(descriptor)
+
+
+class FakeEncoder(FakeLine):
+    """Answers requests by their first byte, always the same; `replies` alone: to 1A."""
+
+    def __init__(self, replies=b""):
+        super().__init__()
+        self.replies = replies if isinstance(replies, dict) else {0x1A: bytes(replies)}
 
     def answer(self, request):
         return self.replies.get(request[0], b"")
@@ -92,32 +109,18 @@ class FakeEncoder:
                 return
             os.write(self.master, self.answer(os.read(self.master, 64)))
 
-    def __enter__(self):
-        self.thread.start()
-        return self
 
-    def __exit__(self, *_):
-        os.write(self.waker, b"x")
-        self.thread.join()
-        for descriptor in (self.master, self.slave, self.wake, self.waker):
-            os.close(descriptor)
-
-
-class BabblingLine:
-    """A pseudo-terminal that is never silent: one of `pieces` every `period` seconds, over and over, whoever asks what.
+class BabblingLine(FakeLine):
+    """A line that is never silent: one of `pieces` every `period` seconds, over and over, whoever asks what.
     With a period of 0 as much as the line takes. What nobody reads is lost."""
 
     def __init__(self, period=0.005, pieces=(b"\x55",)):
+        super().__init__()
         self.period = period
         self.pieces = pieces
-        self.master, self.slave = os.openpty()
-        tty.setraw(self.slave)
         os.set_blocking(self.master, False)
-        self.path = os.ttyname(self.slave)
-        self.wake, self.waker = os.pipe()
-        self.thread = threading.Thread(target=self.babble)
 
-    def babble(self):
+    def serve(self):
         due = time.monotonic()
         for piece in itertools.cycle(self.pieces):
             # Whoever was held up goes on from now.
@@ -129,16 +132,6 @@ class BabblingLine:
             for transfer in (lambda: os.write(self.master, piece), lambda: os.read(self.master, 4096)):
                 with contextlib.suppress(BlockingIOError):
                     transfer()
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        os.write(self.waker, b"x")
-        self.thread.join()
-        for descriptor in (self.master, self.slave, self.wake, self.waker):
-            os.close(descriptor)
 
 
 class Case(unittest.TestCase):

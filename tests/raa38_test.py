@@ -4,13 +4,9 @@
 import csv
 import io
 import json
-import os
-import select
-import threading
-import tty
 import unittest
 
-from command_support import Emulator, EncoderCase, FakeEncoder, absenc, json_lines
+from command_support import BabblingLine, Emulator, EncoderCase, FakeEncoder, absenc, json_lines
 
 FRAME = bytes.fromhex("ff81017f00")  # 3.1.1: 383 of 14 bits
 
@@ -18,36 +14,6 @@ FRAME = bytes.fromhex("ff81017f00")  # 3.1.1: 383 of 14 bits
 def frame(value, data_bytes=2, second=0x81):
     body = bytes([0xFF, second]) + value.to_bytes(data_bytes, "big")
     return body + bytes([sum(body) & 0xFF])
-
-
-class Streamer:
-    """Sends the same bytes again and again on a pseudo-terminal."""
-
-    def __init__(self, data, period=0.005):
-        self.data, self.period = data, period
-        self.master, self.slave = os.openpty()
-        tty.setraw(self.slave)
-        os.set_blocking(self.master, False)
-        self.path = os.ttyname(self.slave)
-        self.wake, self.waker = os.pipe()
-        self.thread = threading.Thread(target=self.serve)
-
-    def serve(self):
-        while not select.select([self.wake], [], [], self.period)[0]:
-            try:
-                os.write(self.master, self.data)
-            except BlockingIOError:
-                pass
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        os.write(self.waker, b"x")
-        self.thread.join()
-        for descriptor in (self.master, self.slave, self.wake, self.waker):
-            os.close(descriptor)
 
 
 class RaaCase(EncoderCase):
@@ -110,28 +76,28 @@ class Stream(RaaCase):
 
     def test_other_sizes(self):
         for bits, value, size in ((10, 1023, 2), (17, 109517, 3), (21, 2097151, 3), (32, 0x12345678, 4)):
-            with self.subTest(bits=bits), Streamer(frame(value, size)) as fake:
+            with self.subTest(bits=bits), BabblingLine(pieces=[frame(value, size)]) as fake:
                 result = absenc("read", f"raa38:{fake.path}?bits={bits}", "--json")
                 self.assert_good(result)
                 self.assertEqual(json.loads(result.stdout)["singleturn"], value)
 
     def test_nothing_comes(self):
-        with Streamer(b"") as fake:
+        with BabblingLine(pieces=[b""]) as fake:
             result = absenc("read", f"raa38:{fake.path}")
         self.assert_trouble(result, "timeout", "nothing comes", f"nothing came from {fake.path}", "mode=bus")
 
     def test_something_else_comes(self):
-        with Streamer(b"\x55\xAA\x00") as fake:
+        with BabblingLine(pieces=[b"\x55\xAA\x00"]) as fake:
             result = absenc("read", f"raa38:{fake.path}")
         self.assert_trouble(result, "bad_framing", "no two frames in a row", "received 55 AA 00", "baud, parity")
 
     def test_more_bits_than_were_said(self):
-        with Streamer(frame(0x4001)) as fake:
+        with BabblingLine(pieces=[frame(0x4001)]) as fake:
             result = absenc("read", f"raa38:{fake.path}")
         self.assert_trouble(result, "out_of_range", "more bits", "received FF 81 40 01", "set bits")
 
     def test_a_speed_limit_needs_the_refresh_rate(self):
-        with Streamer(FRAME) as fake:
+        with BabblingLine(pieces=[FRAME]) as fake:
             result = absenc("read", f"raa38:{fake.path}?max_rpm=100")
             self.assert_trouble(result, "invalid_argument", "how often", "refresh_hz")
             self.assert_good(absenc("read", f"raa38:{fake.path}?max_rpm=100&refresh_hz=200"))

@@ -1,47 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A line that is never silent: what is to end after a time ends, and so does what is interrupted."""
-import os
-import select
 import signal
-import threading
 import time
-import tty
 import unittest
 
-from command_support import EncoderCase, absenc, end
+from command_support import BabblingLine, EncoderCase, absenc, end
 
 PROTOCOLS = ["tformat", "esl", "encolink", "e201", "raa38-modbus"]
-
-
-class RestlessLine:
-    """A pseudo-terminal on which a byte comes every few milliseconds, whatever is asked."""
-
-    def __init__(self, byte):
-        self.byte = byte
-        self.master, self.slave = os.openpty()
-        tty.setraw(self.slave)
-        os.set_blocking(self.master, False)
-        self.path = os.ttyname(self.slave)
-        self.wake, self.waker = os.pipe()
-        self.thread = threading.Thread(target=self.serve)
-
-    def serve(self):
-        while not select.select([self.wake], [], [], 0.005)[0]:
-            try:
-                os.write(self.master, self.byte)
-                os.read(self.master, 4096)
-            except BlockingIOError:
-                pass
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        os.write(self.waker, b"x")
-        self.thread.join()
-        for descriptor in (self.master, self.slave, self.wake, self.waker):
-            os.close(descriptor)
 
 
 class AnEndThatHolds(EncoderCase):
@@ -53,7 +18,7 @@ class AnEndThatHolds(EncoderCase):
 
     def test_record(self):
         for protocol in PROTOCOLS:
-            with self.subTest(protocol), RestlessLine(b"\x1a") as line:
+            with self.subTest(protocol), BabblingLine(pieces=[b"\x1a"]) as line:
                 output = self.file(f"{protocol}.csv")
                 result = self.run_for_a_second("record", f"{protocol}:{line.path}", "--output", output)
                 self.assertEqual(result.returncode, 1, result.stderr)
@@ -62,7 +27,7 @@ class AnEndThatHolds(EncoderCase):
                     self.assertTrue(file.read().endswith("\n"))
 
     def test_monitor(self):
-        with RestlessLine(b"\x1a") as one, RestlessLine(b"\x55") as other:
+        with BabblingLine(pieces=[b"\x1a"]) as one, BabblingLine(pieces=[b"\x55"]) as other:
             for protocol in PROTOCOLS:
                 with self.subTest(protocol):
                     result = self.run_for_a_second("monitor", f"{protocol}:{one.path}", f"{protocol}:{other.path}")
@@ -70,7 +35,7 @@ class AnEndThatHolds(EncoderCase):
                     self.assertEqual(result.stderr.count(" 0 readings; "), 2, result.stderr)
 
     def test_interrupted(self):
-        with RestlessLine(b"\x1a") as line:
+        with BabblingLine(pieces=[b"\x1a"]) as line:
             for arguments in (["monitor"], ["record", "--output", self.file("log.csv")]):
                 with self.subTest(arguments):
                     process = self.start(*arguments, f"encolink:{line.path}", "--for", "600")
