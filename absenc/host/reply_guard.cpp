@@ -12,6 +12,7 @@ using namespace std::chrono_literals;
 constexpr int quiet_limits = 4;         // how many limits a line is quiet before a request is repeated
 constexpr Time longest_quiet = 2500ms;  // no reply that is later has been seen but on a line that is always late
 constexpr Time longest_way = 10s;       // what has not come by then is lost
+constexpr Time noise_limit = 100ms;     // no reply goes on for so long
 constexpr Time tick{1};
 
 struct Nowhere final : FieldSink {
@@ -154,8 +155,9 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
       }
       case Phase::before:
         if (now < until_) return {.at = until_, .gap = pending_.gap};
-        // Never into what is still coming.
-        if (!is_can && heard_at_ + pending_.gap > now && now < latest_) {
+        // Not into what is still coming, unless it never ends: then the conversation finds out.
+        if (noise_end_ == never) noise_end_ = now + noise_limit;
+        if (!is_can && heard_at_ + pending_.gap > now && now < noise_end_) {
           until_ = heard_at_ + pending_.gap;
           break;
         }
@@ -214,6 +216,7 @@ void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
     if (now - newest(owed_[i]) > longest_way) settle(owed_[i]);
   }
   heard_at_ = now - request.gap;
+  noise_end_ = never;
   latest_ = std::max(now, request.at) + 4 * longest_wait();
   // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
   until_ = request.at > now + 1ms ? request.at : now + tick;

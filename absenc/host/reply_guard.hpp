@@ -114,7 +114,8 @@ class ReplyGuard final : public Machine<Item> {
   Time sent_at_{};
   Time received_at_{};
   Time first_at_{};
-  Time heard_at_{};   // before: when something came that was not asked for
+  Time heard_at_{};  // before: when something came that was not asked for
+  Time noise_end_ = never;
   Time suspected_{};  // holding: how late what came is, if it is
 
   Reply reply_{};  // asking: what came; before and holding: the end of it
