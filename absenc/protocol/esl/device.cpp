@@ -37,7 +37,7 @@ ByteStep VirtualEncoder::next(Time) {
     step.gap = idle_time;
     if (!ignoring_ && !stop_wrong_) step.expect = request_length(profile_, *data_id(request_[0])) - request_.size();
   }
-  if (ignoring_) step.expect = foreign_end_ > heard_ ? foreign_end_ - heard_ : 0;
+  if (ignoring_) step.expect = foreign_end_ > heard_ ? static_cast<std::size_t>(foreign_end_ - heard_) : 0;
   return step;
 }
 
@@ -89,7 +89,6 @@ void VirtualEncoder::ignore_request(std::uint8_t control_field) {
 
 // A missing start bit ends the frame set: what was cut short is no request.
 void VirtualEncoder::frame_set_ended() {
-  ignoring_ = false;
   if (stop_wrong_) report_bad_request(status::stop_error, heard_at_);
   stop_wrong_ = ignoring_ = false;
   request_.clear();
