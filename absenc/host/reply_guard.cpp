@@ -397,11 +397,14 @@ void ReplyGuard<Item>::take_late(std::span<const Item> items, Time at) {
   for (const Item& item : items) {
     if (reply_.size() == Reply::capacity()) drop_first(reply_);
     reply_.push_back(item);
-    for (std::size_t i = 0; i < owed_.size(); ++i) {
-      if (ends_with_reply(owed_[i].request, owed_[i].expect)) return end_late(&owed_[i], at);
+    std::size_t i = 0;
+    while (i < owed_.size() && !ends_with_reply(owed_[i].request, owed_[i].expect)) ++i;
+    if (i < owed_.size()) {
+      end_late(&owed_[i], at);
+    } else if (!is_can && asked_ && ends_with_reply(request_, expect_)) {
+      end_late(nullptr,
+               at);  // one too many: what was taken for the reply to the last request may have been another one's
     }
-    // One too many: what was taken for the reply to the last request may have been another one's.
-    if (!is_can && asked_ && ends_with_reply(request_, expect_)) end_late(nullptr, at);
   }
 }
 

@@ -22,9 +22,8 @@ namespace absenc::host {
 /// 1. the same request is sent again only when the line was quiet for twice the limit that was missed, and for half as
 ///    much again as the latest reply was late;
 /// 2. what then comes first is not taken: it may be the owed reply;
-/// 3. the line is listened to for four times the limit, and for as long as that reply would have been late and a
-/// quarter
-///    more: if it was, the present request's own is coming;
+/// 3. the line is listened to for four times the limit, and for a quarter more than that reply would have been late: if
+///    it was, the present request's own is coming;
 /// 4. the request is sent once more where it may be, and its reply is taken; elsewhere the conversation is told that
 ///    none came.
 template <class Item>
