@@ -89,8 +89,8 @@ class Session {
   /// What is known of late replies belongs to the line: sessions of encoders on one line share it. It must outlive
   /// them.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
-  /// How late a reply came at the most; 0: none did.
-  [[nodiscard]] Time lateness() const { return guard_->lateness(); }
+  /// How late a reply came on this line at the most, until the last command ended; 0: none did.
+  [[nodiscard]] Time lateness() const { return lateness_; }
 
   /// From the next command on.
   void set_options(const Options& options) { options_ = options; }
@@ -175,7 +175,9 @@ class Session {
       if constexpr (std::is_same_v<Item, std::uint8_t>) echo_.attach(inner());
     }
     const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
+    // Copied: the guard may be others' by the time anybody asks.
     counters_.late = guard_->late();
+    lateness_ = guard_->lateness();
     return ended;
   }
 
@@ -187,6 +189,7 @@ class Session {
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
   bool guarded_ = false;  // the present conversation
+  Time lateness_{};
   EchoFilter echo_;
   unsigned attempts_;
   FirstReading first_;
