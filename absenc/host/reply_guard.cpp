@@ -15,43 +15,13 @@ constexpr Time longest_way = 10s;       // what has not come by then is lost
 constexpr Time noise_limit = 100ms;     // no reply goes on for so long
 constexpr Time tick{1};
 
-struct Nowhere final : FieldSink {
-  void put(const FieldValue&) override {}
-};
-
-Frame to_frame(Bytes bytes) { return {.bytes = bytes}; }
-Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty() ? nullptr : &frames.front()}; }
-
-template <class Buffer>
-void drop_first(Buffer& buffer, std::size_t count = 1) {
-  const Buffer all = buffer;
-  buffer.clear();
-  buffer.append(all.view().subspan(count));
-}
-
-template <class Owed>
-Time newest(const Owed& owed) {
-  return owed.sent_at.empty() ? owed.lost_last : owed.sent_at[owed.sent_at.size() - 1];
-}
-
-template <class Owed>
-Time oldest(const Owed& owed) {
-  return owed.lost != 0 ? owed.lost_first : owed.sent_at[0];
-}
-
-template <class Item>
-bool equal(std::span<const Item> one, std::span<const Item> other) {
-  return std::equal(one.begin(), one.end(), other.begin(), other.end());
-}
-
 }  // namespace
 
 template <class Item>
 void ReplyGuard<Item>::attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat) {
   close();
   inner_ = &inner;
-  unit_ = &unit;
-  options_ = &options;
+  owed_.judge_by(unit, options);
   may_repeat_ = may_repeat;
   tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
 }
@@ -61,7 +31,7 @@ void ReplyGuard<Item>::attach(Machine<Item>& inner, const Unit& unit, const Opti
 template <class Item>
 void ReplyGuard<Item>::close() {
   const bool looked_after = phase_ == Phase::asking || phase_ == Phase::holding;  // and the conversation left
-  if (looked_after || (open_ && (!heard_ || doubtful_))) owe();
+  if (looked_after || (open_ && (!heard_ || doubtful_))) owed_.add(request_, expect_, sent_at_);
   open_ = false;
   phase_ = Phase::passing;
 }
@@ -71,62 +41,7 @@ bool ReplyGuard<Item>::is_request(const Step<Item>& step) const {
   using Kind = typename Step<Item>::Kind;
   if (step.kind == Kind::pulse) return step.line == Line::trigger;
   if (step.kind != Kind::transfer || step.out.empty() || step.out.size() > Request::capacity()) return false;
-  return unit_->answered == nullptr || unit_->answered(*options_, to_frame(step.out));
-}
-
-template <class Item>
-bool ReplyGuard<Item>::is_reply(std::span<const Item> request, std::span<const Item> reply) const {
-  Nowhere nowhere;
-  return unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) == Error::none;
-}
-
-// Others send on a CAN bus too; a frame that is wrong may still be the answer.
-template <class Item>
-bool ReplyGuard<Item>::concerns(std::span<const Item> request, std::span<const Item> reply) const {
-  Nowhere nowhere;
-  return !is_can || unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) != Error::unexpected_reply;
-}
-
-template <class Item>
-auto ReplyGuard<Item>::find(std::span<const Item> request) -> Owed* {
-  for (std::size_t i = 0; i < owed_.size(); ++i) {
-    if (equal(owed_[i].request.view(), request)) return &owed_[i];
-  }
-  return nullptr;
-}
-
-template <class Item>
-auto ReplyGuard<Item>::owed_to(std::span<const Item> reply) -> Owed* {
-  for (std::size_t i = 0; i < owed_.size(); ++i) {
-    if (is_reply(owed_[i].request, reply)) return &owed_[i];
-  }
-  return nullptr;
-}
-
-// The last request.
-template <class Item>
-void ReplyGuard<Item>::owe() {
-  Owed* owed = find(request_);
-  if (owed == nullptr) {
-    owed_.push_back({.request = request_, .expect = expect_});
-    owed = &owed_[owed_.size() - 1];
-  }
-  if (!owed->sent_at.push_back(sent_at_)) {
-    owed->lost_first = oldest(*owed);
-    owed->lost_last = owed->sent_at[0];
-    ++owed->lost;
-    drop_first(owed->sent_at);
-    owed->sent_at.push_back(sent_at_);
-  }
-}
-
-template <class Item>
-void ReplyGuard<Item>::settle(Owed& owed) {
-  Buffer<Owed, most_owed> left;
-  for (std::size_t i = 0; i < owed_.size(); ++i) {
-    if (&owed_[i] != &owed) left.push_back(owed_[i]);
-  }
-  owed_ = left;
+  return owed_.is_answered(step.out);
 }
 
 template <class Item>
@@ -212,21 +127,19 @@ void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
   tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
   pending_ = request;
   reply_.clear();
-  for (std::size_t i = owed_.size(); i-- > 0;) {
-    if (now - newest(owed_[i]) > longest_way) settle(owed_[i]);
-  }
+  owed_.forget(now - longest_way);
   heard_at_ = now - request.gap;
   noise_end_ = never;
   latest_ = std::max(now, request.at) + 4 * longest_wait();
   // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
   until_ = request.at > now + 1ms ? request.at : now + tick;
-  if (owed_.size() == most_owed) {  // no more can be kept apart: a silence ends them all
+  if (owed_.full()) {  // no more can be kept apart: a silence ends them all
     until_ = std::max(until_, sent_at_ + quiet_time());
-  } else if (const Owed* owed = find(request.out)) {
+  } else if (const Owed* owed = owed_.find(request.out)) {
     // Who has not answered twice, on a line where nothing came late, is not there.
-    const bool absent = lateness_ == Time{} && owed->lost + owed->sent_at.size() > 1;
+    const bool absent = lateness_ == Time{} && owed->count() > 1;
     const Time quiet = lateness_ == Time{} ? quiet_time() / 2 : quiet_time();
-    if (!absent) until_ = std::max(until_, newest(*owed) + quiet);
+    if (!absent) until_ = std::max(until_, owed->newest() + quiet);
   }
   phase_ = Phase::before;
 }
@@ -237,14 +150,10 @@ Step<Item> ReplyGuard<Item>::send(Time now) {
   request_.append(pending_.out);
   expect_ = pending_.expect;
   asked_ = true;
-  if (owed_.size() == most_owed) owed_.clear();
-  if (Owed* const owed = find(request_)) {
-    owed->lost_last = newest(*owed);
-    owed->lost_first = std::max(oldest(*owed), owed->lost_last - longest_wait());
-    owed->lost += static_cast<unsigned>(owed->sent_at.size());
-    owed->sent_at.clear();
-  }
+  if (owed_.full()) owed_.clear();
+  owed_.sent_again(request_, longest_wait());
   reply_.clear();
+  stranger_.clear();
   damaged_ = false;
   sent_at_ = received_at_ = now;
   if (owed_.empty()) {
@@ -279,11 +188,11 @@ template <class Item>
 void ReplyGuard<Item>::feed_passing(const Event<Item>& event) {
   using Kind = typename Event<Item>::Kind;
   if (event.kind == Kind::sent) sent_at_ = event.at;
-  if (event.kind == Kind::received && open_) heard_ = heard_ || concerns(request_, event.items);
+  if (event.kind == Kind::received && open_) heard_ = heard_ || owed_.concerns(request_, event.items);
   if constexpr (is_can) {
     // Whoever only listens is not answered: what comes of that was owed to others.
     if (event.kind == Kind::received && !open_ && !owed_.empty()) {
-      if (Owed* const owed = owed_to(event.items)) return count_late(owed, event.at);
+      if (Owed* const owed = owed_.owed_to(event.items)) return count_late(owed, event.at);
     }
   }
   if (event.kind == Kind::silence && open_ && !heard_) limit_ = std::max(limit_, event.at - sent_at_);
@@ -319,7 +228,10 @@ void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
   for (const Item& item : items) {
     if constexpr (is_can) {
       const std::span<const Item> one(&item, 1);
-      if (!concerns(request_, one) && owed_to(one) == nullptr) continue;
+      if (!owed_.concerns(request_, one) && owed_.owed_to(one) == nullptr) {
+        keep_stranger(item);
+        continue;
+      }
     }
     if (reply_.empty()) first_at_ = at;
     reply_.push_back(item);
@@ -330,7 +242,16 @@ void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
   // Where the length is not known silence ends the reply: some begin with what is one already.
   const std::size_t expected = is_can ? 1 : pending_.expect;
   if (expected == 0 || reply_.size() < expected) return;
-  if (is_reply(request_, reply_) || owed_to(reply_) != nullptr) conclude_asking(false);
+  if (owed_.is_reply(request_, reply_) || owed_.owed_to(reply_) != nullptr) conclude_asking(false);
+}
+
+template <class Item>
+void ReplyGuard<Item>::keep_stranger(const Item& item) {
+  if constexpr (is_can) {
+    CanFrame plain = item;
+    plain.extended = false;
+    if (item.extended && owed_.concerns(request_, std::span(&plain, 1))) stranger_.push_back(item);
+  }
 }
 
 // What begins with the reply to another request is that, and what is behind it may be this one's.
@@ -339,7 +260,8 @@ void ReplyGuard<Item>::strip_late(Time at) {
   for (std::size_t i = 0; i < owed_.size();) {
     const std::size_t size = owed_[i].expect;
     const std::span<const Item> start = reply_.view().first(std::min(size, reply_.size()));
-    if (size == 0 || start.size() < size || !is_reply(owed_[i].request, start) || is_reply(request_, start)) {
+    if (size == 0 || start.size() < size || !owed_.is_reply(owed_[i].request, start) ||
+        owed_.is_reply(request_, start)) {
       ++i;
       continue;
     }
@@ -358,21 +280,14 @@ void ReplyGuard<Item>::count_late(Owed* owed, Time at) {
   lateness_ = std::max(lateness_, std::min(at - sent_at, longest_way));
   if (phase_ == Phase::holding) lateness_ = std::max(lateness_, suspected_);  // another one comes: it was
   latest_reply_ = std::max(latest_reply_, lateness_);
-  if (owed == nullptr) return;
-  // It may be one that was taken for lost: then the one of the next is still to come.
-  if (owed->lost != 0) {
-    --owed->lost;
-  } else {
-    drop_first(owed->sent_at);
-  }
-  if (owed->lost == 0 && owed->sent_at.empty()) settle(*owed);
+  if (owed != nullptr) owed_.came(*owed);
 }
 
 template <class Item>
 void ReplyGuard<Item>::conclude_asking(bool silent) {
   if (!reply_.empty()) {
-    if (const Owed* owed = owed_to(reply_)) {
-      suspected_ = first_at_ - oldest(*owed);
+    if (const Owed* owed = owed_.owed_to(reply_)) {
+      suspected_ = first_at_ - owed->oldest();
       until_ = std::min(sent_at_ + std::clamp(suspected_ * 5 / 4, quiet_time(), longest_wait()), latest_);
       reply_.clear();
       phase_ = Phase::holding;
@@ -380,13 +295,14 @@ void ReplyGuard<Item>::conclude_asking(bool silent) {
     }
   }
   phase_ = Phase::passing;
+  open_ = true;
+  heard_ = !reply_.empty();
+  if (!heard_) reply_ = stranger_;
   tell_sent_ = true;
   tell_error_ = damaged_;
   tell_reply_ = !reply_.empty();
-  tell_silence_ = silent || reply_.empty();
-  open_ = true;
-  heard_ = !reply_.empty();
-  doubtful_ = !(heard_ && !damaged_ && is_reply(request_, reply_));
+  tell_silence_ = silent || !heard_;
+  doubtful_ = !(heard_ && !damaged_ && owed_.is_reply(request_, reply_));
   if (!doubtful_) owed_.clear();  // the line keeps the order: whatever was to come before this has come, or is lost
 }
 
@@ -412,9 +328,9 @@ void ReplyGuard<Item>::take_late(std::span<const Item> items, Time at) {
 template <class Item>
 void ReplyGuard<Item>::pause_late(Time at) {
   if (reply_.empty()) return;
-  if (Owed* const owed = owed_to(reply_)) {
+  if (Owed* const owed = owed_.owed_to(reply_)) {
     end_late(owed, at);
-  } else if (!is_can && asked_ && is_reply(request_, reply_)) {
+  } else if (!is_can && asked_ && owed_.is_reply(request_, reply_)) {
     end_late(nullptr, at);
   }
   reply_.clear();
@@ -423,7 +339,7 @@ void ReplyGuard<Item>::pause_late(Time at) {
 template <class Item>
 bool ReplyGuard<Item>::ends_with_reply(std::span<const Item> request, std::size_t expect) const {
   const std::size_t size = is_can ? 1 : expect;
-  return size != 0 && reply_.size() >= size && is_reply(request, reply_.view().last(size));
+  return size != 0 && reply_.size() >= size && owed_.is_reply(request, reply_.view().last(size));
 }
 
 template <class Item>
@@ -431,7 +347,7 @@ void ReplyGuard<Item>::end_late(Owed* owed, Time at) {
   reply_.clear();
   count_late(owed, at);
   if (phase_ == Phase::before) {
-    if (owed == nullptr) owe();
+    if (owed == nullptr) owed_.add(request_, expect_, sent_at_);
     if (owed_.empty()) {
       until_ = std::max(at + pending_.gap, pending_.at);
       return;

@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <type_traits>
 
 #include "absenc/core/bytes.hpp"
+#include "absenc/host/owed_replies.hpp"
 #include "absenc/link/step.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -44,21 +44,10 @@ class ReplyGuard final : public Machine<Item> {
   [[nodiscard]] Time lateness() const { return latest_reply_; }
 
  private:
-  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
-  static constexpr std::size_t most_owed = 8;
-  using Request = Buffer<Item, is_can ? 1 : 16>;
+  static constexpr bool is_can = OwedReplies<Item>::is_can;
+  using Request = typename OwedReplies<Item>::Request;
+  using Owed = typename OwedReplies<Item>::Owed;
   using Reply = Buffer<Item, is_can ? 1 : 64>;
-
-  /// Equal requests that were not answered.
-  struct Owed {
-    Request request;
-    std::size_t expect = 0;     // items of the reply, 0 where that is not known before
-    Buffer<Time, 4> sent_at{};  // of each, the oldest first
-    // After these the line was quiet for so long that their replies are lost, most likely: the first and the last.
-    Time lost_first{};
-    Time lost_last{};
-    unsigned lost = 0;
-  };
 
   enum class Phase : std::uint8_t {
     passing,  // the conversation is on the line itself
@@ -69,12 +58,6 @@ class ReplyGuard final : public Machine<Item> {
 
   void close();
   [[nodiscard]] bool is_request(const Step<Item>& step) const;
-  [[nodiscard]] bool is_reply(std::span<const Item> request, std::span<const Item> reply) const;
-  [[nodiscard]] bool concerns(std::span<const Item> request, std::span<const Item> reply) const;
-  [[nodiscard]] Owed* find(std::span<const Item> request);
-  [[nodiscard]] Owed* owed_to(std::span<const Item> reply);
-  void owe();
-  void settle(Owed& owed);
   [[nodiscard]] Time quiet_time() const;
   [[nodiscard]] Time longest_wait() const;
 
@@ -85,6 +68,7 @@ class ReplyGuard final : public Machine<Item> {
   void feed_passing(const Event<Item>& event);
   void feed_asking(const Event<Item>& event);
   void take(std::span<const Item> items, Time at);
+  void keep_stranger(const Item& item);
   void strip_late(Time at);
   void count_late(Owed* owed, Time at);
   void take_late(std::span<const Item> items, Time at);
@@ -95,8 +79,6 @@ class ReplyGuard final : public Machine<Item> {
   Step<Item> end_holding(Time now);
 
   Machine<Item>* inner_ = nullptr;
-  const Unit* unit_ = nullptr;
-  const Options* options_ = nullptr;
   bool may_repeat_ = false;
 
   Phase phase_ = Phase::passing;
@@ -117,7 +99,8 @@ class ReplyGuard final : public Machine<Item> {
   Time noise_end_ = never;
   Time suspected_{};  // holding: how late what came is, if it is
 
-  Reply reply_{};  // asking: what came; before and holding: the end of it
+  Reply reply_{};     // asking: what came; before and holding: the end of it
+  Reply stranger_{};  // asking: what would be a reply but for its identifier of 29 bits: it explains a silence
   bool damaged_ = false;
   // What the conversation is still to be told.
   bool tell_sent_ = false;
@@ -125,7 +108,7 @@ class ReplyGuard final : public Machine<Item> {
   bool tell_reply_ = false;
   bool tell_silence_ = false;
 
-  Buffer<Owed, most_owed> owed_{};
+  OwedReplies<Item> owed_;
   Time limit_{};     // the longest that was waited for a reply in vain
   Time lateness_{};  // that is allowed for: fades
   Time latest_reply_{};
