@@ -31,7 +31,7 @@ def read_csv(path):
     """The header and the rows of a recording; every line must be whole."""
     with open(path, encoding="utf-8", newline="") as file:
         text = file.read()
-    if not text.endswith("\n"):
+    if text and not text.endswith("\n"):
         raise AssertionError(f"the last line is cut: {text[-80:]!r}")
     lines = text.splitlines()
     header = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# ") and ": " in line)

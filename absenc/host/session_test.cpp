@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdio>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "absenc/protocol/all.hpp"
@@ -227,6 +228,30 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   const auto before = bench.device->answered();
   EXPECT_EQ(bench.read().error(), Error::none);
   EXPECT_EQ(bench.device->answered(), before + 3);  // the first could have been the late reply to one of before
+}
+
+// What explains the silence is told after each attempt, also when a late reply may still come.
+TEST(Session, AReplyWithTheWrongKindOfIdentifierExplainsASilence) {
+  struct Extended final : Machine<CanFrame> {
+    void feed(const Event<CanFrame>& event) override {
+      if (event.kind == Event<CanFrame>::Kind::received) due = true;
+    }
+    Step<CanFrame> next(Time) override {
+      if (!std::exchange(due, false)) return {.at = never};
+      return {.kind = Step<CanFrame>::Kind::transfer, .out = {&reply, 1}};
+    }
+    CanFrame reply{.id = 0x120, .extended = true, .size = 8};
+    bool due = false;
+  };
+  const Unit& unit = *find_unit("raa38-can");
+  Options options;
+  ASSERT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
+  Extended device;
+  sim::SimPort<CanFrame> port(unit.link, unit.line.with_some_rate(), device);
+  std::vector<std::byte> storage(unit.host_storage);
+  Session<CanFrame> session(unit, options, port, storage, EchoMode::automatic);
+  EXPECT_EQ(session.read(*find_command(unit, Verb::read))->error(), Error::unexpected_reply);
+  EXPECT_GT(session.counters().repeated, 0u);
 }
 
 TEST(Session, AnInvalidPositionIsNeverConfirmed) {
