@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "absenc/capture/annotate.hpp"
+#include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 #include "absenc/protocol/tformat/unit.hpp"
 

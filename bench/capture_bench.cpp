@@ -17,7 +17,7 @@
 #include <thread>
 #include <vector>
 
-#include "absenc/capture/pipeline.hpp"
+#include "absenc/capture/lines/pipeline.hpp"
 
 namespace {
 

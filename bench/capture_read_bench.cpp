@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "absenc/capture/open.hpp"
+#include "absenc/capture/files/open.hpp"
 #include "bench/ratio.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "absenc/protocol/raa38/serial_stream.hpp"
+#include "absenc/protocol/raa38/serial/stream.hpp"
 #include "absenc/sim/random.hpp"
 #include "bench/ratio.hpp"
 

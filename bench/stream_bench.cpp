@@ -23,7 +23,7 @@
 #include "absenc/os/process.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/protocol/raa38/serial_frame.hpp"
+#include "absenc/protocol/raa38/serial/frame.hpp"
 #include "absenc/protocol/raa38/unit.hpp"
 
 namespace {

@@ -14,7 +14,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "absenc/capture/drawing.hpp"
+#include "absenc/capture/annotate/drawing.hpp"
 #include "absenc/protocol/biss/bench_test.hpp"
 #include "absenc/protocol/ssi/device.hpp"
 #include "absenc/protocol/ssi/host.hpp"

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "absenc/capture/can_line.hpp"
+#include "absenc/capture/lines/can_line.hpp"
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/reading_text.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "absenc/capture/annotation.hpp"
+#include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::tool {

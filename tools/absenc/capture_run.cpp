@@ -9,12 +9,12 @@
 #include <thread>
 #include <utility>
 
-#include "absenc/capture/annotate.hpp"
-#include "absenc/capture/annotate_frames.hpp"
-#include "absenc/capture/blocks.hpp"
-#include "absenc/capture/can_line.hpp"
-#include "absenc/capture/open.hpp"
-#include "absenc/capture/pipeline.hpp"
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotate_frames.hpp"
+#include "absenc/capture/files/open.hpp"
+#include "absenc/capture/lines/blocks.hpp"
+#include "absenc/capture/lines/can_line.hpp"
+#include "absenc/capture/lines/pipeline.hpp"
 #include "tools/absenc/annotation_text.hpp"
 #include "tools/absenc/capture_channels.hpp"
 #include "tools/absenc/error.hpp"

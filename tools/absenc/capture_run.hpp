@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "absenc/capture/annotate.hpp"
-#include "absenc/capture/annotation.hpp"
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/capture/signal.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "tools/absenc/subcommand.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "absenc/capture/annotation.hpp"
+#include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/host/statistics.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "tools/absenc/annotation_text.hpp"

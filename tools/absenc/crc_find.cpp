@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "absenc/capture/crc_search.hpp"
+#include "absenc/capture/search/crc_search.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/json.hpp"
 #include "tools/absenc/output.hpp"

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "absenc/capture/stream.hpp"
+#include "absenc/capture/search/stream.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "absenc/capture/hypotheses.hpp"
+#include "absenc/capture/search/hypotheses.hpp"
 #include "tools/absenc/encoder_uri.hpp"
 
 namespace absenc::tool {

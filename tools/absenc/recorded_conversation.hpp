@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "absenc/capture/evidence.hpp"
+#include "absenc/capture/search/evidence.hpp"
 #include "absenc/link/step.hpp"
 
 namespace absenc::tool {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string_view>
 
-#include "absenc/capture/annotation.hpp"
+#include "absenc/capture/annotate/annotation.hpp"
 
 namespace absenc::tool {
 

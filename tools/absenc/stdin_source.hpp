@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "absenc/capture/source.hpp"
+#include "absenc/capture/files/source.hpp"
 
 namespace absenc::tool {
 

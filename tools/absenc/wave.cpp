@@ -11,7 +11,7 @@
 #include <sstream>
 #include <vector>
 
-#include "absenc/capture/drawing.hpp"
+#include "absenc/capture/annotate/drawing.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/capture/annotate/annotate_frames.hpp"
+
+#include <algorithm>
+
+namespace absenc::capture {
+
+// ---- Bursts
+
+// Without the clocks that show the idle line before the first bit.
+Frame BurstAnnotator::word_of(const Burst& burst) {
+  const std::size_t idle = judge_.unit().line.idle_clocks;
+  if (idle == 0 || burst.bits <= idle) return {.bytes = burst.in, .bits = burst.bits};
+  const std::size_t bits = burst.bits - idle;
+  shifted_.assign((bits + 7) / 8, 0);
+  for (std::size_t i = 0; i < bits; ++i) {
+    const std::size_t from = i + idle;
+    const unsigned bit = burst.in[from / 8] >> (7 - from % 8) & 1u;
+    shifted_[i / 8] = static_cast<std::uint8_t>(shifted_[i / 8] | bit << (7 - i % 8));
+  }
+  return {.bytes = shifted_, .bits = bits};
+}
+
+void BurstAnnotator::put(const Burst& burst) {
+  if (burst.bits == 0) return;
+  Annotation annotation{.kind = Annotation::Kind::reply, .begin = burst.begin, .end = burst.end};
+  if (judge_.unit().link == LinkKind::clocked) {
+    annotation.reply = word_of(burst);
+    annotation.error = judge_.decode({}, annotation.reply);
+  } else {
+    decode_exchange(burst, annotation);
+  }
+  if (annotation.error == Error::none) {
+    annotation.reading = judge_.reading();
+  } else if (burst.cut) {
+    annotation.error = Error::none;
+    annotation.remark = Remark::cut;
+  }
+  sink_.put(annotation);
+}
+
+void BurstAnnotator::decode_exchange(const Burst& burst, Annotation& annotation) {
+  annotation.reply.bytes = burst.in;
+  if (!burst.out.empty()) {
+    annotation.kind = Annotation::Kind::exchange;
+    const std::size_t size = judge_.request_size(burst.out);
+    annotation.request.bytes = size != 0 ? Bytes(burst.out).first(size) : Bytes(burst.out);
+  }
+  annotation.error = judge_.decode(annotation.request, annotation.reply);
+  // A host may clock on behind the frame.
+  const std::size_t size = judge_.frame_size(Direction::reply, burst.in);
+  const Frame shorter{.bytes = Bytes(burst.in).first(size)};
+  if (annotation.error != Error::none && size != 0 && judge_.decode(annotation.request, shorter) == Error::none) {
+    annotation.reply = shorter;
+    annotation.error = Error::none;
+  }
+  if (burst.bits % 8 != 0) annotation.error = Error::bad_framing;
+}
+
+// ---- CAN
+
+void CanAnnotator::put(const CanRecord& record) {
+  using Kind = Annotation::Kind;
+  while (waiting_ != 0 && record.at > asked_[0].at + ticks_.limit) give_up(0, Remark::unanswered);
+  if (record.error_frame) return tell(Kind::noise, record, Error::bad_framing, Remark::damaged);
+  if (answers(record)) return;
+  const Frame frame{.bytes = record.frame.bytes(), .can = &record.frame};
+  const Error as_reply = judge_.decode({}, frame);
+  if (as_reply == Error::none) return tell(Kind::reply, record, Error::none, Remark::none, judge_.reading());
+  if (judge_.decode(frame, {}) != Error::none) {
+    return answers_badly(record) ? void() : tell(Kind::noise, record, as_reply, Remark::none);
+  }
+  if (!judge_.answered(frame)) return tell(Kind::request, record, Error::none, Remark::none);
+  end_waits(record.frame);
+  if (waiting_ == capacity) give_up(0, Remark::unanswered);
+  asked_[waiting_++] = record;
+}
+
+void CanAnnotator::finish(Tick end) {
+  while (waiting_ != 0) give_up(0, end > asked_[0].at + ticks_.limit ? Remark::unanswered : Remark::cut);
+}
+
+// Which of the waiting requests this frame answers: the oldest that takes it.
+bool CanAnnotator::answers(const CanRecord& record) {
+  const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
+  for (std::size_t i = 0; i < waiting_; ++i) {
+    const Frame request{.bytes = asked_[i].frame.bytes(), .can = &asked_[i].frame};
+    if (judge_.decode(request, reply) != Error::none) continue;
+    answer(i, record, Error::none);
+    return true;
+  }
+  return false;
+}
+
+// The same of a frame that is no good reply to anything: the newest that it would answer if it were.
+bool CanAnnotator::answers_badly(const CanRecord& record) {
+  const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
+  for (std::size_t i = waiting_; i-- > 0;) {
+    const Error error = judge_.decode({.bytes = asked_[i].frame.bytes(), .can = &asked_[i].frame}, reply);
+    if (error == Error::unexpected_reply) continue;
+    answer(i, record, error);
+    return true;
+  }
+  return false;
+}
+
+// Who asks the same encoder again has given the reply before up: what comes now answers the new request.
+void CanAnnotator::end_waits(const CanFrame& request) {
+  for (std::size_t i = 0; i < waiting_;) {
+    const CanFrame& asked = asked_[i].frame;
+    const bool same = asked.id == request.id && asked.extended == request.extended;
+    if (same) {
+      give_up(i, Remark::unanswered);
+    } else {
+      ++i;
+    }
+  }
+}
+
+void CanAnnotator::answer(std::size_t index, const CanRecord& record, Error error) {
+  const CanRecord asked = take(index);
+  sink_.put({.kind = Annotation::Kind::exchange,
+             .error = error,
+             .begin = asked.at,
+             .end = record.at,
+             .request = {.bytes = asked.frame.bytes(), .can = &asked.frame},
+             .reply = {.bytes = record.frame.bytes(), .can = &record.frame},
+             .reading = error == Error::none ? judge_.reading() : nullptr,
+             .turnaround = record.at - asked.at});
+}
+
+CanRecord CanAnnotator::take(std::size_t index) {
+  const CanRecord asked = asked_[index];
+  const auto first = asked_.begin() + static_cast<std::ptrdiff_t>(index);
+  std::copy(first + 1, asked_.begin() + static_cast<std::ptrdiff_t>(waiting_), first);
+  --waiting_;
+  return asked;
+}
+
+void CanAnnotator::tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
+                        const Reading* reading) {
+  Annotation annotation{
+      .kind = kind, .remark = remark, .error = error, .begin = record.at, .end = record.at, .reading = reading};
+  const Frame frame{.bytes = record.frame.bytes(), .can = &record.frame};
+  (kind == Annotation::Kind::request ? annotation.request : annotation.reply) = frame;
+  sink_.put(annotation);
+}
+
+void CanAnnotator::give_up(std::size_t index, Remark remark) {
+  const CanRecord asked = take(index);
+  tell(Annotation::Kind::request, asked, remark == Remark::cut ? Error::none : Error::timeout, remark);
+}
+
+}  // namespace absenc::capture

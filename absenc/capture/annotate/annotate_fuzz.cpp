@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any bytes with any pauses as the characters of any line: each belongs to exactly one annotation, and what is called
+// good is.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace {
+
+using namespace absenc;
+using namespace absenc::capture;
+
+constexpr Tick length = 10;
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+struct Nowhere final : FieldSink {
+  void put(const FieldValue&) override {}
+};
+
+struct Check final : AnnotationSink {
+  Check(const Unit& one, const Options& its) : unit(one), options(its) {}
+
+  void put(const Annotation& annotation) override {
+    require(annotation.begin <= annotation.end);
+    require(annotation.reading == nullptr || annotation.error == Error::none);
+    const bool is_echo = annotation.remark == Remark::echo;
+    bytes += annotation.request.bytes.size() * (is_echo ? 2 : 1) + annotation.reply.bytes.size();
+    if (annotation.error != Error::none || annotation.remark == Remark::cut) return;
+    if (annotation.remark == Remark::undocumented) return;
+    Nowhere nowhere;
+    require(unit.decode(options, annotation.request, annotation.reply, nowhere) == Error::none);
+  }
+  const Unit& unit;
+  const Options& options;
+  std::size_t bytes = 0;
+};
+
+void annotate(const Unit& unit, const Options& options, Annotator::Settings settings, Bytes data, bool pauses,
+              std::size_t times) {
+  Check check(unit, options);
+  const auto annotator = std::make_unique<Annotator>(unit, options, settings, check);
+  Tick at = length;
+  for (std::size_t i = 0; i < times * data.size(); ++i) {
+    const std::uint8_t byte = data[i % data.size()];
+    const auto channel = static_cast<std::uint8_t>(settings.channel_count == 2 ? byte >> 3 & 1 : 0);
+    annotator->put({.begin = at, .end = at + length, .value = byte, .channel = channel, .bad_stop = i % 61 == 60});
+    at += length + (pauses && byte % 5 == 0 ? byte % 32 : 0);
+  }
+  annotator->finish(at);
+  require(check.bytes == times * data.size() || times * data.size() > Exchanges::Asked::capacity);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const Bytes bytes(data, size);
+  for (const Unit* unit : all_units()) {
+    if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
+    Options options;
+    static_cast<void>(resolve_options(*unit, {}, {}, options));
+    Annotator::Settings settings;
+    settings.ticks = {.pause = length / 2, .character = length, .turnaround = 3, .limit = 20};
+    for (const Carries carries : {Carries::both, Carries::requests, Carries::replies}) {
+      settings.channels[0] = carries;
+      settings.begins_silent = carries == Carries::both;
+      annotate(*unit, options, settings, bytes, true, 1);
+    }
+    settings.channels = {Carries::one, Carries::one};
+    settings.channel_count = 2;
+    annotate(*unit, options, settings, bytes, true, 1);
+    if (size % 16 != 5) continue;  // seldom, because it takes long: a line that never pauses
+    settings.channels[0] = Carries::both;
+    settings.channel_count = 1;
+    annotate(*unit, options, settings, bytes, false, 1 + 2 * Run::capacity / size);
+  }
+  return 0;
+}

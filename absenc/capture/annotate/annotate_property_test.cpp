@@ -1,0 +1,396 @@
+// SPDX-License-Identifier: Apache-2.0
+// Thousands of random exchanges of every unit with faults, as they would be captured: the annotator, which is told
+// neither who speaks nor where a frame begins, finds each with its error, exactly where it was.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotate_frames.hpp"
+#include "absenc/capture/annotate/conversation_test.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::capture {
+namespace {
+
+using testing::Said;
+using testing::Talk;
+using testing::Talker;
+using Kind = Annotation::Kind;
+using Wire = std::vector<std::uint8_t>;
+
+/// An annotation that owns what it has.
+struct Kept {
+  Kind kind;
+  Remark remark;
+  Error error;
+  Tick begin;
+  Tick end;
+  Wire request;
+  Wire reply;
+  std::optional<Reading> reading;
+  std::optional<Tick> turnaround;
+};
+
+struct Keeper final : AnnotationSink {
+  void put(const Annotation& annotation) override {
+    kept.push_back({annotation.kind, annotation.remark, annotation.error, annotation.begin, annotation.end,
+                    Wire(annotation.request.bytes.begin(), annotation.request.bytes.end()),
+                    Wire(annotation.reply.bytes.begin(), annotation.reply.bytes.end()),
+                    annotation.reading == nullptr ? std::nullopt : std::optional(*annotation.reading),
+                    annotation.turnaround});
+  }
+  std::vector<Kept> kept;
+};
+
+std::string to_text(const Wire& bytes) {
+  std::string text;
+  for (const std::uint8_t byte : bytes) {
+    for (const int nibble : {byte >> 4, byte & 15}) text += "0123456789ABCDEF"[nibble];
+  }
+  return text;
+}
+
+std::string to_text(const Kept& one) {
+  return std::to_string(one.begin) + ".." + std::to_string(one.end) + " kind " +
+         std::to_string(static_cast<int>(one.kind)) + " " + to_text(one.request) + " -> " + to_text(one.reply) + " " +
+         std::string(text_of(one.error).name) + " " + std::string(text_of(one.remark)) +
+         (one.reading ? " position " + std::to_string(one.reading->singleturn) : "") +
+         (one.turnaround ? " after " + std::to_string(*one.turnaround) : "");
+}
+
+// ---- What should be found, from who said what
+
+class Truth {
+ public:
+  Truth(const Unit& unit, const Options& options) : judge_(unit, options), limit_(unit.timing.turnaround_limit) {}
+
+  void add(const std::vector<Said>& said) {
+    for (std::size_t i = 0; i < said.size(); ++i) {
+      if (said[i].by == sim::Role::device) {
+        unasked(said[i]);
+        continue;
+      }
+      if (i + 1 < said.size() && said[i + 1].by == sim::Role::device) {
+        answered(said[i], said[i + 1]);
+        ++i;
+      } else {
+        const bool bad = judge_.decode({.bytes = said[i].bytes}, {}) != Error::none;
+        const bool may = !bad && !judge_.answered({.bytes = said[i].bytes});
+        add(Kind::request, may ? Remark::none : Remark::unanswered, may ? Error::none : Error::timeout, said[i], {});
+      }
+    }
+  }
+  void add(const Burst& burst, const Unit& unit) {
+    const std::size_t idle = unit.link == LinkKind::clocked ? unit.line.idle_clocks : 0;
+    Wire bits((burst.bits - idle + 7) / 8);
+    for (std::size_t i = idle; i < burst.bits; ++i) {
+      const unsigned bit = burst.in[i / 8] >> (7 - i % 8) & 1u;
+      bits[(i - idle) / 8] = static_cast<std::uint8_t>(bits[(i - idle) / 8] | bit << (7 - (i - idle) % 8));
+    }
+    const bool clocked = unit.link == LinkKind::clocked;
+    const Frame request{.bytes = clocked ? Bytes{} : Bytes(burst.out).first(2)};
+    Error error = judge_.decode(request, {.bytes = bits, .bits = clocked ? burst.bits - idle : 0});
+    // A host may clock on behind a frame.
+    const std::size_t size = clocked ? 0 : judge_.frame_size(Direction::reply, bits);
+    if (error != Error::none && size != 0 &&
+        judge_.decode(request, {.bytes = Bytes(bits).first(size)}) == Error::none) {
+      error = Error::none;
+      bits.resize(size);
+    }
+    expected.push_back({clocked ? Kind::reply : Kind::exchange,
+                        Remark::none,
+                        error,
+                        burst.begin,
+                        burst.end,
+                        Wire(request.bytes.begin(), request.bytes.end()),
+                        bits,
+                        reading(error),
+                        {}});
+  }
+
+  std::vector<Kept> expected;
+
+ private:
+  std::optional<Reading> reading(Error error) {
+    return error == Error::none && judge_.reading() != nullptr ? std::optional(*judge_.reading()) : std::nullopt;
+  }
+
+  void add(Kind kind, Remark remark, Error error, const Said& said, std::optional<Reading> read) {
+    Kept one{kind, remark, error, said.begin, said.end, {}, {}, read, {}};
+    (kind == Kind::request ? one.request : one.reply) = said.bytes;
+    expected.push_back(one);
+  }
+
+  void unasked(const Said& said) {
+    const Error error = judge_.decode({}, {.bytes = said.bytes});
+    add(Kind::reply, Remark::none, error, said, reading(error));
+  }
+
+  void answered(const Said& asked, const Said& said) {
+    Wire reply = said.bytes;
+    Kept one{Kind::exchange, Remark::none, Error::none, asked.begin, said.end, asked.bytes, {}, {}, {}};
+    one.turnaround = said.begin - asked.end;
+    const Tick each = (said.end - said.begin) / reply.size();
+    const auto good = [&](const Wire& bytes) {
+      return judge_.decode({.bytes = asked.bytes}, {.bytes = bytes}) == Error::none;
+    };
+    const Wire half(reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(reply.size() / 2));
+    const Wire second(reply.begin() + static_cast<std::ptrdiff_t>(reply.size() / 2), reply.end());
+    bool twice = half == second && !half.empty() && good(half);
+    if (twice) reply = half;
+    if (twice) one.end = said.begin + each * half.size();
+    if (!good(reply) && reply.size() > asked.bytes.size() &&
+        std::equal(asked.bytes.begin(), asked.bytes.end(), reply.begin())) {
+      const Wire behind(reply.begin() + static_cast<std::ptrdiff_t>(asked.bytes.size()), reply.end());
+      if (good(behind)) {
+        one.remark = Remark::echo;
+        one.turnaround = *one.turnaround + each * asked.bytes.size();
+        reply = behind;
+      }
+    }
+    one.error = judge_.decode({.bytes = asked.bytes}, {.bytes = reply});
+    one.reply = reply;
+    if (one.error == Error::unsupported && !judge_.answered({.bytes = asked.bytes})) {
+      one.error = Error::none;
+      one.remark = Remark::undocumented;
+    }
+    one.reading = reading(one.error);
+    // Nobody can tell whether this is the reply or the request again.
+    if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count()) && one.request == one.reply) {
+      add(Kind::request, Remark::unanswered, Error::timeout, asked, {});
+      return add(Kind::request, Remark::unanswered, Error::timeout, said, {});
+    }
+    if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count())) {
+      one.error = Error::timeout;
+      one.remark = Remark::late;
+      one.reading.reset();
+    }
+    expected.push_back(one);
+    if (twice) {
+      const Said rest{said.by, half, one.end, said.end};
+      add(Kind::reply, Remark::repeated, Error::unexpected_reply, rest, {});
+    }
+  }
+
+  Judge judge_;
+  Time limit_;
+};
+
+// ---- The comparison
+
+// Every good exchange as it was, and an error wherever one was. What several faults have made may look like something
+// else than it was: of the bad ones, `share` must be found as they were.
+void expect_same(const std::vector<Kept>& found, const std::vector<Kept>& expected, double share = 1) {
+  std::size_t next = 0;
+  std::size_t bad = 0;
+  std::size_t exact = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const Kept& one = expected[i];
+    const std::string context =
+        std::to_string(i) + " " + to_text(one) + (i == 0 ? "" : "\nbefore: " + to_text(expected[i - 1]));
+    ASSERT_LT(next, found.size()) << context;
+    if (one.error == Error::none) {
+      ASSERT_EQ(to_text(found[next++]), to_text(one)) << context;
+      continue;
+    }
+    ++bad;
+    if (to_text(found[next]) == to_text(one)) {
+      ++exact;
+      ++next;
+      continue;
+    }
+    if (share == 1) ADD_FAILURE() << context << "\nfound " << to_text(found[next]);
+    const std::size_t first = next;
+    bool has_error = false;
+    // A host may ask again while a doubled reply is still coming: what is found as it was is not part of this one.
+    const std::string following = i + 1 < expected.size() ? to_text(expected[i + 1]) : "";
+    for (; next < found.size() && found[next].begin >= one.begin && found[next].end <= one.end; ++next) {
+      if (to_text(found[next]) == following) break;
+      has_error = has_error || found[next].error != Error::none;
+    }
+    ASSERT_TRUE(has_error) << context << "\nfound " << to_text(found[first]);
+  }
+  EXPECT_EQ(next, found.size());
+  EXPECT_GE(static_cast<double>(exact), share * static_cast<double>(bad)) << "of " << bad;
+}
+
+std::vector<const Unit*> units_with(bool characters) {
+  std::vector<const Unit*> units;
+  for (const Unit* unit : all_units()) {
+    const bool is = unit->link == LinkKind::half_duplex || unit->link == LinkKind::full_duplex;
+    if (is == characters && unit->link != LinkKind::can) units.push_back(unit);
+  }
+  return units;
+}
+
+sim::FaultRates faults_of(const Unit& unit, const Options& options) {
+  sim::FaultRates rates = sim::testing::damaged_replies(0.05);
+  rates[sim::FaultKind::request_corrupt] = 0.005;
+  rates.delay = unit.timing.turnaround_limit * 3 / 2;
+  // Two frames of a stream are two, however they follow each other.
+  if (unit.streams != nullptr && unit.streams(options)) {
+    rates[sim::FaultKind::repeat] = rates[sim::FaultKind::delay] = 0;
+  }
+  return rates;
+}
+
+Annotator::Settings settings_of(const Unit& unit) {
+  Annotator::Settings settings;
+  settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
+  settings.begins_silent = true;
+  if (unit.link == LinkKind::full_duplex) {
+    settings.channels = {Carries::one, Carries::one};
+    settings.channel_count = 2;
+  }
+  return settings;
+}
+
+std::string name_of(const ::testing::TestParamInfo<const Unit*>& info) {
+  std::string name(info.param->id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+class Characters : public ::testing::TestWithParam<const Unit*> {
+ protected:
+  const Unit& unit = *GetParam();
+  Options options = testing::options_of(unit);
+
+  /// Talks until there are so many exchanges; what a collision has made unreadable is left out.
+  void talk(const sim::FaultRates& rates, std::size_t exchanges, std::uint64_t seed) {
+    Talker talker(unit, options, rates, seed);
+    while (truth.expected.size() < exchanges) {
+      const Talk one = talker.talk();
+      if (one.collided) continue;
+      truth.add(one.said);
+      characters.insert(characters.end(), one.characters.begin(), one.characters.end());
+    }
+    std::stable_sort(characters.begin(), characters.end(),
+                     [](const Character& a, const Character& b) { return a.begin < b.begin; });
+    end = talker.now();
+  }
+  std::vector<Kept> annotate(const Annotator::Settings& settings) const {
+    Keeper keeper;
+    const auto annotator = std::make_unique<Annotator>(unit, options, settings, keeper);
+    for (const Character& character : characters) annotator->put(character);
+    annotator->finish(end);
+    return keeper.kept;
+  }
+
+  Truth truth{unit, options};
+  std::vector<Character> characters;
+  Tick end = 0;
+};
+
+TEST_P(Characters, EveryExchangeWithoutFaults) {
+  talk({}, 2000, 1);
+  for (const Kept& one : truth.expected) ASSERT_EQ(one.error, Error::none) << to_text(one);
+  expect_same(annotate(settings_of(unit)), truth.expected);
+}
+
+TEST_P(Characters, EveryErrorWhereItWas) {
+  talk(faults_of(unit, options), 5000, 2);
+  expect_same(annotate(settings_of(unit)), truth.expected, 0.97);
+  std::map<Error, int> errors;
+  for (const Kept& one : truth.expected) ++errors[one.error];
+  EXPECT_GT(errors.size(), 3u);
+  EXPECT_GT(errors[Error::none], 2000);
+}
+
+// The same when the adapter's own wire, or only one of two, was recorded.
+TEST_P(Characters, OnlyWhatTheEncoderSays) {
+  talk({}, 500, 3);
+  if (unit.link != LinkKind::full_duplex) return;
+  std::erase_if(characters, [](const Character& character) { return character.channel == 0; });
+  for (Character& character : characters) character.channel = 0;
+  Annotator::Settings settings = settings_of(unit);
+  settings.channel_count = 1;
+  settings.channels[0] = Carries::replies;
+  std::size_t positions = 0;
+  for (const Kept& one : annotate(settings)) positions += one.reading ? 1u : 0u;
+  std::size_t expected = 0;
+  for (const Kept& one : truth.expected) expected += one.reading ? 1u : 0u;
+  EXPECT_GE(positions, expected);
+}
+
+// A wrong stop bit makes an exchange bad, and nothing else.
+TEST_P(Characters, DamagedCharacters) {
+  talk({}, 1000, 4);
+  sim::Random random(4);
+  std::vector<Kept> expected = truth.expected;
+  for (Kept& one : expected) {
+    const auto first = std::find_if(characters.begin(), characters.end(),
+                                    [&](const Character& character) { return character.begin >= one.begin; });
+    if (!random.chance(0.1) || one.kind != Kind::exchange || &one == &expected.front()) continue;
+    std::vector<Character*> of_reply;
+    for (auto character = first; character != characters.end() && character->begin < one.end; ++character) {
+      if (character->begin >= one.begin + (one.end - one.begin) / 2) of_reply.push_back(&*character);
+    }
+    if (of_reply.empty()) continue;
+    of_reply.back()->bad_stop = true;
+    one.error = Error::bad_framing;
+    one.remark = Remark::damaged;
+    one.reading.reset();
+  }
+  expect_same(annotate(settings_of(unit)), expected);
+}
+
+// Wherever a capture begins, no frame is found that was not there, and soon all are.
+TEST_P(Characters, BeginsAnywhere) {
+  talk({}, 300, 5);
+  const std::vector<Character> all = characters;
+  std::map<std::pair<Tick, Tick>, const Kept*> there;
+  for (const Kept& one : truth.expected) there[{one.begin, one.end}] = &one;
+  for (std::size_t from = 1; from < std::min<std::size_t>(all.size(), 200); ++from) {
+    characters.assign(all.begin() + static_cast<std::ptrdiff_t>(from), all.end());
+    Annotator::Settings settings = settings_of(unit);
+    settings.begins_silent = false;
+    settings.begin = characters.front().begin - 1;
+    std::size_t missed = 0;
+    std::size_t first = 0;
+    for (const Kept& one : truth.expected) first += one.begin < settings.begin ? 1u : 0u;
+    const std::vector<Kept> found = annotate(settings);
+    for (const Kept& one : found) {
+      if (one.error != Error::none && ++missed == 1) std::printf("%zu: %s\n", from, to_text(one).c_str());
+      if (one.error != Error::none || one.kind != Kind::exchange) continue;
+      const auto known = there.find({one.begin, one.end});
+      ASSERT_NE(known, there.end()) << from << ": " << to_text(one);
+      ASSERT_EQ(to_text(one), to_text(*known->second));
+    }
+    EXPECT_LE(missed, 0u) << from;
+    EXPECT_GE(found.size() + 2, truth.expected.size() - first) << from;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, Characters, ::testing::ValuesIn(units_with(true)), name_of);
+
+// ---- Links that clock
+
+class Bursts : public ::testing::TestWithParam<const Unit*> {};
+
+TEST_P(Bursts, EveryExchange) {
+  const Unit& unit = *GetParam();
+  const Options options = testing::options_of(unit);
+  Talker talker(unit, options, faults_of(unit, options), 6);
+  Truth truth(unit, options);
+  Keeper keeper;
+  BurstAnnotator annotator(unit, options, keeper);
+  while (truth.expected.size() < 5000) {
+    for (const Burst& burst : talker.talk().bursts) {
+      truth.add(burst, unit);
+      annotator.put(burst);
+    }
+  }
+  expect_same(keeper.kept, truth.expected);
+  EXPECT_GT(talker.faulty().damaged_replies(), 100u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, Bursts, ::testing::ValuesIn(units_with(false)), name_of);
+
+}  // namespace
+}  // namespace absenc::capture

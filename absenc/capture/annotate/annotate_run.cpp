@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs to frames: what of a run is a request, what a reply, and how far what is neither goes.
+#include <algorithm>
+
+#include "absenc/capture/annotate/annotate.hpp"
+
+namespace absenc::capture {
+
+namespace {
+
+// So many characters must lie ahead on a line that does not pause: two of the longest frames.
+constexpr std::size_t lookahead = 160;
+
+}  // namespace
+
+// ---- Looking, without taking
+
+Piece Annotator::piece(std::size_t size) const {
+  const Run& run = channel_->run;
+  return {rest(at_).first(size), run.begin(at_), run.end(at_ + size - 1)};
+}
+
+// The size of a good reply, or 0. The pause is the best of all ends, then the size of those before (0: not known):
+// where only a checksum tells the size, a shorter one may be an accident.
+std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usual) {
+  const Bytes bytes = rest(from);
+  const auto is_good = [&](std::size_t size) {
+    return channel_->run.clean(from, size) &&
+           judge_.decode({.bytes = request}, {.bytes = bytes.first(size)}) == Error::none;
+  };
+  if (bytes.empty()) return 0;
+  if (whole_ && bytes.size() <= lookahead && is_good(bytes.size())) return bytes.size();
+  if (usual != 0 && usual <= bytes.size() && is_good(usual)) return usual;
+  const std::size_t size = judge_.frame_size(Direction::reply, bytes);
+  return size != 0 && size <= bytes.size() && is_good(size) ? size : 0;
+}
+
+std::size_t Annotator::request_at(std::size_t from) {
+  const Bytes bytes = rest(from);
+  if (bytes.empty()) return 0;
+  const std::size_t size = judge_.request_size(bytes);
+  return size != 0 && channel_->run.clean(from, size) ? size : 0;
+}
+
+// Whether good frames stand there that belong behind each other: three, or two at the end of the run. One alone, or two
+// with weak checksums, may be an accident.
+bool Annotator::good_from(std::size_t from) {
+  const std::size_t end = channel_->run.size();
+  const auto is_end = [&](std::size_t at) { return whole_ && at == end; };
+  if (channel_->carries != Carries::replies) {
+    const std::size_t first = request_at(from);
+    const bool requests = channel_->carries == Carries::requests;
+    std::size_t second = 0;
+    if (first != 0 && requests) second = request_at(from + first);
+    if (first != 0 && !requests && may_turn(from + first)) {
+      second = reply_at(rest(from).first(first), from + first);
+    }
+    const std::size_t third = from + first + second;
+    if (second != 0 && (is_end(third) || request_at(third) != 0)) return true;
+  }
+  if (channel_->carries == Carries::requests) return false;
+  const std::size_t first = reply_at({}, from);
+  const std::size_t second = first == 0 ? 0 : reply_at({}, from + first);
+  const std::size_t third = from + first + second;
+  return second != 0 && (is_end(third) || reply_at({}, third) != 0);
+}
+
+// Whether another may begin to speak there: it takes him some of the time that the document gives him.
+bool Annotator::may_turn(std::size_t at) const {
+  const Run& run = channel_->run;
+  return at < run.size() && run.begin(at) - std::min(run.begin(at), run.end(at - 1)) >= settings_.ticks.turnaround / 4;
+}
+
+// ---- Taking
+
+std::size_t Annotator::next_frame() {
+  if (!whole_ && channel_->run.size() - at_ <= lookahead) return 0;
+  std::size_t taken = 0;
+  if (channel_->carries != Carries::requests) {
+    taken = answer_here();
+    if (taken == 0) taken = repeated_here();
+  }
+  const auto waiting = exchanges_.waiting();
+  if (taken == 0 && !waiting.empty() && exchanges_.overdue(waiting[0], channel_->run.begin(at_))) {
+    exchanges_.give_up(1);
+  }
+  if (taken == 0 && channel_->carries != Carries::replies) taken = request_here();
+  if (taken == 0 && channel_->carries != Carries::requests) taken = unasked_here();
+  return taken != 0 ? taken : bad_here();
+}
+
+// The newest request that was complete: whoever asks again has given the others up.
+std::optional<std::size_t> Annotator::asked_before(Tick begin) const {
+  const auto waiting = exchanges_.waiting();
+  for (std::size_t i = waiting.size(); i-- > 0;) {
+    if (waiting[i].end <= begin) return i;
+  }
+  return std::nullopt;
+}
+
+std::size_t Annotator::answer_here() {
+  const Tick begin = channel_->run.begin(at_);
+  const std::optional<std::size_t> which = asked_before(begin);
+  if (!which) return 0;
+  const Exchanges::Asked& asked = exchanges_.waiting()[*which];
+  const bool overdue = exchanges_.overdue(asked, begin);
+  if (asked.error != Error::none) {
+    // What was asked is not known, but an encoder answered it.
+    const std::size_t size = overdue ? 0 : reply_at({}, at_);
+    if (size != 0) exchanges_.answer(*which, piece(size), asked.error, asked.remark, nullptr);
+    return size;
+  }
+  std::size_t& usual = reply_sizes_[asked.storage[0]];
+  const std::size_t size = reply_at(asked.bytes(), at_, usual);
+  if (size == 0) return echoed_answer_here(*which);
+  // Some replies are the same as their requests, which nobody answered and which now come again.
+  if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
+  if (whole_ && size < rest(at_).size() && usual != 0 && size != usual && !goes_on(size)) return 0;
+  last_reply_at_ = at_;
+  last_reply_size_ = usual = size;
+  exchanges_.answer(*which, piece(size), Error::none, Remark::none, judge_.reading());
+  return size;
+}
+
+// Whether behind a good reply there is something good: then it is no accident that it is shorter than others.
+bool Annotator::goes_on(std::size_t size) {
+  const Bytes behind = rest(at_ + size);
+  const Bytes reply = rest(at_).first(size);
+  return request_at(at_ + size) != 0 ||
+         (behind.size() >= size && std::equal(reply.begin(), reply.end(), behind.begin()));
+}
+
+// An adapter, or an encoder, that sends the request back.
+std::size_t Annotator::echoed_answer_here(std::size_t which) {
+  const Bytes request = exchanges_.waiting()[which].bytes();
+  const Bytes bytes = rest(at_);
+  if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
+  const std::size_t size = reply_at(request, at_ + request.size());
+  if (size == 0) return 0;
+  const std::size_t echo = request.size();
+  at_ += echo;
+  exchanges_.answer(which, piece(size), Error::none, Remark::echo, judge_.reading());
+  at_ -= echo;
+  return echo + size;
+}
+
+std::size_t Annotator::repeated_here() {
+  const std::size_t size = last_reply_size_;
+  if (size == 0 || last_reply_at_ + size != at_ || rest(at_).size() < size) return 0;
+  const Bytes before = channel_->run.bytes().subspan(last_reply_at_, size);
+  if (!std::equal(before.begin(), before.end(), rest(at_).begin())) return 0;
+  if (judge_.streams()) return 0;
+  // Behind the reply to a request that is its own echo there may stand the same request again.
+  if (channel_->carries == Carries::both && may_turn(at_ + size) && reply_at(rest(at_).first(size), at_ + size) != 0) {
+    return 0;
+  }
+  exchanges_.alone(Annotation::Kind::reply, piece(size), Error::unexpected_reply, Remark::repeated);
+  return size;
+}
+
+std::size_t Annotator::request_here() {
+  const std::size_t size = request_at(at_);
+  if (size == 0 || !is_request(size)) return 0;
+  if (channel_->carries == Carries::both) exchanges_.give_up(exchanges_.waiting().size());
+  // Some replies are the same as their requests, and this one's may lie before the capture.
+  const bool may_be_reply = is_first_ && channel_->carries == Carries::both && reply_at({}, at_) == size;
+  exchanges_.ask(piece(size), Error::none, may_be_reply ? Remark::cut : Remark::none, true);
+  last_reply_size_ = 0;
+  return size;
+}
+
+// Whether a good request of this size at `at_` is one. On a line of both directions it may also begin a reply.
+bool Annotator::is_request(std::size_t size) {
+  const Channel& channel = *channel_;
+  const bool is_rest = whole_ && size == rest(at_).size();
+  if (channel.carries == Carries::requests) return channel.in_step || good_from(at_);
+  if (is_rest) {
+    const auto waiting = exchanges_.waiting();
+    if (waiting.empty() || at_ != 0) return channel.in_step;
+    // No host asks again so soon: this is what is left of the reply.
+    const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
+    return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
+  }
+  const bool turns = may_turn(at_ + size);
+  const bool answered = turns && reply_at(rest(at_).first(size), at_ + size) != 0;
+  const std::size_t as_reply = reply_at({}, at_);
+  if (as_reply != 0 && (!answered || channel.last_size != 0)) return false;
+  if (answered) return true;
+  const auto waiting = exchanges_.waiting();
+  const bool expects_reply = !waiting.empty() && judge_.answered({.bytes = waiting.back().bytes()});
+  return turns && channel.in_step && exchanges_.has_asked() && !expects_reply && !judge_.streams();
+}
+
+std::size_t Annotator::unasked_here() {
+  const bool streams = judge_.streams();
+  // A good reply, but to something else.
+  if (!streams && asked_before(channel_->run.begin(at_))) return 0;
+  const std::size_t size = reply_at({}, at_, channel_->last_size);
+  if (size == 0) return 0;
+  const bool trusted = channel_->in_step || good_from(at_);
+  if (!trusted) return 0;
+  channel_->in_step = true;
+  channel_->last_size = size;
+  last_reply_size_ = 0;
+  const bool good = streams || !exchanges_.has_asked();
+  static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // the look ahead has another reading
+  exchanges_.alone(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
+                   good ? Remark::none : Remark::unasked, good ? judge_.reading() : nullptr);
+  return size;
+}
+
+std::size_t Annotator::bad_here() {
+  const std::size_t size = bad_size();
+  tell_bad(size);
+  last_reply_size_ = 0;
+  channel_->in_step = true;  // what comes next was found to be good
+  if (!whole_ && !good_from(at_ + size)) channel_->in_step = false;
+  return size;
+}
+
+// Up to where good frames go on; to the end of the run when they do not.
+std::size_t Annotator::bad_size() {
+  const std::size_t left = rest(at_).size();
+  // In a stream the next frame stands where it would stand if this one were good.
+  const std::size_t period = channel_->last_size;
+  if (channel_->in_step && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
+  // The next request may stand right behind it.
+  const auto ends_before_request = [&](std::size_t size) {
+    return size != 0 && size < left && request_at(at_ + size) == left - size;
+  };
+  if (channel_->carries == Carries::both && whole_) {
+    const std::optional<std::size_t> which = asked_before(channel_->run.begin(at_));
+    const std::size_t usual = which ? reply_sizes_[exchanges_.waiting()[*which].storage[0]] : 0;
+    if (ends_before_request(usual)) return usual;
+    const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
+    if (ends_before_request(size)) return size;
+  }
+  const std::size_t most = whole_ ? left : left - lookahead / 2;
+  for (std::size_t i = 1; i < most; ++i) {
+    if (good_from(at_ + i)) return i;
+  }
+  return most;
+}
+
+void Annotator::tell_bad(std::size_t size) {
+  using Kind = Annotation::Kind;
+  const Piece bad = piece(size);
+  const bool is_end = whole_ && size == rest(at_).size();
+  const bool damaged = !channel_->run.clean(at_, size);
+  const auto error_of = [&](const Frame& request, const Frame& reply) {
+    const Error error = damaged ? Error::bad_framing : judge_.decode(request, reply);
+    return error == Error::none ? Error::bad_framing : error;
+  };
+  Remark remark = damaged ? Remark::damaged : Remark::none;
+  const bool cut = is_first_ || (cut_ && is_end);
+  if (cut) remark = Remark::cut;
+  const auto unless_cut = [cut](Error error) { return cut ? Error::none : error; };
+
+  if (channel_->carries == Carries::requests) {
+    return exchanges_.alone(Kind::request, bad, unless_cut(error_of({.bytes = bad.bytes}, {})), remark);
+  }
+  const std::optional<std::size_t> which = asked_before(bad.begin);
+  if (which) {
+    const Error error = error_of({.bytes = exchanges_.waiting()[*which].bytes()}, {.bytes = bad.bytes});
+    return exchanges_.answer(*which, bad, unless_cut(error), remark, nullptr);
+  }
+  const bool may_be_request = channel_->carries == Carries::both && is_end && at_ == 0 && !judge_.streams();
+  if (may_be_request && !cut && exchanges_.has_asked()) {
+    return exchanges_.ask(bad, error_of({.bytes = bad.bytes}, {}), remark, false);
+  }
+  const Kind kind = channel_->carries == Carries::both && !judge_.streams() ? Kind::noise : Kind::reply;
+  exchanges_.alone(kind, bad, unless_cut(error_of({}, {.bytes = bad.bytes})), remark);
+}
+
+}  // namespace absenc::capture

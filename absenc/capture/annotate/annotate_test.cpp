@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: Apache-2.0
+// What conversations do not show by themselves: lines that never pause, bytes without times, wires nobody named, CAN.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotate_frames.hpp"
+#include "absenc/capture/annotate/conversation_test.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::capture {
+namespace {
+
+using testing::Said;
+using testing::Talk;
+using testing::Talker;
+using Kind = Annotation::Kind;
+using Wire = std::vector<std::uint8_t>;
+
+struct Found {
+  Kind kind;
+  Remark remark;
+  Error error;
+  Tick begin;
+  Wire request;
+  Wire reply;
+  std::optional<Tick> turnaround;
+};
+
+struct Finder final : AnnotationSink {
+  void put(const Annotation& one) override {
+    found.push_back({one.kind,
+                     one.remark,
+                     one.error,
+                     one.begin,
+                     {one.request.bytes.begin(), one.request.bytes.end()},
+                     {one.reply.bytes.begin(), one.reply.bytes.end()},
+                     one.turnaround});
+    for (const Frame* frame : {&one.request, &one.reply}) {
+      if (frame->can != nullptr) ids.push_back(frame->can->id);
+    }
+  }
+  std::vector<Found> found;
+  std::vector<std::uint32_t> ids;
+};
+
+class OfUnit : public ::testing::TestWithParam<const Unit*> {
+ protected:
+  const Unit& unit = *GetParam();
+  Options options = testing::options_of(unit);
+
+  std::vector<Said> talk(std::size_t count, std::uint64_t seed) {
+    Talker talker(unit, options, {}, seed);
+    std::vector<Said> said;
+    while (said.size() < count) {
+      const Talk one = talker.talk();
+      said.insert(said.end(), one.said.begin(), one.said.end());
+    }
+    return said;
+  }
+  std::vector<Found> annotate(const std::vector<Character>& characters, const Annotator::Settings& settings) const {
+    Finder finder;
+    const auto annotator = std::make_unique<Annotator>(unit, options, settings, finder);
+    for (const Character& character : characters) annotator->put(character);
+    annotator->finish(characters.empty() ? 0 : characters.back().end + settings.ticks.pause);
+    return finder.found;
+  }
+};
+
+std::string name_of(const ::testing::TestParamInfo<const Unit*>& info) {
+  std::string name(info.param->id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+std::vector<const Unit*> units_of_characters() {
+  std::vector<const Unit*> units;
+  for (const Unit* unit : all_units()) {
+    if (unit->link == LinkKind::half_duplex || unit->link == LinkKind::full_duplex) units.push_back(unit);
+  }
+  return units;
+}
+
+constexpr Tick length = 100;  // of a character
+
+// An encoder that sends position after position without a pause, seen from anywhere on.
+TEST_P(OfUnit, ALineThatNeverPauses) {
+  std::vector<Character> characters;
+  std::vector<Tick> begins;
+  std::vector<std::size_t> sizes;
+  for (const Said& said : talk(2000, 1)) {
+    Finder finder;
+    Judge judge(unit, options);
+    const bool is_position = said.by == sim::Role::device && judge.decode({}, {.bytes = said.bytes}) == Error::none &&
+                             judge.reading() != nullptr;
+    if (!is_position) continue;
+    begins.push_back(characters.size() * length);
+    sizes.push_back(said.bytes.size());
+    for (const std::uint8_t byte : said.bytes) {
+      const Tick begin = characters.size() * length;
+      characters.push_back({.begin = begin, .end = begin + length, .value = byte});
+    }
+  }
+  ASSERT_GT(begins.size(), 50u);
+  ASSERT_GT(characters.size(), 2 * Run::capacity / 3);
+  Annotator::Settings settings;
+  settings.channels[0] = Carries::replies;
+  settings.ticks = {.pause = length / 2, .character = length};
+  for (std::size_t from = 0; from < 2 * sizes[0]; ++from) {
+    std::vector<Character> seen(characters.begin() + static_cast<std::ptrdiff_t>(from), characters.end());
+    while (seen.size() <= Run::capacity) {  // a line that ends sooner has not shown that it never pauses
+      const Tick behind = seen.back().end - characters.front().begin;
+      for (Character character : characters) {
+        character.begin += behind;
+        character.end += behind;
+        seen.push_back(character);
+      }
+    }
+    settings.begin = seen.front().begin;
+    std::size_t good = 0;
+    Tick skipped_until = 0;
+    for (const Found& one : annotate(seen, settings)) {
+      const Tick begin = one.begin % (characters.size() * length);
+      if (one.error != Error::none || one.remark != Remark::none) {
+        EXPECT_LT(one.begin, settings.begin + 200 * length) << from << " " << text_of(one.error).name;
+        skipped_until = one.begin;
+        continue;
+      }
+      ++good;
+      const auto there = std::find(begins.begin(), begins.end(), begin);
+      ASSERT_NE(there, begins.end()) << from << ": a frame at " << begin / length;
+      EXPECT_EQ(one.reply.size(), sizes[static_cast<std::size_t>(there - begins.begin())]);
+    }
+    EXPECT_GE(good + 3, begins.size()) << from << ", skipped until " << skipped_until;
+  }
+}
+
+// As a terminal program or a dump has them: one byte behind the other, both sides in one.
+TEST_P(OfUnit, BytesWithoutTimes) {
+  std::vector<Character> characters;
+  std::vector<Said> said = talk(800, 2);
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    for (const std::uint8_t byte : said[i].bytes) {
+      const Tick begin = characters.size();
+      characters.push_back({.begin = begin, .end = begin + 1, .value = byte});
+    }
+  }
+  ASSERT_GT(characters.size(), 3 * Run::capacity);
+  Annotator::Settings settings;
+  settings.begins_silent = true;
+  const std::vector<Found> found = annotate(characters, settings);
+  std::size_t next = 0;
+  std::size_t wrong = 0;
+  for (const Found& one : found) {
+    Wire bytes = one.request;
+    bytes.insert(bytes.end(), one.reply.begin(), one.reply.end());
+    Wire expected;
+    while (next < said.size() && expected.size() < bytes.size()) {
+      expected.insert(expected.end(), said[next].bytes.begin(), said[next].bytes.end());
+      ++next;
+    }
+    wrong += one.error != Error::none || bytes != expected ? 1u : 0u;
+    if (one.error != Error::none)
+      ADD_FAILURE() << text_of(one.error).name << " at " << one.begin << " " << std::string(bytes.begin(), bytes.end());
+  }
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_EQ(next, said.size());
+}
+
+TEST_P(OfUnit, WhichWireIsWhose) {
+  if (unit.link != LinkKind::full_duplex) return;
+  for (const std::uint8_t swapped : {std::uint8_t{0}, std::uint8_t{1}}) {
+    Talker talker(unit, options, {}, 3);
+    std::vector<Character> characters;
+    for (int i = 0; i < 200; ++i) {
+      for (Character character : talker.talk().characters) {
+        character.channel ^= swapped;
+        characters.push_back(character);
+      }
+    }
+    Annotator::Settings settings;
+    settings.channels = {Carries::one, Carries::one};
+    settings.channel_count = 2;
+    settings.begins_silent = true;
+    settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
+    std::size_t exchanges = 0;
+    for (const Found& one : annotate(characters, settings)) {
+      EXPECT_EQ(one.error, Error::none);
+      exchanges += one.kind == Kind::exchange ? 1u : 0u;
+    }
+    EXPECT_GE(exchanges, 150u);
+  }
+}
+
+// What a plug or a motor puts on the line between two exchanges is told, and harms neither of them.
+TEST_P(OfUnit, NoiseBetweenExchanges) {
+  const auto begins_nothing = [&](std::uint8_t byte) {
+    for (const Direction direction : {Direction::request, Direction::reply}) {
+      const Wire many(64, byte);
+      const Delimit delimit = unit.delimit(options, direction, Bytes(many).first(1));
+      const bool may = delimit.kind == Delimit::Kind::complete ||
+                       unit.delimit(options, direction, many).kind == Delimit::Kind::complete;
+      if (may) return false;
+    }
+    return true;
+  };
+  Talker talker(unit, options, {}, 4);
+  std::vector<Character> quiet;
+  std::vector<Character> noisy;
+  std::size_t noises = 0;
+  const auto pause = static_cast<Tick>((unit.timing.turnaround_limit + std::chrono::milliseconds(1)).count());
+  const Tick each = static_cast<Tick>(testing::line_of(unit).character().count());
+  for (int i = 0; i < 300; ++i) {
+    for (const Character& character : talker.talk().characters) {
+      quiet.push_back(character);
+      noisy.push_back(character);
+    }
+    std::uint8_t byte = 0;
+    do {
+      byte = static_cast<std::uint8_t>(talker.random().below(256));
+    } while (!begins_nothing(byte));
+    ++noises;
+    const std::uint64_t count = 1 + talker.random().below(3);
+    for (std::uint64_t k = 0; k < count; ++k) {
+      const Tick begin = talker.now() - pause / 2 + k * each;
+      noisy.push_back({.begin = begin, .end = begin + each, .value = byte});
+    }
+  }
+  Annotator::Settings settings;
+  settings.begins_silent = true;
+  settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
+  if (unit.link == LinkKind::full_duplex) {
+    settings.channels = {Carries::requests, Carries::replies};
+    settings.channel_count = 2;
+  }
+  const std::vector<Found> without = annotate(quiet, settings);
+  std::size_t next = 0;
+  std::size_t bad = 0;
+  for (const Found& one : annotate(noisy, settings)) {
+    if (one.error != Error::none) {
+      ++bad;
+      EXPECT_NE(one.kind, Kind::exchange) << one.begin;
+      continue;
+    }
+    ASSERT_LT(next, without.size());
+    EXPECT_EQ(one.begin, without[next].begin);
+    EXPECT_EQ(one.request, without[next].request);
+    EXPECT_EQ(one.reply, without[next].reply);
+    ++next;
+  }
+  EXPECT_EQ(next, without.size());
+  EXPECT_EQ(bad, noises);
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, OfUnit, ::testing::ValuesIn(units_of_characters()), name_of);
+
+// ---- CAN: a toy whose node n is asked on 0x200 + n and answers, or speaks unasked, on 0x100 + n with the same data
+
+Error decode_toy(const Options&, Frame request, Frame reply, FieldSink& sink) {
+  if (reply.can == nullptr) return (request.can->id & 0x700) == 0x200 ? Error::none : Error::unexpected_reply;
+  if ((reply.can->id & 0x700) != 0x100) return Error::unexpected_reply;
+  if (request.can != nullptr) {
+    const bool is_answer = (request.can->id & 0xFF) == (reply.can->id & 0xFF) && request.can->data == reply.can->data;
+    if (!is_answer) return Error::unexpected_reply;
+  }
+  sink.put_reading({.singleturn = reply.can->data[0], .singleturn_bits = 8, .singleturn_valid_bits = 8});
+  return Error::none;
+}
+
+Unit toy() {
+  Unit unit{};
+  unit.id = "toy";
+  unit.link = LinkKind::can;
+  unit.decode = decode_toy;
+  return unit;
+}
+
+CanRecord record(Tick at, std::uint32_t id, std::uint8_t value) {
+  CanRecord one{.at = at};
+  one.frame.id = id;
+  one.frame.size = 8;
+  one.frame.data[0] = value;
+  return one;
+}
+
+TEST(Can, NodesAnswerInAnyOrder) {
+  const Unit unit = toy();
+  Finder finder;
+  CanAnnotator annotator(unit, {}, {.limit = 1000}, finder);
+  annotator.put(record(0, 0x201, 7));
+  annotator.put(record(10, 0x202, 8));
+  annotator.put(record(20, 0x102, 9));  // not the answer: what node 2 says by itself
+  annotator.put(record(30, 0x102, 8));
+  annotator.put(record(40, 0x101, 7));
+  annotator.put(record(50, 0x333, 0));
+  CanRecord error = record(60, 0x004, 0);
+  error.error_frame = true;
+  annotator.put(error);
+  annotator.put(record(70, 0x203, 1));
+  annotator.put(record(2000, 0x204, 1));
+  annotator.finish(2500);
+  ASSERT_EQ(finder.found.size(), 7u);
+  const auto expect = [&](std::size_t i, Kind kind, Error wrong, Remark remark, Tick begin) {
+    EXPECT_EQ(finder.found[i].kind, kind) << i;
+    EXPECT_EQ(finder.found[i].error, wrong) << i;
+    EXPECT_EQ(finder.found[i].remark, remark) << i;
+    EXPECT_EQ(finder.found[i].begin, begin) << i;
+  };
+  expect(0, Kind::reply, Error::none, Remark::none, 20);
+  expect(1, Kind::exchange, Error::none, Remark::none, 10);
+  expect(2, Kind::exchange, Error::none, Remark::none, 0);
+  EXPECT_EQ(finder.found[1].turnaround, 20u);
+  EXPECT_EQ(finder.found[2].turnaround, 40u);
+  expect(3, Kind::noise, Error::unexpected_reply, Remark::none, 50);
+  expect(4, Kind::noise, Error::bad_framing, Remark::damaged, 60);
+  expect(5, Kind::request, Error::timeout, Remark::unanswered, 70);
+  expect(6, Kind::request, Error::none, Remark::cut, 2000);
+  EXPECT_EQ(finder.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
+}
+
+// Who asks again has given the others up, and what answers badly has answered.
+TEST(Can, EachReplyBelongsToTheNewestRequest) {
+  const Unit& unit = *find_unit("raa38-can");
+  Options options;
+  ASSERT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
+  Finder finder;
+  CanAnnotator annotator(unit, options, {.limit = 100'000}, finder);
+  const auto ask = [&](Tick at) {
+    CanRecord one = record(at, 0x220, 0xFF);
+    one.frame.data[0] = 0x80;
+    one.frame.data[1] = 0x20;
+    annotator.put(one);
+  };
+  const auto reply = [&](Tick at, bool good) {
+    CanRecord one = record(at, 0x120, 5);
+    one.frame.data[7] = good ? 0 : 1;
+    annotator.put(one);
+  };
+  for (Tick i = 0; i < 6; ++i) {
+    ask(1000 * i);
+    if (i != 3) reply(1000 * i + 70, i != 1);
+  }
+  annotator.finish(1'000'000);
+  ASSERT_EQ(finder.found.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const Found& one = finder.found[i];
+    EXPECT_EQ(one.begin, 1000 * i);
+    EXPECT_EQ(one.error, i == 1 ? Error::out_of_range : i == 3 ? Error::timeout : Error::none) << i;
+    EXPECT_EQ(one.kind, i == 3 ? Kind::request : Kind::exchange) << i;
+    if (i != 3) {
+      EXPECT_EQ(one.turnaround, 70u) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace absenc::capture

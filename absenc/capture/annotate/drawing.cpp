@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/capture/annotate/drawing.hpp"
+
+#include <zip.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <ostream>
+#include <stdexcept>
+
+namespace absenc::capture {
+
+namespace {
+
+// Numbers take as many bytes as they need, 7 bits each: most changes follow the one before closely.
+void put_number(std::FILE* file, std::uint64_t number) {
+  for (; number > 0x7F; number >>= 7) std::putc(static_cast<int>(number & 0x7F) | 0x80, file);
+  std::putc(static_cast<int>(number), file);
+}
+
+bool get_number(std::FILE* file, std::uint64_t& number) {
+  number = 0;
+  for (unsigned shift = 0; shift < 64; shift += 7) {
+    const int byte = std::getc(file);
+    if (byte == EOF) return false;
+    number |= static_cast<std::uint64_t>(byte & 0x7F) << shift;
+    if (byte < 0x80) return true;
+  }
+  return false;
+}
+
+[[noreturn]] void fail_scratch(const char* why) {
+  throw std::runtime_error(std::string("the waveform cannot be kept until it is written: ") + why);
+}
+
+void check(std::FILE* file) {
+  if (std::ferror(file) != 0) fail_scratch(std::strerror(errno));
+}
+
+void begin_reading(std::FILE* file) {
+  if (std::fflush(file) != 0 || std::fseek(file, 0, SEEK_SET) != 0) fail_scratch(std::strerror(errno));
+}
+
+/// The levels of all wires from one change to the next.
+class Levels {
+ public:
+  explicit Levels(Drawing& drawing) : drawing_(drawing) {
+    for (const Drawing::Wire& wire : drawing.wires()) levels.push_back(wire.before);
+    drawing.rewind_changes();
+    take();
+    advance(0);
+  }
+
+  /// The time of the next change, or the end of the drawing.
+  [[nodiscard]] Tick next_change() const { return std::min(next_, drawing_.end()); }
+  /// Everything that changes up to and including `time`.
+  void advance(Tick time) {
+    constexpr unsigned now_and_then = 4096;
+    for (; next_ <= time && next_ != none; take()) {
+      levels[wire_] = !levels[wire_];
+      if (++taken_ % now_and_then == 0) drawing_.look();
+    }
+  }
+
+  std::vector<bool> levels;
+
+ private:
+  static constexpr Tick none = std::numeric_limits<Tick>::max();
+
+  void take() {
+    if (!drawing_.next_change(next_, wire_)) next_ = none;
+  }
+
+  Drawing& drawing_;
+  Tick next_ = 0;
+  std::size_t wire_ = 0;
+  std::uint64_t taken_ = 0;
+};
+
+// Printable characters from '!' on, more than one where there are many traces.
+std::string identifier(std::size_t trace) {
+  constexpr std::size_t digits = 94;
+  std::string text(1, static_cast<char>('!' + trace % digits));
+  return trace < digits ? text : identifier(trace / digits - 1) + text;
+}
+
+constexpr std::uint64_t nanoseconds_a_second = 1'000'000'000;
+
+std::string seconds(Tick time) {
+  std::string fraction = std::to_string(time % nanoseconds_a_second);
+  fraction.insert(0, 9 - fraction.size(), '0');
+  return std::to_string(time / nanoseconds_a_second) + '.' + fraction;
+}
+
+/// The samples of a drawing, made while the archive asks for them: a part at a time, as sigrok itself writes them.
+class Samples {
+ public:
+  Samples(Drawing& drawing, std::uint64_t rate)
+      : size(std::bit_ceil((drawing.wires().size() + 7) / 8)),
+        count(sample_at(drawing.end(), rate)),
+        drawing_(drawing),
+        levels_(drawing),
+        rate_(rate) {}
+
+  /// As many whole samples as fit. Returns the number of bytes.
+  std::size_t fill(std::uint8_t* bytes, std::size_t room) {
+    drawing_.look();
+    const std::size_t wanted = room / size;
+    for (std::size_t done = 0; done < wanted;) {
+      if (sample_ >= changes_at_) take_change();
+      const std::uint64_t same = changes_at_ > sample_ ? changes_at_ - sample_ : wanted;
+      const auto run = static_cast<std::size_t>(std::min<std::uint64_t>(wanted - done, same));
+      if (size == 1) {
+        std::memset(bytes + done, packed_[0], run);
+      } else {
+        for (std::size_t i = 0; i < run; ++i) std::memcpy(bytes + (done + i) * size, packed_, size);
+      }
+      done += run;
+      sample_ += run;
+    }
+    return wanted * size;
+  }
+
+  const std::size_t size;  // bytes of one sample
+  const std::uint64_t count;
+  std::exception_ptr trouble{};  // what ended it
+
+ private:
+  // The first sample that is not before the time.
+  static std::uint64_t sample_at(Tick time, std::uint64_t rate) {
+    const std::uint64_t whole = time / nanoseconds_a_second * rate;
+    return whole + (time % nanoseconds_a_second * rate + nanoseconds_a_second - 1) / nanoseconds_a_second;
+  }
+  // What is past at this sample, and when the next change shows.
+  void take_change() {
+    while (true) {
+      const Tick next = levels_.next_change();
+      changes_at_ = sample_at(next, rate_);
+      if (changes_at_ > sample_ || changes_at_ >= count) break;
+      levels_.advance(next);
+    }
+    std::memset(packed_, 0, sizeof(packed_));
+    for (std::size_t i = 0; i < levels_.levels.size(); ++i) {
+      if (levels_.levels[i]) packed_[i / 8] |= static_cast<std::uint8_t>(1u << i % 8);
+    }
+  }
+
+  Drawing& drawing_;
+  Levels levels_;
+  std::uint64_t rate_;
+  std::uint64_t sample_ = 0;
+  std::uint64_t changes_at_ = 0;
+  std::uint8_t packed_[8]{};
+};
+
+/// One part of the samples as a file of the archive.
+struct Part {
+  Samples* samples;
+  std::uint64_t size;  // bytes
+  std::uint64_t given = 0;
+};
+
+// What libzip asks of whoever provides a file while it compresses.
+zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t command) {
+  Part& part = *static_cast<Part*>(state);
+  switch (command) {
+    case ZIP_SOURCE_OPEN:
+    case ZIP_SOURCE_CLOSE:
+    case ZIP_SOURCE_FREE:
+      return 0;
+    case ZIP_SOURCE_READ: {
+      const std::uint64_t room = std::min<std::uint64_t>(size, part.size - part.given);
+      try {
+        const std::size_t filled = part.samples->fill(static_cast<std::uint8_t*>(data), room);
+        part.given += filled;
+        return static_cast<zip_int64_t>(filled);
+      } catch (...) {  // not through libzip, which is C
+        part.samples->trouble = std::current_exception();
+        return -1;
+      }
+    }
+    case ZIP_SOURCE_STAT: {
+      auto* const stat = static_cast<zip_stat_t*>(data);
+      zip_stat_init(stat);
+      stat->size = part.size;
+      stat->valid = ZIP_STAT_SIZE;
+      return sizeof(*stat);
+    }
+    case ZIP_SOURCE_SUPPORTS:
+      return zip_source_make_command_bitmap(ZIP_SOURCE_OPEN, ZIP_SOURCE_READ, ZIP_SOURCE_CLOSE, ZIP_SOURCE_STAT,
+                                            ZIP_SOURCE_FREE, -1);
+    default:
+      return -1;
+  }
+}
+
+struct Discard {
+  void operator()(zip_t* archive) const { zip_discard(archive); }
+};
+using Archive = std::unique_ptr<zip_t, Discard>;
+
+[[noreturn]] void fail(const std::string& path, const char* why) {
+  throw std::runtime_error(path + " cannot be written: " + why);
+}
+
+void add(zip_t* archive, const std::string& path, const char* name, zip_source_t* source) {
+  if (source != nullptr && zip_file_add(archive, name, source, ZIP_FL_OVERWRITE) >= 0) return;
+  if (source != nullptr) zip_source_free(source);
+  fail(path, zip_strerror(archive));
+}
+
+std::string metadata(Drawing& drawing, std::uint64_t rate, std::size_t unit_size) {
+  std::string text = "[global]\nsigrok version=0.5.2\n\n[device 1]\ncapturefile=logic-1\ntotal probes=" +
+                     std::to_string(drawing.wires().size()) + "\nsamplerate=" + std::to_string(rate) +
+                     " Hz\ntotal analog=0\n";
+  for (std::size_t i = 0; i < drawing.wires().size(); ++i) {
+    text += "probe" + std::to_string(i + 1) + '=' + drawing.wires()[i].name + '\n';
+  }
+  return text + "unitsize=" + std::to_string(unit_size) + '\n';
+}
+
+}  // namespace
+
+Drawing::Drawing(std::string title, ScratchFile changes, ScratchFile labels)
+    : title_(std::move(title)), changes_(std::move(changes)), labels_(std::move(labels)) {
+  if (changes_ == nullptr || labels_ == nullptr) fail_scratch("there is no place for temporary files");
+}
+
+void Drawing::change(Tick at, std::size_t wire) {
+  put_number(changes_.get(), at - std::exchange(last_change_, at));
+  put_number(changes_.get(), wire);
+  check(changes_.get());
+}
+
+void Drawing::label(Tick at, std::string_view words) {
+  put_number(labels_.get(), at - std::exchange(last_label_, at));
+  put_number(labels_.get(), words.size());
+  std::fwrite(words.data(), 1, words.size(), labels_.get());
+  check(labels_.get());
+}
+
+void Drawing::rewind_changes() {
+  begin_reading(changes_.get());
+  last_change_ = 0;
+}
+
+bool Drawing::next_change(Tick& at, std::size_t& wire) {
+  std::uint64_t later = 0;
+  if (!get_number(changes_.get(), later) || !get_number(changes_.get(), wire)) return check(changes_.get()), false;
+  at = last_change_ += later;
+  return true;
+}
+
+void Drawing::rewind_labels() {
+  begin_reading(labels_.get());
+  last_label_ = 0;
+}
+
+bool Drawing::next_label(Tick& at, std::string& words) {
+  std::uint64_t later = 0;
+  std::uint64_t size = 0;
+  if (!get_number(labels_.get(), later) || !get_number(labels_.get(), size)) return check(labels_.get()), false;
+  words.resize(size);
+  if (std::fread(words.data(), 1, size, labels_.get()) != size) return check(labels_.get()), false;
+  at = last_label_ += later;
+  return true;
+}
+
+void write_vcd(std::ostream& out, Drawing& drawing) {
+  out << "$version absenc $end\n$timescale 1 ns $end\n";
+  // Not among the changes, where the standard allows them too: sigrok's reader stops at the first.
+  drawing.rewind_labels();
+  Tick labelled = 0;
+  for (std::string words; drawing.next_label(labelled, words);) {
+    out << "$comment #" << labelled << ' ' << words << " $end\n";
+  }
+  out << "$scope module " << drawing.title() << " $end\n";
+  for (std::size_t i = 0; i < drawing.wires().size(); ++i) {
+    out << "$var wire 1 " << identifier(i) << ' ' << drawing.wires()[i].name << " $end\n";
+  }
+  out << "$upscope $end\n$enddefinitions $end\n#0\n";
+  Levels levels(drawing);
+  for (std::size_t i = 0; i < levels.levels.size(); ++i) out << levels.levels[i] << identifier(i) << '\n';
+  for (Tick at = levels.next_change(); at < drawing.end(); at = levels.next_change()) {
+    const std::vector<bool> before = levels.levels;
+    levels.advance(at);
+    out << '#' << at << '\n';
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      if (before[i] != levels.levels[i]) out << levels.levels[i] << identifier(i) << '\n';
+    }
+  }
+  out << '#' << drawing.end() << '\n';
+}
+
+void write_saleae_csv(std::ostream& out, Drawing& drawing) {
+  out << "Time [s]";
+  for (const Drawing::Wire& wire : drawing.wires()) out << ',' << wire.name;
+  out << '\n';
+  Levels levels(drawing);
+  for (Tick at = 0;; at = levels.next_change()) {
+    levels.advance(at);
+    out << seconds(at);
+    for (const bool level : levels.levels) out << ',' << level;
+    out << '\n';
+    if (at == drawing.end()) break;
+  }
+}
+
+void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate) {
+  int code = 0;
+  Archive archive(zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &code));
+  if (archive == nullptr) {
+    zip_error_t error;
+    zip_error_init_with_code(&error, code);
+    const std::string why = zip_error_strerror(&error);
+    zip_error_fini(&error);
+    fail(path, why.c_str());
+  }
+  Samples samples(drawing, rate);
+  const std::string about = metadata(drawing, rate, samples.size);
+  add(archive.get(), path, "version", zip_source_buffer(archive.get(), "2", 1, 0));
+  add(archive.get(), path, "metadata", zip_source_buffer(archive.get(), about.data(), about.size(), 0));
+
+  constexpr std::uint64_t samples_a_part = 4 << 20;
+  std::vector<std::unique_ptr<Part>> parts;
+  for (std::uint64_t first = 0; first < samples.count; first += samples_a_part) {
+    const std::uint64_t size = std::min(samples_a_part, samples.count - first) * samples.size;
+    parts.push_back(std::make_unique<Part>(Part{&samples, size}));
+    add(archive.get(), path, ("logic-1-" + std::to_string(parts.size())).c_str(),
+        zip_source_function(archive.get(), provide, parts.back().get()));
+  }
+  // Compresses everything, in the order of the files.
+  if (zip_close(archive.get()) != 0) {
+    if (samples.trouble != nullptr) std::rethrow_exception(samples.trouble);
+    fail(path, zip_strerror(archive.get()));
+  }
+  static_cast<void>(archive.release());
+}
+
+}  // namespace absenc::capture

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Raw samples: nothing but 1, 2, 4 or 8 bytes for each, little endian, channel 0 in bit 0; the fewest that hold all
+// channels.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string_view>
+
+#include "absenc/capture/files/source.hpp"
+#include "absenc/capture/signal.hpp"
+
+namespace absenc::capture {
+
+/// 1, 2, 4 or 8 for 1 to 64 channels.
+[[nodiscard]] constexpr unsigned bytes_per_sample(unsigned channels) {
+  return channels <= 8 ? 1 : channels <= 16 ? 2 : channels <= 32 ? 4 : 8;
+}
+
+/// Throws OpenError when `channels` is not 1 to 64 or there is no rate. Bytes at the end that make no whole sample are
+/// a damage.
+[[nodiscard]] std::unique_ptr<Reader> read_raw(std::unique_ptr<Source> source, std::string_view name, unsigned channels,
+                                               std::uint64_t samples_per_second);
+
+}  // namespace absenc::capture

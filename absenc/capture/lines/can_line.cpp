@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/capture/lines/can_line.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace absenc::capture {
+
+namespace {
+
+constexpr unsigned integration_bits = 11;  // recessive in a row: the bus is idle
+constexpr unsigned most_equal = 5;         // the sixth bit is of the other kind
+constexpr std::size_t crc_bits = 15;
+constexpr std::uint32_t protocol_error = 0x08, nobody_acknowledged = 0x20;
+constexpr std::uint32_t bus_off = 0x40, arbitration_lost = 0x02, controller = 0x04;
+constexpr std::uint8_t stuffing = 0x04, form = 0x02, in_crc = 0x08, in_end = 0x1A;
+
+std::uint16_t crc_of(const std::vector<bool>& bits, std::size_t count) {
+  std::uint16_t crc = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool feedback = ((crc & 0x4000) != 0) != bits[i];
+    crc = static_cast<std::uint16_t>((crc << 1 & 0x7FFF) ^ (feedback ? 0x4599 : 0));
+  }
+  return crc;
+}
+
+}  // namespace
+
+std::string_view text_of_error(const CanFrame& error) {
+  if ((error.id & bus_off) != 0) return "a controller is bus-off: too many of its frames were destroyed";
+  if ((error.id & nobody_acknowledged) != 0) return "nobody acknowledged the frame: is another node on the bus?";
+  if ((error.id & protocol_error) != 0) {
+    if ((error.data[2] & stuffing) != 0)
+      return "six equal bits where five are the most: a destroyed frame, or another bit rate";
+    if (error.data[3] == in_crc) return "the CRC of a frame is wrong";
+    return "a bit of a frame is not what it must be";
+  }
+  if ((error.id & arbitration_lost) != 0) return "a controller lost the arbitration";
+  if ((error.id & controller) != 0) return "a controller has counted many errors, or lost frames";
+  return "an error on the bus";
+}
+
+void CanDecoder::decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames) {
+  if (first != end_) {
+    finish(frames);
+    since_ = first;
+    told_ = 0;
+    recessive_ = 0;
+    doing_ = Doing::waiting;
+  }
+  if (part.before != level_) change(first, frames);
+  for (const Tick at : part.at) change(at, frames);
+  end_ = end;
+}
+
+void CanDecoder::change(Tick at, std::vector<CanRecord>& frames) {
+  level_for(level_, since_, at, frames);
+  level_ = !level_;
+  since_ = at;
+  told_ = 0;
+}
+
+void CanDecoder::finish(std::vector<CanRecord>& frames) {
+  if (end_ > since_) level_for(level_, since_, end_, frames);
+  since_ = end_;
+  if (doing_ == Doing::stuffed || doing_ == Doing::tail) doing_ = Doing::waiting;  // cut off: no error of the bus
+}
+
+// As many bits as fit the time best; of the idle bus no more than matter.
+void CanDecoder::level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames) {
+  constexpr double enough = 32;
+  const double bits = std::min(static_cast<double>(to - from) / bit_, enough);
+  const auto count = static_cast<std::size_t>(std::lround(bits));
+  for (; told_ < count; ++told_) take(level, from + static_cast<Tick>(static_cast<double>(told_) * bit_), frames);
+}
+
+void CanDecoder::take(bool bit, Tick at, std::vector<CanRecord>& frames) {
+  recessive_ = bit ? recessive_ + 1 : 0;
+  switch (doing_) {
+    case Doing::waiting:
+      if (recessive_ >= integration_bits) doing_ = Doing::idle;
+      break;
+    case Doing::idle:
+      if (bit) break;
+      doing_ = Doing::stuffed;
+      record_ = {.at = at};
+      bits_.assign(1, false);
+      before_ = false;
+      run_ = 1;
+      length_ = 0;
+      break;
+    case Doing::stuffed:
+      take_stuffed(bit, frames);
+      break;
+    case Doing::tail:
+      take_tail(bit, frames);
+      break;
+  }
+}
+
+void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
+  const bool stuff_bit = run_ == most_equal;
+  if (stuff_bit && bit == before_) return fail(protocol_error, stuffing, 0, frames);
+  run_ = bit == before_ ? run_ + 1 : 1;
+  before_ = bit;
+  if (!stuff_bit) {
+    bits_.push_back(bit);
+    interpret();
+  }
+  // A stuff bit may follow the last bit of the CRC.
+  if (length_ == 0 || bits_.size() < length_ || run_ == most_equal) return;
+  doing_ = Doing::tail;
+  tail_ = 0;
+}
+
+// CRC delimiter, acknowledge, its delimiter, seven bits of the end. The last one may be cut short by the next frame.
+void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
+  constexpr unsigned acknowledge = 1, last = 8;
+  if (tail_ == acknowledge) {
+    if (crc_of(bits_, length_ - crc_bits) != field(length_ - crc_bits, crc_bits)) {
+      return fail(protocol_error, 0, in_crc, frames);
+    }
+    if (bit) return fail(nobody_acknowledged, 0, 0, frames);
+  } else if (!bit) {
+    return fail(protocol_error, form, in_end, frames);
+  }
+  if (tail_++ < last) return;
+  frames.push_back(record_);
+  doing_ = Doing::waiting;
+  recessive_ = last;  // with what follows of the end and the intermission, the bus is idle
+}
+
+std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
+  std::uint32_t value = 0;
+  for (std::size_t i = first; i < first + count; ++i) value = value << 1 | (bits_[i] ? 1u : 0u);
+  return value;
+}
+
+// Start, 11 identifier bits, RTR or SRR, IDE; then r0 and DLC, or 18 identifier bits, RTR, r1, r0 and DLC.
+void CanDecoder::interpret() {
+  if (length_ != 0 || bits_.size() < 19) return;
+  const bool extended = bits_[13];
+  const std::size_t header = extended ? 39 : 19;
+  if (bits_.size() < header) return;
+  CanFrame& frame = record_.frame;
+  if (bits_.size() == header) {
+    frame.extended = extended;
+    frame.id = extended ? field(1, 11) << 18 | field(14, 18) : field(1, 11);
+    frame.remote = bits_[extended ? 32 : 12];
+    frame.size = static_cast<std::uint8_t>(std::min<std::uint32_t>(field(header - 4, 4), 8));
+  }
+  const std::size_t data = frame.remote ? 0 : frame.size;
+  if (bits_.size() < header + 8 * data) return;
+  for (std::size_t i = 0; i < data; ++i) frame.data[i] = static_cast<std::uint8_t>(field(header + 8 * i, 8));
+  length_ = header + 8 * data + crc_bits;
+}
+
+void CanDecoder::fail(std::uint32_t error_class, std::uint8_t how, std::uint8_t where, std::vector<CanRecord>& frames) {
+  record_.frame = {.id = error_class, .size = 8, .data = {0, 0, how, where}};
+  record_.error_frame = true;
+  frames.push_back(record_);
+  doing_ = Doing::waiting;
+}
+
+}  // namespace absenc::capture

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/capture/lines/clocked.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace absenc::capture {
+
+namespace {
+
+constexpr Tick none = std::numeric_limits<Tick>::max();
+constexpr std::size_t most_periods = 4096;
+
+void put(std::vector<std::uint8_t>& bytes, std::size_t bit, bool level) {
+  if (bit % 8 == 0) bytes.push_back(0);
+  bytes.back() = static_cast<std::uint8_t>(bytes.back() | (level ? 0x80u >> bit % 8 : 0u));
+}
+
+}  // namespace
+
+std::optional<Tick> find_pause(const Changes& clock) {
+  std::vector<Tick> periods;
+  for (std::size_t i = 2; i < clock.at.size() && periods.size() < most_periods; ++i) {
+    periods.push_back(clock.at[i] - clock.at[i - 2]);
+  }
+  if (periods.empty()) return std::nullopt;
+  const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
+  std::nth_element(periods.begin(), middle, periods.end());
+  return 3 * *middle;
+}
+
+void ClockedDecoder::Wire::begin(const Changes* changes, Tick first, bool known) {
+  border.reset();
+  left = {};
+  if (changes == nullptr) return;
+  left = changes->at;
+  if (known && level != changes->before) border = first;
+  if (!known) level = changes->before;
+}
+
+Tick ClockedDecoder::Wire::next() const {
+  if (border) return *border;
+  return left.empty() ? none : left.front();
+}
+
+void ClockedDecoder::Wire::step() {
+  level = !level;
+  if (border) {
+    border.reset();
+  } else {
+    left = left.subspan(1);
+  }
+}
+
+bool ClockedDecoder::Wire::before(Tick at) {
+  if (border && *border < at) step();
+  std::size_t passed = 0;
+  while (passed < left.size() && left[passed] < at) ++passed;
+  level = level != (passed % 2 != 0);
+  left = left.subspan(passed);
+  return level;
+}
+
+void ClockedDecoder::begin_part(const ClockedPart& part) {
+  has_in_ = part.in != nullptr;
+  has_out_ = part.out != nullptr;
+  clock_.begin(part.clock, part.first, begun_);
+  in_.begin(part.in, part.first, begun_);
+  out_.begin(part.out, part.first, begun_);
+  select_.begin(part.select, part.first, begun_);
+  if (begun_) return;
+  begun_ = true;
+  last_ = part.first;
+  if (format_.has_select && select_.level == format_.select_high) open(part.first, true, nullptr);
+}
+
+// True: it met one of the targets.
+bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
+  if (targets != nullptr && !cut) {
+    while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;
+    const Burst* const target =
+        targets->next < targets->bursts.size() ? &targets->bursts[targets->next] : targets->open;
+    targets->met = target != nullptr && target->begin == at && !target->cut;
+    if (targets->met) return true;
+  }
+  open_ = true;
+  burst_ = {};
+  burst_.begin = at;
+  burst_.cut = cut;
+  return false;
+}
+
+void ClockedDecoder::close(Tick at, bool cut, std::vector<Burst>& bursts) {
+  open_ = false;
+  burst_.end = at;
+  burst_.cut = burst_.cut || cut;
+  if (burst_.bits > 0) bursts.push_back(std::move(burst_));
+  burst_ = {};
+}
+
+void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
+  if (burst_.bits == most_bits) {
+    close(at, true, bursts);
+    open(at, true, nullptr);
+  }
+  if (has_in_) put(burst_.in, burst_.bits, in_.before(at));
+  if (has_out_) put(burst_.out, burst_.bits, out_.before(at));
+  ++burst_.bits;
+}
+
+bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>& bursts) {
+  if (!format_.has_select) {
+    if (at - last_ > format_.pause) {
+      seen_pause_ = true;
+      if (open_) close(last_, false, bursts);
+    }
+    if (!open_ && open(at, !seen_pause_, targets)) return true;
+  }
+  clock_.step();
+  last_ = at;
+  if (open_ && clock_.level == format_.rising) take(at, bursts);
+  return false;
+}
+
+bool ClockedDecoder::select_changes(Tick at, Targets* targets, std::vector<Burst>& bursts) {
+  const bool active = select_.level != format_.select_high;
+  if (active && open(at, false, targets)) return true;
+  select_.step();
+  if (!active && open_) close(at, false, bursts);
+  return false;
+}
+
+// A clock that changes together with chip select still belongs to what was before.
+bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<Burst>& bursts) {
+  begin_part(part);
+  for (;;) {
+    const Tick clock = clock_.next();
+    const Tick select = format_.has_select ? select_.next() : none;
+    if (clock == none && select == none) break;
+    if (clock <= select ? clock_changes(clock, targets, bursts) : select_changes(select, targets, bursts)) return true;
+  }
+  // What the data did behind the last clock counts for the next part.
+  in_.before(none);
+  out_.before(none);
+  if (!format_.has_select && open_ && part.end - last_ > format_.pause) {
+    seen_pause_ = true;
+    close(last_, false, bursts);
+  }
+  return false;
+}
+
+void ClockedDecoder::decode(const ClockedPart& part, std::vector<Burst>& bursts) { run(part, nullptr, bursts); }
+
+void ClockedDecoder::join(const ClockedPart& part, ClockedDecoder& other, std::vector<Burst>& guessed,
+                          std::vector<Burst>& bursts) {
+  Targets targets{guessed, other.open_ ? &other.burst_ : nullptr};
+  if (!run(part, &targets, bursts)) return;
+  const auto from = guessed.begin() + static_cast<std::ptrdiff_t>(targets.next);
+  bursts.insert(bursts.end(), std::make_move_iterator(from), std::make_move_iterator(guessed.end()));
+  std::swap(*this, other);
+}
+
+void ClockedDecoder::finish(std::vector<Burst>& bursts) {
+  if (open_) close(last_, true, bursts);
+  restart();
+}
+
+}  // namespace absenc::capture

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <utility>
+
+#include "absenc/capture/lines/blocks.hpp"
+#include "absenc/capture/lines/edges.hpp"
+#include "absenc/capture/lines/pipeline.hpp"
+
+namespace absenc::capture {
+
+namespace {
+
+constexpr std::size_t enough_changes = 8194;      // of the clock, to find its period
+constexpr std::size_t most_changes = 64 * 16384;  // of the data, while the clock has not enough
+
+// Where the wires stand among the channels.
+struct Wires {
+  explicit Wires(const ClockedLine& line) : channels{line.clock} {
+    const auto add = [this](const std::optional<unsigned>& channel) -> std::optional<std::size_t> {
+      if (!channel) return std::nullopt;
+      channels.push_back(*channel);
+      return channels.size() - 1;
+    };
+    in = add(line.in);
+    out = add(line.out);
+    select = add(line.select);
+  }
+  [[nodiscard]] ClockedPart part(const Levels& levels) const {
+    const auto at = [&](const std::optional<std::size_t>& index) { return index ? &levels.changes[*index] : nullptr; };
+    return {&levels.changes[0], at(in), at(out), at(select), levels.first, levels.end};
+  }
+
+  std::vector<unsigned> channels;
+  std::optional<std::size_t> in;
+  std::optional<std::size_t> out;
+  std::optional<std::size_t> select;
+};
+
+class Decoding {
+ public:
+  struct Guess {
+    std::optional<ClockedDecoder> decoder;
+    std::vector<Burst> bursts;
+  };
+
+  Decoding(const Wires& wires, const ClockedFormat& format, const Sink& sink)
+      : wires_(wires), format_(format), sink_(sink), decoder_(format) {}
+
+  bool decode(const Levels& levels) {
+    if (levels.first == levels.end) return true;
+    begin(levels);
+    decoder_.decode(wires_.part(levels), bursts_);
+    return deliver();
+  }
+  void guess(const Levels& levels, Guess& guess) const {
+    guess.decoder.emplace(format_);
+    guess.bursts.clear();
+    guess.decoder->decode(wires_.part(levels), guess.bursts);
+  }
+  bool join(const Levels& levels, Guess& guess) {
+    if (levels.first == levels.end) return true;
+    begin(levels);
+    decoder_.join(wires_.part(levels), *guess.decoder, guess.bursts, bursts_);
+    return deliver();
+  }
+  void finish() {
+    decoder_.finish(bursts_);
+    deliver();
+  }
+
+  [[nodiscard]] bool clock_seen() const { return clock_seen_; }
+  [[nodiscard]] bool selected() const { return selected_; }
+
+ private:
+  // What lies between two parts nobody knows.
+  void begin(const Levels& levels) {
+    if (begun_ && levels.first != end_) decoder_.finish(bursts_);
+    const Changes& clock = levels.changes[0];
+    const bool moved = begun_ && levels.first == end_ && clock.before != clock_level_;
+    clock_seen_ = clock_seen_ || moved || !clock.at.empty();
+    clock_level_ = level_after(clock);
+    if (wires_.select) {
+      const Changes& select = levels.changes[*wires_.select];
+      selected_ = selected_ || select.before == format_.select_high || !select.at.empty();
+    }
+    begun_ = true;
+    end_ = levels.end;
+  }
+  bool deliver() {
+    const bool wanted = sink_({decoder_.settled(end_), {}, bursts_, {}});
+    bursts_.clear();
+    return wanted;
+  }
+
+  const Wires& wires_;
+  ClockedFormat format_;
+  const Sink& sink_;
+  ClockedDecoder decoder_;
+  std::vector<Burst> bursts_;
+  bool begun_ = false;
+  bool clock_seen_ = false;
+  bool clock_level_ = false;
+  bool selected_ = false;
+  Tick end_ = 0;
+};
+
+std::string no_clock(const std::string& name) {
+  return name + " never changes its level, so there is no clock: is it the right channel, and was it connected?";
+}
+
+// "": `pause` is known.
+std::string look_for_pause(LevelReader& reader, const ClockedLine& line, std::vector<Levels>& parts, Tick& pause) {
+  Changes clock;
+  bool begun = false;
+  std::size_t others = 0;
+  look_ahead(reader, parts, [&](const Levels& levels) {
+    if (levels.first == levels.end) return false;
+    if (!std::exchange(begun, true)) clock.before = levels.changes[0].before;
+    append(clock, levels.changes[0], levels.first);
+    for (std::size_t i = 1; i < levels.changes.size(); ++i) others += levels.changes[i].at.size();
+    return clock.at.size() > enough_changes || others > most_changes;
+  });
+  if (const auto found = find_pause(clock)) {
+    pause = *found;
+    return {};
+  }
+  const std::string name = reader.name(line.clock);
+  if (clock.at.empty() && others <= most_changes) return no_clock(name);
+  return name + " changes its level only " + std::to_string(clock.at.size()) + " times, its data " +
+         std::to_string(others) + " times, so there is no word: is it the right channel?";
+}
+
+}  // namespace
+
+ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned threads, const Sink& sink) {
+  const Wires wires(line);
+  LevelReader reader(source, wires.channels);
+  ClockedOutcome outcome{reader.problem(), line.pause};
+  if (outcome.problem.empty() && !line.in && !line.out) {
+    outcome.problem = "no channel with data was named: name at least one";
+  }
+  if (!outcome.problem.empty()) return outcome;
+
+  std::vector<Levels> parts;
+  if (!line.select && line.pause == 0) {
+    outcome.problem = look_for_pause(reader, line, parts, outcome.pause);
+    if (!outcome.problem.empty()) return outcome;
+  }
+  Decoding decoding(wires, {line.rising, line.select.has_value(), line.select_high, outcome.pause}, sink);
+  bool wanted = true;
+  for (const Levels& levels : std::exchange(parts, {})) wanted = wanted && decoding.decode(levels);
+  if (wanted) wanted = BlockRun<Decoding>(reader, decoding, threads).run();
+  if (!wanted) return outcome;
+  decoding.finish();
+  if (!decoding.clock_seen())
+    outcome.problem = no_clock(reader.name(line.clock));
+  else if (line.select && !decoding.selected()) {
+    outcome.problem = reader.name(*line.select) +
+                      " is never active: is it the right channel and polarity? Without chip "
+                      "select, words end where the clock pauses";
+  }
+  return outcome;
+}
+
+}  // namespace absenc::capture

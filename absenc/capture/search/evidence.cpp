@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/capture/search/evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "absenc/core/angle.hpp"
+
+namespace absenc::capture {
+
+namespace {
+
+constexpr unsigned many_attempts = 1u << 20;  // where only one or two frames have to tell
+constexpr unsigned enough_accepted = 256;     // to know a rate to some percent
+
+struct Nowhere final : FieldSink {
+  void put(const FieldValue&) override {}
+};
+
+/// The position of a good reply.
+struct PositionSink final : FieldSink {
+  void put(const FieldValue&) override {}
+  void put_reading(const Reading& reading) override {
+    if (reading.singleturn_bits != 0) position = reading;
+  }
+  std::optional<Reading> position;
+};
+
+// How many bytes at its beginning a reply has in common with its request.
+std::size_t repeated(const HeardExchange& exchange) {
+  const auto& request = exchange.request.bytes;
+  const auto& reply = exchange.reply.bytes;
+  const std::size_t both = std::min(request.size(), reply.size());
+  std::size_t count = 0;
+  while (count < both && request[count] == reply[count]) ++count;
+  return count;
+}
+
+double position_of(const Reading& reading) { return static_cast<double>(reading.singleturn); }
+
+// The shortest way between two positions, as a part of all that there are.
+double way(const Reading& from, const Reading& to) {
+  const double all = std::ldexp(1.0, static_cast<int>(from.singleturn_bits));
+  const double difference = std::abs(position_of(to) - position_of(from));
+  return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
+}
+
+// Of random positions, each step is as short as the longest of these with the probability of twice its length; one step
+// is spent on choosing that length.
+std::optional<double> weigh_motion(std::span<const Reading> positions) {
+  double longest = 0;
+  std::size_t steps = 0;
+  for (std::size_t i = 1; i < positions.size(); ++i) {
+    const double one = way(positions[i - 1], positions[i]);
+    if (one <= 0) continue;
+    ++steps;
+    longest = std::max(longest, one);
+  }
+  if (steps == 0) return std::nullopt;
+  const double least = std::ldexp(1.0, -static_cast<int>(positions[0].singleturn_bits));
+  return static_cast<double>(steps - 1) * std::log10(std::min(1.0, 2 * longest + least));
+}
+
+/// The good ones, each once, and what chance makes of them.
+class Distinct {
+ public:
+  Distinct(const Unit& unit, const Options& options) : unit_(unit), options_(options) {}
+
+  void add(const HeardExchange& exchange) {
+    const auto same = [&](const HeardExchange* one) { return *one == exchange; };
+    if (std::any_of(all_.begin(), all_.end(), same)) return;
+    all_.push_back(&exchange);
+  }
+  [[nodiscard]] std::size_t count() const { return all_.size(); }
+  /// The geometric mean.
+  [[nodiscard]] double each() {
+    if (all_.empty()) return 1;
+    double sum = 0;
+    for (const HeardExchange* one : all_) sum += std::log10(acceptance_like(*one));
+    return std::pow(10, sum / static_cast<double>(all_.size()));
+  }
+
+ private:
+  struct Known {
+    const HeardExchange* exchange;
+    double acceptance;
+  };
+
+  double acceptance_like(const HeardExchange& exchange) {
+    for (const Known& known : known_) {
+      const HeardExchange& other = *known.exchange;
+      const bool alike = other.request == exchange.request && other.reply.bytes.size() == exchange.reply.bytes.size() &&
+                         other.reply.bits == exchange.reply.bits && repeated(other) == repeated(exchange);
+      if (alike) return known.acceptance;
+    }
+    const unsigned attempts = all_.size() > 2 ? usual_attempts : many_attempts;
+    known_.push_back({&exchange, acceptance(unit_, options_, exchange, attempts)});
+    return known_.back().acceptance;
+  }
+
+  const Unit& unit_;
+  const Options& options_;
+  std::vector<const HeardExchange*> all_;
+  std::vector<Known> known_;
+};
+
+}  // namespace
+
+double Evidence::chance() const { return motion && explains_all() ? frames + *motion : frames; }
+
+double acceptance(const Unit& unit, const Options& options, const HeardExchange& good, unsigned attempts) {
+  std::mt19937_64 random(good.reply.bytes.size());  // the same answer each time
+  HeardExchange noise = good;
+  const std::size_t kept = repeated(good);
+  Nowhere nowhere;
+  unsigned accepted = 0;
+  unsigned tried = 0;
+  for (; tried < attempts && accepted < enough_accepted; ++tried) {
+    std::uint64_t bits = 0;
+    const auto fill = [&](auto from, auto to) {
+      unsigned left = 0;
+      for (auto byte = from; byte != to; ++byte, bits >>= 8, --left) {
+        if (left == 0) {
+          bits = random();
+          left = 8;
+        }
+        *byte = static_cast<std::uint8_t>(bits);
+      }
+    };
+    fill(noise.reply.bytes.begin() + static_cast<std::ptrdiff_t>(kept), noise.reply.bytes.end());
+    if (noise.reply.can) fill(noise.reply.can->data.begin(), noise.reply.can->data.begin() + noise.reply.can->size);
+    if (unit.decode(options, noise.request.frame(), noise.reply.frame(), nowhere) == Error::none) ++accepted;
+  }
+  return std::max(accepted, 1u) / static_cast<double>(tried);
+}
+
+bool explains(const Unit& unit, const Options& options, const HeardExchange& exchange) {
+  Nowhere nowhere;
+  const Frame reply = exchange.reply.frame();
+  return !reply.empty() && unit.decode(options, exchange.request.frame(), reply, nowhere) == Error::none;
+}
+
+Evidence weigh(const Unit& unit, const Options& options, std::span<const HeardExchange> exchanges) {
+  Evidence evidence{.tried = exchanges.size()};
+  Distinct distinct(unit, options);
+  std::vector<Reading> positions;
+  for (const HeardExchange& exchange : exchanges) {
+    if (!explains(unit, options, exchange)) continue;
+    ++evidence.explained;
+    distinct.add(exchange);
+    PositionSink sink;
+    static_cast<void>(unit.decode(options, exchange.request.frame(), exchange.reply.frame(), sink));
+    if (sink.position) positions.push_back(*sink.position);
+  }
+  evidence.distinct = distinct.count();
+  const std::size_t unexplained = evidence.tried - evidence.explained;
+  evidence.frames = tail(evidence.distinct, evidence.distinct + unexplained, distinct.each());
+  evidence.motion = weigh_motion(positions);
+  return evidence;
+}
+
+double tail(std::size_t good, std::size_t all, double each) {
+  if (good == 0 || each >= 1) return 0;
+  const auto n = static_cast<double>(all);
+  double sum = 0;  // in units of the first term, which is the largest that matters
+  double first = 0;
+  for (std::size_t k = good; k <= all; ++k) {
+    const auto at = static_cast<double>(k);
+    const double term = (std::lgamma(n + 1) - std::lgamma(at + 1) - std::lgamma(n - at + 1)) / std::log(10.0) +
+                        at * std::log10(each) + (n - at) * std::log10(1 - each);
+    if (k == good) first = term;
+    sum += std::pow(10, term - first);
+  }
+  return std::min(0.0, first + std::log10(sum));
+}
+
+}  // namespace absenc::capture

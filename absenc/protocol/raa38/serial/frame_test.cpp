@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/raa38/serial/frame.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "absenc/protocol/raa38/serial/settings.hpp"
+
+namespace absenc::raa38::serial {
+namespace {
+
+static_assert(Format{.bits = 16}.data_bytes() == 2 && Format{.bits = 17}.data_bytes() == 3);
+static_assert(Format{.bits = 24}.data_bytes() == 3 && Format{.bits = 25}.data_bytes() == 4);
+static_assert(encode_position({.bits = 14}, {383})[4] == 0x00, "the sum of 3.1.1 is 200 hex");
+
+TEST(RaaFrame, EveryPositionOfEverySizeSurvives) {
+  for (unsigned bits = least_bits; bits <= most_bits; ++bits) {
+    const Format format{.bits = bits};
+    for (std::uint64_t value = 0; value <= low_mask(bits); value += 1 + low_mask(bits) / 5000) {
+      const Position position{static_cast<std::uint32_t>(value), 0x81};
+      const Result<Position> decoded = decode_position(format, encode_position(format, position));
+      ASSERT_TRUE(decoded.has_value()) << bits;
+      EXPECT_EQ(*decoded, position);
+    }
+  }
+}
+
+TEST(RaaFrame, TheFirstCheckThatFailsNamesTheError) {
+  const Format format{.bits = 14};
+  const auto error = [&](std::initializer_list<std::uint8_t> bytes, int unit = anybody) {
+    return decode_position(format, {bytes.begin(), bytes.size()}, unit).error();
+  };
+  EXPECT_EQ(error({0xFF, 0x81, 0x40, 0x00}), Error::wrong_length);
+  EXPECT_EQ(error({0xFE, 0x80, 0x40, 0x00, 0x00}), Error::bad_checksum);
+  EXPECT_EQ(error({0xFE, 0x81, 0x40, 0x00, 0xBF}), Error::unexpected_reply);
+  EXPECT_EQ(error({0xFF, 0x81, 0x40, 0x00, 0xC0}), Error::out_of_range);
+  EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}, 1), Error::unexpected_reply);
+  EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}, 2), Error::none);
+  EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}), Error::none);
+}
+
+TEST(RaaFrame, SwappedBytesAreAnotherPositionAndOnlyTheSpeedTells) {
+  const Format format{.bits = 16};
+  FrameBytes bytes = encode_position(format, {383});
+  std::swap(bytes[2], bytes[3]);
+  const Result<Position> decoded = decode_position(format, bytes);
+  ASSERT_TRUE(decoded.has_value());
+  EXPECT_EQ(decoded->singleturn, 32513u);
+  const Settings settings{.format = format, .maximum_rpm = 6000};
+  EXPECT_FALSE(is_possible(settings, 383, decoded->singleturn, std::chrono::milliseconds(1)));
+  EXPECT_TRUE(is_possible(settings, 383, 383 + 6553, std::chrono::milliseconds(1)));
+  EXPECT_FALSE(is_possible(settings, 383, 383 + 6560, std::chrono::milliseconds(1)));
+  EXPECT_TRUE(is_possible(settings, 2, 65534, std::chrono::nanoseconds(1))) << "over the zero";
+}
+
+// A standing shaft repeats its frame. With the sizes that the encoders have, no other place in the repetition gives
+// another position: a search can never settle there.
+TEST(RaaFrame, ARepeatedFrameReadElsewhereIsNoOtherPosition) {
+  for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
+    const Format format{.bits = bits};
+    const std::size_t size = format.frame_bytes();
+    for (std::uint64_t value = 0; value <= low_mask(bits); ++value) {
+      const FrameBytes frame = encode_position(format, {static_cast<std::uint32_t>(value)});
+      std::array<std::uint8_t, 2 * frame_capacity> twice{};
+      for (std::size_t i = 0; i < 2 * size; ++i) twice[i] = frame[i % size];
+      for (std::size_t offset = 1; offset < size; ++offset) {
+        if (twice[offset] != header || twice[offset + 1] != fixed_second_byte) continue;
+        const Result<Position> other = decode_position(format, Bytes(twice).subspan(offset, size));
+        ASSERT_TRUE(!other || other->singleturn == value) << bits << " bits, " << value;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace absenc::raa38::serial

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// The conversation with an encoder that transmits by itself: it only listens, and goes on as long as it is driven.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/raa38/serial/settings.hpp"
+#include "absenc/protocol/raa38/serial/stream.hpp"
+
+namespace absenc::raa38::serial {
+
+/// Emits every frame, and every loss of the frames with its error. Ends only when nothing good comes any more: timeout,
+/// bad_framing, out_of_range. With a maximum speed a position that the shaft cannot have reached is cross_check_failed.
+class Listen final : public Conversation<std::uint8_t> {
+ public:
+  /// `settings.maximum_rpm` needs `settings.period`: otherwise invalid_argument, because times of arrival are too
+  /// rough.
+  explicit Listen(const Settings& settings);
+
+  void feed(const Event<std::uint8_t>& event) override;
+  Step<std::uint8_t> next(Time now) override;
+  [[nodiscard]] bool streams() const override { return true; }
+  [[nodiscard]] Error error() const override { return error_; }
+  [[nodiscard]] std::string_view detail() const override { return detail_; }
+  [[nodiscard]] std::string_view advice() const override { return advice_; }
+  [[nodiscard]] const Reading* reading() const override;
+  void report(FieldSink& sink) const override;
+  [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
+
+  [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
+
+ private:
+  // Frames of as many bytes as a port hands out at once.
+  static constexpr std::size_t most_waiting = 1024;
+
+  void take(const Found& found);
+  void accept(const Found& found, Time latched);
+  [[nodiscard]] bool is_plausible(std::uint32_t singleturn, Time latched);
+  [[nodiscard]] Time latched_time(const Found& found) const;
+  void give_up();
+  void fail(Error error, std::string_view detail, std::string_view advice = {});
+
+  Settings settings_;
+  StreamDecoder decoder_;
+  Buffer<Found, most_waiting> waiting_;
+  std::size_t taken_ = 0;  // of `waiting_`
+  bool done_ = false;
+  bool heard_ = false;  // anything, since the last good frame
+  bool arm_ = true;     // the time to the next good frame begins
+  Time deadline_{};
+  Time heard_at_{};         // of the bytes that are being worked on,
+  Time heard_before_{};     // and of those before
+  std::uint64_t good_ = 0;  // frames
+  Reading reading_{};
+  Time last_good_at_{};
+  std::uint32_t last_good_ = 0;     // position that later ones must be reachable from
+  std::uint64_t frame_number_ = 0;  // of frames, good or not plausible,
+  std::uint64_t last_number_ = 0;   // and of the one with `last_good_`
+  bool has_suspect_ = false;
+  std::uint32_t suspect_ = 0;  // the last position that was not plausible
+  FrameBytes frame_;
+  Error error_ = Error::none;
+  std::string_view detail_{};
+  std::string_view advice_{};
+};
+
+}  // namespace absenc::raa38::serial

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// The stream of a virtual encoder in virtual time, and what `Session` makes of it.
+#include "absenc/protocol/raa38/serial/listen.hpp"
+
+#include <gtest/gtest.h>
+
+#include "absenc/host/session.hpp"
+#include "absenc/protocol/raa38/serial/bench_test.hpp"
+#include "absenc/protocol/raa38/serial/unit.hpp"
+#include "absenc/protocol/raa38/unit.hpp"
+#include "absenc/sim/sim_port.hpp"
+
+namespace absenc::raa38::serial {
+namespace {
+
+using namespace testing;
+using Wire = std::vector<std::uint8_t>;
+
+constexpr Settings fast{.mode = Mode::timing, .period = 1ms};
+
+/// The results of so many emits.
+struct Results {
+  std::vector<std::uint32_t> positions;
+  std::vector<Time> times;
+  std::vector<Error> errors;
+};
+
+Results listen(Bench& bench, Listen& listen, std::size_t count) {
+  Results results;
+  bench.run(listen, [&] {
+    if (const Reading* reading = listen.reading()) {
+      results.positions.push_back(static_cast<std::uint32_t>(reading->singleturn));
+      results.times.push_back(reading->latched);
+    } else {
+      results.errors.push_back(listen.error());
+    }
+    return results.positions.size() + results.errors.size() < count;
+  });
+  return results;
+}
+
+TEST(RaaListen, EveryFrameAtTheRateOfTheStream) {
+  Bench bench(fast);
+  bench.shaft.spin(60, Time{});  // 16.384 counts a frame
+  Listen machine(fast);
+  const Results results = listen(bench, machine, 1000);
+  ASSERT_EQ(results.positions.size(), 1000u);
+  EXPECT_TRUE(results.errors.empty());
+  EXPECT_EQ(bench.took, 999ms + 5 * line_of_tests.character());
+  for (std::size_t i = 0; i < 1000; ++i) EXPECT_EQ(results.positions[i], (383 + 16'384 * i / 1000) % 16'384) << i;
+  for (std::size_t i = 3; i < 1000; ++i) EXPECT_EQ(results.times[i] - results.times[i - 1], 1ms);
+}
+
+TEST(RaaListen, ADamagedFrameIsOneErrorAndTheStreamGoesOn) {
+  Bench bench(fast);
+  bench.device().set([](unsigned frame, Wire& reply) {
+    if (frame == 5) reply[3] ^= 1;
+    if (frame == 8) reply.pop_back();
+  });
+  Listen machine(fast);
+  const Results results = listen(bench, machine, 20);
+  EXPECT_EQ(results.errors.size(), 2u);
+  EXPECT_EQ(results.errors[0], Error::bad_checksum);
+  EXPECT_EQ(bench.encoder().answered(), 20u) << "nothing good was lost";
+  EXPECT_EQ(report(machine).numbers["skipped"], std::vector<std::int64_t>{9});
+}
+
+TEST(RaaListen, SpeedRefusesAJumpUnlessItStays) {
+  Settings settings = fast;
+  settings.maximum_rpm = 6000;
+  Bench bench(settings);
+  bench.device().set([&](unsigned frame, Wire& reply) {
+    if (frame == 5) reply = {0xFF, 0x81, 0x17, 0x0F, 0xA6};  // half a byte moved
+    if (frame == 9) bench.shaft.put(0, 0x3000);              // turned while nobody could see it
+  });
+  Listen machine(settings);
+  const Results results = listen(bench, machine, 20);
+  EXPECT_EQ(results.errors, (std::vector{Error::cross_check_failed, Error::cross_check_failed}));
+  ASSERT_EQ(results.positions.size(), 18u);
+  for (std::size_t i = 0; i < 18; ++i) EXPECT_EQ(results.positions[i], i < 10 ? 383u : 0x3000u) << i;
+}
+
+TEST(RaaListen, SpeedNeedsTheRefreshRate) {
+  const Listen machine({.maximum_rpm = 6000});
+  EXPECT_EQ(machine.error(), Error::invalid_argument);
+  EXPECT_EQ(machine.advice(), "set refresh_hz as well");
+}
+
+TEST(RaaListen, SaysWhyNothingGoodComes) {
+  struct Row {
+    std::function<void(Wire&)> change;
+    Error error;
+    std::string_view words;
+  };
+  const std::vector<Row> rows{
+      {[](Wire& reply) { reply.clear(); }, Error::timeout, "does not transmit by itself"},
+      {[](Wire& reply) { reply[4] ^= 1; }, Error::bad_framing, "no two frames in a row"},
+      {[](Wire& reply) {
+         reply = {0xFF, 0x81, 0x40, 0x01, 0xC1};
+       },
+       Error::out_of_range, "more bits"},
+  };
+  for (const Row& row : rows) {
+    Bench bench(row.error == Error::timeout ? Settings{.mode = Mode::bus} : fast);
+    bench.device().set([&](unsigned, Wire& reply) { row.change(reply); });
+    Listen machine(fast);
+    bench.run(machine);
+    EXPECT_EQ(machine.error(), row.error);
+    EXPECT_NE(machine.detail().find(row.words), std::string_view::npos) << machine.detail();
+    EXPECT_FALSE(machine.advice().empty());
+    EXPECT_EQ(machine.reading(), nullptr);
+  }
+}
+
+TEST(RaaListen, WithoutTheRefreshRateTimesAreSpreadOverWhatCameAtOnce) {
+  Listen machine(Settings{});
+  Wire wire;
+  const auto feed = [&](std::uint32_t from, std::uint32_t frames, Time at) {
+    wire.clear();
+    for (std::uint32_t i = 0; i < frames; ++i) {
+      const FrameBytes frame = encode_position({}, {from + i});
+      wire.insert(wire.end(), frame.view().begin(), frame.view().end());
+    }
+    machine.feed({.kind = Event<std::uint8_t>::Kind::received, .at = at, .items = wire});
+  };
+  feed(1, 2, 10ms);
+  while (machine.next(10ms).kind == Step<std::uint8_t>::Kind::emit) EXPECT_EQ(machine.reading()->latched, 10ms);
+  feed(3, 4, 14ms);
+  for (int i = 1; i <= 4; ++i) {
+    ASSERT_EQ(machine.next(14ms).kind, Step<std::uint8_t>::Kind::emit);
+    EXPECT_EQ(machine.reading()->singleturn, static_cast<unsigned>(2 + i));
+    EXPECT_EQ(machine.reading()->latched, 10ms + i * 1ms);
+  }
+}
+
+// ---- In a session
+
+struct SessionBench {
+  const Conversation<std::uint8_t>& read(host::Take take) { return *session.read(command, take); }
+
+  Shaft14 shaft;
+  Time clock{};
+  VirtualEncoder encoder = [this] {
+    shaft.spin(60, Time{});
+    VirtualEncoder made(fast, shaft);
+    made.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    return made;
+  }();
+  sim::SimPort<std::uint8_t> port{
+      LinkKind::half_duplex,
+      line_of_tests,
+      encoder,
+      {.now = [this] { return clock; }, .sleep_until = [this](Time time) { clock = std::max(clock, time); }}};
+  std::vector<std::byte> storage = std::vector<std::byte>(serial_unit.host_storage);
+  Options options = [] {
+    Options all;
+    EXPECT_EQ(resolve_options(serial_unit, {}, {}, all).kind, OptionError::Kind::none);
+    return all;
+  }();
+  const Command& command = *find_command(serial_unit, Verb::read);
+  host::Session<std::uint8_t> session{serial_unit, options, port, storage, host::EchoMode::automatic};
+};
+
+TEST(RaaSession, ReadsEveryFrameOfTheStream) {
+  SessionBench bench;
+  bench.read(host::Take::every);
+  Time before = bench.read(host::Take::every).reading()->received;
+  for (int i = 0; i < 200; ++i) {
+    const Reading reading = *bench.read(host::Take::every).reading();
+    EXPECT_EQ(reading.received - before, 1ms);
+    before = reading.received;
+  }
+  EXPECT_EQ(bench.encoder.answered(), bench.session.counters().good);
+}
+
+// A pause of the caller must not bring old positions.
+TEST(RaaSession, TheNewestIsNew) {
+  SessionBench bench;
+  bench.read(host::Take::newest);
+  for (int i = 0; i < 20; ++i) {
+    bench.clock += 50ms;
+    const Reading reading = *bench.read(host::Take::newest).reading();
+    EXPECT_GT(reading.received, bench.clock - 2ms);
+    const auto frame = static_cast<std::uint64_t>(reading.received / 1ms);  // which began then
+    EXPECT_EQ(reading.singleturn, 16'384 * frame / 1000 % 16'384);
+  }
+}
+
+TEST(RaaSession, RunEndsAtOneResult) {
+  SessionBench bench;
+  const auto* conversation = bench.session.run(bench.command);
+  ASSERT_NE(conversation->reading(), nullptr);
+  EXPECT_EQ(bench.session.counters().good, 1u);
+}
+
+TEST(RaaSession, SilenceIsToldAndTheStreamFoundAgain) {
+  SessionBench bench;
+  bench.read(host::Take::every);
+  bench.encoder.power_off(bench.port.now());
+  EXPECT_EQ(bench.read(host::Take::every).error(), Error::timeout);
+  EXPECT_FALSE(bench.session.confirmed());
+}
+
+}  // namespace
+}  // namespace absenc::raa38::serial

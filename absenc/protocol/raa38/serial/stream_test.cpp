@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/raa38/serial/stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <vector>
+
+#include "absenc/core/hex.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc::raa38::serial {
+namespace {
+
+using namespace std::chrono_literals;
+using Wire = std::vector<std::uint8_t>;
+
+void append(Wire& wire, Bytes bytes) { wire.insert(wire.end(), bytes.begin(), bytes.end()); }
+
+struct Heard {
+  std::vector<std::uint32_t> positions;
+  std::vector<Error> errors;
+};
+
+Heard hear(StreamDecoder& decoder, Bytes bytes, std::size_t piece = SIZE_MAX) {
+  Heard heard;
+  while (!bytes.empty()) {
+    const Bytes now = bytes.first(std::min(piece, bytes.size()));
+    bytes = bytes.subspan(now.size());
+    decoder.feed(now, Time{}, [&](const Found& found) {
+      if (found.error == Error::none) heard.positions.push_back(found.singleturn);
+      if (found.error != Error::none) heard.errors.push_back(found.error);
+    });
+  }
+  return heard;
+}
+
+Wire stream(const Format& format, std::uint32_t first, std::uint32_t last) {
+  Wire wire;
+  for (std::uint32_t value = first; value <= last; ++value) append(wire, encode_position(format, {value}));
+  return wire;
+}
+
+std::vector<std::uint32_t> range(std::uint32_t first, std::uint32_t last) {
+  std::vector<std::uint32_t> values;
+  for (std::uint32_t value = first; value <= last; ++value) values.push_back(value);
+  return values;
+}
+
+TEST(RaaStream, EveryFrameInPiecesOfEverySize) {
+  for (const unsigned bits : {14u, 17u, 25u}) {
+    const Format format{.bits = bits};
+    const Wire wire = stream(format, 100, 150);
+    for (std::size_t piece = 1; piece <= wire.size(); ++piece) {
+      StreamDecoder decoder(format);
+      const Heard heard = hear(decoder, wire, piece);
+      EXPECT_EQ(heard.positions, range(100, 150)) << bits << " bits in pieces of " << piece;
+      EXPECT_TRUE(heard.errors.empty());
+      EXPECT_EQ(decoder.skipped(), 0u);
+    }
+  }
+}
+
+TEST(RaaStream, ADisturbanceCostsWhatItHits) {
+  const Format format{.bits = 14};
+  const std::size_t size = format.frame_bytes();
+  for (std::size_t piece = 1; piece < 23; ++piece) {
+    Wire flipped = stream(format, 100, 110);
+    flipped[5 * size + 3] ^= 0x10;
+    StreamDecoder decoder(format);
+    Heard heard = hear(decoder, flipped, piece);
+    std::vector<std::uint32_t> wanted = range(100, 110);
+    wanted.erase(wanted.begin() + 5);
+    EXPECT_EQ(heard.positions, wanted);
+    EXPECT_EQ(heard.errors, std::vector{Error::bad_checksum});
+    EXPECT_EQ(decoder.skipped(), size);
+
+    Wire longer = stream(format, 100, 110);
+    longer.insert(longer.begin() + 5 * static_cast<std::ptrdiff_t>(size), {0xFF, 0x81, 0x00});
+    StreamDecoder other(format);
+    heard = hear(other, longer, piece);
+    EXPECT_EQ(heard.positions, range(100, 110)) << "what came in between hit no frame";
+    EXPECT_EQ(heard.errors.size(), 1u);
+    EXPECT_EQ(other.skipped(), 3u);
+  }
+}
+
+TEST(RaaStream, BeginsInTheMiddleOfAFrameWithTheHeaderInItsData) {
+  const Format format{.bits = 14};
+  Wire wire;
+  for (int i = 0; i < 5; ++i) append(wire, encode_position(format, {0x3F81}));  // FF 81 3F 81 40
+  for (std::size_t cut = 0; cut < 5; ++cut) {
+    StreamDecoder decoder(format);
+    const Heard heard = hear(decoder, Bytes(wire).subspan(cut));
+    EXPECT_EQ(heard.positions, std::vector<std::uint32_t>(cut == 0 ? 5 : 4, 0x3F81));
+  }
+}
+
+// Two bytes were lost: FF 81 02 .. .. FF 81 02 09 8B. What stands there has a right sum and fits into 10 bits.
+TEST(RaaStream, AHeaderThatSlippedIntoAFrameIsNoPosition) {
+  const Format format{.bits = 10};
+  for (std::size_t piece = 1; piece < 20; ++piece) {
+    Wire wire = stream(format, 0x200, 0x203);
+    append(wire, hex<"ff8102">);
+    append(wire, stream(format, 0x209, 0x20C));
+    StreamDecoder decoder(format);
+    std::vector<std::uint32_t> wanted = range(0x200, 0x203);
+    for (const std::uint32_t position : range(0x209, 0x20C)) wanted.push_back(position);
+    EXPECT_EQ(hear(decoder, wire, piece).positions, wanted) << piece;
+  }
+}
+
+// The sum of FF 81 00 7F is FF: such a frame waits for the next header, and no longer.
+TEST(RaaStream, AFrameWithFFInsideWaitsForTheNextHeader) {
+  const Format format{.bits = 14};
+  StreamDecoder decoder(format);
+  Wire wire = stream(format, 0x7D, 0x7F);
+  EXPECT_EQ(hear(decoder, wire).positions, range(0x7D, 0x7E));
+  EXPECT_EQ(hear(decoder, hex<"ff81">).positions, range(0x7F, 0x7F));
+  EXPECT_EQ(hear(decoder, hex<"008000">).positions, range(0x80, 0x80));
+}
+
+TEST(RaaStream, TellsEachLossOnceAndWhy) {
+  const Format format{.bits = 14};
+  Wire wire = stream(format, 1, 2);
+  append(wire, encode_position({.bits = 16}, {0x4001}));
+  for (int i = 0; i < 20; ++i) wire.push_back(0x55);
+  StreamDecoder decoder(format);
+  EXPECT_EQ(hear(decoder, wire).errors, std::vector{Error::out_of_range});
+  EXPECT_TRUE(decoder.saw_larger_positions());
+  EXPECT_FALSE(decoder.in_step());
+  EXPECT_EQ(decoder.bad().size(), 5u);
+}
+
+TEST(RaaStream, ADamagedCharacterIsADisturbance) {
+  const Format format{.bits = 14};
+  StreamDecoder decoder(format);
+  const Wire wire = stream(format, 1, 4);
+  EXPECT_EQ(hear(decoder, Bytes(wire).first(17)).positions, range(1, 3));
+  std::vector<Error> errors;
+  decoder.disturbed([&](const Found& found) { errors.push_back(found.error); });
+  EXPECT_EQ(errors, std::vector{Error::bad_framing});
+  EXPECT_EQ(hear(decoder, stream(format, 5, 7)).positions, range(5, 7));
+}
+
+// ---- The refresh rate: what checksum and range let pass
+
+// With 24 bits FF 81 FF 81 81 81 repeats itself so that it also reads FF 81 81 81 FF 81: only the rest between frames
+// tells which is right.
+TEST(RaaStream, TheRestBetweenFramesTellsWhereTheyBegin) {
+  const Format format{.bits = 24};
+  const FrameBytes frame = encode_position(format, {0xFF8181});
+  const auto decoded = [&](Time period) {
+    StreamDecoder decoder(format, fixed_second_byte, period);
+    std::vector<std::uint32_t> positions;
+    for (std::size_t i = 2; i < 60; ++i) {  // somebody plugged the cable in after two bytes
+      const Time at = 10ms * (i / frame.size()) + 87us * (i % frame.size());
+      decoder.feed(frame.view().subspan(i % frame.size(), 1), at,
+                   [&](const Found& found) { positions.push_back(found.singleturn); });
+    }
+    return positions;
+  };
+  for (const std::uint32_t position : decoded(10ms)) EXPECT_EQ(position, 0xFF8181u);
+  EXPECT_GE(decoded(10ms).size(), 8u);
+  EXPECT_EQ(decoded(Time{}).front(), 0x8181FFu) << "without it nothing does";
+}
+
+TEST(RaaStream, FramesNearerThanTheRefreshRateAllowsAreNone) {
+  const Format format{.bits = 14};
+  const Wire burst = stream(format, 1, 2);
+  StreamDecoder strict(format, fixed_second_byte, 10ms);
+  StreamDecoder plain(format);
+  std::size_t believed = 0;
+  std::size_t believed_plainly = 0;
+  for (std::size_t i = 0; i < burst.size(); ++i) {
+    const Time at = 87us * static_cast<int>(i);
+    strict.feed(Bytes(burst).subspan(i, 1), at, [&](const Found&) { ++believed; });
+    plain.feed(Bytes(burst).subspan(i, 1), at, [&](const Found&) { ++believed_plainly; });
+  }
+  EXPECT_EQ(believed, 0u);
+  EXPECT_EQ(believed_plainly, 2u);
+}
+
+// The operating system hands over what came whenever it likes: that must not keep a good stream from being found.
+TEST(RaaStream, PiecesThatEndInsideEveryFrameOnlyDelay) {
+  const Format format{.bits = 14};
+  const Wire wire = stream(format, 1, 100);
+  for (std::size_t cut = 1; cut < 5; ++cut) {
+    StreamDecoder decoder(format, fixed_second_byte, 1ms);
+    std::vector<std::uint32_t> positions;
+    const auto keep = [&](const Found& found) { positions.push_back(found.singleturn); };
+    decoder.feed(Bytes(wire).first(cut), Time{}, keep);
+    for (std::size_t at = cut; at + 5 <= wire.size(); at += 5) {
+      decoder.feed(Bytes(wire).subspan(at, 5), Time(1ms) * static_cast<int>(at / 5 + 1), keep);
+    }
+    EXPECT_EQ(positions, range(1, 99)) << cut;
+  }
+}
+
+// ---- A million frames, cut, joined and polluted
+
+/// One stretch of a stream without disturbance, and what disturbs it behind.
+struct Tally {
+  std::uint64_t sent = 0;
+  std::uint64_t untouched = 0;  // frames that no disturbance hit
+  std::uint64_t lost = 0;       // of those
+  std::uint64_t wrong = 0;      // positions that were never sent
+  std::uint64_t disturbances = 0;
+};
+
+/// Adds a disturbance: garbage, a cut, a flipped or a swapped pair of bits, a join with a later part of the stream.
+class Polluter {
+ public:
+  Polluter(const Format& format, std::uint64_t seed) : format_(format), random_(seed) {}
+
+  Tally run(std::uint64_t frames) {
+    StreamDecoder decoder(format_);
+    while (tally_.sent < frames) {
+      wire_.clear();
+      sent_.clear();
+      const std::uint64_t stretches = 50;
+      for (std::uint64_t i = 0; i < stretches; ++i) {
+        stretch(1 + random_.below(60));
+        disturb();
+      }
+      judge(hear(decoder, wire_, 1 + random_.below(300)));
+    }
+    return tally_;
+  }
+
+ private:
+  struct Sent {
+    std::uint32_t position;
+    bool hit;
+  };
+
+  void stretch(std::uint64_t frames) {
+    for (std::uint64_t i = 0; i < frames; ++i) {
+      const auto masked = [&](std::uint64_t value) {
+        return static_cast<std::uint32_t>(value & low_mask(format_.bits));
+      };
+      position_ = masked(position_ + 1 + random_.below(6));
+      const std::uint32_t position = random_.chance(0.01) ? masked(0x3F81FF81) : position_;
+      append(wire_, encode_position(format_, {position}));
+      sent_.push_back({position, false});
+      ++tally_.sent;
+    }
+  }
+
+  void disturb() {
+    ++tally_.disturbances;
+    const std::size_t size = format_.frame_bytes();
+    switch (random_.below(4)) {
+      case 0:  // garbage between frames, rich in headers
+        for (std::uint64_t i = 1 + random_.below(20); i > 0; --i) {
+          const std::uint64_t kind = random_.below(4);
+          const auto noise = static_cast<std::uint8_t>(random_.below(256));
+          wire_.push_back(kind == 0 ? header : kind == 1 ? fixed_second_byte : noise);
+        }
+        return;
+      case 1:  // a cut inside the last frame
+        wire_.resize(wire_.size() - 1 - random_.below(size - 1));
+        break;
+      case 2:  // one bit
+        wire_[wire_.size() - 1 - random_.below(size)] ^= static_cast<std::uint8_t>(1u << random_.below(8));
+        break;
+      default:  // a lost byte
+        wire_.erase(wire_.end() - 1 - static_cast<std::ptrdiff_t>(random_.below(size)));
+        break;
+    }
+    sent_.back().hit = true;
+  }
+
+  // Both in the order of the line: what was heard and not sent next is wrong, what was sent and not heard is lost.
+  void judge(const Heard& heard) {
+    constexpr std::size_t most_missing = 12;  // in a row
+    std::size_t next = 0;
+    for (const std::uint32_t position : heard.positions) {
+      const std::size_t end = std::min(sent_.size(), next + most_missing);
+      std::size_t found = next;
+      while (found < end && sent_[found].position != position) ++found;
+      if (found == end) {
+        ++tally_.wrong;
+        continue;
+      }
+      for (; next < found; ++next) count(sent_[next], true);
+      count(sent_[next++], false);
+    }
+    for (; next < sent_.size(); ++next) count(sent_[next], true);
+  }
+
+  void count(const Sent& one, bool lost) {
+    if (one.hit) return;
+    ++tally_.untouched;
+    if (lost) ++tally_.lost;
+  }
+
+  Format format_;
+  sim::Random random_;
+  std::uint32_t position_ = 0;
+  Wire wire_;
+  std::vector<Sent> sent_;
+  Tally tally_;
+};
+
+TEST(RaaStream, AMillionFramesCutJoinedAndPolluted) {
+  Tally all;
+  for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
+    const Tally tally = Polluter({.bits = bits}, bits).run(200'000);
+    // One good frame for each disturbance at the most.
+    EXPECT_LE(tally.lost, tally.disturbances) << bits;
+    all.sent += tally.sent;
+    all.untouched += tally.untouched;
+    all.lost += tally.lost;
+    all.wrong += tally.wrong;
+    all.disturbances += tally.disturbances;
+  }
+  std::printf("%llu frames, %llu disturbances: %llu good frames lost, %llu positions wrong\n",
+              static_cast<unsigned long long>(all.sent), static_cast<unsigned long long>(all.disturbances),
+              static_cast<unsigned long long>(all.lost), static_cast<unsigned long long>(all.wrong));
+  EXPECT_GE(all.sent, 1'000'000u);
+  EXPECT_LE(all.lost * 20, all.disturbances) << "most cost no good frame at all";
+  // A damaged frame passes an 8-bit sum by chance; two bytes joined from two frames do as well.
+  EXPECT_LE(all.wrong * 1000, all.disturbances);
+}
+
+}  // namespace
+}  // namespace absenc::raa38::serial
