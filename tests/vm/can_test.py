@@ -40,6 +40,11 @@ def receivers(interface):
         return len(re.findall(rf"^\s*{interface} ", file.read(), re.MULTILINE))
 
 
+def losses(rows):
+    """Without the gaps that a busy machine leaves."""
+    return [row["event"] for row in rows if row["event"] in ("lost", "back")]
+
+
 class AnotherNode(threading.Thread):
     """Answers each request for a position of node 20 with these frames, as they are."""
 
@@ -177,7 +182,8 @@ class Verbs(OnABus):
         log = self.file("log.csv")
         self.assert_good(absenc("record", ENCODER, "--output", log, "--count", "40", "--rate", "40"))
         rows = read_csv(log)[1]
-        self.assertEqual({row["event"] for row in rows}, {""})
+        self.assertLessEqual({row["event"] for row in rows}, {"", "gap"})
+        rows = [row for row in rows if row["event"] == ""]
         counts = [int(row["position"]) for row in rows]
         moments = [float(row["time_s"]) for row in rows]
         self.assertEqual(counts, sorted(counts))
@@ -335,7 +341,7 @@ class ErrorFrames(OnABus):
         self.next_message(process, "the port is back after")
         wait_until(lambda: rows_so_far(log)[-1]["singleturn"] == "1000", "readings again")
         self.assertEqual(end(process, signal.SIGINT)[0], 0)
-        self.assertEqual([row["event"] for row in read_csv(log)[1] if row["event"]], ["lost", "back"])
+        self.assertEqual(losses(read_csv(log)[1]), ["lost", "back"])
         self.next_message(emulator.process, f"{BUS} is bus-off")
         self.next_message(emulator.process, f"{BUS} is back")
 
@@ -377,7 +383,7 @@ class Down(OnABus):
         self.assertRegex(messages, why)
         self.assertIn("the port is back after", messages)
         rows = read_csv(output)[1]
-        self.assertEqual([row["event"] for row in rows if row["event"]], ["lost", "back"])
+        self.assertEqual(losses(rows), ["lost", "back"])
         self.assertEqual({row["singleturn"] for row in rows if row["event"] == ""}, {"1000"})
         with open(can_log, encoding="utf-8") as file:  # before and after, in one file
             answers = file.read().count(f"{BUS} 120#E803000000000000\n")
