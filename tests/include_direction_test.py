@@ -22,7 +22,7 @@ BELOW = {
 }
 FREESTANDING = {"core", "link", "protocol", "host"}
 FREESTANDING_HEADERS = set(
-    """algorithm array bit cfloat chrono climits compare concepts cstddef cstdint cstring initializer_list iterator
+    """algorithm array bit cfloat chrono climits compare concepts coroutine cstddef cstdint cstring initializer_list iterator
     limits new numbers numeric optional ratio span string_view tuple type_traits utility version""".split()
 )
 # Each costs seconds for every file that includes it.
@@ -41,8 +41,9 @@ def is_test(path):
 
 
 def unit_of(path):
-    """protocol/tformat/frame.hpp -> tformat; protocol/unit.hpp -> None."""
-    return path.parts[2] if path.parts[:2] == ("absenc", "protocol") and len(path.parts) > 3 else None
+    """protocol/tformat/frame.hpp -> tformat; protocol/unit.hpp and what units are made with -> None."""
+    is_unit = path.parts[:2] == ("absenc", "protocol") and len(path.parts) > 3 and path.parts[2] != "author"
+    return path.parts[2] if is_unit else None
 
 
 def built_on(root, unit):

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "absenc/protocol/amt21/unit.hpp"
 #include "absenc/protocol/biss/unit.hpp"
 #include "absenc/protocol/e201/unit.hpp"
 #include "absenc/protocol/encolink/unit.hpp"
@@ -18,6 +19,7 @@ namespace {
 constexpr std::array units{
     &tformat::unit, &esl::unit,  &encolink::unit,     &encolink::spi_unit, &biss::unit,
     &ssi::unit,     &e201::unit, &raa38::serial_unit, &raa38::modbus_unit, &raa38::can_unit,
+    &amt21::unit,
 };
 }  // namespace
 

@@ -2,6 +2,7 @@
 // The two roles a unit plays: conversations (host side) and virtual encoders (device side). Both are machines.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -73,6 +74,8 @@ struct Device : Machine<Item> {
   /// the others until `lower_alarms`.
   virtual void raise_alarms(std::uint32_t bits) = 0;
   virtual void lower_alarms(std::uint32_t bits) = 0;
+  /// Sets the unit's condition of this index to `value`, within its range.
+  virtual void set_condition(std::size_t /*index*/, std::int64_t /*value*/, Time /*now*/) {}
   /// Everything that survives power off. Write to it only while the encoder is off.
   [[nodiscard]] virtual MutableBytes memory() = 0;
   /// Counts up with every change of `memory`.

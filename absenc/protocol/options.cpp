@@ -57,6 +57,7 @@ Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
   if (!option.choices.empty()) return Error::invalid_argument;
   const Result<std::int64_t> number = option.decimals > 0 ? parse_decimal(text, option.decimals) : parse_number(text);
   if (!number || *number < option.minimum || *number > option.maximum) return Error::invalid_argument;
+  if ((*number - option.minimum) % option.step != 0) return Error::invalid_argument;
   return number;
 }
 

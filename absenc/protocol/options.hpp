@@ -32,6 +32,7 @@ struct Option {
   bool probeable = false;  // whether captured frames can tell which value is right
   unsigned decimals = 0;
   bool describes_word = false;  // a word format says it instead: the two cannot be given together
+  std::uint32_t step = 1;       // the values are `minimum` and what is multiples of this above it
 };
 
 struct OptionValue {

@@ -86,6 +86,16 @@ struct RegisterInfo {
   bool writable = false;
 };
 
+/// Something around a virtual encoder that its document speaks of: a temperature, a battery, a fault of one channel.
+struct Condition {
+  std::string_view name;
+  std::string_view unit;  // as of a field; "" for yes (1) or no (0) and plain numbers
+  std::string_view meaning;
+  std::int64_t minimum;
+  std::int64_t maximum;
+  std::int64_t normal;  // of a healthy installation: what it begins with
+};
+
 /// A frame in the form its link carries.
 struct Frame {
   Bytes bytes{};
@@ -230,6 +240,7 @@ struct Unit {
   bool (*streams)(const Options& options) = nullptr;
   /// Whether this request, a good one, is answered; null: every one is.
   bool (*answered)(const Options& options, Frame request) = nullptr;
+  std::span<const Condition> conditions{};  // that can be set of the virtual encoder, also while it runs
 };
 
 /// Whether a word format may stand in for some of its options.

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Device side of a line of characters: finds requests, leaves those of others alone, answers in time, lists the rules
+// that its host breaks, and keeps its memory. It knows no protocol, and is compiled once.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/shaft.hpp"
+#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/interruption.hpp"
+
+namespace absenc::author {
+
+/// The times of a virtual encoder, as its document has them.
+struct DeviceTimes {
+  Time character{};    // of its line: a pause of two ends a request that is not whole
+  Time answer_time{};  // from the end of a request to its reply
+  Time start_time{};   // from power on to the first request that is answered
+};
+
+/// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
+class Responder : public Device<std::uint8_t> {
+ public:
+  void feed(const Event<std::uint8_t>& event) final;
+  Step<std::uint8_t> next(Time now) final;
+
+  void power_on(Time now, PowerOn kind) override;
+  void power_off(Time now) override;
+  void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
+  void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
+  [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
+  [[nodiscard]] std::span<const Violation> violations() const final { return violations_; }
+  [[nodiscard]] std::uint32_t violation_count() const final { return violation_count_; }
+  [[nodiscard]] std::uint64_t answered() const final { return answered_; }
+
+ protected:
+  explicit Responder(const DeviceTimes& times) : times_(times) {}
+  ~Responder() = default;
+
+  /// A rule of the document that the host broke.
+  void violate(std::string_view rule, Time at);
+  /// Does not hear anything until `time`, as after a reset.
+  void restart(Time until);
+  [[nodiscard]] bool is_on(Time now);
+  [[nodiscard]] std::uint32_t raised() const { return raised_; }
+  void change_memory() { ++memory_version_; }
+
+  /// How many bytes the request has that begins so, one at least; 0: none begins so.
+  [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
+  /// How many bytes follow this request, which is another encoder's.
+  [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
+  enum class Answer : std::uint8_t { sent, none, for_others };
+  /// A whole request. Its reply goes to `reply`.
+  virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
+  /// Power has come, and the start-up is over, at the time at which it was.
+  virtual void started(Time) {}
+  virtual void stopped(Time) {}
+
+ private:
+  enum class Power : std::uint8_t { off, starting, on };
+  void hear(std::uint8_t byte, Time at);
+
+  DeviceTimes times_;
+  Power power_ = Power::off;
+  Time ready_at_{};
+  ByteBuffer<32> request_;
+  std::size_t skipping_ = 0;  // characters of another encoder's reply
+  ByteBuffer<64> reply_;
+  Time reply_at_{};
+  bool reply_pending_ = false;
+  bool transmitting_ = false;
+  Interruption interruption_;
+  std::uint32_t raised_ = 0;
+  std::uint32_t memory_version_ = 0;
+  Buffer<Violation, 16> violations_;
+  std::uint32_t violation_count_ = 0;
+  std::uint64_t answered_ = 0;
+};
+
+/// A virtual encoder of a protocol with requests and replies (line.hpp), with `memory_size` bytes that survive power
+/// off. Of the protocol it needs besides:
+///
+///   static DeviceTimes device_times(const Format&);
+///   static std::size_t request_size(Bytes begin);
+///   static std::size_t reply_size(const Format&, const Request&);      // 0: it is not answered
+///   static Result<Request> decode_request(const Format&, Bytes);
+///   static ByteBuffer<N> encode_reply(const Format&, const Request&, const Reply&);
+///
+/// `Derived` answers: `bool is_mine(const Request&)`, and `std::optional<Reply> answer(const Request&, Time at)`, where
+/// none is no reply.
+template <class P, class Derived, std::size_t memory_size>
+class BusDevice : public Responder {
+ public:
+  using Format = typename P::Format;
+  using Request = typename P::Request;
+  using Reply = typename P::Reply;
+
+  [[nodiscard]] MutableBytes memory() final { return memory_; }
+
+ protected:
+  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  BusDevice(const Format& format, const Shaft& shaft)
+      : Responder(P::device_times(format)), format_(format), shaft_(&shaft) {}
+  ~BusDevice() = default;
+
+  [[nodiscard]] const Format& format() const { return format_; }
+  [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
+  [[nodiscard]] std::uint8_t stored(std::size_t address) const { return memory_[address]; }
+  void store(std::size_t address, std::uint8_t value) {
+    memory_[address] = value;
+    change_memory();
+  }
+
+ private:
+  [[nodiscard]] std::size_t request_size(Bytes begin) const final { return P::request_size(begin); }
+  [[nodiscard]] std::size_t others_reply_size(Bytes bytes) const final {
+    const Result<Request> request = P::decode_request(format_, bytes);
+    return request ? P::reply_size(format_, *request) : 0;
+  }
+  Answer respond(Bytes bytes, Time at, ByteBuffer<64>& reply) final {
+    auto& derived = static_cast<Derived&>(*this);
+    const Result<Request> request = P::decode_request(format_, bytes);
+    if (!request || !derived.is_mine(*request)) return Answer::for_others;
+    const std::optional<Reply> answer = derived.answer(*request, at);
+    if (!answer) return Answer::none;
+    reply.append(P::encode_reply(format_, *request, *answer).view());
+    return Answer::sent;
+  }
+
+  Format format_;
+  const Shaft* shaft_;
+  std::array<std::uint8_t, memory_size> memory_{};
+};
+
+}  // namespace absenc::author

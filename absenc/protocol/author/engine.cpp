@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/author/engine.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace absenc::author {
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+// ---- For the subclass
+
+void Engine::send(Bytes request, const Manner& manner, Time earliest) {
+  out_ = request;
+  manner_ = manner;
+  attempts_left_ = manner.attempts;
+  start(earliest);
+}
+
+void Engine::start(Time earliest) {
+  earliest_ = earliest;
+  --attempts_left_;
+  state_ = State::ready;
+}
+
+void Engine::sleep(Time time) {
+  earliest_ = time;
+  state_ = State::sleeping;
+}
+
+void Engine::finish(const Outcome& outcome) {
+  outcome_ = outcome;
+  earliest_ = received_at_ + outcome.hold;
+  state_ = outcome.hold == Time{} ? State::over : State::ending;
+}
+
+// ---- Steps
+
+ByteStep Engine::next(Time now) {
+  // What was on the line before this conversation is not known.
+  if (!begun_) received_at_ = now;
+  begun_ = true;
+  if (rate_ != 0) return {.kind = ByteStep::Kind::configure, .settings = {.rate = std::exchange(rate_, 0)}};
+  if (std::exchange(emitting_, false)) return {.kind = ByteStep::Kind::emit};
+  if (state_ == State::sleeping) {
+    if (now < earliest_) return {.at = earliest_};
+    woken();
+    return next(now);
+  }
+  if (state_ == State::ending && now < earliest_) return {.at = earliest_};
+  ByteStep step{.at = never,
+                .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : wire_.answer_limit,
+                .gap = wire_.gap_limit};
+  switch (state_) {
+    case State::ready: {
+      const Time quiet = received_at_ + wire_.silence;
+      if (wire_.silence != Time{} && now < std::max(quiet, earliest_)) return {.at = std::max(quiet, earliest_)};
+      state_ = State::sending;
+      disturbed_ = false;
+      noise_.clear();
+      size_ = 0;
+      step.kind = ByteStep::Kind::transfer;
+      step.out = out_;
+      step.expect = manner_.answered ? expected({}) : 0;
+      step.at = std::max(earliest_, wire_.silence != Time{} ? now : Time{});
+      break;
+    }
+    case State::receiving: {
+      const std::size_t whole = expected(reply());
+      step.expect = whole > size_ ? whole - size_ : 0;
+      break;
+    }
+    case State::sending:
+    case State::settling:
+    case State::sleeping:
+      break;
+    case State::ending:
+    case State::over:
+      state_ = State::over;
+      step.kind = ByteStep::Kind::done;
+      break;
+  }
+  return step;
+}
+
+// ---- Events
+
+void Engine::feed(const ByteEvent& event) {
+  using Kind = ByteEvent::Kind;
+  switch (event.kind) {
+    case Kind::sent:
+      sent_at_ = received_at_ = event.at;
+      if (state_ != State::sending) break;
+      if (!manner_.answered) return conclude_with(Error::none);
+      state_ = disturbed_ ? State::settling : State::receiving;
+      break;
+    case Kind::received: {
+      if (state_ == State::ending || state_ == State::over) break;
+      received_at_ = event.at;
+      const State before = state_;
+      if (before != State::receiving && before != State::settling) disturbed_ = true;
+      noise_.heard(event.at);
+      received(event.items);
+      end_noise(before);
+      break;
+    }
+    case Kind::line_error:
+      disturbed_ = true;
+      noise_.heard(event.at);
+      if (state_ == State::receiving) state_ = State::settling;
+      end_noise(state_);
+      break;
+    case Kind::silence:
+      if (state_ == State::receiving || state_ == State::settling) conclude();
+      break;
+    default:
+      break;
+  }
+}
+
+// What no longer fits changes nothing: it is too long already.
+void Engine::received(Bytes bytes) {
+  const std::size_t taken = std::min(bytes.size(), storage_.size() - size_);
+  std::copy_n(bytes.begin(), taken, storage_.begin() + static_cast<std::ptrdiff_t>(size_));
+  size_ += taken;
+  if (state_ != State::receiving || manner_.ends_by_silence) return;
+  const std::size_t whole = expected(reply());
+  if (whole == 0 || size_ < whole) return;
+  const Error error = check(reply());
+  if (error == Error::none || is_whole(error)) return conclude_with(error);
+  state_ = State::settling;
+}
+
+void Engine::conclude() {
+  if (size_ == 0) return conclude_with(disturbed_ ? Error::bad_framing : check({}));
+  // Bytes that are not this reply's.
+  conclude_with(disturbed_ || is_noisy() ? Error::wrong_length : check(reply()));
+}
+
+void Engine::conclude_with(Error error) {
+  if (error != Error::none && attempts_left_ > 0 && !is_noisy()) {
+    return start(manner_.pause == Time{} ? Time{} : received_at_ + manner_.pause);
+  }
+  state_ = State::over;  // unless the subclass goes on
+  answered(error);
+}
+
+void Engine::end_noise(State before) {
+  const bool waits = state_ == State::receiving || state_ == State::settling;
+  const bool listens = state_ == State::ready && before == State::ready;
+  if (!waits && !listens && state_ != State::sending) return noise_.clear();  // the reply was taken
+  if (is_noisy() && state_ != State::sending) conclude();
+}
+
+}  // namespace absenc::author

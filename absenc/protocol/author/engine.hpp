@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// Host side of a line of characters on which one request at a time is answered by one reply: sends, receives, settles,
+// repeats, gives up. It knows no protocol, and is compiled once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "absenc/protocol/author/routine.hpp"
+#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/noise.hpp"
+
+namespace absenc::author {
+
+/// The times of a line, as its document has them.
+struct Wire {
+  Time answer_limit{};          // from the end of a request to the first character of its reply, at the most
+  Time gap_limit{};             // between two characters of it, at the most
+  Time silence{};               // of the line before each request; what is heard meanwhile begins it anew
+  Time patience = noise_limit;  // a line on which something goes on for so long is never silent
+};
+
+/// How one request is sent, and how its reply ends.
+struct Manner {
+  unsigned attempts = 1;         // how often it is sent before its error counts
+  Time pause{};                  // before it is repeated: from what was last sent or heard
+  bool answered = true;          // false: no reply is due, and none is waited for
+  bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
+  Time answer_limit{};           // in place of that of the wire; 0: that
+  Time hold{};                   // after an error: so long the encoder may be busy with it all the same
+};
+
+/// A subclass says what a whole reply is, and what becomes of it. LineOf makes one from a protocol.
+class Engine : public Conversation<std::uint8_t> {
+ public:
+  void feed(const Event<std::uint8_t>& event) final;
+  Step<std::uint8_t> next(Time now) final;
+  [[nodiscard]] Error error() const final { return outcome_.error; }
+  [[nodiscard]] std::string_view detail() const override {
+    return outcome_.detail.empty() ? noise_.explanation().found : outcome_.detail;
+  }
+  [[nodiscard]] std::string_view advice() const override {
+    return outcome_.advice.empty() ? noise_.explanation().advice : outcome_.advice;
+  }
+  [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
+
+  /// End of the last request; of the last characters of its reply, before them that of the request.
+  [[nodiscard]] Time sent_at() const { return sent_at_; }
+  [[nodiscard]] Time received_at() const { return received_at_; }
+  /// What came since the last request, good or bad.
+  [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
+  /// Whether the last exchange was given up because the line is never silent: asking once more is of no use.
+  [[nodiscard]] bool is_noisy() const { return noise_.is_endless(); }
+  /// Whether characters of the last exchange were damaged, or came before its request was out.
+  [[nodiscard]] bool is_disturbed() const { return disturbed_; }
+
+ protected:
+  /// `storage`: for a reply, longer than the longest, so that one that is too long is noticed.
+  Engine(const Wire& wire, MutableBytes storage) : wire_(wire), noise_(wire.patience), storage_(storage) {}
+  ~Engine() = default;
+
+  /// Sends `request`, which must stay until it is answered, not before `earliest`.
+  void send(Bytes request, const Manner& manner, Time earliest);
+  /// Hands out an intermediate result before anything else.
+  void emit() { emitting_ = true; }
+  /// This end of the line is set to `rate` before anything else is sent, and before the end.
+  void set_rate(std::uint32_t rate) { rate_ = rate; }
+  /// Nothing is sent until `time`; then `woken`.
+  void sleep(Time time);
+  /// The conversation is over. Its texts must stay.
+  void finish(const Outcome& outcome);
+  [[nodiscard]] const Manner& manner() const { return manner_; }
+
+  /// How many bytes the reply has that begins so; 0: that is not known yet, or silence alone tells.
+  [[nodiscard]] virtual std::size_t expected(Bytes reply) const = 0;
+  /// Judges a whole reply, and keeps what it says.
+  [[nodiscard]] virtual Error check(Bytes reply) = 0;
+  /// Whether a reply with this error is whole all the same, as a refusal is: nothing follows it. After anything else
+  /// that is wrong more may be coming, which must not meet the next request.
+  [[nodiscard]] virtual bool is_whole(Error error) const = 0;
+  /// `none`, or why the last attempt failed. Calls `send`, `sleep` or `finish`.
+  virtual void answered(Error error) = 0;
+  virtual void woken() {}
+
+ private:
+  enum class State : std::uint8_t {
+    ready,      // the next request is to be sent
+    sending,    // until its last bit is out
+    receiving,  // the reply is due
+    settling,   // something is wrong: until the line is silent
+    sleeping,
+    ending,  // the result is known, but told only after a time the encoder needs
+    over,
+  };
+
+  void received(Bytes bytes);
+  void conclude();
+  void conclude_with(Error error);
+  void end_noise(State before);
+  void start(Time earliest);
+  [[nodiscard]] Time due(Time now);
+
+  Wire wire_;
+  Noise noise_;
+  MutableBytes storage_;
+  std::size_t size_ = 0;
+  Bytes out_{};
+  Manner manner_{};
+  unsigned attempts_left_ = 0;
+  Time earliest_{};
+  Time sent_at_{};
+  Time received_at_{};
+  std::uint32_t rate_ = 0;
+  State state_ = State::over;
+  bool disturbed_ = false;
+  bool emitting_ = false;
+  bool begun_ = false;
+  Outcome outcome_{};
+};
+
+}  // namespace absenc::author

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// A field is declared with the member that holds it: what is put, and in which order, follows.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+
+#include "absenc/protocol/field.hpp"
+
+namespace absenc::author {
+
+template <auto member>
+struct FieldOf {
+  FieldInfo info;
+};
+
+/// `member` may be an optional: what it does not hold is not put.
+template <auto member>
+[[nodiscard]] constexpr FieldOf<member> field(const FieldInfo& info) {
+  return {info};
+}
+
+/// The fields of `Values`, a struct whose members they show. `first`: their place in the unit's table.
+template <class Values, auto... members>
+struct FieldsOf {
+  constexpr explicit FieldsOf(const FieldOf<members>&... all) : infos{all.info...} {}
+
+  constexpr void put(FieldSink& sink, const Values& values) const {
+    std::size_t index = 0;
+    (put_one(sink, infos[index++], values.*members), ...);
+  }
+
+  std::array<FieldInfo, sizeof...(members)> infos;
+
+ private:
+  template <class T>
+  static constexpr void put_one(FieldSink& sink, const FieldInfo& info, const T& value) {
+    if constexpr (std::is_same_v<T, double>) {
+      sink.put({.info = &info, .real = value});
+    } else if constexpr (std::is_same_v<T, std::string_view>) {
+      ByteBuffer<32> text;
+      for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
+      sink.put({.info = &info, .bytes = text});
+    } else {
+      sink.put({.info = &info, .number = static_cast<std::int64_t>(value)});
+    }
+  }
+  template <class T>
+  static constexpr void put_one(FieldSink& sink, const FieldInfo& info, const std::optional<T>& value) {
+    if (value) put_one(sink, info, *value);
+  }
+};
+
+template <class Values, auto... members>
+[[nodiscard]] constexpr FieldsOf<Values, members...> fields_of(const FieldOf<members>&... all) {
+  return FieldsOf<Values, members...>(all...);
+}
+
+}  // namespace absenc::author

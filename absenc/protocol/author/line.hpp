@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+// The engine with a protocol: conversations that ask for one thing and procedures that ask for several.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <type_traits>
+
+#include "absenc/protocol/author/engine.hpp"
+#include "absenc/protocol/author/routine.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::author {
+
+/// What the document says of frames:
+///
+///   struct Protocol {
+///     using Format, Request, Reply;                                  // Format: what the options make of them
+///     static constexpr std::size_t longest_reply;                    // bytes
+///     static Wire wire(const Format&);
+///     static Manner manner(const Format&, const Request&);
+///     static ByteBuffer<N> encode(const Format&, const Request&);
+///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine::expected
+///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of no bytes: Error::timeout
+///     static bool is_whole(Error);                                   // see Engine; left out: never
+///   };
+///
+/// Typed requests and replies; a subclass says what becomes of them.
+template <class P>
+class HostOf : public Engine {
+ public:
+  using Format = typename P::Format;
+  using Request = typename P::Request;
+  using Reply = typename P::Reply;
+
+  [[nodiscard]] const Format& format() const { return format_; }
+  [[nodiscard]] const Request& request() const { return request_; }
+  /// The last good one.
+  [[nodiscard]] const Reply& last() const { return last_; }
+
+ protected:
+  explicit HostOf(const Format& format) : Engine(P::wire(format), storage_), format_(format) {}
+  ~HostOf() = default;
+
+  void ask(const Request& request, Time earliest = {}) { ask(request, P::manner(format_, request), earliest); }
+  void ask(const Request& request, const Manner& manner, Time earliest = {}) {
+    request_ = request;
+    request_bytes_ = P::encode(format_, request);
+    send(request_bytes_, manner, earliest);
+  }
+
+ private:
+  [[nodiscard]] std::size_t expected(Bytes reply) const final { return P::expected(format_, request_, reply); }
+  [[nodiscard]] Error check(Bytes reply) final {
+    const Result<Reply> result = P::decode(format_, request_, reply);
+    if (result) last_ = *result;
+    return result.error();
+  }
+  [[nodiscard]] bool is_whole(Error error) const final {
+    if constexpr (requires { P::is_whole(error); }) {
+      return P::is_whole(error);
+    } else {
+      return false;
+    }
+  }
+
+  Format format_;
+  Request request_{};
+  decltype(P::encode(Format{}, Request{})) request_bytes_{};
+  Reply last_{};
+  // More than the longest reply tells "too long".
+  std::array<std::uint8_t, 3 * P::longest_reply> storage_;
+};
+
+/// A position, asked for once: what a drive repeats ten thousand times a second. `P::reading(format, request, reply)`
+/// makes a Reading of the reply; its times are those of the exchange.
+template <class P>
+class ReadPosition : public HostOf<P> {
+ public:
+  ReadPosition(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
+    this->ask(request);
+  }
+  [[nodiscard]] const Reading* reading() const final {
+    return this->error() == Error::none && reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_
+                                                                                                   : nullptr;
+  }
+
+ private:
+  void answered(Error error) final {
+    if (error == Error::none) {
+      reading_ = P::reading(this->format(), this->request(), this->last());
+      reading_.latched = this->sent_at();  // the latest it can have been taken
+      reading_.received = this->received_at();
+    }
+    this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
+  }
+
+  Reading reading_{};
+};
+
+/// What a procedure speaks through.
+template <class P>
+class LineOf : public HostOf<P>, public Routine {
+ public:
+  using Request = typename P::Request;
+  using Reply = typename P::Reply;
+
+  /// `co_await`ed. With `must` the procedure ends when there is no good reply, and what is awaited is the reply;
+  /// without, it is a Result.
+  template <bool must>
+  class [[nodiscard]] Question {
+   public:
+    explicit Question(LineOf& line) : line_(line) {}
+    /// Not before `pause` has passed since the encoder was last heard, or asked.
+    Question& after(Time pause) {
+      line_.earliest_ = line_.received_at() + pause;
+      return *this;
+    }
+    /// It is never sent again.
+    Question& once() {
+      line_.asking_.attempts = 1;
+      return *this;
+    }
+    Question& repeated(unsigned attempts) {
+      line_.asking_.attempts = attempts;
+      return *this;
+    }
+    /// What the procedure's error says when it ends here: which step failed.
+    Question& or_say(std::string_view words) {
+      line_.words_ = words;
+      return *this;
+    }
+
+    [[nodiscard]] bool await_ready() const { return false; }
+    void await_suspend(std::coroutine_handle<>) { line_.ask_it(must); }
+    auto await_resume() const {
+      if constexpr (must) {
+        return line_.last();
+      } else {
+        return line_.failure_ == Error::none ? Result<Reply>(line_.last()) : Result<Reply>(line_.failure_);
+      }
+    }
+
+   private:
+    LineOf& line_;
+  };
+
+  [[nodiscard]] Question<true> ask(const Request& request) {
+    prepare(request);
+    return Question<true>(*this);
+  }
+  [[nodiscard]] Question<false> attempt(const Request& request) {
+    prepare(request);
+    return Question<false>(*this);
+  }
+  /// Nothing is sent for so long after the encoder was last heard, or asked: `co_await line.rest(10ms)`.
+  [[nodiscard]] auto rest(Time pause) {
+    struct Rest {
+      LineOf& line;
+      Time pause;
+      [[nodiscard]] bool await_ready() const { return pause == Time{}; }
+      void await_suspend(std::coroutine_handle<>) { line.sleep(line.received_at() + pause); }
+      void await_resume() const {}
+    };
+    return Rest{*this, pause};
+  }
+  /// Hands out an intermediate result before what is asked next.
+  void emit() { HostOf<P>::emit(); }
+  /// This end of the line speaks at `rate` from here on.
+  void set_rate(std::uint32_t rate) { HostOf<P>::set_rate(rate); }
+  /// From here on it leaves the encoder as it was when it is asked to end early; `is_aborted` tells.
+  void restores(bool yes = true) { restores_ = yes; }
+  [[nodiscard]] bool is_aborted() const { return aborted_; }
+  bool abort() final {
+    aborted_ = aborted_ || restores_;
+    return restores_;
+  }
+
+ protected:
+  LineOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
+  ~LineOf() = default;
+
+ private:
+  void prepare(const Request& request) {
+    next_ = request;
+    asking_ = P::manner(this->format(), request);
+    earliest_ = {};
+    words_ = {};
+  }
+  void ask_it(bool must) {
+    must_ = must;
+    HostOf<P>::ask(next_, asking_, earliest_);
+  }
+  void answered(Error error) final {
+    failure_ = error;
+    if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
+    resume();
+  }
+  void woken() final { resume(); }
+  void ended(const Outcome& outcome) final { this->finish(outcome); }
+
+  Request next_{};
+  Manner asking_{};
+  Time earliest_{};
+  std::string_view words_{};
+  Error failure_ = Error::none;
+  bool must_ = false;
+  bool restores_ = false;
+  bool aborted_ = false;
+};
+
+/// A procedure that runs: `procedure(line, found, bound..., arguments)`, the last where it takes them. What it finds is
+/// `Found`, whose member `reading`, if there is one, is the position. Frames lie in the storage behind this object.
+template <class P, class Found, auto procedure, auto... bound>
+class Run : public LineOf<P> {
+ public:
+  Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena) : LineOf<P>(format, arena) {
+    for (const std::int64_t argument : arguments) static_cast<void>(arguments_.push_back(argument));
+    if constexpr (std::is_invocable_v<decltype(procedure), LineOf<P>&, Found&, decltype(bound)..., Arguments>) {
+      this->begin(procedure(*this, found_, bound..., arguments_.view()).handle);
+    } else {
+      this->begin(procedure(*this, found_, bound...).handle);
+    }
+  }
+  [[nodiscard]] const Found& found() const { return found_; }
+  [[nodiscard]] const Reading* reading() const final {
+    if constexpr (requires { found_.reading; }) {
+      if (this->error() == Error::none && found_.reading.singleturn_bits != 0) return &found_.reading;
+    }
+    return nullptr;
+  }
+
+ private:
+  Found found_{};
+  Buffer<std::int64_t, 6> arguments_;
+};
+
+}  // namespace absenc::author

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// An option is declared with the member of the format that it sets: the table of the unit, the format, and what models
+// and vectors say of it follow.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+
+#include "absenc/protocol/options.hpp"
+
+namespace absenc::author {
+
+namespace detail {
+template <class Format, class Member>
+Format format_of(Member Format::*);
+template <class Format, class Member>
+Member member_of(Member Format::*);
+}  // namespace detail
+
+template <auto member>
+struct OptionOf {
+  using Format = decltype(detail::format_of(member));
+  using Member = decltype(detail::member_of(member));
+  Option info;
+
+  constexpr void put(Format& format, std::int64_t value) const { format.*member = static_cast<Member>(value); }
+};
+
+/// A number from `minimum` to `maximum` in steps; its default is that of the member.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning, std::int64_t minimum,
+                                                std::int64_t maximum, std::uint32_t step = 1) {
+  const auto value = typename OptionOf<member>::Format{}.*member;
+  return {{.name = name,
+           .meaning = meaning,
+           .default_value = static_cast<std::int64_t>(value),
+           .minimum = minimum,
+           .maximum = maximum,
+           .step = step}};
+}
+
+/// One of `choices`: of an enumeration, in its order.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning,
+                                                std::span<const std::string_view> choices) {
+  const auto value = typename OptionOf<member>::Format{}.*member;
+  return {{.name = name, .meaning = meaning, .default_value = static_cast<std::int64_t>(value), .choices = choices}};
+}
+
+/// Yes or no.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning) {
+  return option<member>(name, meaning, std::span<const std::string_view>(boolean_choices));
+}
+
+/// The same option, which captured frames can tell.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> probeable(OptionOf<member> one) {
+  one.info.probeable = true;
+  return one;
+}
+
+template <auto... members>
+struct OptionsOf {
+  using Format = std::common_type_t<typename OptionOf<members>::Format...>;
+
+  constexpr explicit OptionsOf(const OptionOf<members>&... all) : each(all...), infos{all.info...} {}
+
+  /// What these values make of the format's own.
+  [[nodiscard]] constexpr Format format(const Options& values) const {
+    Format made{};
+    std::size_t index = 0;
+    std::apply([&](const auto&... one) { (one.put(made, values[index++]), ...); }, each);
+    return made;
+  }
+  /// Index of the option with this name; the number of options when there is none.
+  [[nodiscard]] constexpr std::size_t find(std::string_view name) const {
+    std::size_t i = 0;
+    while (i < infos.size() && infos[i].name != name) ++i;
+    return i;
+  }
+
+  std::tuple<OptionOf<members>...> each;
+  std::array<Option, sizeof...(members)> infos;
+};
+
+/// A model as text: "bits=12 turns=false".
+struct ModelText {
+  std::string_view name;
+  std::string_view meaning;
+  std::uint32_t maximum_rpm;  // 0: the document states none
+  std::string_view values;
+};
+
+}  // namespace absenc::author

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// What counts as standing still: stated once, as an angle.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/time.hpp"
+
+namespace absenc::author {
+
+/// Two looks at a shaft so far apart show whether it turns: at 0.33 rpm and more.
+inline constexpr Time between_looks = std::chrono::milliseconds(10);
+/// What noise may make of it.
+inline constexpr std::uint32_t standstill_millidegrees = 20;
+
+/// Whether two places on a circle of 2^bits counts (1 to 40) are no further apart than this angle, or one count.
+[[nodiscard]] constexpr bool is_near(std::uint64_t counts, std::uint64_t other, unsigned bits,
+                                     std::uint32_t millidegrees = standstill_millidegrees) {
+  const std::int64_t apart = wrapped_difference(counts, other, bits);
+  const auto limit =
+      std::max<std::int64_t>(static_cast<std::int64_t>((std::uint64_t{millidegrees} << bits) / 360'000), 1);
+  return apart <= limit && -apart <= limit;
+}
+
+}  // namespace absenc::author

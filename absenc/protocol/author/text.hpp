@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vectors and models as an author writes them: as text, read when the unit is compiled.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/hex.hpp"
+#include "absenc/protocol/options.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::author {
+
+/// A frame with what it must decode to: `fields` is "name=value name=value" with whole numbers or texts, or the name of
+/// an error. Frames are hexadecimal.
+struct VectorText {
+  std::string_view id;
+  std::string_view meaning;
+  std::string_view source;
+  std::string_view options;
+  std::string_view request;
+  std::string_view reply;
+  std::string_view fields;
+};
+
+// Not constexpr, and not defined: who calls one when compiling reads its name in the compiler's message.
+void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
+void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_32_bytes();
+void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
+
+/// Calls `take(name, value)` for each "name=value" of a text until it returns false; whether all were taken.
+template <class Take>
+constexpr bool for_each_value(std::string_view text, Take&& take) {
+  while (!text.empty()) {
+    const std::size_t end = text.find(' ') < text.size() ? text.find(' ') : text.size();
+    const std::string_view one = text.substr(0, end);
+    text.remove_prefix(end < text.size() ? end + 1 : end);
+    const std::size_t equals = one.find('=');
+    if (equals == std::string_view::npos || !take(one.substr(0, equals), one.substr(equals + 1))) return false;
+  }
+  return true;
+}
+
+/// A whole number, decimal or 0x hexadecimal.
+constexpr bool to_number(std::string_view text, std::int64_t& number) {
+  const bool negative = text.starts_with('-');
+  if (negative) text.remove_prefix(1);
+  const bool hex = text.starts_with("0x");
+  if (hex) text.remove_prefix(2);
+  if (text.empty()) return false;
+  number = 0;
+  for (const char c : text) {
+    const int digit = hex_digit(c);
+    if (digit < 0 || (!hex && digit > 9)) return false;
+    number = number * (hex ? 16 : 10) + digit;
+  }
+  if (negative) number = -number;
+  return true;
+}
+
+/// The value of an option: a number, or one of its choices.
+constexpr bool to_value(const Option& option, std::string_view text, std::int64_t& value) {
+  if (option.choices.empty()) {
+    return to_number(text, value) && value >= option.minimum && value <= option.maximum &&
+           (value - option.minimum) % option.step == 0;
+  }
+  for (std::size_t i = 0; i < option.choices.size(); ++i) {
+    if (option.choices[i] != text) continue;
+    value = static_cast<std::int64_t>(i);
+    return true;
+  }
+  return false;
+}
+
+/// What a VectorText says, where a Vector can point to. When it says nothing that can be understood, it does not
+/// compile.
+struct VectorParts {
+  constexpr VectorParts() = default;
+  constexpr explicit VectorParts(const VectorText& text) {
+    append(request, text.request);
+    append(reply, text.reply);
+    for (std::size_t i = 1; i < error_texts.size(); ++i) {
+      if (error_texts[i].name == text.fields) error = static_cast<Error>(i);
+    }
+    if (error != Error::none) return;
+    const bool good = for_each_value(text.fields, [&](std::string_view name, std::string_view value) {
+      std::int64_t number = 0;
+      if (to_number(value, number)) return fields.push_back({.field = name, .number = number});
+      return fields.push_back({.field = name, .text = value});
+    });
+    if (!good) fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
+  }
+
+  ByteBuffer<32> request{};
+  ByteBuffer<32> reply{};
+  Buffer<Expected, 16> fields{};
+  Error error = Error::none;
+
+ private:
+  static constexpr void append(ByteBuffer<32>& bytes, std::string_view hex) {
+    for (std::size_t i = 0; i < hex.size(); i += 2) {
+      if (i + 1 == hex.size() || hex_digit(hex[i]) < 0 || hex_digit(hex[i + 1]) < 0 ||
+          !bytes.push_back(static_cast<std::uint8_t>(hex_digit(hex[i]) << 4 | hex_digit(hex[i + 1])))) {
+        a_frame_of_a_vector_is_hexadecimal_and_has_at_most_32_bytes();
+      }
+    }
+  }
+};
+
+}  // namespace absenc::author
