@@ -33,7 +33,8 @@ class Refusal final : public Conversation<Item> {
 
 /// What a unit hands out: the conversation, and the words for people that firmware does not link. `Definition` says
 /// what is reported: `put(sink, format, found)` of a procedure, `put(sink, format, request, reply)` of a reading; and
-/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something.
+/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something. In their
+/// place `put(sink, conversation)` and `explain(conversation)`, of what only the conversation knows.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -41,7 +42,9 @@ class Told final : public Base {
 
   void report(FieldSink& sink) const override {
     if (this->error() != Error::none) return;
-    if constexpr (requires { this->found(); }) {
+    if constexpr (requires { Definition::put(sink, self()); }) {
+      Definition::put(sink, self());
+    } else if constexpr (requires { this->found(); }) {
       Definition::put(sink, this->format(), this->found());
     } else {
       Definition::put(sink, this->format(), this->request(), this->last());
@@ -58,8 +61,11 @@ class Told final : public Base {
   }
 
  private:
+  [[nodiscard]] const Base& self() const { return *this; }
   [[nodiscard]] Explanation explained() const {
-    if constexpr (requires { Definition::explain(this->format(), Error::none, Bytes{}, Bytes{}); }) {
+    if constexpr (requires { Definition::explain(self()); }) {
+      return this->error() == Error::none || this->is_noisy() ? Explanation{} : Definition::explain(self());
+    } else if constexpr (requires { Definition::explain(this->format(), Error::none, Bytes{}, Bytes{}); }) {
       if (this->error() == Error::none || this->is_noisy()) return {};
       return Definition::explain(this->format(), this->error(), this->exchange().sent, this->exchange().received);
     } else {
@@ -76,7 +82,7 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;
-  /// The one request that does its work; procedures send more.
+  /// The one request that does its work; procedures send more. Null: what it sends is not known beforehand.
   Request (*request)(const Format&, Arguments);
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  // bytes of storage, without those of frames

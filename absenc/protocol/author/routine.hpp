@@ -165,7 +165,7 @@ struct [[nodiscard]] Part {
     routine.go_on_with(handle);
   }
   // By value: a reference would point into the frame, which is given back here.
-  [[nodiscard]] T await_resume() {
+  T await_resume() {
     const T result = handle.promise().result;
     Routine& routine = handle.promise().routine;
     void* const frame = handle.address();

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/author/command.hpp"
@@ -31,13 +32,17 @@ namespace absenc::author {
 ///   static constexpr std::array models;            // of ModelText
 ///   static constexpr FieldsOf fields;              // field.hpp
 ///   static constexpr std::array commands;          // of CommandOf, command.hpp
-///   static constexpr std::array vectors;           // of VectorText, text.hpp: they hold, or it does not compile
+///   static constexpr std::array vectors;           // of VectorText, text.hpp, or of Vector: they hold, or it does not
+///                                                  // compile
 ///   static constexpr std::size_t frames_size;      // bytes of storage that the procedures' frames need at the most
 ///   static constexpr Resolution resolution(const Format&);
 ///   static constexpr void put(FieldSink&, const Format&, const Request&);
 ///   static constexpr void put(FieldSink&, const Format&, const Request&, const Reply&);
 ///   static constexpr std::size_t reply_size(const Format&, Bytes begin);    // of any reply that begins so; 0: none
 ///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
+///   static constexpr Format format(const Options&);      // left out: what the options make of it
+///   static constexpr Error decode(const Format&, Frame asked, Frame reply, FieldSink&);    // in place of P's, put and
+///                                                                                         // guess_request
 ///   static constexpr Explanation explain(...);     // command.hpp; may be left out
 ///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
 template <class Definition>
@@ -46,12 +51,25 @@ struct UnitOf {
   using Format = typename P::Format;
   using Request = typename P::Request;
 
-  static constexpr Format format(const Options& values) { return Definition::options.format(values); }
+  static constexpr Format format(const Options& values) {
+    if constexpr (requires { Definition::format(values); }) {
+      return Definition::format(values);
+    } else {
+      return Definition::options.format(values);
+    }
+  }
 
   // ---- The functions of the descriptor
 
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
-    const Format f = format(values);
+    if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
+      return Definition::decode(format(values), asked, frame, sink);
+    } else {
+      return decode_reply(format(values), asked, frame, sink);
+    }
+  }
+
+  static constexpr Error decode_reply(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
     Request request = Definition::guess_request(f, frame.bytes);
     if (!asked.bytes.empty()) {
       const Result<Request> result = P::decode_request(f, asked.bytes);
@@ -78,8 +96,9 @@ struct UnitOf {
                                     MutableBytes out) {
     const Format f = format(values);
     const CommandOf<P>& one = find(command);
-    if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
+    if (one.request == nullptr || (one.missing != nullptr && !one.missing(f).empty())) return Error::unsupported;
     const auto bytes = P::encode(f, one.request(f, arguments));
+    if (bytes.empty()) return Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
     return bytes.size();
@@ -149,29 +168,40 @@ struct UnitOf {
     std::array<Model, Definition::models.size()> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
       const ModelText& text = Definition::models[i];
-      made[i] = {text.name, text.meaning, text.maximum_rpm, model_values[i].view()};
+      made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
+      if (!text.values.empty()) made[i].values = model_values[i].view();  // g++ 12 cannot look into an empty one
     }
     return made;
   }();
 
+  static constexpr bool vectors_are_texts =
+      std::is_same_v<typename decltype(Definition::vectors)::value_type, VectorText>;
   static constexpr auto vector_parts = [] {
-    std::array<VectorParts, Definition::vectors.size()> made{};
-    for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i]);
-    return made;
+    if constexpr (vectors_are_texts) {
+      std::array<VectorParts, Definition::vectors.size()> made{};
+      for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i]);
+      return made;
+    } else {
+      return 0;
+    }
   }();
   static constexpr auto vectors = [] {
     std::array<Vector, Definition::vectors.size()> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
-      const VectorText& text = Definition::vectors[i];
-      const VectorParts& parts = vector_parts[i];
-      made[i] = {text.id,
-                 text.meaning,
-                 text.source,
-                 text.options,
-                 parts.request.view(),
-                 parts.reply.view(),
-                 parts.fields.view(),
-                 parts.error};
+      if constexpr (vectors_are_texts) {
+        const VectorText& text = Definition::vectors[i];
+        const VectorParts& parts = vector_parts[i];
+        made[i] = {text.id,
+                   text.meaning,
+                   text.source,
+                   text.options,
+                   parts.request.view(),
+                   parts.reply.view(),
+                   parts.fields.view(),
+                   parts.error};
+      } else {
+        made[i] = Definition::vectors[i];
+      }
     }
     return made;
   }();
@@ -214,7 +244,7 @@ struct UnitOf {
               .device = device,
               .resolution = resolution,
               .settings = settings};
-    unit.answered = answered;
+    if constexpr (requires { P::reply_size(Format{}, Request{}); }) unit.answered = answered;
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
