@@ -15,6 +15,11 @@
 #include "absenc/core/result.hpp"
 #include "absenc/core/time.hpp"
 
+// Without optimisation g++ 12 takes the frame's own operators for a pair that does not match, in every coroutine.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
+#endif
+
 namespace absenc::author {
 
 /// How a procedure ends.
