@@ -31,9 +31,20 @@ class Refusal final : public Conversation<Item> {
   std::string_view why_;
 };
 
-/// What a unit hands out: the conversation, and the words for people that firmware does not link. `Definition` says
-/// what is reported: `put(sink, format, found)` of a procedure, `put(sink, format, request, reply)` of a reading; and
-/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something.
+/// Puts the fields of what `values` are made of: a request, a request and its reply, what a procedure found. A
+/// Definition has `values(format, ...)`, whose result its `fields` show; or `put(sink, format, ...)`, where one table
+/// cannot say it.
+template <class Definition, class Format, class... What>
+constexpr void put_values(FieldSink& sink, const Format& format, const What&... what) {
+  if constexpr (requires { Definition::put(sink, format, what...); }) {
+    Definition::put(sink, format, what...);
+  } else {
+    Definition::fields.put(sink, Definition::values(format, what...));
+  }
+}
+
+/// What a unit hands out: the conversation, and the words for people that firmware does not link. What the document
+/// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -42,9 +53,9 @@ class Told final : public Base {
   void report(FieldSink& sink) const override {
     if (this->error() != Error::none) return;
     if constexpr (requires { this->found(); }) {
-      Definition::put(sink, this->format(), this->found());
+      put_values<Definition>(sink, this->format(), this->found());
     } else {
-      Definition::put(sink, this->format(), this->request(), this->last());
+      put_values<Definition>(sink, this->format(), this->request(), this->last());
     }
   }
   [[nodiscard]] std::string_view detail() const override {
@@ -126,9 +137,9 @@ template <class Definition, class P, auto request>
 [[nodiscard]] constexpr CommandOf<P> reading(const Command& info) {
   using Made = Told<Definition, ReadPosition<P>>;
   return {.info = info,
-          .request = [](const typename P::Format& format, Arguments) { return request(format); },
+          .request = [](const typename P::Format& format, Arguments) { return request(format, {}); },
           .make = [](const typename P::Format& format, Arguments,
-                     std::span<std::byte> storage) { return make_host<Made>(storage, format, request(format)); },
+                     std::span<std::byte> storage) { return make_host<Made>(storage, format, request(format, {})); },
           .size = sizeof(Made)};
 }
 

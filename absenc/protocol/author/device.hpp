@@ -9,6 +9,7 @@
 #include <optional>
 #include <string_view>
 
+#include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/conversation.hpp"
@@ -100,16 +101,28 @@ class BusDevice : public Responder {
   using Request = typename P::Request;
   using Reply = typename P::Reply;
 
-  [[nodiscard]] MutableBytes memory() final { return memory_; }
-
- protected:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   BusDevice(const Format& format, const Shaft& shaft)
       : Responder(P::device_times(format)), format_(format), shaft_(&shaft) {}
+  [[nodiscard]] MutableBytes memory() final { return memory_; }
+
+ protected:
   ~BusDevice() = default;
 
   [[nodiscard]] const Format& format() const { return format_; }
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
+  /// Counts of 2^-bits revolution since the zero that `store_zero` keeps in four bytes from this address on; they go on
+  /// from turn to turn, and are negative below zero.
+  [[nodiscard]] std::int64_t counts(Time at, unsigned bits, std::size_t zero_address) const {
+    const auto zero = static_cast<std::int64_t>(load_little_endian(Bytes(memory_).subspan(zero_address, 4)));
+    return (shaft(at).position - zero) >> (32 - bits);
+  }
+  /// The zero is here.
+  void store_zero(Time at, std::size_t zero_address) {
+    const auto here = static_cast<std::uint64_t>(shaft(at).position) & low_mask(32);
+    store_little_endian(MutableBytes(memory_).subspan(zero_address, 4), here);
+    change_memory();
+  }
   [[nodiscard]] std::uint8_t stored(std::size_t address) const { return memory_[address]; }
   void store(std::size_t address, std::uint8_t value) {
     memory_[address] = value;

@@ -23,7 +23,8 @@ namespace absenc::author {
 ///     static Wire wire(const Format&);
 ///     static Manner manner(const Format&, const Request&);
 ///     static ByteBuffer<N> encode(const Format&, const Request&);
-///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine::expected
+///     static std::size_t reply_size(const Format&, const Request&);              // 0: it is not answered
+///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine; left out: reply_size
 ///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of no bytes: Error::timeout
 ///     static bool is_whole(Error);                                   // see Engine; left out: never
 ///   };
@@ -53,7 +54,13 @@ class HostOf : public Engine {
   }
 
  private:
-  [[nodiscard]] std::size_t expected(Bytes reply) const final { return P::expected(format_, request_, reply); }
+  [[nodiscard]] std::size_t expected(Bytes reply) const final {
+    if constexpr (requires { P::expected(format_, request_, reply); }) {
+      return P::expected(format_, request_, reply);
+    } else {
+      return P::reply_size(format_, request_);
+    }
+  }
   [[nodiscard]] Error check(Bytes reply) final {
     const Result<Reply> result = P::decode(format_, request_, reply);
     if (result) last_ = *result;

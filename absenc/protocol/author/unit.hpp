@@ -20,23 +20,36 @@
 
 namespace absenc::author {
 
+/// Shortens what a Definition that derives from it declares: `command<Found, procedure, request>({...})`.
+template <class Definition, class P>
+struct Declares {
+  using Protocol = P;
+  template <auto request>
+  [[nodiscard]] static constexpr CommandOf<P> reading(const Command& info) {
+    return author::reading<Definition, P, request>(info);
+  }
+  template <class Found, auto procedure, auto request, auto... bound>
+  [[nodiscard]] static constexpr CommandOf<P> command(const Command& info) {
+    return author::command<Definition, P, Found, procedure, request, bound...>(info);
+  }
+};
+
 /// `Definition` has:
 ///
-///   using Protocol;                                // line.hpp, device.hpp
+///   using Protocol;                                // line.hpp, device.hpp; its Format has line() and resolution()
 ///   using Encoder;                                 // the virtual one: BusDevice, made of (format, shaft)
 ///   static constexpr std::string_view id, name, document;
 ///   static constexpr LinkKind link;
-///   static constexpr LineSettings line(const Format&);
 ///   static constexpr OptionsOf options;            // option.hpp; their defaults are those of Format
 ///   static constexpr std::array models;            // of ModelText
 ///   static constexpr FieldsOf fields;              // field.hpp
 ///   static constexpr std::array commands;          // of CommandOf, command.hpp
 ///   static constexpr std::array vectors;           // of VectorText, text.hpp: they hold, or it does not compile
 ///   static constexpr std::size_t frames_size;      // bytes of storage that the procedures' frames need at the most
-///   static constexpr Resolution resolution(const Format&);
-///   static constexpr void put(FieldSink&, const Format&, const Request&);
-///   static constexpr void put(FieldSink&, const Format&, const Request&, const Reply&);
-///   static constexpr std::size_t reply_size(const Format&, Bytes begin);    // of any reply that begins so; 0: none
+///   static constexpr Values values(const Format&, const Request&);          // put_values, command.hpp
+///   static constexpr Values values(const Format&, const Request&, const Reply&);
+///   static constexpr std::size_t reply_size(const Format&, Bytes begin);    // of any reply that begins so; 0: none;
+///                                                  // left out: Protocol::longest_reply
 ///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
 ///   static constexpr Explanation explain(...);     // command.hpp; may be left out
 ///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
@@ -61,12 +74,12 @@ struct UnitOf {
       return Error::wrong_length;
     }
     if (frame.bytes.empty()) {
-      Definition::put(sink, f, request);
+      put_values<Definition>(sink, f, request);
       return Error::none;
     }
     const auto reply = P::decode(f, request, frame.bytes);
     if (!reply) return reply.error();
-    Definition::put(sink, f, request, *reply);
+    put_values<Definition>(sink, f, request, *reply);
     const Reading reading = P::reading(f, request, *reply);
     if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
     return Error::none;
@@ -87,8 +100,12 @@ struct UnitOf {
 
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
     if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
-    const std::size_t size =
-        direction == Direction::request ? P::request_size(bytes) : Definition::reply_size(format(values), bytes);
+    std::size_t size = P::longest_reply;
+    if (direction == Direction::request) {
+      size = P::request_size(bytes);
+    } else if constexpr (requires { Definition::reply_size(Format{}, bytes); }) {
+      size = Definition::reply_size(format(values), bytes);
+    }
     if (size == 0) return {Delimit::Kind::no_frame};
     return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
   }
@@ -102,8 +119,8 @@ struct UnitOf {
     return make_device<typename Definition::Encoder>(storage, format(values), shaft);
   }
 
-  static constexpr Resolution resolution(const Options& values) { return Definition::resolution(format(values)); }
-  static constexpr LineSettings settings(const Options& values) { return Definition::line(format(values)); }
+  static constexpr Resolution resolution(const Options& values) { return format(values).resolution(); }
+  static constexpr LineSettings settings(const Options& values) { return format(values).line(); }
 
   static bool answered(const Options& values, Frame asked) {
     const Format f = format(values);
@@ -149,7 +166,8 @@ struct UnitOf {
     std::array<Model, Definition::models.size()> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
       const ModelText& text = Definition::models[i];
-      made[i] = {text.name, text.meaning, text.maximum_rpm, model_values[i].view()};
+      made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
+      if (!text.values.empty()) made[i].values = model_values[i].view();  // g++ 12 takes a view of nothing for a change
     }
     return made;
   }();
@@ -197,7 +215,7 @@ struct UnitOf {
               .name = Definition::name,
               .document = Definition::document,
               .link = Definition::link,
-              .line = Definition::line(Format{}),
+              .line = Format{}.line(),
               .options = Definition::options.infos,
               .models = models,
               .fields = Definition::fields.infos,
