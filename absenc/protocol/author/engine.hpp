@@ -44,6 +44,8 @@ class Engine : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override {
     return outcome_.advice.empty() ? noise_.explanation().advice : outcome_.advice;
   }
+  /// Nothing: the names and texts of fields are not linked where nobody asks for them. Told (command.hpp) has them.
+  void report(FieldSink&) const override {}
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
   /// End of the last request; of the last characters of its reply, before them that of the request.
