@@ -107,13 +107,13 @@ struct Bench {
 Wire echo(std::uint8_t request, unsigned) { return {static_cast<std::uint8_t>(request | 0x80)}; }
 Wire nothing(std::uint8_t, unsigned) { return {}; }
 
-template <auto procedure, std::size_t size = 4096>
+template <auto procedure>
 struct Case {
-  explicit Case(Bench::Encoder encoder, Toy::Format format = {}, Arguments arguments = {})
-      : host(format, arguments, arena), bench(std::move(encoder)) {
+  explicit Case(Bench::Encoder encoder, Toy::Format format = {}, Arguments arguments = {}, std::size_t size = 16384)
+      : host(format, arguments, std::span(arena).first(size)), bench(std::move(encoder)) {
     bench.run(host);
   }
-  alignas(std::max_align_t) std::array<std::byte, size> arena;
+  alignas(std::max_align_t) std::array<std::byte, 16384> arena;
   Run<Toy, Found, procedure> host;
   Bench bench;
 };
@@ -217,7 +217,7 @@ TEST(Procedures, PartsGiveTheirStorageBack) {
 
 TEST(Procedures, StopFromAnyDepth) {
   const std::array<std::int64_t, 1> depth{12};
-  Case<many_parts, 16384> stopped(echo, {}, depth);
+  Case<many_parts> stopped(echo, {}, depth);
   EXPECT_EQ(stopped.host.error(), Error::out_of_range);
   EXPECT_EQ(stopped.host.detail(), "too deep");
   EXPECT_EQ(stopped.bench.sent.size(), 1u);
@@ -225,8 +225,10 @@ TEST(Procedures, StopFromAnyDepth) {
 
 TEST(Procedures, SayWhenTheStorageIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
-  EXPECT_EQ((Case<many_parts, 64>(echo, {}, depth).host.error()), Error::buffer_too_small);    // of the procedure
-  EXPECT_EQ((Case<many_parts, 2048>(echo, {}, depth).host.error()), Error::buffer_too_small);  // of a part
+  const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);          // too deep
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);  // for a part
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);          // for the procedure
 }
 
 Procedure endless(ToyLine& line, Found& found) {
