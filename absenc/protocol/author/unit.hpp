@@ -40,13 +40,22 @@ namespace absenc::author {
 ///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
 ///   static constexpr Explanation explain(...);     // command.hpp; may be left out
 ///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
+///   static constexpr Format format(const Options&);      // where members of it alone do not say what options mean
+///   static constexpr bool is_usable(const Format&);      // false: no virtual encoder is made; left out: it always is
+///   static constexpr bool frames_are_texts = true;       // those of vectors; left out: they are hexadecimal
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
   using Format = typename P::Format;
   using Request = typename P::Request;
 
-  static constexpr Format format(const Options& values) { return Definition::options.format(values); }
+  static constexpr Format format(const Options& values) {
+    if constexpr (requires { Definition::format(values); }) {
+      return Definition::format(values);
+    } else {
+      return Definition::options.format(values);
+    }
+  }
 
   // ---- The functions of the descriptor
 
@@ -80,6 +89,7 @@ struct UnitOf {
     const CommandOf<P>& one = find(command);
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
     const auto bytes = P::encode(f, one.request(f, arguments));
+    if (bytes.empty()) return Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
     return bytes.size();
@@ -99,7 +109,11 @@ struct UnitOf {
   }
 
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-    return make_device<typename Definition::Encoder>(storage, format(values), shaft);
+    const Format f = format(values);
+    if constexpr (requires { Definition::is_usable(f); }) {
+      if (!Definition::is_usable(f)) return {};
+    }
+    return make_device<typename Definition::Encoder>(storage, f, shaft);
   }
 
   static constexpr Resolution resolution(const Options& values) { return Definition::resolution(format(values)); }
@@ -108,7 +122,9 @@ struct UnitOf {
   static bool answered(const Options& values, Frame asked) {
     const Format f = format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
-    return !request || P::reply_size(f, *request) != 0;
+    if (!request) return true;
+    const Manner manner = P::manner(f, *request);
+    return manner.answered && !manner.any_reply;
   }
 
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
@@ -156,7 +172,8 @@ struct UnitOf {
 
   static constexpr auto vector_parts = [] {
     std::array<VectorParts, Definition::vectors.size()> made{};
-    for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i]);
+    const bool are_texts = requires { Definition::frames_are_texts; };
+    for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i], are_texts);
     return made;
   }();
   static constexpr auto vectors = [] {
