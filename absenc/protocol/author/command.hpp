@@ -44,7 +44,9 @@ constexpr void put_values(FieldSink& sink, const Format& format, const What&... 
 }
 
 /// What a unit hands out: the conversation, and the words for people that firmware does not link. What the document
-/// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something.
+/// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something and the
+/// procedure has not said what to do. `noise_advice`, where a line that is never silent means something. What a
+/// procedure that is broken off leaves: `put_left(sink, format, found)`.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -57,6 +59,12 @@ class Told final : public Base {
     } else {
       put_values<Definition>(sink, this->format(), this->request(), this->last());
     }
+    if (const Reading* reading = this->reading()) sink.put_reading(*reading);
+  }
+  void report_left(FieldSink& sink) const override {
+    if constexpr (requires { Definition::put_left(sink, this->format(), this->found()); }) {
+      Definition::put_left(sink, this->format(), this->found());
+    }
   }
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
@@ -65,13 +73,16 @@ class Told final : public Base {
   }
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
+    if constexpr (requires { Definition::noise_advice; }) {
+      if (own == endless_noise.advice) return Definition::noise_advice;
+    }
     return own.empty() ? explained().advice : own;
   }
 
  private:
   [[nodiscard]] Explanation explained() const {
     if constexpr (requires { Definition::explain(this->format(), Error::none, Bytes{}, Bytes{}); }) {
-      if (this->error() == Error::none || this->is_noisy()) return {};
+      if (this->error() == Error::none || !Base::advice().empty()) return {};
       return Definition::explain(this->format(), this->error(), this->exchange().sent, this->exchange().received);
     } else {
       return {};
@@ -87,7 +98,8 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;
-  /// The one request that does its work; procedures send more.
+  /// The one request that does its work; procedures send more. One that P::encode makes nothing of: the arguments are
+  /// none of this command.
   Request (*request)(const Format&, Arguments);
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  // bytes of storage, without those of frames
@@ -96,10 +108,17 @@ struct CommandOf {
   /// Of formats of which `is_other` is true, in place of `make`. Null: of none.
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
   bool (*is_other)(const Format&) = nullptr;
+  /// Of formats of which this is false no conversation is made: the options contradict it. Null: of all one is.
+  bool (*possible)(const Format&) = nullptr;
 
   [[nodiscard]] constexpr CommandOf unless(std::string_view (*why)(const Format&)) const {
     CommandOf one = *this;
     one.missing = why;
+    return one;
+  }
+  [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
+    CommandOf one = *this;
+    one.possible = is_possible;
     return one;
   }
   /// Of these formats `other` carries it out.
@@ -113,6 +132,8 @@ struct CommandOf {
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<std::uint8_t>>(storage, why);
+    if (possible != nullptr && !possible(format)) return {};
+    if (P::encode(format, request(format, arguments)).empty()) return {};
     const bool other = is_other != nullptr && is_other(format);
     return (other ? make_other : make)(format, arguments, storage);
   }

@@ -13,6 +13,7 @@ void Responder::power_on(Time now, PowerOn kind) {
   ready_at_ = kind == PowerOn::skip ? now : now + times_.start_time;
   request_.clear();
   skipping_ = 0;
+  kept_.clear();
   reply_pending_ = transmitting_ = false;
   static_cast<void>(is_on(now));
 }
@@ -53,9 +54,13 @@ void Responder::feed(const ByteEvent& event) {
     case ByteEvent::Kind::received:
       for (const std::uint8_t byte : event.items) hear(byte, event.at);
       break;
-    case ByteEvent::Kind::sent:
+    case ByteEvent::Kind::sent: {
       transmitting_ = false;
+      const ByteBuffer<64> kept = kept_;
+      kept_.clear();
+      for (const std::uint8_t byte : kept.view()) hear(byte, event.at);
       break;
+    }
     case ByteEvent::Kind::silence:
     case ByteEvent::Kind::line_error:  // what was begun is none
       request_.clear();
@@ -68,6 +73,10 @@ void Responder::feed(const ByteEvent& event) {
 
 void Responder::hear(std::uint8_t byte, Time at) {
   if (!is_on(at)) return;
+  if (transmitting_ && times_.keeps_requests) {
+    kept_.push_back(byte);
+    return;
+  }
   if (transmitting_) {
     if (interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) {
       violate("request during the encoder's transmission", at);
@@ -83,9 +92,10 @@ void Responder::hear(std::uint8_t byte, Time at) {
   if (size == 0) return request_.clear();
   if (request_.size() < size) return;
   reply_.clear();
+  longer_ = {};
   switch (respond(request_, at, reply_)) {
     case Answer::sent:
-      reply_at_ = at + times_.answer_time;
+      reply_at_ = at + times_.answer_time + longer_;
       reply_pending_ = transmitting_ = true;
       interruption_.begin();
       ++answered_;

@@ -22,6 +22,8 @@ struct DeviceTimes {
   Time character{};    // of its line: a pause of two ends a request that is not whole
   Time answer_time{};  // from the end of a request to its reply
   Time start_time{};   // from power on to the first request that is answered
+  /// Full duplex with a memory for what comes while it sends: that is answered afterwards.
+  bool keeps_requests = false;
 };
 
 /// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
@@ -56,6 +58,8 @@ class Responder : public Device<std::uint8_t> {
   /// How many bytes follow this request, which is another encoder's.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
   enum class Answer : std::uint8_t { sent, none, for_others };
+  /// For `respond`: this reply takes so much longer.
+  void take_longer(Time time) { longer_ = time; }
   /// A whole request. Its reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
   /// Power has come, and the start-up is over, at the time at which it was.
@@ -73,6 +77,8 @@ class Responder : public Device<std::uint8_t> {
   std::size_t skipping_ = 0;  // characters of another encoder's reply
   ByteBuffer<64> reply_;
   Time reply_at_{};
+  Time longer_{};
+  ByteBuffer<64> kept_;  // what came while it sends
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;

@@ -124,7 +124,7 @@ void Engine::received(Bytes bytes) {
   const std::size_t taken = std::min(bytes.size(), storage_.size() - size_);
   std::copy_n(bytes.begin(), taken, storage_.begin() + static_cast<std::ptrdiff_t>(size_));
   size_ += taken;
-  if (state_ != State::receiving || manner_.ends_by_silence) return;
+  if (state_ != State::receiving || manner_.ends_by_silence || manner_.any_reply) return;
   const std::size_t whole = expected(reply());
   if (whole == 0 || size_ < whole) return;
   const Error error = check(reply());
@@ -133,9 +133,10 @@ void Engine::received(Bytes bytes) {
 }
 
 void Engine::conclude() {
-  if (size_ == 0) return conclude_with(disturbed_ ? Error::bad_framing : check({}));
+  if (disturbed_ && size_ == 0) return conclude_with(Error::bad_framing);
   // Bytes that are not this reply's.
-  conclude_with(disturbed_ || is_noisy() ? Error::wrong_length : check(reply()));
+  if (size_ != 0 && (disturbed_ || is_noisy())) return conclude_with(Error::wrong_length);
+  conclude_with(manner_.any_reply ? Error::none : check(reply()));
 }
 
 void Engine::conclude_with(Error error) {

@@ -28,8 +28,10 @@ struct Manner {
   Time pause{};                  // before it is repeated: from what was last sent or heard
   bool answered = true;          // false: no reply is due, and none is waited for
   bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
-  Time answer_limit{};           // in place of that of the wire; 0: that
-  Time hold{};                   // after an error: so long the encoder may be busy with it all the same
+  bool any_reply = false;  // no document says what its reply is, or whether there is one: what comes is not looked
+                           // at, and that it ends by silence is enough
+  Time answer_limit{};     // in place of that of the wire; 0: that
+  Time hold{};             // after an error: so long the encoder may be busy with it all the same
 };
 
 /// A subclass says what a whole reply is, and what becomes of it. LineOf makes one from a protocol.

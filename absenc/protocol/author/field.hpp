@@ -14,12 +14,13 @@
 
 namespace absenc::author {
 
+/// `member` shows a member, or what a function makes of all: `T (*)(const Values&)`.
 template <auto member>
 struct FieldOf {
   FieldInfo info;
 };
 
-/// `member` may be an optional: what it does not hold is not put.
+/// What is shown may be an optional: what it does not hold is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(const FieldInfo& info) {
   return {info};
@@ -32,16 +33,26 @@ struct FieldsOf {
 
   constexpr void put(FieldSink& sink, const Values& values) const {
     std::size_t index = 0;
-    (put_one(sink, infos[index++], values.*members), ...);
+    (put_one(sink, infos[index++], shown<members>(values)), ...);
   }
 
   std::array<FieldInfo, sizeof...(members)> infos;
 
  private:
+  template <auto member>
+  static constexpr auto shown(const Values& values) {
+    if constexpr (std::is_member_pointer_v<decltype(member)>) {
+      return values.*member;
+    } else {
+      return member(values);
+    }
+  }
   template <class T>
   static constexpr void put_one(FieldSink& sink, const FieldInfo& info, const T& value) {
     if constexpr (std::is_same_v<T, double>) {
       sink.put({.info = &info, .real = value});
+    } else if constexpr (std::is_same_v<T, Bytes>) {
+      sink.put({.info = &info, .bytes = value});
     } else if constexpr (std::is_same_v<T, std::string_view>) {
       ByteBuffer<32> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));

@@ -65,6 +65,20 @@ template <auto member>
   return one;
 }
 
+/// The same option, which a word format says instead.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> describing_word(OptionOf<member> one) {
+  one.info.describes_word = true;
+  return one;
+}
+
+/// The same option with so many digits behind the point: its values are in units of the last one.
+template <unsigned decimals, auto member>
+[[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
+  one.info.decimals = decimals;
+  return one;
+}
+
 template <auto... members>
 struct OptionsOf {
   using Format = std::common_type_t<typename OptionOf<members>::Format...>;

@@ -36,7 +36,7 @@ struct Declares {
 
 /// `Definition` has:
 ///
-///   using Protocol;                                // line.hpp, device.hpp; its Format has line() and resolution()
+///   using Protocol;                                // line.hpp, device.hpp; its Format has line() and resolution(), or this
 ///   using Encoder;                                 // the virtual one: BusDevice, made of (format, shaft)
 ///   static constexpr std::string_view id, name, document;
 ///   static constexpr LinkKind link;
@@ -53,13 +53,22 @@ struct Declares {
 ///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
 ///   static constexpr Explanation explain(...);     // command.hpp; may be left out
 ///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
+///   static constexpr Format format(const Options&);      // where members of it alone do not say what options mean
+///   static constexpr bool is_usable(const Format&);      // false: no virtual encoder is made; left out: it always is
+///   static constexpr bool frames_are_texts = true;       // those of vectors; left out: they are hexadecimal
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
   using Format = typename P::Format;
   using Request = typename P::Request;
 
-  static constexpr Format format(const Options& values) { return Definition::options.format(values); }
+  static constexpr Format format(const Options& values) {
+    if constexpr (requires { Definition::format(values); }) {
+      return Definition::format(values);
+    } else {
+      return Definition::options.format(values);
+    }
+  }
 
   // ---- The functions of the descriptor
 
@@ -93,6 +102,7 @@ struct UnitOf {
     const CommandOf<P>& one = find(command);
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
     const auto bytes = P::encode(f, one.request(f, arguments));
+    if (bytes.empty()) return Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
     return bytes.size();
@@ -116,16 +126,35 @@ struct UnitOf {
   }
 
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-    return make_device<typename Definition::Encoder>(storage, format(values), shaft);
+    const Format f = format(values);
+    if constexpr (requires { Definition::is_usable(f); }) {
+      if (!Definition::is_usable(f)) return {};
+    }
+    return make_device<typename Definition::Encoder>(storage, f, shaft);
   }
 
-  static constexpr Resolution resolution(const Options& values) { return format(values).resolution(); }
-  static constexpr LineSettings settings(const Options& values) { return format(values).line(); }
+  static constexpr Resolution resolution(const Options& values) {
+    if constexpr (requires { Definition::resolution(Format{}); }) {
+      return Definition::resolution(format(values));
+    } else {
+      return format(values).resolution();
+    }
+  }
+  static constexpr LineSettings line_of(const Format& f) {
+    if constexpr (requires { Definition::line(f); }) {
+      return Definition::line(f);
+    } else {
+      return f.line();
+    }
+  }
+  static constexpr LineSettings settings(const Options& values) { return line_of(format(values)); }
 
   static bool answered(const Options& values, Frame asked) {
     const Format f = format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
-    return !request || P::reply_size(f, *request) != 0;
+    if (!request) return true;
+    const Manner manner = P::manner(f, *request);
+    return manner.answered && !manner.any_reply;
   }
 
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
@@ -174,7 +203,8 @@ struct UnitOf {
 
   static constexpr auto vector_parts = [] {
     std::array<VectorParts, Definition::vectors.size()> made{};
-    for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i]);
+    const bool are_texts = requires { Definition::frames_are_texts; };
+    for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i], are_texts);
     return made;
   }();
   static constexpr auto vectors = [] {
@@ -215,7 +245,7 @@ struct UnitOf {
               .name = Definition::name,
               .document = Definition::document,
               .link = Definition::link,
-              .line = Format{}.line(),
+              .line = line_of(Format{}),
               .options = Definition::options.infos,
               .models = models,
               .fields = Definition::fields.infos,
