@@ -43,7 +43,7 @@ struct FieldsOf {
     if constexpr (std::is_same_v<T, double>) {
       sink.put({.info = &info, .real = value});
     } else if constexpr (std::is_same_v<T, std::string_view>) {
-      ByteBuffer<32> text;
+      ByteBuffer<96> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
       sink.put({.info = &info, .bytes = text});
     } else {
