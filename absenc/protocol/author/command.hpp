@@ -81,9 +81,10 @@ class Told final : public Base {
 
  private:
   [[nodiscard]] Explanation explained() const {
-    if constexpr (requires { Definition::explain(this->format(), Error::none, Bytes{}, Bytes{}); }) {
-      if (this->error() == Error::none || !Base::advice().empty()) return {};
-      return Definition::explain(this->format(), this->error(), this->exchange().sent, this->exchange().received);
+    const auto exchange = this->exchange();
+    if constexpr (requires { Definition::explain(this->format(), Error::none, exchange.sent, exchange.received); }) {
+      if (this->error() == Error::none || this->is_alone() || !Base::advice().empty()) return {};
+      return Definition::explain(this->format(), this->error(), exchange.sent, exchange.received);
     } else {
       return {};
     }
@@ -92,15 +93,31 @@ class Told final : public Base {
   mutable Sentence words_;
 };
 
+namespace detail {
+template <class P>
+struct ItemOf {
+  using Item = std::uint8_t;
+};
+template <class P>
+requires requires { typename P::Item; }
+struct ItemOf<P> {
+  using Item = typename P::Item;
+};
+}  // namespace detail
+
+/// What the lines of a protocol carry: characters where it does not say otherwise.
+template <class P>
+using ItemOf = typename detail::ItemOf<P>::Item;
+
 template <class P>
 struct CommandOf {
   using Format = typename P::Format;
   using Request = typename P::Request;
 
   Command info;
-  /// The one request that does its work; procedures send more. One that P::encode makes nothing of: the arguments are
-  /// none of this command.
-  Request (*request)(const Format&, Arguments);
+  /// The one request that does its work; procedures send more. Or why there is none with these arguments: an error, or
+  /// one that P::encode makes nothing of. Null: what it sends is not known beforehand.
+  Result<Request> (*request)(const Format&, Arguments);
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  // bytes of storage, without those of frames
   /// Why an encoder of this format does not have it; empty: it has. Null: every one has.
@@ -129,11 +146,21 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
+  // Whether there is a request with these arguments.
+  [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
+    if (request == nullptr) return true;
+    const Result<Request> asked = request(format, arguments);
+    if constexpr (requires { P::encode(format, *asked).empty(); }) {
+      return asked && !P::encode(format, *asked).empty();
+    } else {
+      return asked.has_value();
+    }
+  }
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
-    if (!why.empty()) return make_host<Refusal<std::uint8_t>>(storage, why);
+    if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, why);
     if (possible != nullptr && !possible(format)) return {};
-    if (P::encode(format, request(format, arguments)).empty()) return {};
+    if (!can_ask(format, arguments)) return {};
     const bool other = is_other != nullptr && is_other(format);
     return (other ? make_other : make)(format, arguments, storage);
   }
@@ -153,22 +180,29 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 }
 }  // namespace detail
 
-/// A position, or another value, that one request asks for: `request` makes it of the format.
-template <class Definition, class P, auto request>
+/// A position, or another value, that one request asks for: `request` makes it of the format, and Reader reads it.
+template <class Definition, class P, auto request, class Reader = ReadPosition<P>>
 [[nodiscard]] constexpr CommandOf<P> reading(const Command& info) {
-  using Made = Told<Definition, ReadPosition<P>>;
+  using Made = Told<Definition, Reader>;
   return {.info = info,
-          .request = [](const typename P::Format& format, Arguments) { return request(format, {}); },
+          .request = [](const typename P::Format& format, Arguments) -> Result<typename P::Request> {
+            return request(format, {});
+          },
           .make = [](const typename P::Format& format, Arguments,
                      std::span<std::byte> storage) { return make_host<Made>(storage, format, request(format, {})); },
           .size = sizeof(Made)};
 }
 
-/// What a procedure does. `request(format, arguments)`: see CommandOf.
+/// What a procedure does. `request(format, arguments)`: see CommandOf; a Request, or a Result.
 template <class Definition, class P, class Found, auto procedure, auto request, auto... bound>
 [[nodiscard]] constexpr CommandOf<P> command(const Command& info) {
   using Made = Told<Definition, Run<P, Found, procedure, bound...>>;
-  return {.info = info, .request = request, .make = detail::make_run<Made>, .size = detail::aligned_size<Made>};
+  return {.info = info,
+          .request = [](const typename P::Format& format, Arguments arguments) -> Result<typename P::Request> {
+            return request(format, arguments);
+          },
+          .make = detail::make_run<Made>,
+          .size = detail::aligned_size<Made>};
 }
 
 }  // namespace absenc::author

@@ -54,7 +54,7 @@ struct FieldsOf {
     } else if constexpr (std::is_same_v<T, Bytes>) {
       sink.put({.info = &info, .bytes = value});
     } else if constexpr (std::is_same_v<T, std::string_view>) {
-      ByteBuffer<32> text;
+      ByteBuffer<96> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
       sink.put({.info = &info, .bytes = text});
     } else {

@@ -176,8 +176,30 @@ class LineOf : public HostOf<P>, public Routine {
   }
   /// Hands out an intermediate result before what is asked next.
   void emit() { HostOf<P>::emit(); }
-  /// This end of the line speaks at `rate` from here on.
-  void set_rate(std::uint32_t rate) { HostOf<P>::set_rate(rate); }
+  /// This end of the line speaks at `rate` from here on; where the times of the line follow the rate, the protocol has
+  /// `wire(format, rate)`.
+  void set_rate(std::uint32_t rate) {
+    HostOf<P>::set_rate(rate);
+    if constexpr (requires { P::wire(this->format(), rate); }) this->set_wire(P::wire(this->format(), rate));
+  }
+  /// Nothing is sent for so long, which what is awaited next begins: `heard` tells what comes, until it is over.
+  void listen(Time duration) {
+    heard_ = {};
+    HostOf<P>::listen(duration);
+  }
+  struct Heard {
+    Bytes bytes{};  // none, and it is not over: a damaged character. They are there until something is awaited
+    bool over = false;
+  };
+  [[nodiscard]] auto heard() {
+    struct Hear {
+      LineOf& line;
+      [[nodiscard]] bool await_ready() const { return false; }
+      void await_suspend(std::coroutine_handle<>) { line.listen_on(); }
+      Heard await_resume() const { return line.heard_; }
+    };
+    return Hear{*this};
+  }
   /// From here on it leaves the encoder as it was when it is asked to end early; `is_aborted` tells.
   void restores(bool yes = true) { restores_ = yes; }
   [[nodiscard]] bool is_aborted() const { return aborted_; }
@@ -206,7 +228,14 @@ class LineOf : public HostOf<P>, public Routine {
     if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
     resume();
   }
-  void woken() final { resume(); }
+  void woken() final {
+    heard_ = {.over = true};
+    resume();
+  }
+  void heard(Bytes bytes) final {
+    heard_ = {bytes, false};
+    resume();
+  }
   void ended(const Outcome& outcome) final { this->finish(outcome); }
 
   Request next_{};
@@ -214,6 +243,7 @@ class LineOf : public HostOf<P>, public Routine {
   Time earliest_{};
   std::string_view words_{};
   Error failure_ = Error::none;
+  Heard heard_{};
   bool must_ = false;
   bool restores_ = false;
   bool aborted_ = false;

@@ -20,6 +20,15 @@ template <class Format, class Member>
 Format format_of(Member Format::*);
 template <class Format, class Member>
 Member member_of(Member Format::*);
+// Of a time nanoseconds.
+template <class Value>
+constexpr std::int64_t number_of(const Value& value) {
+  if constexpr (requires { value.count(); }) {
+    return value.count();
+  } else {
+    return static_cast<std::int64_t>(value);
+  }
+}
 }  // namespace detail
 
 template <auto member>
@@ -38,7 +47,7 @@ template <auto member>
   const auto value = typename OptionOf<member>::Format{}.*member;
   return {{.name = name,
            .meaning = meaning,
-           .default_value = static_cast<std::int64_t>(value),
+           .default_value = detail::number_of(value),
            .minimum = minimum,
            .maximum = maximum,
            .step = step}};
@@ -72,9 +81,14 @@ template <auto member>
   return one;
 }
 
-/// The same option with so many digits behind the point: its values are in units of the last one.
+/// The same option, of which the user writes so many digits behind a point: its values are in units of the last one.
 template <unsigned decimals, auto member>
 [[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
+  one.info.decimals = decimals;
+  return one;
+}
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> with_decimals(unsigned decimals, OptionOf<member> one) {
   one.info.decimals = decimals;
   return one;
 }

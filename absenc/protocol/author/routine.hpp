@@ -23,6 +23,7 @@ struct Outcome {
   std::string_view detail{};  // which step failed, what was found
   std::string_view advice{};  // what to do, in place of the error's own advice
   Time hold{};                // so long after what was last sent or heard the encoder must not be disturbed
+  bool alone = false;         // these texts say all: what the document says of the last reply is not added
 };
 
 /// `co_return done;`
@@ -147,10 +148,10 @@ struct [[nodiscard]] Part {
       };
       return Back{};
     }
-    void return_value(const T& value) { result = value; }
+    void return_value(const T& value) { result.emplace(value); }
 
     std::coroutine_handle<> caller{};
-    T result{};
+    std::optional<T> result;
   };
 
   [[nodiscard]] bool await_ready() const { return false; }
@@ -166,7 +167,7 @@ struct [[nodiscard]] Part {
   }
   // By value: a reference would point into the frame, which is given back here.
   [[nodiscard]] T await_resume() {
-    const T result = handle.promise().result;
+    const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;
     void* const frame = handle.address();
     handle.destroy();

@@ -14,6 +14,8 @@ namespace absenc::author {
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// What noise may make of it.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
+/// How far from 0 a zero may be that was set, where the document does not say how exact it is.
+inline constexpr std::uint32_t zero_millidegrees = 350;
 
 /// This angle on a circle of 2^bits counts (1 to 64), one count at least.
 [[nodiscard]] constexpr std::int64_t counts_of_angle(unsigned bits,

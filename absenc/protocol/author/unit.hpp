@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/author/command.hpp"
@@ -36,15 +37,15 @@ struct Declares {
 
 /// `Definition` has:
 ///
-///   using Protocol;                                // line.hpp, device.hpp; its Format has line() and resolution(), or this
-///   using Encoder;                                 // the virtual one: BusDevice, made of (format, shaft)
-///   static constexpr std::string_view id, name, document;
-///   static constexpr LinkKind link;
-///   static constexpr OptionsOf options;            // option.hpp; their defaults are those of Format
-///   static constexpr std::array models;            // of ModelText
+///   using Protocol;                                // line.hpp, device.hpp; its Format has line() and resolution(), or
+///   this using Encoder;                                 // the virtual one: BusDevice, made of (format, shaft) static
+///   constexpr std::string_view id, name, document; static constexpr LinkKind link; static constexpr OptionsOf options;
+///   // option.hpp; their defaults are those of Format static constexpr std::array models;            // of ModelText
 ///   static constexpr FieldsOf fields;              // field.hpp
 ///   static constexpr std::array commands;          // of CommandOf, command.hpp
-///   static constexpr std::array vectors;           // of VectorText, text.hpp: they hold, or it does not compile
+///   static constexpr std::array vectors;           // of VectorText (text.hpp), or of Vector: they hold, or it does
+///   not
+///                                                  // compile
 ///   static constexpr std::size_t frames_size;      // bytes of storage that the procedures' frames need at the most
 ///   static constexpr Values values(const Format&, const Request&);          // put_values, command.hpp
 ///   static constexpr Values values(const Format&, const Request&, const Reply&);
@@ -52,10 +53,14 @@ struct Declares {
 ///                                                  // left out: Protocol::longest_reply
 ///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
 ///   static constexpr Explanation explain(...);     // command.hpp; may be left out
-///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
+///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing`, `covered`,
+///                                                        // `probe`, `streams` and `extra_lines`
 ///   static constexpr Format format(const Options&);      // where members of it alone do not say what options mean
 ///   static constexpr bool is_usable(const Format&);      // false: no virtual encoder is made; left out: it always is
 ///   static constexpr bool frames_are_texts = true;       // those of vectors; left out: they are hexadecimal
+///
+/// Where these do not say it, `decode`, `delimit` and `answered` themselves, with the parameters that they have in
+/// Unit.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -73,6 +78,14 @@ struct UnitOf {
   // ---- The functions of the descriptor
 
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
+    if constexpr (requires { Definition::decode(values, asked, frame, sink); }) {
+      return Definition::decode(values, asked, frame, sink);
+    } else {
+      return decode_bytes(values, asked, frame, sink);
+    }
+  }
+
+  static constexpr Error decode_bytes(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     const Format f = format(values);
     Request request = Definition::guess_request(f, frame.bytes);
     if (!asked.bytes.empty()) {
@@ -101,7 +114,10 @@ struct UnitOf {
     const Format f = format(values);
     const CommandOf<P>& one = find(command);
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
-    const auto bytes = P::encode(f, one.request(f, arguments));
+    if (one.request == nullptr) return Error::unsupported;
+    const Result<Request> request = one.request(f, arguments);
+    if (!request) return request.error();
+    const auto bytes = P::encode(f, *request);
     if (bytes.empty()) return Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
@@ -109,15 +125,19 @@ struct UnitOf {
   }
 
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
-    if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
-    std::size_t size = P::longest_reply;
-    if (direction == Direction::request) {
-      size = P::request_size(bytes);
-    } else if constexpr (requires { Definition::reply_size(Format{}, bytes); }) {
-      size = Definition::reply_size(format(values), bytes);
+    if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
+      return Definition::delimit(values, direction, bytes);
+    } else {
+      if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
+      std::size_t size = P::longest_reply;
+      if (direction == Direction::request) {
+        size = P::request_size(bytes);
+      } else if constexpr (requires { Definition::reply_size(Format{}, bytes); }) {
+        size = Definition::reply_size(format(values), bytes);
+      }
+      if (size == 0) return {Delimit::Kind::no_frame};
+      return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
     }
-    if (size == 0) return {Delimit::Kind::no_frame};
-    return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
   }
 
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
@@ -150,15 +170,28 @@ struct UnitOf {
   static constexpr LineSettings settings(const Options& values) { return line_of(format(values)); }
 
   static bool answered(const Options& values, Frame asked) {
-    const Format f = format(values);
-    const Result<Request> request = P::decode_request(f, asked.bytes);
-    if (!request) return true;
-    const Manner manner = P::manner(f, *request);
-    return manner.answered && !manner.any_reply;
+    if constexpr (requires { Definition::answered(values, asked); }) {
+      return Definition::answered(values, asked);
+    } else {
+      const Format f = format(values);
+      const Result<Request> request = P::decode_request(f, items(asked));
+      if (!request) return true;
+      const Manner manner = P::manner(f, *request);
+      return manner.answered && !manner.any_reply;
+    }
+  }
+
+  // As the links of the protocol carry it.
+  static constexpr std::span<const ItemOf<P>> items(const Frame& frame) {
+    if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
+      return {frame.can, frame.can != nullptr ? 1u : 0u};
+    } else {
+      return frame.bytes;
+    }
   }
 
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
-    return Definition::explain(format(values), error, asked.bytes, reply.bytes);
+    return Definition::explain(format(values), error, items(asked), items(reply));
   }
 
   // ---- Its tables
@@ -173,7 +206,7 @@ struct UnitOf {
   }();
 
   static constexpr std::size_t host_storage = [] {
-    std::size_t most = sizeof(Refusal<std::uint8_t>);
+    std::size_t most = sizeof(Refusal<ItemOf<P>>);
     for (const CommandOf<P>& one : Definition::commands) most = std::max(most, one.size);
     return most + Definition::frames_size;
   }();
@@ -196,33 +229,51 @@ struct UnitOf {
     for (std::size_t i = 0; i < made.size(); ++i) {
       const ModelText& text = Definition::models[i];
       made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
-      if (!text.values.empty()) made[i].values = model_values[i].view();  // g++ 12 takes a view of nothing for a change
+      if (!text.values.empty()) made[i].values = model_values[i].view();  // g++ 12 cannot view an empty one
     }
     return made;
   }();
 
+  static constexpr bool has_texts = std::is_same_v<typename decltype(Definition::vectors)::value_type, VectorText>;
   static constexpr auto vector_parts = [] {
-    std::array<VectorParts, Definition::vectors.size()> made{};
-    const bool are_texts = requires { Definition::frames_are_texts; };
-    for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i], are_texts);
-    return made;
-  }();
-  static constexpr auto vectors = [] {
-    std::array<Vector, Definition::vectors.size()> made{};
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      const VectorText& text = Definition::vectors[i];
-      const VectorParts& parts = vector_parts[i];
-      made[i] = {text.id,
-                 text.meaning,
-                 text.source,
-                 text.options,
-                 parts.request.view(),
-                 parts.reply.view(),
-                 parts.fields.view(),
-                 parts.error};
+    std::array<VectorParts, has_texts ? Definition::vectors.size() : 0> made{};
+    if constexpr (has_texts) {
+      const bool are_texts = requires { Definition::frames_are_texts; };
+      for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i], are_texts);
     }
     return made;
   }();
+  static constexpr auto vectors = [] {
+    if constexpr (has_texts) {
+      std::array<Vector, Definition::vectors.size()> made{};
+      for (std::size_t i = 0; i < made.size(); ++i) {
+        const VectorText& text = Definition::vectors[i];
+        const VectorParts& parts = vector_parts[i];
+        made[i] = {text.id,
+                   text.meaning,
+                   text.source,
+                   text.options,
+                   parts.request.view(),
+                   parts.reply.view(),
+                   parts.fields.view(),
+                   parts.error};
+      }
+      return made;
+    } else {
+      return Definition::vectors;
+    }
+  }();
+
+  static constexpr Error decode_vector(const Options& values, const Vector& vector, FieldSink& sink) {
+    if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
+      const CanFrame request = can_frame_of_text(vector.request);
+      const CanFrame reply = can_frame_of_text(vector.reply);
+      return decode(values, {.can = vector.request.empty() ? nullptr : &request},
+                    {.can = vector.reply.empty() ? nullptr : &reply}, sink);
+    } else {
+      return decode(values, {.bytes = vector.request}, {.bytes = vector.reply}, sink);
+    }
+  }
 
   static constexpr bool holds(const Vector& vector) {
     Options values;
@@ -235,8 +286,7 @@ struct UnitOf {
              to_value(Definition::options.infos[option], text, values.values[option]);
     });
     VectorCheck check(vector.fields);
-    return known && decode(values, {.bytes = vector.request}, {.bytes = vector.reply}, check) == vector.error &&
-           check.all();
+    return known && decode_vector(values, vector, check) == vector.error && check.all();
   }
   static_assert(std::all_of(vectors.begin(), vectors.end(), holds), "a vector does not decode to what it says");
 
@@ -262,13 +312,21 @@ struct UnitOf {
               .device = device,
               .resolution = resolution,
               .settings = settings};
-    unit.answered = answered;
+    if constexpr (
+        requires { P::reply_size(Format{}, Request{}); } || requires { &Definition::answered; }) {
+      unit.answered = answered;
+    }
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
     if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
     if constexpr (requires { Definition::covered; }) unit.covered = Definition::covered;
-    if constexpr (requires { Definition::explain(Format{}, Error::none, Bytes{}, Bytes{}); }) unit.explain = explain;
+    if constexpr (requires { Definition::probe; }) unit.probe = Definition::probe;
+    if constexpr (requires { Definition::streams; }) unit.streams = Definition::streams;
+    if constexpr (requires { Definition::extra_lines; }) unit.extra_lines = Definition::extra_lines;
+    if constexpr (requires { Definition::explain(Format{}, Error::none, items({}), items({})); }) {
+      unit.explain = explain;
+    }
     return unit;
   }
 };
