@@ -11,8 +11,7 @@ from pathlib import Path
 
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 LIBRARY = Path(os.environ["ABSENC"]).parent.parent / "libabsenc.a"
-COMPILE = ["g++", "-std=c++20", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion",
-           "-Wno-mismatched-new-delete", "-Werror"]
+COMPILE = ["g++", "-std=c++20", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror"]
 
 
 class NewProtocol(unittest.TestCase):

@@ -46,7 +46,8 @@ constexpr void put_values(FieldSink& sink, const Format& format, const What&... 
 /// What a unit hands out: the conversation, and the words for people that firmware does not link. What the document
 /// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something and the
 /// procedure has not said what to do. `noise_advice`, where a line that is never silent means something. What a
-/// procedure that is broken off leaves: `put_left(sink, format, found)`.
+/// procedure that is broken off leaves: `put_left(sink, format, found)`. Of what only the conversation knows
+/// `put(sink, conversation)` and `explain(conversation)`.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -54,7 +55,9 @@ class Told final : public Base {
 
   void report(FieldSink& sink) const override {
     if (this->error() != Error::none) return;
-    if constexpr (requires { this->found(); }) {
+    if constexpr (requires { Definition::put(sink, self()); }) {
+      Definition::put(sink, self());
+    } else if constexpr (requires { this->found(); }) {
       put_values<Definition>(sink, this->format(), this->found());
     } else {
       put_values<Definition>(sink, this->format(), this->request(), this->last());
@@ -80,9 +83,15 @@ class Told final : public Base {
   }
 
  private:
+  [[nodiscard]] const Base& self() const { return *this; }
   [[nodiscard]] Explanation explained() const {
     const auto exchange = this->exchange();
-    if constexpr (requires { Definition::explain(this->format(), Error::none, exchange.sent, exchange.received); }) {
+    if constexpr (requires { Definition::explain(self()); }) {
+      return this->error() == Error::none || this->is_alone() || !Base::advice().empty() ? Explanation{}
+                                                                                         : Definition::explain(self());
+    } else if constexpr (requires {
+                           Definition::explain(this->format(), Error::none, exchange.sent, exchange.received);
+                         }) {
       if (this->error() == Error::none || this->is_alone() || !Base::advice().empty()) return {};
       return Definition::explain(this->format(), this->error(), exchange.sent, exchange.received);
     } else {

@@ -21,6 +21,7 @@ void Responder::power_on(Time now, PowerOn kind) {
 void Responder::power_off(Time now) {
   if (is_on(now)) stopped(now);
   power_ = Power::off;
+  reply_pending_ = transmitting_ = false;
 }
 
 void Responder::restart(Time until) {
@@ -95,10 +96,7 @@ void Responder::hear(std::uint8_t byte, Time at) {
   longer_ = {};
   switch (respond(request_, at, reply_)) {
     case Answer::sent:
-      reply_at_ = at + times_.answer_time + longer_;
-      reply_pending_ = transmitting_ = true;
-      interruption_.begin();
-      ++answered_;
+      begin_reply(at + times_.answer_time + longer_);
       break;
     case Answer::none:
       ++answered_;
@@ -108,6 +106,19 @@ void Responder::hear(std::uint8_t byte, Time at) {
       break;
   }
   request_.clear();
+}
+
+void Responder::begin_reply(Time at) {
+  reply_at_ = at;
+  reply_pending_ = transmitting_ = true;
+  interruption_.begin();
+  ++answered_;
+}
+
+void Responder::transmit(Bytes bytes, Time at) {
+  reply_.clear();
+  reply_.append(bytes);
+  begin_reply(at);
 }
 
 void Responder::violate(std::string_view rule, Time at) {

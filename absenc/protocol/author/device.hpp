@@ -29,8 +29,8 @@ struct DeviceTimes {
 /// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
 class Responder : public Device<std::uint8_t> {
  public:
-  void feed(const Event<std::uint8_t>& event) final;
-  Step<std::uint8_t> next(Time now) final;
+  void feed(const Event<std::uint8_t>& event) override;
+  Step<std::uint8_t> next(Time now) override;
 
   void power_on(Time now, PowerOn kind) override;
   void power_off(Time now) override;
@@ -52,6 +52,9 @@ class Responder : public Device<std::uint8_t> {
   [[nodiscard]] bool is_on(Time now);
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
   void change_memory() { ++memory_version_; }
+  /// Sends what no request on a line of characters asks for: what a chip select does, or nobody.
+  void transmit(Bytes bytes, Time at);
+  [[nodiscard]] bool is_transmitting() const { return transmitting_; }
 
   /// How many bytes the request has that begins so, one at least; 0: none begins so.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
@@ -69,6 +72,7 @@ class Responder : public Device<std::uint8_t> {
  private:
   enum class Power : std::uint8_t { off, starting, on };
   void hear(std::uint8_t byte, Time at);
+  void begin_reply(Time at);
 
   DeviceTimes times_;
   Power power_ = Power::off;

@@ -78,6 +78,7 @@ ByteStep Engine::next(Time now) {
       step.out = out_;
       step.expect = manner_.answered ? expected({}) : 0;
       step.at = std::max(earliest_, wire_.silence != Time{} ? now : Time{});
+      begun_at_ = std::max(now, earliest_);
       break;
     }
     case State::receiving: {

@@ -249,14 +249,32 @@ class LineOf : public HostOf<P>, public Routine {
   bool aborted_ = false;
 };
 
+namespace detail {
+template <class P>
+struct CarrierOf {
+  using Type = LineOf<P>;
+};
+template <class P>
+requires requires { typename P::Line; }
+struct CarrierOf<P> {
+  using Type = typename P::Line;
+};
+}  // namespace detail
+
+/// What carries the procedures of a protocol: `P::Line`, an Engine and Routine made of (format, arena), where one
+/// request is not answered by one reply.
+template <class P>
+using CarrierOf = typename detail::CarrierOf<P>::Type;
+
 /// A procedure that runs: `procedure(line, found, bound..., arguments)`, the last where it takes them. What it finds is
-/// `Found`, whose member `reading`, if there is one, is the position. Frames lie in the storage behind this object.
+/// `Found`, whose member `reading`, if there is one, is the position; else that of the line. Frames lie in the storage
+/// behind this object.
 template <class P, class Found, auto procedure, auto... bound>
-class Run : public LineOf<P> {
+class Run : public CarrierOf<P> {
  public:
-  Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena) : LineOf<P>(format, arena) {
+  Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena) : CarrierOf<P>(format, arena) {
     for (const std::int64_t argument : arguments) static_cast<void>(arguments_.push_back(argument));
-    if constexpr (std::is_invocable_v<decltype(procedure), LineOf<P>&, Found&, decltype(bound)..., Arguments>) {
+    if constexpr (std::is_invocable_v<decltype(procedure), CarrierOf<P>&, Found&, decltype(bound)..., Arguments>) {
       this->begin(procedure(*this, found_, bound..., arguments_.view()).handle);
     } else {
       this->begin(procedure(*this, found_, bound...).handle);
@@ -265,9 +283,10 @@ class Run : public LineOf<P> {
   [[nodiscard]] const Found& found() const { return found_; }
   [[nodiscard]] const Reading* reading() const final {
     if constexpr (requires { found_.reading; }) {
-      if (this->error() == Error::none && found_.reading.singleturn_bits != 0) return &found_.reading;
+      return this->error() == Error::none && found_.reading.singleturn_bits != 0 ? &found_.reading : nullptr;
+    } else {
+      return CarrierOf<P>::reading();
     }
-    return nullptr;
   }
 
  private:

@@ -15,6 +15,9 @@
 #include "absenc/core/result.hpp"
 #include "absenc/core/time.hpp"
 
+// Without optimisation g++ 12 takes the frame's own operators for a pair that does not match, in every coroutine.
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
+
 namespace absenc::author {
 
 /// How a procedure ends.
@@ -166,7 +169,7 @@ struct [[nodiscard]] Part {
     routine.go_on_with(handle);
   }
   // By value: a reference would point into the frame, which is given back here.
-  [[nodiscard]] T await_resume() {
+  T await_resume() {
     const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;
     void* const frame = handle.address();

@@ -35,32 +35,24 @@ struct Declares {
   }
 };
 
-/// `Definition` has:
+/// A Definition has these, all static and constexpr:
 ///
-///   using Protocol;                                // line.hpp, device.hpp; its Format has line() and resolution(), or
-///   this using Encoder;                                 // the virtual one: BusDevice, made of (format, shaft) static
-///   constexpr std::string_view id, name, document; static constexpr LinkKind link; static constexpr OptionsOf options;
-///   // option.hpp; their defaults are those of Format static constexpr std::array models;            // of ModelText
-///   static constexpr FieldsOf fields;              // field.hpp
-///   static constexpr std::array commands;          // of CommandOf, command.hpp
-///   static constexpr std::array vectors;           // of VectorText (text.hpp), or of Vector: they hold, or it does
-///   not
-///                                                  // compile
-///   static constexpr std::size_t frames_size;      // bytes of storage that the procedures' frames need at the most
-///   static constexpr Values values(const Format&, const Request&);          // put_values, command.hpp
-///   static constexpr Values values(const Format&, const Request&, const Reply&);
-///   static constexpr std::size_t reply_size(const Format&, Bytes begin);    // of any reply that begins so; 0: none;
-///                                                  // left out: Protocol::longest_reply
-///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
-///   static constexpr Explanation explain(...);     // command.hpp; may be left out
-///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing`, `covered`,
-///                                                        // `probe`, `streams` and `extra_lines`
-///   static constexpr Format format(const Options&);      // where members of it alone do not say what options mean
-///   static constexpr bool is_usable(const Format&);      // false: no virtual encoder is made; left out: it always is
-///   static constexpr bool frames_are_texts = true;       // those of vectors; left out: they are hexadecimal
+/// - `Protocol` (line.hpp, device.hpp), and `Encoder`, the virtual one, made of (format, shaft): BusDevice
+/// - `id`, `name`, `document`, `link`
+/// - `options`: OptionsOf (option.hpp), whose defaults are those of Format; or `Format format(const Options&)`
+/// - `models`: an array of ModelText
+/// - `fields`: FieldsOf (field.hpp)
+/// - `commands`: an array of CommandOf (command.hpp)
+/// - `vectors`: an array of VectorText (text.hpp) or of Vector; they hold, or it does not compile. `frames_are_texts`:
+///   those of the texts are no hexadecimal
+/// - `frames_size`: bytes of storage that the procedures' frames need at the most
+/// - `values(format, request)`, `values(format, request, reply)`, `values(format, found)`: see put_values (command.hpp)
+/// - `Request guess_request(const Format&, Bytes reply)`: what was asked, of a reply alone
 ///
-/// Where these do not say it, `decode`, `delimit` and `answered` themselves, with the parameters that they have in
-/// Unit.
+/// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
+/// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
+/// false: no virtual encoder is made; `status`, `alarms`, `conditions`, `timing`, `covered`, `probe`, `streams`,
+/// `extra_lines` as in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -80,13 +72,14 @@ struct UnitOf {
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     if constexpr (requires { Definition::decode(values, asked, frame, sink); }) {
       return Definition::decode(values, asked, frame, sink);
+    } else if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
+      return Definition::decode(format(values), asked, frame, sink);
     } else {
-      return decode_bytes(values, asked, frame, sink);
+      return decode_bytes(format(values), asked, frame, sink);
     }
   }
 
-  static constexpr Error decode_bytes(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
-    const Format f = format(values);
+  static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
     Request request = Definition::guess_request(f, frame.bytes);
     if (!asked.bytes.empty()) {
       const Result<Request> result = P::decode_request(f, asked.bytes);
