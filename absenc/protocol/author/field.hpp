@@ -35,13 +35,27 @@ struct FieldsOf {
     (put_one(sink, infos[index++], values.*members), ...);
   }
 
+  /// What is declared of this member.
+  template <auto member>
+  [[nodiscard]] constexpr const FieldInfo& info() const {
+    std::size_t index = 0;
+    static_cast<void>(((index += same_member<member, members>() ? 0 : 1, same_member<member, members>()) || ...));
+    return infos[index];
+  }
+
   std::array<FieldInfo, sizeof...(members)> infos;
 
  private:
+  template <auto one, auto other>
+  static constexpr bool same_member() {
+    return std::is_same_v<FieldOf<one>, FieldOf<other>>;
+  }
   template <class T>
   static constexpr void put_one(FieldSink& sink, const FieldInfo& info, const T& value) {
     if constexpr (std::is_same_v<T, double>) {
       sink.put({.info = &info, .real = value});
+    } else if constexpr (std::is_same_v<T, Bytes>) {
+      sink.put({.info = &info, .bytes = value});
     } else if constexpr (std::is_same_v<T, std::string_view>) {
       ByteBuffer<32> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
