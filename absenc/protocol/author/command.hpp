@@ -33,7 +33,8 @@ class Refusal final : public Conversation<Item> {
 
 /// What a unit hands out: the conversation, and the words for people that firmware does not link. `Definition` says
 /// what is reported: `put(sink, format, found)` of a procedure, `put(sink, format, request, reply)` of a reading; and
-/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something.
+/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something; or, where
+/// the words must be put together, `tell(sentence, format, engine)` of the exchange that went wrong.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -49,7 +50,15 @@ class Told final : public Base {
   }
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
-    words_.add(explained().found).add_part(Base::detail());
+    const std::string_view own = Base::detail();
+    if (this->error() != Error::none && this->is_noisy()) {
+      if (own != endless_noise.found) words_.add(endless_noise.found);
+    } else if constexpr (requires { Definition::tell(words_, this->format(), *this); }) {
+      if (this->error() != Error::none) Definition::tell(words_, this->format(), *this);
+    } else {
+      words_.add(explained().found);
+    }
+    words_.add_part(own);
     return words_.view();
   }
   [[nodiscard]] std::string_view advice() const override {
