@@ -37,7 +37,8 @@ namespace absenc::author {
 ///   static constexpr void put(FieldSink&, const Format&, const Request&);
 ///   static constexpr void put(FieldSink&, const Format&, const Request&, const Reply&);
 ///   static constexpr std::size_t reply_size(const Format&, Bytes begin);    // of any reply that begins so; 0: none
-///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
+///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone; or a
+///                                                                           // Result, where it may not tell
 ///   static constexpr Explanation explain(...);     // command.hpp; may be left out
 ///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
 template <class Definition>
@@ -52,22 +53,18 @@ struct UnitOf {
 
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     const Format f = format(values);
-    Request request = Definition::guess_request(f, frame.bytes);
-    if (!asked.bytes.empty()) {
-      const Result<Request> result = P::decode_request(f, asked.bytes);
-      if (!result) return result.error();
-      request = *result;
-    } else if (frame.bytes.empty()) {
-      return Error::wrong_length;
-    }
+    if (asked.bytes.empty() && frame.bytes.empty()) return Error::wrong_length;
+    const Result<Request> request = asked.bytes.empty() ? Result<Request>(Definition::guess_request(f, frame.bytes))
+                                                        : P::decode_request(f, asked.bytes);
+    if (!request) return request.error();
     if (frame.bytes.empty()) {
-      Definition::put(sink, f, request);
+      Definition::put(sink, f, *request);
       return Error::none;
     }
-    const auto reply = P::decode(f, request, frame.bytes);
+    const auto reply = P::decode(f, *request, frame.bytes);
     if (!reply) return reply.error();
-    Definition::put(sink, f, request, *reply);
-    const Reading reading = P::reading(f, request, *reply);
+    Definition::put(sink, f, *request, *reply);
+    const Reading reading = P::reading(f, *request, *reply);
     if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
     return Error::none;
   }
@@ -85,10 +82,18 @@ struct UnitOf {
     return bytes.size();
   }
 
+  static constexpr std::size_t request_size(const Options& values, Bytes begin) {
+    if constexpr (requires { P::request_size(format(values), begin); }) {
+      return P::request_size(format(values), begin);
+    } else {
+      return P::request_size(begin);
+    }
+  }
+
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
     if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
     const std::size_t size =
-        direction == Direction::request ? P::request_size(bytes) : Definition::reply_size(format(values), bytes);
+        direction == Direction::request ? request_size(values, bytes) : Definition::reply_size(format(values), bytes);
     if (size == 0) return {Delimit::Kind::no_frame};
     return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
   }
@@ -133,7 +138,8 @@ struct UnitOf {
   }();
 
   static constexpr auto model_values = [] {
-    std::array<Buffer<OptionValue, maximum_options>, Definition::models.size()> made{};
+    // Without {}: g++ 12 refuses it where no model has a value.
+    std::array<Buffer<OptionValue, maximum_options>, Definition::models.size()> made;
     for (std::size_t i = 0; i < made.size(); ++i) {
       const bool good = for_each_value(Definition::models[i].values, [&](std::string_view name, std::string_view text) {
         const std::size_t option = Definition::options.find(name);
