@@ -47,7 +47,8 @@ constexpr void put_values(FieldSink& sink, const Format& format, const What&... 
 /// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something and the
 /// procedure has not said what to do. `noise_advice`, where a line that is never silent means something. What a
 /// procedure that is broken off leaves: `put_left(sink, format, found)`. Of what only the conversation knows
-/// `put(sink, conversation)` and `explain(conversation)`.
+/// `put(sink, conversation)` and `explain(conversation)`; where words must be put together, `tell(sentence, format,
+/// engine)` of the exchange that went wrong.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -71,7 +72,15 @@ class Told final : public Base {
   }
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
-    words_.add(explained().found).add_part(Base::detail());
+    const std::string_view own = Base::detail();
+    if (this->error() != Error::none && this->is_noisy()) {
+      if (own != endless_noise.found) words_.add(endless_noise.found);
+    } else if constexpr (requires { Definition::tell(words_, this->format(), *this); }) {
+      if (this->error() != Error::none) Definition::tell(words_, this->format(), *this);
+    } else {
+      words_.add(explained().found);
+    }
+    words_.add_part(own);
     return words_.view();
   }
   [[nodiscard]] std::string_view advice() const override {

@@ -11,8 +11,7 @@ using ByteEvent = Event<std::uint8_t>;
 void Responder::power_on(Time now, PowerOn kind) {
   power_ = Power::starting;
   ready_at_ = kind == PowerOn::skip ? now : now + times_.start_time;
-  request_.clear();
-  skipping_ = 0;
+  forget();
   kept_.clear();
   reply_pending_ = transmitting_ = false;
   static_cast<void>(is_on(now));
@@ -45,8 +44,10 @@ ByteStep Responder::next(Time) {
     return {.kind = ByteStep::Kind::transfer, .out = reply_, .at = reply_at_};
   }
   ByteStep step{.expect = 1, .at = never};
-  if (!request_.empty()) step.expect = request_size(request_) - request_.size();
-  if (!request_.empty() || skipping_ != 0) step.gap = 2 * times_.character;
+  // Another encoder may be absent: behind its request any pause is enough.
+  if (damaged_ || skipping_ != 0) step.expect = 0;
+  if (!damaged_ && !request_.empty()) step.expect = request_size(request_) - request_.size();
+  if (damaged_ || !request_.empty() || skipping_ != 0) step.gap = 2 * times_.character;
   return step;
 }
 
@@ -62,18 +63,32 @@ void Responder::feed(const ByteEvent& event) {
       for (const std::uint8_t byte : kept.view()) hear(byte, event.at);
       break;
     }
-    case ByteEvent::Kind::silence:
-    case ByteEvent::Kind::line_error:  // what was begun is none
-      request_.clear();
-      skipping_ = 0;
+    case ByteEvent::Kind::line_error:
+      heard_at_ = event.at;
+      damaged_ = !transmitting_ && is_on(event.at);
+      break;
+    case ByteEvent::Kind::silence:  // what was begun is none
+      if (damaged_ && !request_.empty()) {
+        reply_.clear();
+        longer_ = {};
+        ended(respond_to_damaged(request_, heard_at_, reply_), heard_at_);
+      }
+      forget();
       break;
     default:
       break;
   }
 }
 
+void Responder::forget() {
+  request_.clear();
+  skipping_ = 0;
+  damaged_ = false;
+}
+
 void Responder::hear(std::uint8_t byte, Time at) {
-  if (!is_on(at)) return;
+  heard_at_ = at;
+  if (!is_on(at) || damaged_) return;
   if (transmitting_ && times_.keeps_requests) {
     kept_.push_back(byte);
     return;
@@ -94,7 +109,12 @@ void Responder::hear(std::uint8_t byte, Time at) {
   if (request_.size() < size) return;
   reply_.clear();
   longer_ = {};
-  switch (respond(request_, at, reply_)) {
+  ended(respond(request_, at, reply_), at);
+  request_.clear();
+}
+
+void Responder::ended(Answer answer, Time at) {
+  switch (answer) {
     case Answer::sent:
       begin_reply(at + times_.answer_time + longer_);
       break;
@@ -105,7 +125,6 @@ void Responder::hear(std::uint8_t byte, Time at) {
       skipping_ = others_reply_size(request_);
       break;
   }
-  request_.clear();
 }
 
 void Responder::begin_reply(Time at) {

@@ -65,6 +65,8 @@ class Responder : public Device<std::uint8_t> {
   void take_longer(Time time) { longer_ = time; }
   /// A whole request. Its reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
+  /// A request of which a character was damaged, as far as it came before. Its host ended at `at`; the line is silent.
+  virtual Answer respond_to_damaged(Bytes, Time, ByteBuffer<64>&) { return Answer::for_others; }
   /// Power has come, and the start-up is over, at the time at which it was.
   virtual void started(Time) {}
   virtual void stopped(Time) {}
@@ -73,11 +75,15 @@ class Responder : public Device<std::uint8_t> {
   enum class Power : std::uint8_t { off, starting, on };
   void hear(std::uint8_t byte, Time at);
   void begin_reply(Time at);
+  void ended(Answer answer, Time at);
+  void forget();
 
   DeviceTimes times_;
   Power power_ = Power::off;
   Time ready_at_{};
   ByteBuffer<32> request_;
+  bool damaged_ = false;  // a character of it: the rest is none until the line is silent
+  Time heard_at_{};
   std::size_t skipping_ = 0;  // characters of another encoder's reply
   ByteBuffer<64> reply_;
   Time reply_at_{};
@@ -97,7 +103,7 @@ class Responder : public Device<std::uint8_t> {
 /// off. Of the protocol it needs besides:
 ///
 ///   static DeviceTimes device_times(const Format&);
-///   static std::size_t request_size(Bytes begin);
+///   static std::size_t request_size(Bytes begin);                      // or (const Format&, Bytes begin)
 ///   static std::size_t reply_size(const Format&, const Request&);      // 0: it is not answered
 ///   static Result<Request> decode_request(const Format&, Bytes);
 ///   static ByteBuffer<N> encode_reply(const Format&, const Request&, const Reply&);
@@ -140,7 +146,13 @@ class BusDevice : public Responder {
   }
 
  private:
-  [[nodiscard]] std::size_t request_size(Bytes begin) const final { return P::request_size(begin); }
+  [[nodiscard]] std::size_t request_size(Bytes begin) const final {
+    if constexpr (requires { P::request_size(format_, begin); }) {
+      return P::request_size(format_, begin);
+    } else {
+      return P::request_size(begin);
+    }
+  }
   [[nodiscard]] std::size_t others_reply_size(Bytes bytes) const final {
     const Result<Request> request = P::decode_request(format_, bytes);
     return request ? P::reply_size(format_, *request) : 0;

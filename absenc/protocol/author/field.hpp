@@ -36,9 +36,21 @@ struct FieldsOf {
     (put_one(sink, infos[index++], shown<members>(values)), ...);
   }
 
+  /// What is declared of this member.
+  template <auto member>
+  [[nodiscard]] constexpr const FieldInfo& info() const {
+    std::size_t index = 0;
+    static_cast<void>(((index += same_member<member, members>() ? 0 : 1, same_member<member, members>()) || ...));
+    return infos[index];
+  }
+
   std::array<FieldInfo, sizeof...(members)> infos;
 
  private:
+  template <auto one, auto other>
+  static constexpr bool same_member() {
+    return std::is_same_v<FieldOf<one>, FieldOf<other>>;
+  }
   template <auto member>
   static constexpr auto shown(const Values& values) {
     if constexpr (std::is_member_pointer_v<decltype(member)>) {

@@ -83,7 +83,8 @@ class HostOf : public Engine {
 };
 
 /// A position, asked for once: what a drive repeats ten thousand times a second. `P::reading(format, request, reply)`
-/// makes a Reading of the reply; its times are those of the exchange.
+/// makes a Reading of the reply; its times are those of the exchange. Where the document says when the encoder takes
+/// the position, `P::latched(format, sent_at)` is that time.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
@@ -99,7 +100,11 @@ class ReadPosition : public HostOf<P> {
   void answered(Error error) final {
     if (error == Error::none) {
       reading_ = P::reading(this->format(), this->request(), this->last());
-      reading_.latched = this->sent_at();  // the latest it can have been taken
+      if constexpr (requires { P::latched(this->format(), this->sent_at()); }) {
+        reading_.latched = P::latched(this->format(), this->sent_at());
+      } else {
+        reading_.latched = this->sent_at();  // the latest it can have been taken
+      }
       reading_.received = this->received_at();
     }
     this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});

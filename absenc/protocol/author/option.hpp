@@ -38,6 +38,9 @@ struct OptionOf {
   Option info;
 
   constexpr void put(Format& format, std::int64_t value) const { format.*member = static_cast<Member>(value); }
+  [[nodiscard]] constexpr std::int64_t get(const Format& format) const {
+    return static_cast<std::int64_t>(format.*member);
+  }
 };
 
 /// A number from `minimum` to `maximum` in steps; its default is that of the member.
@@ -105,6 +108,23 @@ struct OptionsOf {
     std::size_t index = 0;
     std::apply([&](const auto&... one) { (one.put(made, values[index++]), ...); }, each);
     return made;
+  }
+  /// The option of this index alone.
+  constexpr void put(Format& format, std::size_t option, std::int64_t value) const {
+    std::size_t index = 0;
+    const auto put_one = [&](const auto& one) {
+      if (index++ == option) one.put(format, value);
+    };
+    std::apply([&](const auto&... one) { (put_one(one), ...); }, each);
+  }
+  [[nodiscard]] constexpr std::int64_t get(const Format& format, std::size_t option) const {
+    std::size_t index = 0;
+    std::int64_t value = 0;
+    const auto get_one = [&](const auto& one) {
+      if (index++ == option) value = one.get(format);
+    };
+    std::apply([&](const auto&... one) { (get_one(one), ...); }, each);
+    return value;
   }
   /// Index of the option with this name; the number of options when there is none.
   [[nodiscard]] constexpr std::size_t find(std::string_view name) const {

@@ -154,7 +154,7 @@ struct [[nodiscard]] Part {
     void return_value(const T& value) { result.emplace(value); }
 
     std::coroutine_handle<> caller{};
-    std::optional<T> result;
+    std::optional<T> result{};
   };
 
   [[nodiscard]] bool await_ready() const { return false; }

@@ -47,7 +47,8 @@ struct Declares {
 ///   those of the texts are no hexadecimal
 /// - `frames_size`: bytes of storage that the procedures' frames need at the most
 /// - `values(format, request)`, `values(format, request, reply)`, `values(format, found)`: see put_values (command.hpp)
-/// - `Request guess_request(const Format&, Bytes reply)`: what was asked, of a reply alone
+/// - `Request guess_request(const Format&, Bytes reply)`: what was asked, of a reply alone; or a Result, where it
+///   may not tell
 ///
 /// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
@@ -80,22 +81,18 @@ struct UnitOf {
   }
 
   static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
-    Request request = Definition::guess_request(f, frame.bytes);
-    if (!asked.bytes.empty()) {
-      const Result<Request> result = P::decode_request(f, asked.bytes);
-      if (!result) return result.error();
-      request = *result;
-    } else if (frame.bytes.empty()) {
-      return Error::wrong_length;
-    }
+    if (asked.bytes.empty() && frame.bytes.empty()) return Error::wrong_length;
+    const Result<Request> request = asked.bytes.empty() ? Result<Request>(Definition::guess_request(f, frame.bytes))
+                                                        : P::decode_request(f, asked.bytes);
+    if (!request) return request.error();
     if (frame.bytes.empty()) {
-      put_values<Definition>(sink, f, request);
+      put_values<Definition>(sink, f, *request);
       return Error::none;
     }
-    const auto reply = P::decode(f, request, frame.bytes);
+    const auto reply = P::decode(f, *request, frame.bytes);
     if (!reply) return reply.error();
-    put_values<Definition>(sink, f, request, *reply);
-    const Reading reading = P::reading(f, request, *reply);
+    put_values<Definition>(sink, f, *request, *reply);
+    const Reading reading = P::reading(f, *request, *reply);
     if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
     return Error::none;
   }
@@ -117,6 +114,14 @@ struct UnitOf {
     return bytes.size();
   }
 
+  static constexpr std::size_t request_size(const Options& values, Bytes begin) {
+    if constexpr (requires { P::request_size(format(values), begin); }) {
+      return P::request_size(format(values), begin);
+    } else {
+      return P::request_size(begin);
+    }
+  }
+
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
     if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
       return Definition::delimit(values, direction, bytes);
@@ -124,7 +129,7 @@ struct UnitOf {
       if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
       std::size_t size = P::longest_reply;
       if (direction == Direction::request) {
-        size = P::request_size(bytes);
+        size = request_size(values, bytes);
       } else if constexpr (requires { Definition::reply_size(Format{}, bytes); }) {
         size = Definition::reply_size(format(values), bytes);
       }
@@ -205,7 +210,8 @@ struct UnitOf {
   }();
 
   static constexpr auto model_values = [] {
-    std::array<Buffer<OptionValue, maximum_options>, Definition::models.size()> made{};
+    // Without {}: g++ 12 refuses it where no model has a value.
+    std::array<Buffer<OptionValue, maximum_options>, Definition::models.size()> made;
     for (std::size_t i = 0; i < made.size(); ++i) {
       const bool good = for_each_value(Definition::models[i].values, [&](std::string_view name, std::string_view text) {
         const std::size_t option = Definition::options.find(name);
