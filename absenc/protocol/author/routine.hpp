@@ -150,7 +150,7 @@ struct [[nodiscard]] Part {
     void return_value(const T& value) { result = value; }
 
     std::coroutine_handle<> caller{};
-    T result{};
+    std::optional<T> result{};
   };
 
   [[nodiscard]] bool await_ready() const { return false; }
@@ -166,7 +166,7 @@ struct [[nodiscard]] Part {
   }
   // By value: a reference would point into the frame, which is given back here.
   [[nodiscard]] T await_resume() {
-    const T result = handle.promise().result;
+    const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;
     void* const frame = handle.address();
     handle.destroy();
