@@ -33,7 +33,9 @@ class Refusal final : public Conversation<Item> {
 
 /// What a unit hands out: the conversation, and the words for people that firmware does not link. `Definition` says
 /// what is reported: `put(sink, format, found)` of a procedure, `put(sink, format, request, reply)` of a reading; and
-/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something.
+/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something. Of a
+/// procedure that leaves the encoder changed when it fails or is broken off, `left(found)` is what to add to the
+/// error's words, and `put_left(sink, found)` puts it.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -49,12 +51,15 @@ class Told final : public Base {
   }
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
-    words_.add(explained().found).add_part(Base::detail());
+    words_.add(explained().found).add_part(Base::detail()).add_part(left());
     return words_.view();
   }
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
     return own.empty() ? explained().advice : own;
+  }
+  void report_left(FieldSink& sink) const override {
+    if constexpr (requires { Definition::put_left(sink, this->found()); }) Definition::put_left(sink, this->found());
   }
 
  private:
@@ -65,6 +70,13 @@ class Told final : public Base {
     } else {
       return {};
     }
+  }
+
+  [[nodiscard]] std::string_view left() const {
+    if constexpr (requires { Definition::left(this->found()); }) {
+      if (this->error() != Error::none) return Definition::left(this->found());
+    }
+    return {};
   }
 
   mutable Sentence words_;
@@ -121,10 +133,10 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 }
 }  // namespace detail
 
-/// A position, or another value, that one request asks for: `request` makes it of the format.
-template <class Definition, class P, auto request>
+/// A position, or another value, that one request asks for: `request` makes it of the format. `Reader` is made of both.
+template <class Definition, class P, auto request, class Reader = ReadPosition<P>>
 [[nodiscard]] constexpr CommandOf<P> reading(const Command& info) {
-  using Made = Told<Definition, ReadPosition<P>>;
+  using Made = Told<Definition, Reader>;
   return {.info = info,
           .request = [](const typename P::Format& format, Arguments) { return request(format); },
           .make = [](const typename P::Format& format, Arguments,
