@@ -34,6 +34,13 @@ struct FieldsOf {
     std::size_t index = 0;
     (put_one(sink, infos[index++], values.*members), ...);
   }
+  /// Of the field that shows this member.
+  template <auto member>
+  [[nodiscard]] constexpr const FieldInfo* of() const {
+    std::size_t index = 0;
+    static_cast<void>(((std::is_same_v<FieldOf<member>, FieldOf<members>> || (++index, false)) || ...));
+    return &infos[index];
+  }
 
   std::array<FieldInfo, sizeof...(members)> infos;
 
@@ -42,6 +49,8 @@ struct FieldsOf {
   static constexpr void put_one(FieldSink& sink, const FieldInfo& info, const T& value) {
     if constexpr (std::is_same_v<T, double>) {
       sink.put({.info = &info, .real = value});
+    } else if constexpr (std::is_same_v<T, Bytes>) {
+      sink.put({.info = &info, .bytes = value});
     } else if constexpr (std::is_same_v<T, std::string_view>) {
       ByteBuffer<32> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
