@@ -37,9 +37,15 @@ namespace absenc::author {
 ///   static constexpr void put(FieldSink&, const Format&, const Request&);
 ///   static constexpr void put(FieldSink&, const Format&, const Request&, const Reply&);
 ///   static constexpr std::size_t reply_size(const Format&, Bytes begin);    // of any reply that begins so; 0: none
-///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
-///   static constexpr Explanation explain(...);     // command.hpp; may be left out
-///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
+///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone; or a
+///                                                  // Result
+///
+/// And may have:
+///
+///   static constexpr Error answer_to_bad(Error, Bytes reply);   // of a request that is none, and what came after it
+///   static constexpr Explanation explain(...);     // command.hpp
+///   static constexpr const FieldInfo *status, *alarms;
+///   static constexpr ... memory, conditions, timing, covered;   // as in Unit
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -52,24 +58,30 @@ struct UnitOf {
 
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     const Format f = format(values);
-    Request request = Definition::guess_request(f, frame.bytes);
-    if (!asked.bytes.empty()) {
-      const Result<Request> result = P::decode_request(f, asked.bytes);
-      if (!result) return result.error();
-      request = *result;
-    } else if (frame.bytes.empty()) {
-      return Error::wrong_length;
-    }
+    const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
+    if (!request) return request.error();
     if (frame.bytes.empty()) {
-      Definition::put(sink, f, request);
+      Definition::put(sink, f, *request);
       return Error::none;
     }
-    const auto reply = P::decode(f, request, frame.bytes);
+    const auto reply = P::decode(f, *request, frame.bytes);
     if (!reply) return reply.error();
-    Definition::put(sink, f, request, *reply);
-    const Reading reading = P::reading(f, request, *reply);
+    Definition::put(sink, f, *request, *reply);
+    const Reading reading = P::reading(f, *request, *reply);
     if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
     return Error::none;
+  }
+
+  static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
+    if (asked.empty()) {
+      if (reply.empty()) return Error::wrong_length;
+      return Definition::guess_request(f, reply);
+    }
+    const Result<Request> request = P::decode_request(f, asked);
+    if constexpr (requires { Definition::answer_to_bad(request.error(), reply); }) {
+      if (!request) return Definition::answer_to_bad(request.error(), reply);
+    }
+    return request;
   }
 
   static constexpr const CommandOf<P>& find(const Command& command) { return Definition::commands[command.id]; }
@@ -176,16 +188,36 @@ struct UnitOf {
     return made;
   }();
 
-  static constexpr bool holds(const Vector& vector) {
-    Options values;
+  // Whether the text is understood. Without model: the defaults.
+  static constexpr bool resolve(std::string_view text, const Model* model, Options& values) {
     for (std::size_t i = 0; i < Definition::options.infos.size(); ++i) {
       values.values[i] = Definition::options.infos[i].default_value;
     }
-    const bool known = for_each_value(vector.options, [&](std::string_view name, std::string_view text) {
+    if (model != nullptr) {
+      for (const OptionValue& one : model->values) values.values[one.option] = one.value;
+    }
+    return for_each_value(text, [&](std::string_view name, std::string_view value) {
       const std::size_t option = Definition::options.find(name);
       return option < Definition::options.infos.size() &&
-             to_value(Definition::options.infos[option], text, values.values[option]);
+             to_value(Definition::options.infos[option], value, values.values[option]);
     });
+  }
+  static constexpr bool agrees(const Model& model, const Options& values) {
+    return std::all_of(model.values.begin(), model.values.end(),
+                       [&](const OptionValue& one) { return values.values[one.option] == one.value; });
+  }
+
+  static constexpr bool holds(const Vector& vector) {
+    Options values;
+    bool known = resolve(vector.options, nullptr, values);
+    // The first model that agrees with what is said, as resolve_options has it.
+    for (const Model& model : models) {
+      Options of_model;
+      known = known && resolve(vector.options, &model, of_model);
+      if (!agrees(model, of_model)) continue;
+      values = of_model;
+      break;
+    }
     VectorCheck check(vector.fields);
     return known && decode(values, {.bytes = vector.request}, {.bytes = vector.reply}, check) == vector.error &&
            check.all();
@@ -217,6 +249,7 @@ struct UnitOf {
     unit.answered = answered;
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
+    if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
     if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
     if constexpr (requires { Definition::covered; }) unit.covered = Definition::covered;
