@@ -21,6 +21,7 @@ struct DeviceTimes {
   Time character{};    // of its line: a pause of two ends a request that is not whole
   Time answer_time{};  // from the end of a request to its reply
   Time start_time{};   // from power on to the first request that is answered
+  Time gap{};          // the pause that ends it, where it is not two
 };
 
 /// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
@@ -54,9 +55,23 @@ class Responder : public Device<std::uint8_t> {
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
   /// How many bytes follow this request, which is another encoder's.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
-  enum class Answer : std::uint8_t { sent, none, for_others };
+  enum class Answer : std::uint8_t {
+    sent,
+    none,
+    for_others,
+    refused,  // when the line is silent: see `refuse`
+  };
   /// A whole request. Its reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
+  enum class Flaw : std::uint8_t {
+    damaged,    // a character
+    unknown,    // no request begins so
+    cut_short,  // by silence
+  };
+  /// Whether what is no request is refused. What is not is as if it had not come.
+  virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
+  /// The line is silent after something that is refused: the reply to it.
+  virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
   /// Power has come, and the start-up is over, at the time at which it was.
   virtual void started(Time) {}
   virtual void stopped(Time) {}
@@ -64,12 +79,17 @@ class Responder : public Device<std::uint8_t> {
  private:
   enum class Power : std::uint8_t { off, starting, on };
   void hear(std::uint8_t byte, Time at);
+  void broken_off(const Event<std::uint8_t>& event);
+  void forget();
+  void answer(Time from);
 
   DeviceTimes times_;
   Power power_ = Power::off;
   Time ready_at_{};
   ByteBuffer<32> request_;
   std::size_t skipping_ = 0;  // characters of another encoder's reply
+  bool refusing_ = false;     // what was heard is answered when the line is silent
+  Time heard_at_{};
   ByteBuffer<64> reply_;
   Time reply_at_{};
   bool reply_pending_ = false;
