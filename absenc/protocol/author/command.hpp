@@ -46,9 +46,9 @@ constexpr void put_values(FieldSink& sink, const Format& format, const What&... 
 /// What a unit hands out: the conversation, and the words for people that firmware does not link. What the document
 /// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something and the
 /// procedure has not said what to do. `noise_advice`, where a line that is never silent means something. What a
-/// procedure that is broken off leaves: `put_left(sink, format, found)`. Of what only the conversation knows
-/// `put(sink, conversation)` and `explain(conversation)`; where words must be put together, `tell(sentence, format,
-/// engine)` of the exchange that went wrong.
+/// procedure that is broken off leaves: `put_left(sink, format, found)`, and `left(found)` in words. Of what only the
+/// conversation knows `put(sink, conversation)` and `explain(conversation)`; where words must be put together,
+/// `tell(sentence, format, engine)` of the exchange that went wrong.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -80,7 +80,7 @@ class Told final : public Base {
     } else {
       words_.add(explained().found);
     }
-    words_.add_part(own);
+    words_.add_part(own).add_part(left());
     return words_.view();
   }
   [[nodiscard]] std::string_view advice() const override {
@@ -106,6 +106,13 @@ class Told final : public Base {
     } else {
       return {};
     }
+  }
+
+  [[nodiscard]] std::string_view left() const {
+    if constexpr (requires { Definition::left(this->found()); }) {
+      if (this->error() != Error::none) return Definition::left(this->found());
+    }
+    return {};
   }
 
   mutable Sentence words_;
@@ -185,6 +192,16 @@ struct CommandOf {
 };
 
 namespace detail {
+// Made of the format, and of arguments, of which there are none.
+template <auto request, class Format>
+constexpr auto request_of(const Format& format) {
+  if constexpr (std::is_invocable_v<decltype(request), const Format&>) {
+    return request(format);
+  } else {
+    return request(format, Arguments{});
+  }
+}
+
 template <class Machine>
 constexpr std::size_t aligned_size = (sizeof(Machine) + alignof(std::max_align_t) - 1) / alignof(std::max_align_t) *
                                      alignof(std::max_align_t);
@@ -204,10 +221,12 @@ template <class Definition, class P, auto request, class Reader = ReadPosition<P
   using Made = Told<Definition, Reader>;
   return {.info = info,
           .request = [](const typename P::Format& format, Arguments) -> Result<typename P::Request> {
-            return request(format, {});
+            return detail::request_of<request>(format);
           },
-          .make = [](const typename P::Format& format, Arguments,
-                     std::span<std::byte> storage) { return make_host<Made>(storage, format, request(format, {})); },
+          .make =
+              [](const typename P::Format& format, Arguments, std::span<std::byte> storage) {
+                return make_host<Made>(storage, format, detail::request_of<request>(format));
+              },
           .size = sizeof(Made)};
 }
 

@@ -22,6 +22,7 @@ struct DeviceTimes {
   Time character{};    // of its line: a pause of two ends a request that is not whole
   Time answer_time{};  // from the end of a request to its reply
   Time start_time{};   // from power on to the first request that is answered
+  Time gap{};          // the pause that ends a request, where it is not two characters
   /// Full duplex with a memory for what comes while it sends: that is answered afterwards.
   bool keeps_requests = false;
 };
@@ -60,13 +61,27 @@ class Responder : public Device<std::uint8_t> {
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
   /// How many bytes follow this request, which is another encoder's.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
-  enum class Answer : std::uint8_t { sent, none, for_others };
+  enum class Answer : std::uint8_t {
+    sent,
+    none,
+    for_others,
+    refused,  // when the line is silent: see `refuse`
+  };
   /// For `respond`: this reply takes so much longer.
   void take_longer(Time time) { longer_ = time; }
   /// A whole request. Its reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
   /// A request of which a character was damaged, as far as it came before. Its host ended at `at`; the line is silent.
   virtual Answer respond_to_damaged(Bytes, Time, ByteBuffer<64>&) { return Answer::for_others; }
+  enum class Flaw : std::uint8_t {
+    damaged,    // a character
+    unknown,    // no request begins so
+    cut_short,  // by silence
+  };
+  /// Whether what is no request is refused. What is not is as if it had not come.
+  virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
+  /// The line is silent after something that is refused: the reply to it.
+  virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
   /// Power has come, and the start-up is over, at the time at which it was.
   virtual void started(Time) {}
   virtual void stopped(Time) {}
@@ -76,6 +91,8 @@ class Responder : public Device<std::uint8_t> {
   void hear(std::uint8_t byte, Time at);
   void begin_reply(Time at);
   void ended(Answer answer, Time at);
+  void damage(Time at);
+  void end_run(Time at);
   void forget();
 
   DeviceTimes times_;
@@ -85,6 +102,7 @@ class Responder : public Device<std::uint8_t> {
   bool damaged_ = false;  // a character of it: the rest is none until the line is silent
   Time heard_at_{};
   std::size_t skipping_ = 0;  // characters of another encoder's reply
+  bool refusing_ = false;     // what was heard is answered when the line is silent
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};

@@ -43,6 +43,13 @@ struct FieldsOf {
     static_cast<void>(((index += same_member<member, members>() ? 0 : 1, same_member<member, members>()) || ...));
     return infos[index];
   }
+  /// Of the field that shows this member.
+  template <auto member>
+  [[nodiscard]] constexpr const FieldInfo* of() const {
+    std::size_t index = 0;
+    static_cast<void>(((std::is_same_v<FieldOf<member>, FieldOf<members>> || (++index, false)) || ...));
+    return &infos[index];
+  }
 
   std::array<FieldInfo, sizeof...(members)> infos;
 

@@ -41,6 +41,8 @@ class HostOf : public Engine {
   [[nodiscard]] const Request& request() const { return request_; }
   /// The last good one.
   [[nodiscard]] const Reply& last() const { return last_; }
+  /// Nothing: who prints takes the conversation of the unit, which is Told (command.hpp).
+  void report(FieldSink&) const override {}
 
  protected:
   explicit HostOf(const Format& format) : Engine(P::wire(format), storage_), format_(format) {}

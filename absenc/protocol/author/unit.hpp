@@ -52,8 +52,9 @@ struct Declares {
 ///
 /// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
-/// false: no virtual encoder is made; `status`, `alarms`, `conditions`, `timing`, `covered`, `probe`, `streams`,
-/// `extra_lines` as in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they have there.
+/// false: no virtual encoder is made; `answer_to_bad(error, reply)`, of a request that is none; `status`, `alarms`,
+/// `conditions`, `timing`, `covered`, `memory`, `probe`, `streams`, `extra_lines` as in Unit; and `decode`, `delimit`,
+/// `answered` themselves, with the parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -81,9 +82,7 @@ struct UnitOf {
   }
 
   static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
-    if (asked.bytes.empty() && frame.bytes.empty()) return Error::wrong_length;
-    const Result<Request> request = asked.bytes.empty() ? Result<Request>(Definition::guess_request(f, frame.bytes))
-                                                        : P::decode_request(f, asked.bytes);
+    const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
     if (!request) return request.error();
     if (frame.bytes.empty()) {
       put_values<Definition>(sink, f, *request);
@@ -95,6 +94,18 @@ struct UnitOf {
     const Reading reading = P::reading(f, *request, *reply);
     if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
     return Error::none;
+  }
+
+  static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
+    if (asked.empty()) {
+      if (reply.empty()) return Error::wrong_length;
+      return Definition::guess_request(f, reply);
+    }
+    const Result<Request> request = P::decode_request(f, asked);
+    if constexpr (requires { Definition::answer_to_bad(request.error(), reply); }) {
+      if (!request) return Definition::answer_to_bad(request.error(), reply);
+    }
+    return request;
   }
 
   static constexpr const CommandOf<P>& find(const Command& command) { return Definition::commands[command.id]; }
@@ -233,7 +244,7 @@ struct UnitOf {
     return made;
   }();
 
-  static constexpr bool has_texts = std::is_same_v<typename decltype(Definition::vectors)::value_type, VectorText>;
+  static constexpr bool has_texts = std::is_same_v<std::remove_cvref_t<decltype(Definition::vectors[0])>, VectorText>;
   static constexpr auto vector_parts = [] {
     std::array<VectorParts, has_texts ? Definition::vectors.size() : 0> made{};
     if constexpr (has_texts) {
@@ -274,16 +285,36 @@ struct UnitOf {
     }
   }
 
-  static constexpr bool holds(const Vector& vector) {
-    Options values;
+  // Whether the text is understood. Without model: the defaults.
+  static constexpr bool resolve(std::string_view text, const Model* model, Options& values) {
     for (std::size_t i = 0; i < Definition::options.infos.size(); ++i) {
       values.values[i] = Definition::options.infos[i].default_value;
     }
-    const bool known = for_each_value(vector.options, [&](std::string_view name, std::string_view text) {
+    if (model != nullptr) {
+      for (const OptionValue& one : model->values) values.values[one.option] = one.value;
+    }
+    return for_each_value(text, [&](std::string_view name, std::string_view value) {
       const std::size_t option = Definition::options.find(name);
       return option < Definition::options.infos.size() &&
-             to_value(Definition::options.infos[option], text, values.values[option]);
+             to_value(Definition::options.infos[option], value, values.values[option]);
     });
+  }
+  static constexpr bool agrees(const Model& model, const Options& values) {
+    return std::all_of(model.values.begin(), model.values.end(),
+                       [&](const OptionValue& one) { return values.values[one.option] == one.value; });
+  }
+
+  static constexpr bool holds(const Vector& vector) {
+    Options values;
+    bool known = resolve(vector.options, nullptr, values);
+    // The first model that agrees with what is said, as resolve_options has it.
+    for (const Model& model : models) {
+      Options of_model;
+      known = known && resolve(vector.options, &model, of_model);
+      if (!agrees(model, of_model)) continue;
+      values = of_model;
+      break;
+    }
     VectorCheck check(vector.fields);
     return known && decode_vector(values, vector, check) == vector.error && check.all();
   }
@@ -317,6 +348,7 @@ struct UnitOf {
     }
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
+    if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
     if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
     if constexpr (requires { Definition::covered; }) unit.covered = Definition::covered;
