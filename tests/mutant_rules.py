@@ -38,6 +38,7 @@ ARITHMETIC = {"bit", "shift", "sign"}  # one of them in a line says what all of 
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"violate|fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
+TABLES = {"array", "to_array", "Option", "option", "Argument", "Fields"}  # texts and their numbers
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
@@ -326,7 +327,7 @@ class Finder:
             begin = source.left(index, {";"})
             declared = [source[i] for i in range(begin, index)]
             if "constexpr" in declared and ("=" in declared or source[index] == "{") and ")" not in declared:
-                return "array" not in declared and "Option" not in declared
+                return not TABLES.intersection(declared)
             if source[begin - 1] != "{":
                 return False
             index = begin - 1

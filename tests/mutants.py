@@ -15,6 +15,7 @@ import random
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -30,6 +31,7 @@ COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
 # Of what the compiler says when a vector or another thing that is checked at compile time no longer holds.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
+HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
 OUTCOMES = ("static_assert", "kit", "own", "time", "known", "new", "no C++")
 
 
@@ -126,11 +128,10 @@ class Tree:
     def build_command(self, *targets):
         return ["cmake", "--build", self.build, "-j", "1", "--target", *targets]
 
-    def compile(self, program):
+    def compile(self, target):
         """What the compiler said; None when it took it."""
-        done = subprocess.run(
-            self.build_command(program.name), env=self.environment, capture_output=True, text=True, check=False
-        )
+        command = self.build_command(target)
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
         return None if done.returncode == 0 else done.stdout + done.stderr
 
     def run(self, program, cpu_limit):
@@ -195,14 +196,18 @@ class Tree:
     def outcome(self, mutant, path, text, programs):
         """What became of it, and the program that killed it. The source stays as the mutant has it."""
         self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
+        # Vectors are checked where the unit is described: one file to compile tells most of what is wrong in a header.
+        unit = path.relative_to(ROOT).with_name("unit.cpp")
+        first = [f"CMakeFiles/absenc.dir/{unit}.o"] if (ROOT / unit).exists() else []
         for program in programs:
-            refused = self.compile(program)
-            if refused is not None:
-                return ("static_assert" if STATIC_CHECK.search(refused) else "no C++"), program.name
-            status, seconds = self.run(program, self.limits[program])
+            for target in [*first, program.name]:
+                refused = self.compile(target)
+                if refused is not None:
+                    return ("static_assert" if STATIC_CHECK.search(refused) else "no C++"), target.rpartition("/")[2]
+            first = []
+            status, _ = self.run(program, self.limits[program])
             if status != 0:
-                late = seconds >= self.limits[program]
-                return ("time" if late else "own" if program.is_own else "kit"), program.name
+                return ("time" if status in HANGS else "own" if program.is_own else "kit"), program.name
         return "survived", ""
 
 
@@ -234,7 +239,9 @@ class Campaign:
                 thread.join()
         except KeyboardInterrupt:
             self.stopping = True
-            print("interrupted")
+            print("interrupted: what is being built ends first", flush=True)
+            for thread in threads:
+                thread.join()
         if self.failure:
             raise self.failure
 
@@ -256,7 +263,7 @@ class Campaign:
         except queue.Empty:
             pass
         except (SystemExit, OSError) as failure:
-            self.failure = failure
+            self.failure = None if self.stopping else failure
             self.stopping = True
 
     def note(self, unit, mutant, path, text, result, seconds):

@@ -162,6 +162,18 @@ class Script(unittest.TestCase):
         self.assertEqual(len(set(coarse)), len(coarse))
         self.assertFalse([name for name in coarse if "_test." in name or "vectors" in name or "fields" in name])
 
+    def test_tells_failing_from_hanging(self):
+        with tempfile.TemporaryDirectory() as folder:
+            tree = mutants.Tree(Path(folder))
+            programs = tree.build / "tests"
+            programs.mkdir(parents=True)
+            for name, text in (("good", "exit 0"), ("bad", "exit 1"), ("endless", "while :; do :; done")):
+                (programs / name).write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+                (programs / name).chmod(0o755)
+            self.assertEqual(tree.run(mutants.Program("good", True), 5)[0], 0)
+            self.assertEqual(tree.run(mutants.Program("bad", True), 5)[0], 1)
+            self.assertIn(tree.run(mutants.Program("endless", True), 1)[0], mutants.HANGS)
+
     def test_survivors_have_reasons(self):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "survivors.txt"
