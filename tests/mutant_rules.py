@@ -244,7 +244,7 @@ class Finder:
 
     def _told(self, index):
         source = self.source
-        if source[index + 1] == "(" and source[index - 1] in (";", "{", "}", "return", ")"):
+        if source[index + 1] == "(" and source[index - 1] in (";", "{", "}", "return"):
             self._change("silent", index, source.partner[index + 1] + 1, "")
 
     # ---- Constants

@@ -98,6 +98,7 @@ class Rules(unittest.TestCase):
             ("silent", 'violate("too soon", at)', ""),
         ):
             self.assertIn(change, self.found)
+        self.assertEqual(sum(rule == "silent" for rule, _, _ in self.found), 1)  # more says the same as `never`
         self.assertEqual(sum(rule == "half" and "character" in before for rule, before, _ in self.found), 1)
 
     def test_steps_of_procedures(self):
