@@ -48,6 +48,16 @@ def unit_folders():
     return folders | {"host": ROOT / "absenc" / "host"}
 
 
+def generic_programs():
+    """Those that test every unit: a source of tests/ is one, or a folder in it (cmake/tests.cmake)."""
+    tests = ROOT / "tests"
+    names = []
+    for path in [*sorted(tests.glob("*_test.cpp")), *sorted(tests.glob("*/*_test.cpp"))]:
+        if "INSTANTIATE_TEST_SUITE_P" in path.read_text(encoding="utf-8"):
+            names.append(path.stem if path.parent == tests else f"{path.parent.name}_test")
+    return list(dict.fromkeys(names))
+
+
 def id_of(path):
     """What the ids of the mutants of a source begin with."""
     below = path.relative_to(ROOT / "absenc")
@@ -176,9 +186,7 @@ class Tree:
 
     def programs(self, unit, folders):
         """Those that may kill a unit's mutants, the fastest first. All of them pass without a mutant."""
-        tests = ROOT / "tests"
-        kit = [p.stem for p in sorted(tests.glob("*_test.cpp")) if "INSTANTIATE_TEST_SUITE_P" in p.read_text("utf-8")]
-        kit = [Program(name, False) for name in kit]
+        kit = [Program(name, False) for name in generic_programs()]
         owners = list(folders) if unit == "author" else [unit]
         seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]
         own = [f"{owner}_test" for owner in owners if any(folders[owner].rglob("*_test.cpp"))]
@@ -191,7 +199,7 @@ class Tree:
             if status != 0:
                 raise SystemExit(f"mutants: without any mutant {program.name} fails with {program.tests}")
             self.limits[program] = int(5 * seconds) + 5
-        return programs
+        return sorted(programs, key=lambda program: (program.is_own, self.limits[program]))
 
     def outcome(self, mutant, path, text, programs):
         """What became of it, and the program that killed it. The source stays as the mutant has it."""
