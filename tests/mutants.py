@@ -261,6 +261,8 @@ class Campaign:
                 unit, mutants = self.work.get_nowait()
                 if unit not in programs:
                     programs[unit] = tree.programs(unit, self.folders)
+                    names = ", ".join(program.name for program in programs[unit])
+                    print(f"{unit}, which passes without a mutant: {names}", flush=True)
                 for mutant, path, text in mutants:
                     began = time.monotonic()
                     result = tree.outcome(mutant, path, text, programs[unit])
@@ -353,6 +355,7 @@ def main():
     for unit, mutants in chosen.items():
         campaign.add(unit, mutants)
     jobs = max(1, min(arguments.jobs, campaign.work.qsize()))
+    print(f"{sum(map(len, chosen.values()))} mutants; building in build/mutants, at first for minutes", flush=True)
     campaign.run([Tree(ROOT / "build" / "mutants" / str(number)) for number in range(jobs)])
     print_table(campaign.counts)
     for name in campaign.revived:
