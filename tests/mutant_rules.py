@@ -7,7 +7,8 @@ spaces, a template's bracket does not). By the name that they have in a mutant's
   never        a check does not refuse: its condition is false, or one of those joined by || is left out
   silent       a broken timing rule is not told, where more than that depends on its condition
   skip         a step of a procedure whose answer nobody looks at is left out
-  half, twice  a time
+  half, twice  a time in a header, where those of the document stand
+  zero, ten    a time in a source, which its author chose: nothing, and ten times as much
 
 and the fine ones:
 
@@ -33,7 +34,7 @@ from cpp_source import CLOSING, OPENING, Source
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
 # What no operand of && or || reaches across.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
-COARSE = {"never", "silent", "skip", "half", "twice"}
+COARSE = {"never", "silent", "skip", "half", "twice", "zero", "ten"}
 ARITHMETIC = {"bit", "shift", "sign"}  # one of them in a line says what all of them would
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"violate|fail|failed|refuse\w*|reject\w*|settle\w*")
@@ -282,18 +283,21 @@ class Finder:
                         self.left_alone[k] = True
 
     def _times(self, first, last):
-        before = self.source.span(first, last)
-        self._change("half", first, last, f"Time({before}) / 2")
-        self._change("twice", first, last, f"Time({before}) * 2")
+        before = f"Time({self.source.span(first, last)})"
+        if self.file.endswith(".hpp"):
+            changes = {"half": f"{before} / 2", "twice": f"{before} * 2"}
+        else:
+            changes = {"zero": "Time{}", "ten": f"{before} * 10"}
+        is_operand = last == first + 1 and self.source[first - 1] != "="
+        for rule, after in changes.items():
+            self._change(rule, first, last, f"({after})" if is_operand else after)
 
     def _number(self, index):
         source = self.source
         number = source[index]
         if DURATION.fullmatch(number):
             if number[0] != "0":
-                before = f"Time({number})"
-                self._change("half", index, index + 1, f"({before} / 2)")
-                self._change("twice", index, index + 1, f"({before} * 2)")
+                self._times(index, index + 1)
             return
         value = value_of(number)
         if value is None:

@@ -9,6 +9,7 @@ reason.
 """
 
 import argparse
+import fcntl
 import os
 import queue
 import random
@@ -101,9 +102,16 @@ class Tree:
         self.source = folder / "source"
         self.build = folder / "tree"
         self.limits = {}
+        self.lock = None
         self.environment = {**os.environ, "CCACHE_BASEDIR": str(folder), "GTEST_FAIL_FAST": "1", "GTEST_BRIEF": "1"}
 
     def prepare(self):
+        self.source.mkdir(parents=True, exist_ok=True)
+        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")  # until this process ends
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SystemExit(f"mutants: somebody else works in {self.source.parent}") from None
         wanted = set()
         for name in COPIED:
             for path in sorted((ROOT / name).rglob("*")) if (ROOT / name).is_dir() else [ROOT / name]:

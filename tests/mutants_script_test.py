@@ -50,11 +50,11 @@ Procedure zero(Line& line) {
 """
 
 
-def changes(text):
+def changes(text, file="toy.hpp"):
     """(rule, before, after) of each mutant; white space made single."""
     return [
         (found.rule, " ".join(found.before.split()), " ".join(found.after.split()))
-        for found in mutant_rules.find("toy.cpp", text)
+        for found in mutant_rules.find(file, text)
     ]
 
 
@@ -98,6 +98,8 @@ class Rules(unittest.TestCase):
             ("silent", 'violate("too soon", at)', ""),
         ):
             self.assertIn(change, self.found)
+        chosen = changes("constexpr Time pause = 40us;", "toy.cpp")
+        self.assertEqual(chosen, [("zero", "40us", "Time{}"), ("ten", "40us", "Time(40us) * 10")])
         self.assertEqual(sum(rule == "silent" for rule, _, _ in self.found), 1)  # more says the same as `never`
         self.assertEqual(sum(rule == "half" and "character" in before for rule, before, _ in self.found), 1)
 
@@ -113,7 +115,7 @@ class Rules(unittest.TestCase):
 
     def test_leaves_alone(self):
         lines = TOY.splitlines()
-        broken = {lines[found.line - 1] for found in mutant_rules.find("toy.cpp", TOY)}
+        broken = {lines[found.line - 1] for found in mutant_rules.find("toy.hpp", TOY)}
         for begin in ("//", "#define", "static_assert", "    return fail"):
             self.assertFalse([line for line in broken if line.startswith(begin)], begin)
         # Neither the header of a loop nor templates' brackets nor raw strings.
@@ -121,7 +123,7 @@ class Rules(unittest.TestCase):
         self.assertEqual(changes('void f() { g(h<pair<int, 4>>(1), R"(a && b < 2ms)", "1s", \'&\'); }'), [])
 
     def test_only_the_place_changes(self):
-        for found in mutant_rules.find("toy.cpp", TOY):
+        for found in mutant_rules.find("toy.hpp", TOY):
             broken = found.applied_to(TOY)
             self.assertNotEqual(broken, TOY)
             self.assertEqual(TOY[found.start : found.end], found.before)
@@ -132,7 +134,7 @@ class Rules(unittest.TestCase):
 class Ids(unittest.TestCase):
     @staticmethod
     def ids(text):
-        return [found.id for found in mutant_rules.find("toy.cpp", text)]
+        return [found.id for found in mutant_rules.find("toy.hpp", text)]
 
     def test_are_unique(self):
         twice = TOY + TOY
@@ -185,10 +187,10 @@ class Script(unittest.TestCase):
                 mutants.read_survivors(path)
 
     def test_shows_the_lines_before_and_after(self):
-        path = mutants.ROOT / "absenc" / "toy.cpp"
-        found = next(one for one in mutant_rules.find("toy.cpp", TOY) if one.rule == "half")
+        path = mutants.ROOT / "absenc" / "toy.hpp"
+        found = next(one for one in mutant_rules.find("toy.hpp", TOY) if one.rule == "half")
         lines = ["  - constexpr Time pause = 40us;", "  + constexpr Time pause = Time(40us) / 2;"]
-        self.assertEqual(mutants.shown(found, path, TOY).splitlines(), [f"absenc/toy.cpp:3  {found.id}", *lines])
+        self.assertEqual(mutants.shown(found, path, TOY).splitlines(), [f"absenc/toy.hpp:3  {found.id}", *lines])
 
 
 if __name__ == "__main__":
