@@ -15,7 +15,8 @@ and the fine ones:
   drop         one term of a condition is left out; `&&` for `||` is no rule: whatever notices these notices that
   edge         `<` for `<=`, `>=` for `>` in a condition, and the other way round
   true, false  what a predicate of one comparison returns
-  number       a constant, or a length that a function returns: one more, or its lowest bit the other way
+  number       a constant, or a length that a function returns: one more, from 256 on twice as much; written in
+               hexadecimal digits, its lowest bit the other way
   bit          a mask without its lowest bit
   shift        one bit further
   sign         + 1 for - 1, and the other way round
@@ -316,8 +317,9 @@ class Finder:
 
     @staticmethod
     def _other(number, value):
-        is_pattern = number[1:2] in ("x", "X", "b", "B") and value > 0
-        return f"({number} ^ {value & -value})" if is_pattern else f"({number} + 1)"
+        if number[1:2] in ("x", "X", "b", "B") and value > 0:
+            return f"({number} ^ {value & -value})"
+        return f"({number} + 1)" if value < 256 else f"({number} * 2)"
 
     def _is_constant(self, index):
         """The value of an enumerator, or anywhere in that of a constant: the polynomial of a CRC, for example."""

@@ -110,6 +110,7 @@ class Rules(unittest.TestCase):
         for change in (("number", "8", "(8 + 1)"), ("number", "3", "(3 + 1)"), ("bit", "0x0F", "(0x0F ^ 1)")):
             self.assertIn(change, self.found)
         self.assertEqual(changes("constexpr std::uint8_t bit = 0x60;"), [("number", "0x60", "(0x60 ^ 32)")])
+        self.assertEqual(changes("constexpr int speed = 6'000;"), [("number", "6'000", "(6'000 * 2)")])
         self.assertEqual(changes("void f() { g(a << 8 * i, n - 1); }"), [("shift", "8", "9")])
         self.assertEqual(changes("void f() { g(n - 1); }"), [("sign", "-", "+")])
 
