@@ -14,7 +14,6 @@ import os
 import queue
 import random
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -154,20 +153,14 @@ class Tree:
 
     def run(self, program, cpu_limit):
         """Its exit status and the seconds that it computed; the limit does not count what others compute meanwhile."""
-
-        def limit():
-            resource.setrlimit(resource.RLIMIT_CPU, (cpu_limit, cpu_limit + 1))
-            resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
+        limits = ["prlimit", f"--cpu={cpu_limit}:{cpu_limit + 1}", f"--as={4 << 30}", "--core=0"]
         environment = {**self.environment, "GTEST_FILTER": program.tests}
         running = subprocess.Popen(
-            [self.build / "tests" / program.name],
+            [*limits, self.build / "tests" / program.name],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            preexec_fn=limit,
         )
         too_long = threading.Timer(10 * cpu_limit, running.kill)  # it waits for what never comes
         too_long.start()
