@@ -40,7 +40,7 @@ ARITHMETIC = {"bit", "shift", "sign"}  # one of them in a line says what all of 
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"violate|fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
-TABLES = {"array", "to_array", "Option", "option", "Argument", "Fields"}  # texts and their numbers
+TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}  # texts and their numbers
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
