@@ -89,9 +89,10 @@ constexpr Error take_frame(const Source& source, BitView samples, ReplyType& rep
 
 template <class Source>
 constexpr auto decode_by(const Source& source, BitView samples) {
-  ReplyWith<typename Source::Word> reply;
-  const Error error = take_frame(source, samples, reply);
-  return error == Error::none ? Result(reply) : error;
+  Result result = ReplyWith<typename Source::Word>{};
+  const Error error = take_frame(source, samples, *result);
+  if (error != Error::none) result = error;
+  return result;
 }
 
 }  // namespace detail
