@@ -78,13 +78,13 @@ TEST_F(SpiEncoder, Biss) {
 }
 
 TEST_F(SpiEncoder, Encolink) {
-  const encolink::Format format{.resolution = 20, .multiturn_bits = 16};
+  const encolink::Format format{.resolution = 20, .multiturn_bits = 16, .wire = encolink::Wire::spi};
   const auto read = [&](encolink::VirtualEncoder& encoder, const SpiChoice& choice) {
     FakeSpi controller;
     encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);
     controller.connect(LinkKind::exchange, encolink::spi_settings, encoder);
     SpiPort port(FakeSpi::path, LinkKind::exchange, encolink::spi_settings, choice, controller);
-    encolink::ReadPosition conversation(format, encolink::Wire::spi);
+    encolink::ReadPosition conversation(format);
     EXPECT_TRUE(run(conversation, port));
     if (conversation.error() == Error::none) {
       EXPECT_EQ(conversation.reading()->singleturn, encoder.measure({}).singleturn);
@@ -93,30 +93,32 @@ TEST_F(SpiEncoder, Encolink) {
     return conversation.error();
   };
   shaft.state.position = 0x7'95C6'1234;
-  encolink::VirtualEncoder good(format, encolink::Wire::spi, shaft);
+  encolink::VirtualEncoder good(format, shaft);
   EXPECT_EQ(read(good, {4'000'000, {}}), Error::none);
   EXPECT_EQ(good.violation_count(), 0u) << good.violations()[0].rule;
   for (const std::uint8_t mode : {std::uint8_t{0}, std::uint8_t{2}, std::uint8_t{3}}) {
-    encolink::VirtualEncoder shifted(format, encolink::Wire::spi, shaft);
+    encolink::VirtualEncoder shifted(format, shaft);
     EXPECT_EQ(read(shifted, {{}, mode}), Error::bad_checksum) << int{mode};
   }
   // The time between chip select and clock does not make it slower.
-  encolink::VirtualEncoder hurried(format, encolink::Wire::spi, shaft);
+  encolink::VirtualEncoder hurried(format, shaft);
   EXPECT_EQ(read(hurried, {4'100'000, {}}), Error::none);
   ASSERT_GT(hurried.violation_count(), 0u);
   EXPECT_EQ(hurried.violations()[0].rule, "clock faster than 4 MHz");
 }
 
 TEST_F(SpiEncoder, EncolinkNoticesAClockTooSoonAfterChipSelect) {
+  encolink::Format format = encolink::virtual_format;
+  format.wire = encolink::Wire::spi;
   for (const Time lead : {Time{}, Time{4000}, Time{5000}}) {
-    encolink::VirtualEncoder encoder({}, encolink::Wire::spi, shaft);
+    encolink::VirtualEncoder encoder(format, shaft);
     encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);
     LineSettings settings = encolink::spi_settings;
     settings.select_lead = lead;
     FakeSpi controller;
     controller.connect(LinkKind::exchange, settings, encoder);
     SpiPort port(FakeSpi::path, LinkKind::exchange, settings, {}, controller);
-    encolink::ReadPosition conversation(encolink::virtual_format, encolink::Wire::spi);
+    encolink::ReadPosition conversation(format);
     ASSERT_TRUE(run(conversation, port));
     if (lead == encolink::spi_lead) {
       EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;

@@ -14,89 +14,58 @@ constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8
 
 }  // namespace
 
-VirtualEncoder::VirtualEncoder(const Format& format, Wire wire, const Shaft& shaft, const Build& build)
-    : format_(format), wire_(wire), shaft_(&shaft), build_(build) {
+// It answers while it starts: with zeros.
+VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
+    : Responder({.character = uart_settings.character(), .answer_time = answer_time}), format_(format), shaft_(&shaft) {
   if (format_.resolution == 0) format_.resolution = virtual_format.resolution;
   if (format_.multiturn_bits < 0) format_.multiturn_bits = virtual_format.multiturn_bits;
+  for (std::size_t i = 0; i < conditions.size(); ++i) conditions_[i] = conditions[i].normal;
 }
 
 // ---- The line
 
 ByteStep VirtualEncoder::next(Time now) {
-  ByteStep step{.at = never};
+  const bool streams = format_.stream_rate > 0 && format_.wire == Wire::uart;
   update(now);
-  if (build_.stream_rate > 0 && power_ != Power::off && !transmitting_ && wire_ == Wire::uart) {
+  if (streams && is_on(now) && !is_transmitting()) {
     if (now < next_frame_) return {.at = next_frame_};
-    make_frame(now);
-    frame_at_ = std::max(now, next_frame_);
-    next_frame_ = frame_at_ + Time(1'000'000'000 / build_.stream_rate);
+    const Time at = std::max(now, next_frame_);
+    transmit(make_frame(now), at);
+    next_frame_ = at + Time(1'000'000'000 / format_.stream_rate);
   }
-  if (frame_pending_) {
-    frame_pending_ = false;
-    step.kind = ByteStep::Kind::transfer;
-    step.out = frame_;
-    step.at = frame_at_;
-    return step;
-  }
-  if (!request_.empty()) step.gap = request_gap;
-  step.expect = request_bytes - request_.size();
-  return step;
+  return Responder::next(now);
 }
 
 void VirtualEncoder::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::received:
-      if (wire_ == Wire::uart) {
-        for (const std::uint8_t byte : event.items) byte_received(byte, event.at);
-      } else if (power_ != Power::off && event.items.size() >= request_bytes) {
-        handle(event.items[0], event.items[1], event.at);
-      }
-      break;
-    case ByteEvent::Kind::selected:
-      selected(event.at);
-      break;
-    case ByteEvent::Kind::sent:
-      transmitting_ = false;
-      if (wire_ == Wire::spi) stopped_clocking(event);
-      break;
-    case ByteEvent::Kind::silence:
-    case ByteEvent::Kind::line_error:
-      request_.clear();
-      break;
-    default:
-      break;
-  }
-}
-
-void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
-  update(at);
-  if (power_ == Power::off || build_.stream_rate > 0) return;
-  if (transmitting_) {
-    if (interruption_.begins_request(request_bytes, at, uart_settings.character()))
-      violate("request before the reply was complete", at);
+  update(event.at);
+  const bool received = event.kind == ByteEvent::Kind::received;
+  if (format_.wire == Wire::uart) {
+    if (!received || format_.stream_rate == 0) Responder::feed(event);
     return;
   }
-  request_.push_back(byte);
-  if (request_.size() < request_bytes) return;
-  const std::uint8_t config = request_[0];
-  const std::uint8_t ra = request_[1];
-  request_.clear();
-  make_frame(at);
+  if (event.kind == ByteEvent::Kind::selected) selected(event.at);
+  if (received && is_on(event.at) && event.items.size() >= request_bytes) handle(event.items, event.at);
+  if (event.kind != ByteEvent::Kind::sent) return;
+  Responder::feed(event);
+  stopped_clocking(event);
+}
+
+VirtualEncoder::Answer VirtualEncoder::respond(Bytes request, Time at, ByteBuffer<64>& reply) {
+  const ReplyBytes frame = make_frame(at);
+  reply.append(frame);
   // Whoever asks with the vendor's library reads as many bytes as the identity may have, twice.
-  const bool identifies = frame_.size() == identity_bytes || config == static_cast<std::uint8_t>(Config::identify);
-  while (identifies && frame_.size() < build_.identity_size && build_.identity_size > identity_bytes)
-    frame_.push_back(0);
-  frame_at_ = at + answer_time;
-  handle(config, ra, at);
+  const bool identifies = frame.size() == identity_bytes || request[0] == static_cast<std::uint8_t>(Config::identify);
+  while (identifies && reply.size() < format_.identity_size && format_.identity_size > identity_bytes) {
+    reply.push_back(0);
+  }
+  handle(request, at);
+  return Answer::sent;
 }
 
 void VirtualEncoder::selected(Time at) {
-  update(at);
   if (was_selected_ && at - pause_since_ < spi_pause) violate("NCS high for less than 5 us", at);
   was_selected_ = true;
-  if (power_ == Power::off) return;
-  make_frame(at);
-  frame_at_ = at;
+  if (is_on(at)) transmit(make_frame(at), at);
 }
 
 void VirtualEncoder::stopped_clocking(const ByteEvent& event) {
@@ -105,24 +74,19 @@ void VirtualEncoder::stopped_clocking(const ByteEvent& event) {
   if (event.width > Time{} && event.width < shortest_clock) violate("clock faster than 4 MHz", event.at);
 }
 
-void VirtualEncoder::make_frame(Time now) {
-  frame_pending_ = transmitting_ = true;
-  interruption_.begin();
-  ++answered_;
-  if (power_ == Power::starting) {
-    frame_ = encode_position(format_, {});
-  } else if (identity_next_) {
-    frame_ = encode_identity(identity());
+ReplyBytes VirtualEncoder::make_frame(Time now) {
+  if (now < zeros_until_) return encode_position(format_, {});
+  if (identity_next_) {
     identity_next_ = false;
-  } else {
-    Position position = measure(now);
-    position.channel2 = next_channel2(position, now);
-    frame_ = encode_position(format_, position);
+    return encode_identity(identity());
   }
+  Position position = measure(now);
+  position.channel2 = next_channel2(position, now);
+  return encode_position(format_, position);
 }
 
 Identity VirtualEncoder::identity() const {
-  Identity identity{.protocol_version = build_.protocol_version,
+  Identity identity{.protocol_version = format_.generation == Generation::aksim4 ? version::aksim4 : version::aksim2,
                     .frame_bytes = static_cast<std::uint8_t>(format_.turns_bytes() != 0 ? 7 : 5),
                     .resolution = format_.resolution};
   std::copy(part_text.begin(), part_text.end(), identity.text.begin() + 2);
@@ -130,22 +94,12 @@ Identity VirtualEncoder::identity() const {
 }
 
 // The frame that goes out with this request was made before: what it asks for shows in the next one.
-void VirtualEncoder::handle(std::uint8_t config, std::uint8_t ra, Time at) {
-  if (power_ != Power::on) return;
-  switch (static_cast<Config>(config)) {
-    case Config::reset_channels:
-      return reset_channels();
-    case Config::identify:
-      identity_next_ = true;
-      return reset_channels();
-    default:
-      return ra_received(ra, at);
-  }
-}
-
-void VirtualEncoder::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
+void VirtualEncoder::handle(Bytes request, Time at) {
+  if (at < zeros_until_) return;
+  const auto config = static_cast<Config>(request[0]);
+  if (config != Config::reset_channels && config != Config::identify) return ra_received(request[1], at);
+  identity_next_ = identity_next_ || config == Config::identify;
+  reset_channels();
 }
 
 // ---- Channels 2 and 3
@@ -160,8 +114,8 @@ void VirtualEncoder::reset_channels() {
 std::uint8_t VirtualEncoder::next_channel2(const Position& position, Time now) {
   const std::size_t size = format_.cycle_bytes();
   if (cycle_index_ == 0) {
-    cycle_content_ = {position, alarms_, 0};
-    if (build_.channel2_disagrees) cycle_content_.position.singleturn ^= 1;
+    cycle_content_ = {position, alarms(), 0};
+    if (conditions_[condition_channels_disagree] != 0) cycle_content_.position.singleturn ^= 1;
   }
   if (cycle_index_ == size - 2) cycle_content_.channel3 = next_channel3(now);
   if (cycle_index_ == 0 || cycle_index_ == size - 2) cycle_ = encode_cycle(format_, cycle_content_);
@@ -172,7 +126,7 @@ std::uint8_t VirtualEncoder::next_channel2(const Position& position, Time now) {
 
 std::uint8_t VirtualEncoder::next_channel3(Time now) {
   if (answered_bytes_ == answer_.size()) return channel3::idle;
-  if (now < busy_until_ || build_.busy_for_ever) return channel3::busy;
+  if (now < busy_until_ || conditions_[condition_busy] != 0) return channel3::busy;
   return answer_[answered_bytes_++];
 }
 
@@ -194,30 +148,25 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
 
 // Of the shaft with the offset, as if the turn counter had no end: 2^-32 revolution.
 std::int64_t VirtualEncoder::place(Time now) const {
-  const auto offset = static_cast<std::int32_t>(build_.offset.fraction(format_.resolution, settings_.offset));
+  const auto fraction = static_cast<std::int32_t>(format_.offset_fraction(offset()));
   const std::int64_t position = shaft_->at(now).position;
-  return build_.offset.sign == OffsetSign::add ? position + offset : position - offset;
+  return format_.offset_sign == OffsetSign::add ? position + fraction : position - fraction;
 }
 
 Position VirtualEncoder::measure(Time now) const {
   const std::int64_t here = place(now);
-  const auto turns = static_cast<std::uint32_t>(here >> 32) - settings_.turns;
+  const auto turns = static_cast<std::uint32_t>(here >> 32) - values_[turns_taken];
   Position position;
   position.singleturn = static_cast<std::uint32_t>(here) >> (32 - format_.resolution);
   position.multiturn = static_cast<std::uint16_t>(turns & low_mask(static_cast<unsigned>(format_.multiturn_bits)));
-  position.error = (alarms_ & status::errors) != 0;
-  position.warning = (alarms_ & status::warnings) != 0;
+  position.error = (alarms() & status::errors) != 0;
+  position.warning = (alarms() & status::warnings) != 0;
   return position;
 }
 
 // Brings everything that changes with time up to now.
 void VirtualEncoder::update(Time now) {
-  if (power_ == Power::starting && now >= ready_at_) power_ = Power::on;
-  if (power_ != Power::on) return;
-  if (save_pending_ && now >= busy_until_) {
-    save_pending_ = false;
-    store();
-  }
+  if (save_pending_ && now >= busy_until_) save();
   if (calibrating_ && now >= calibrated_at_) end_calibration(now);
 }
 
@@ -235,24 +184,18 @@ void VirtualEncoder::end_calibration(Time now) {
 // ---- Power
 
 void VirtualEncoder::power_on(Time now, PowerOn kind) {
-  if (power_ != Power::off) return;
   load();
-  power_ = Power::starting;
-  ready_at_ = kind == PowerOn::real ? now + start_up : now;
-  next_frame_ = now;
+  zeros_until_ = next_frame_ = now;
+  if (kind == PowerOn::real) zeros_until_ += start_up;
   busy_until_ = Time{};
   calibration_status_ = 0;
   reset_channels();
-  update(now);
+  Responder::power_on(now, kind);
 }
 
-void VirtualEncoder::power_off(Time now) {
-  if (power_ == Power::off) return;
+void VirtualEncoder::stopped(Time now) {
   update(now);
-  power_ = Power::off;
   save_pending_ = calibrating_ = identity_next_ = false;
-  request_.clear();
-  frame_pending_ = transmitting_ = false;
 }
 
 }  // namespace absenc::encolink

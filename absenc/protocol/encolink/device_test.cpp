@@ -55,7 +55,7 @@ class RawHost final : public Machine<std::uint8_t> {
 
 std::vector<RawBytes> ask(Bench& bench, std::vector<RawBytes> requests, std::size_t expect = 0, Time pause = 5us) {
   RawHost host(std::move(requests), expect, pause);
-  bench.run(host);
+  bench.drive(host);
   return host.replies;
 }
 
@@ -65,7 +65,7 @@ const RawBytes position_request{0x00, 0x00};
 TEST(EncolinkDevice, AnswersFiveMicrosecondsAfterTheRequest) {
   Bench bench(testing::single);
   RawHost host({position_request}, 0, 0us);
-  bench.run(host);
+  bench.drive(host);
   EXPECT_EQ(host.sent_at, 20us);
   EXPECT_EQ(host.first_byte_at, 20us + answer_time + 10us);
   EXPECT_EQ(RawBytes(host.replies[0].begin(), host.replies[0].begin() + 4),
@@ -115,7 +115,7 @@ TEST(EncolinkDevice, ARequestDuringTheReplyIsAViolation) {
   Bench bench(testing::single);
   ask(bench, {{0x00, 0x00, 0x00, 0x00, 0x00, 0x00}});
   ASSERT_EQ(bench.encoder.violation_count(), 2u);  // requests, not bytes
-  EXPECT_EQ(bench.encoder.violations()[0].rule, "request before the reply was complete");
+  EXPECT_EQ(bench.encoder.violations()[0].rule, "request during the encoder's transmission");
 }
 
 TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
@@ -142,7 +142,7 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
   };
   Bench hasty(testing::single, Wire::spi);
   Hasty host;
-  hasty.run(host);
+  hasty.drive(host);
   ASSERT_EQ(hasty.encoder.violation_count(), 1u);
   EXPECT_EQ(hasty.encoder.violations()[0].rule, "NCS high for less than 5 us");
 
@@ -150,7 +150,7 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
   Hasty too_fast;
   too_fast.left = 1;
   too_fast.settings.rate = 8'000'000;
-  fast.run(too_fast);
+  fast.drive(too_fast);
   ASSERT_EQ(fast.encoder.violation_count(), 1u);
   EXPECT_EQ(fast.encoder.violations()[0].rule, "clock faster than 4 MHz");
 
@@ -212,7 +212,9 @@ TEST(EncolinkDevice, AlarmsSetTheTwoBitsOfEveryFrame) {
 }
 
 TEST(EncolinkDevice, TransmitsByItselfAtItsRate) {
-  Bench bench(testing::single, Wire::uart, {.stream_rate = 2000});
+  Format format = testing::single;
+  format.stream_rate = 2000;
+  Bench bench(format);
   std::vector<Time> ends;
   bench.line.observe([&ends](auto, Time, Time end, std::uint8_t) { ends.push_back(end); });
   bench.pass(10ms);

@@ -9,7 +9,7 @@
 #include "absenc/protocol/encolink/fields.hpp"
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
-#include "absenc/protocol/encolink/procedures.hpp"
+#include "absenc/protocol/encolink/unit.hpp"
 #include "tests/fuzz_toys.hpp"
 
 namespace {
@@ -44,8 +44,7 @@ void decode_all(const Format& format, Bytes input) {
 }
 
 // Whatever comes back, a conversation ends or goes on asking, and has a position only after a good frame.
-template <class Conversation>
-void converse(Conversation& conversation, const Format& format, Bytes input) {
+void converse(Conversation<std::uint8_t>& conversation, const Format& format, Bytes input) {
   Time now{};
   std::size_t at = 0;
   for (unsigned steps = 0; steps < 400; ++steps) {
@@ -81,7 +80,7 @@ void listen(const Format& format, Bytes input) {
 // Pairs of bytes as requests: the device answers each with a sealed frame.
 void ask_device(const Format& format, Bytes input) {
   const Still still;
-  VirtualEncoder encoder(format, Wire::uart, still);
+  VirtualEncoder encoder(format, still);
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
   const std::size_t sealed = encoder.format().position_bytes() + 1;
   Time now{};
@@ -107,13 +106,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   ask_device(format_of(data[0]), input.subspan(1));
   const Format format{.resolution = 20, .multiturn_bits = 0};
   listen(format, input);
-  ReadPosition position(format);
-  converse(position, format, input);
-  ReadDetailedStatus status(format, Wire::spi);
-  converse(status, format, input);
-  ReadRegister reader(format, Wire::uart, 0x4C);
-  converse(reader, format, input);
-  WriteRegister writer(format, Wire::spi, 0, 0, 1);
-  converse(writer, format, input);
+  alignas(std::max_align_t) static std::array<std::byte, 16384> storage;
+  for (const Unit* one : {&unit, &spi_unit}) {
+    for (const std::string_view name : {"position", "alarms", "memory-read", "memory-write"}) {
+      Options options;
+      options.values[0] = format.resolution;
+      options.values[2] = 1;
+      constexpr std::array<std::int64_t, 3> arguments{0, 1, 2};
+      const auto& command = *find_command(*one, name);
+      converse(*one->host(options, command, std::span(arguments).first(command.arguments.size()), storage).bytes,
+               format, input);
+    }
+  }
   return 0;
 }

@@ -65,21 +65,22 @@ RC_GTEST_PROP(EncolinkProperty, APositionIsReadAsTheShaftStands, (std::int32_t t
   const Wire wire = *rc::gen::element(Wire::uart, Wire::spi);
   testing::Bench bench(format, wire);
   bench.shaft.start.position = (std::int64_t{turns} << 32) + fraction;
-  const ReadPosition read = bench.conversed<ReadPosition>();
-  RC_ASSERT(read.error() == Error::none);
-  RC_ASSERT(read.reading()->singleturn == fraction >> (32 - format.resolution));
-  RC_ASSERT(read.reading()->multiturn ==
+  const testing::Told read = bench.run("position");
+  RC_ASSERT(read.error == Error::none);
+  RC_ASSERT(read.reading->singleturn == fraction >> (32 - format.resolution));
+  RC_ASSERT(read.reading->multiturn ==
             (static_cast<std::uint32_t>(turns) & low_mask(static_cast<unsigned>(format.multiturn_bits))));
 }
 
 RC_GTEST_PROP(EncolinkProperty, ZeroIsHereWhereverTheShaftStands,
               (std::int32_t turns, std::uint32_t fraction, std::uint32_t offset)) {
-  const auto sign = *rc::gen::element(OffsetSign::add, OffsetSign::subtract);
-  testing::Bench bench(testing::multi, Wire::uart, {.offset = {.sign = sign}});
+  Format format = testing::multi;
+  format.offset_sign = *rc::gen::element(OffsetSign::add, OffsetSign::subtract);
+  testing::Bench bench(format);
   bench.shaft.start.position = (std::int64_t{turns} << 32) + fraction;
-  RC_ASSERT(bench.conversed<WriteRegister>(0u, std::uint16_t{0}, std::uint64_t{offset & 0xFFFFF}).error() == Error::none);
-  RC_ASSERT(bench.conversed<Zero>(Offset{.sign = sign}).error() == Error::none);
-  RC_ASSERT(bench.conversed<ReadPosition>().reading()->singleturn == 0u);
+  RC_ASSERT(bench.run("memory-write", {0, offset & 0xFFFFF}).error == Error::none);
+  RC_ASSERT(bench.run("zero").error == Error::none);
+  RC_ASSERT(bench.run("position").reading->singleturn == 0u);
 }
 
 }  // namespace

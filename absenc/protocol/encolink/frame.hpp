@@ -40,11 +40,25 @@ inline constexpr unsigned maximum_resolution = 22;
 inline constexpr unsigned maximum_multiturn_bits = 16;
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
+/// A transfer on SPI brings the frame of the moment at which it begins; a UART answers afterwards.
+enum class Wire : std::uint8_t { uart, spi };
+/// Whether the position offset is added to what the sensor measures or taken off. The register map does not say.
+enum class OffsetSign : std::uint8_t { add, subtract };
+/// What the position offset counts. The map does not say it either; the vendor's example shows FFFFFFFF refused.
+enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
+enum class Generation : std::uint8_t { aksim2, aksim4 };
+
 /// What an encoder's frames carry. What is unknown is asked: the identity tells it.
 struct Format {
   unsigned resolution = 0;  // bits of the turn, 1 to 22; 0: unknown
   int multiturn_bits = -1;  // 0 to 16; -1: unknown
   bool has_ch2 = true;      // false: frames as those of an AksIM-1, without the last byte
+  Wire wire = Wire::uart;
+  OffsetSign offset_sign = OffsetSign::add;
+  OffsetUnit offset_unit = OffsetUnit::counts;
+  std::uint32_t stream_rate = 0;                // frames a second that it sends by itself; 0: it answers requests
+  Generation generation = Generation::aksim2;   // of the virtual encoder
+  std::uint8_t identity_size = identity_bytes;  // of the virtual encoder on a UART, or padded_identity_bytes
 
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
@@ -52,7 +66,24 @@ struct Format {
   [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
   [[nodiscard]] constexpr std::size_t cycle_bytes() const { return position_bytes() + 4; }
+
+  /// The largest position offset.
+  [[nodiscard]] constexpr std::uint32_t largest_offset() const {
+    return static_cast<std::uint32_t>(low_mask(offset_unit == OffsetUnit::counts ? resolution : 32));
+  }
+  /// The offset that takes `singleturn` off what the encoder shows with `offset`.
+  [[nodiscard]] constexpr std::uint32_t moved_offset(std::uint32_t offset, std::uint32_t singleturn) const {
+    const std::uint32_t here = offset_unit == OffsetUnit::counts ? singleturn : singleturn << (32 - resolution);
+    return (offset_sign == OffsetSign::add ? offset - here : offset + here) & largest_offset();
+  }
+  /// Of a turn, in 2^-32.
+  [[nodiscard]] constexpr std::uint32_t offset_fraction(std::uint32_t offset) const {
+    return offset_unit == OffsetUnit::counts ? offset << (32 - resolution) : offset;
+  }
 };
+
+/// What a virtual encoder that is asked for its own format has.
+inline constexpr Format virtual_format{.resolution = 20, .multiturn_bits = 16};
 
 /// What channel 1 says. `channel2` is outside the checksum.
 struct Position {

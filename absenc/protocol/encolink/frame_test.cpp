@@ -8,6 +8,7 @@
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/encolink/channels.hpp"
 #include "absenc/protocol/encolink/fields.hpp"
+#include "absenc/protocol/encolink/options.hpp"
 #include "absenc/protocol/encolink/registers.hpp"
 #include "absenc/protocol/encolink/unit.hpp"
 
@@ -209,13 +210,13 @@ TEST(EncolinkChannels, AnAccessGoesThroughBusyToItsData) {
 // ---- Descriptor
 
 TEST(EncolinkUnit, AFrameEndsWhereItsChecksumSays) {
-  Options options;
-  options.values[option_multiturn_bits] = 0;
-  options.values[option_has_ch2] = 1;
-  const Delimit broken = unit.delimit(options, Direction::reply, hex<"00000000000000000000000000000000000000">);
+  Options values;
+  values.values[options.find("multiturn_bits")] = 0;
+  values.values[options.find("has_ch2")] = 1;
+  const Delimit broken = unit.delimit(values, Direction::reply, hex<"00000000000000000000000000000000000000">);
   EXPECT_EQ(broken.kind, Delimit::Kind::no_frame);
-  EXPECT_EQ(unit.delimit(options, Direction::request, hex<"AA00">).size, 2u);
-  EXPECT_EQ(unit.delimit(options, Direction::request, hex<"A900">).kind, Delimit::Kind::no_frame);
+  EXPECT_EQ(unit.delimit(values, Direction::request, hex<"AA00">).size, 2u);
+  EXPECT_EQ(unit.delimit(values, Direction::request, hex<"A900">).kind, Delimit::Kind::no_frame);
 }
 
 TEST(EncolinkUnit, EncodesTheBytesThatDoTheWork) {

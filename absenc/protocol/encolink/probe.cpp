@@ -5,11 +5,14 @@
 #include <optional>
 
 #include "absenc/protocol/encolink/frame.hpp"
-#include "absenc/protocol/encolink/unit.hpp"
+#include "absenc/protocol/encolink/options.hpp"
 
 namespace absenc::encolink {
 
 namespace {
+
+constexpr std::size_t option_resolution = options.find("resolution");
+constexpr std::size_t option_multiturn_bits = options.find("multiturn_bits");
 
 // What speaks for a format: the identity, or without one the length that most frames have.
 struct Told {
@@ -43,7 +46,7 @@ Told told_by(const Format& format, std::span<const Capture> captures) {
 }  // namespace
 
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
-  const Told told = told_by(to_format(values), captures);
+  const Told told = told_by(options.format(values), captures);
   constexpr std::string_view open = "these frames do not tell";
   for (std::int64_t bits = 1; bits <= std::int64_t{maximum_resolution}; ++bits) {
     const bool possible = !told.identity || bits == told.identity->resolution;

@@ -68,6 +68,14 @@ enum class Access : std::uint8_t { read_only, read_write, write_only };
 /// How the bytes of a register are to be understood; all are big endian.
 enum class Content : std::uint8_t { number, tenths, flags, text };
 
+/// A register that has commands of its own: one that reads it, named as it is, and set-... that writes it.
+struct Setting {
+  std::string_view meaning{};  // empty: it has none
+  std::string_view how{};      // what set-... does
+  std::string_view value{};    // of its argument
+  std::int64_t largest = 0;
+};
+
 struct Register {
   std::string_view name;
   std::uint16_t address;
@@ -75,6 +83,7 @@ struct Register {
   Access access;
   Content content;
   bool in_info;  // part of what `info` shows
+  Setting setting{};
 };
 
 enum RegisterIndex : std::size_t {
@@ -109,7 +118,13 @@ enum RegisterIndex : std::size_t {
 // Addresses and sizes: rls-encolink 1.0.1, product_aksim2_map.h. Some overlap; each is accessed as a whole. Which can
 // be written it does not say: README.md has what is assumed.
 inline constexpr std::array<Register, 26> registers{{
-    {"position_offset", 0x00, 4, Access::read_write, Content::number, false},
+    {"position_offset",
+     0x00,
+     4,
+     Access::read_write,
+     Content::number,
+     false,
+     {"position offset", "set it, until power off unless saved", "in what offset_unit says", 0xFFFFFFFF}},
     {"position_filter", 0x04, 4, Access::read_write, Content::number, false},
     {"position_filter_speed", 0x08, 4, Access::read_write, Content::number, false},
     {"velocity_filter", 0x0C, 4, Access::read_write, Content::number, false},
@@ -119,7 +134,14 @@ inline constexpr std::array<Register, 26> registers{{
     {"eccentricity", 0x1B, 2, Access::read_only, Content::number, false},
     {"eccentricity_phase", 0x1D, 2, Access::read_only, Content::number, false},
     {"radial_displacement", 0x1F, 2, Access::read_only, Content::number, false},
-    {"write_lock", 0x2E, 1, Access::read_write, Content::number, true},
+    {"write_lock",
+     0x2E,
+     1,
+     Access::read_write,
+     Content::number,
+     true,
+     {"whether the configuration is locked", "lock or unlock it, until power off unless saved", "0: open, 1: locked",
+      1}},
     {"firmware_major", 0x2F, 2, Access::read_only, Content::number, true},
     {"firmware_minor", 0x31, 2, Access::read_only, Content::number, true},
     {"protocol_register", 0x33, 4, Access::read_only, Content::number, false},

@@ -20,7 +20,6 @@ inline constexpr Time spi_pause = 5us;  // t_p
 inline constexpr Time answer_time = 5us;
 inline constexpr Time answer_limit = 500us;
 inline constexpr Time gap_limit = 30us;
-inline constexpr Time request_gap = 100us;  // after which the encoder forgets the first byte of a request
 
 inline constexpr Time start_up = 100ms;  // of well-formed zeros; assumed
 inline constexpr Time save_time = 50ms;  // busy; assumed

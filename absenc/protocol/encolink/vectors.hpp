@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink frames with their source. Each is decoded at compile time: a broken frame does not build.
+// EncoLink frames with their source. The unit decodes each at compile time: a broken frame does not build.
 #pragma once
 
 #include <array>
 
 #include "absenc/core/hex.hpp"
-#include "absenc/protocol/encolink/fields.hpp"
 #include "absenc/protocol/unit.hpp"
-#include "absenc/protocol/vector_check.hpp"
 
 namespace absenc::encolink {
 
@@ -84,36 +82,5 @@ inline constexpr std::array<Vector, 3> spi_vectors{{
     {"encolink-spi-003", "channel 2 ST cycle", "derived", "resolution=19 multiturn_bits=0", hex<"">, hex<"2468a3000033d3">, expected::v017},
 }};
 // clang-format on
-
-namespace detail {
-
-// The number of an option `name=` in the text of a vector.
-constexpr int option(std::string_view text, std::string_view name, int fallback) {
-  const std::size_t at = text.find(name);
-  if (at == std::string_view::npos) return fallback;
-  int value = 0;
-  for (std::size_t i = at + name.size(); i < text.size() && text[i] != ' '; ++i) value = value * 10 + (text[i] - '0');
-  return value;
-}
-
-constexpr bool holds(const Vector& vector) {
-  const Format format{.resolution = static_cast<unsigned>(option(vector.options, "resolution=", 0)),
-                      .multiturn_bits = option(vector.options, "multiturn_bits=", -1),
-                      .has_ch2 = vector.options.find("has_ch2=false") == std::string_view::npos};
-  VectorCheck check(vector.fields);
-  const Error error = decode(format, vector.request, vector.reply, check);
-  return error == vector.error && check.all();
-}
-
-constexpr bool all_hold(std::span<const Vector> frames) {
-  for (const Vector& vector : frames) {
-    if (!holds(vector)) return false;
-  }
-  return true;
-}
-static_assert(all_hold(vectors));
-static_assert(all_hold(spi_vectors));
-
-}  // namespace detail
 
 }  // namespace absenc::encolink
