@@ -51,20 +51,20 @@ struct Values {
   std::optional<std::uint8_t> ch1_alarms{};
   std::optional<std::uint32_t> singleturn{};
   std::optional<std::uint16_t> multiturn{};
-  std::optional<std::uint8_t> ch1_sequence{};
   std::optional<std::uint8_t> encoder_id{};
   std::optional<unsigned> safety{};
   std::optional<unsigned> multiturn_bytes{};
   std::optional<unsigned> singleturn_bits{};
+  std::optional<std::uint8_t> ch1_sequence{};
   std::optional<std::int8_t> temperature{};  // its sign is assumed
   std::optional<std::uint8_t> ch2_status{};
   std::optional<std::uint8_t> ch2_alarms{};
   std::optional<std::uint16_t> redundant{};
   std::optional<std::uint8_t> ch2_sequence{};
+  std::optional<std::uint8_t> page{};
   std::optional<std::uint8_t> memory_address{};
   std::optional<bool> busy{};
   std::optional<std::uint8_t> value{};
-  std::optional<std::uint8_t> page{};
   std::optional<Bytes> data{};
   std::optional<bool> written{};
   std::optional<bool> led_error{};
@@ -86,12 +86,12 @@ inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::singleturn>(
         {"singleturn", Kind::number, "counts", "ABS: position within the turn", {}, Shows::position}),
     author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Shows::turns}),
-    author::field<&Values::ch1_sequence>({"ch1_sequence", Kind::number, "", "SC1: counts the replies, 0 to 255"}),
     author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID: D8 multi-turn, 98 single-turn"}),
     author::field<&Values::safety>({"safety", Kind::number, "", "1: a safety encoder (ENID bit 7)"}),
     author::field<&Values::multiturn_bytes>({"multiturn_bytes", Kind::number, "", "of turns (ENID bits 6 and 5)"}),
     author::field<&Values::singleturn_bits>(
         {"singleturn_bits", Kind::number, "", "of the position within the turn (ENID bits 4 to 0)"}),
+    author::field<&Values::ch1_sequence>({"ch1_sequence", Kind::number, "", "SC1: counts the replies, 0 to 255"}),
     author::field<&Values::temperature>({"temperature_c", Kind::number, "degC", "inside the encoder"}),
     author::field<&Values::ch2_status>({"ch2_status", Kind::flags, "", "SF of channel 2", status_flags}),
     author::field<&Values::ch2_alarms>({"ch2_alarms", Kind::flags, "", "ALM of channel 2", alarm_flags}),
@@ -102,11 +102,11 @@ inline constexpr auto fields = author::fields_of<Values>(
                                        {},
                                        Shows::position}),
     author::field<&Values::ch2_sequence>({"ch2_sequence", Kind::number, "", "SC2: counts the replies, 0 to 127"}),
+    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
     author::field<&Values::memory_address>({"memory_address", Kind::number, "", "ADF: 0 to 126; 127 selects the page"}),
     author::field<&Values::busy>(
         {"busy", Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
     author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory"}),
-    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
     author::field<&Values::data>({"data", Kind::bytes, "", "the bytes in memory from `memory_address` on"}),
     author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
     author::field<&Values::led_error>({"led_error", Kind::boolean, "", "the LED current is out of its range"}),

@@ -148,7 +148,8 @@ author::Part<std::uint8_t> select(Line& line, std::uint8_t page, std::string_vie
   co_return page;
 }
 
-author::Part<std::uint8_t> read_byte(Line& line, std::uint8_t page, std::uint8_t address, Time pause, std::string_view words) {
+author::Part<std::uint8_t> read_byte(Line& line, std::uint8_t page, std::uint8_t address, Time pause,
+                                     std::string_view words) {
   const Request request{DataId::read_memory, line.format().address, address};
   const Result<Reply> reply = co_await settled(line, request, pause, !is_immediate(page, address));
   if (!reply) co_await line.stop({reply.error(), words, {}, eeprom_read_pause});

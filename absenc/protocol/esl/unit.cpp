@@ -152,13 +152,13 @@ struct Definition {
     fields.put(sink, values);
   }
   static void put(FieldSink& sink, const Profile&, const MemoryBytes& found) {
-    Values values{.memory_address = found.address, .value = found.data[0], .page = found.page};
+    Values values{.page = found.page, .memory_address = found.address, .value = found.data[0]};
     if (found.data.size() > 1) values.data = found.data.view();
     fields.put(sink, values);
   }
   static void put(FieldSink& sink, const Profile&, const Written& found) {
     fields.put(sink,
-               {.memory_address = found.address, .value = found.value, .page = found.page, .written = found.sent});
+               {.page = found.page, .memory_address = found.address, .value = found.value, .written = found.sent});
   }
   static void put(FieldSink& sink, const Profile&, const Selected& found) { fields.put(sink, {.page = found.page}); }
   static void put(FieldSink& sink, const Profile&, const ErrorInfo& found) {

@@ -8,6 +8,7 @@
 
 namespace absenc::esl {
 
+// clang-format off
 inline constexpr std::array vectors{
     author::VectorText{"esl-001", "request ID1 EAD0", "derived", "", "0875", "", "data_id=1 control_field=8 encoder_address=0"},
     author::VectorText{"esl-002", "ID1 nominal", "derived", "", "0875", "084000efcdab34125646b3086000abd6cd84", "data_id=1 encoder_address=0 ch1_status=0x40 singleturn=11259375 multiturn=4660 ch1_alarms=0x00 ch1_sequence=86 ch2_status=0x60 ch2_alarms=0x00 redundant_singleturn=343 ch2_sequence=86"},
@@ -80,5 +81,6 @@ inline constexpr std::array vectors{
     author::VectorText{"esl-132", "request with a wrong CRC", "derived", "", "0874", "", "bad_checksum"},
     author::VectorText{"esl-133", "request with an id that Table 3 lacks", "derived", "", "189f", "", "unsupported"},
 };
+// clang-format on
 
 }  // namespace absenc::esl
