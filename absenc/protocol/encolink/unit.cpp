@@ -49,35 +49,35 @@ struct Protocol {
 
 template <Config config>
 Result<Request> frame(const Format&, Arguments) {
-  return {config};
+  return Request{config};
 }
 
 template <std::size_t index>
 Result<Request> reading_of(const Format&, Arguments) {
-  return {Config::position, read_request(registers[index].address, registers[index].size)};
+  return Request{Config::position, read_request(registers[index].address, registers[index].size)};
 }
 
 template <std::size_t index>
 Result<Request> writing_of(const Format&, Arguments arguments) {
   const auto value = static_cast<std::uint64_t>(arguments[0]);
-  return {Config::position, write_request(registers[index].address, registers[index].size, value)};
+  return Request{Config::position, write_request(registers[index].address, registers[index].size, value)};
 }
 
 template <std::uint8_t code>
 Result<Request> order(const Format&, Arguments) {
-  return {Config::position, write_request(registers[command_register].address, 1, code)};
+  return Request{Config::position, write_request(registers[command_register].address, 1, code)};
 }
 
 Result<Request> memory_reading(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  return {Config::position, read_request(address, size_of(address, arguments[1]))};
+  return Request{Config::position, read_request(address, size_of(address, arguments[1]))};
 }
 
 Result<Request> memory_writing(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
   const std::uint16_t size = size_of(address, arguments[2]);
-  if (size > 8) return {Config::position, RegisterRequest{}};
-  return {Config::position, write_request(address, size, static_cast<std::uint64_t>(arguments[1]))};
+  if (size > 8) return Request{Config::position, RegisterRequest{}};
+  return Request{Config::position, write_request(address, size, static_cast<std::uint64_t>(arguments[1]))};
 }
 
 constexpr auto not_known = nullptr;  // the value depends on the position, or nothing is sent
