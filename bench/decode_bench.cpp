@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding and verifying frames against the same work with the CRC taken bit by bit.
+// Decoding and verifying frames: of the T-format against the same work with the CRC taken bit by bit, of BiSS against
+// the way of a motor controller.
+#include <algorithm>
 #include <array>
-#include <bit>
 
 #include "absenc/protocol/biss/frame.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 #include "bench/ratio.hpp"
+#include "bench/sampled_peer.hpp"
 
 namespace {
 
@@ -48,67 +50,75 @@ void tformat_everything_reference(benchmark::State& state) {
 }
 BENCHMARK(tformat_everything_reference);
 
-// 64 samples of SLO with a frame of 32 bits, as a register or an E201-9S gives them; different ACKs and positions.
-constexpr unsigned biss_data_bits = 32 + 2 + 6;
+// 64 samples of SLO with a frame of 32 bits: packed, as an SPI controller or an E201-9S gives them, and a byte for
+// each, as a timer that samples a port gives them. Different ACKs and positions.
+constexpr biss::Format known{.word = "position:32 error:1! warning:1!"_word};
 
-std::array<std::uint64_t, 64> biss_samples() {
-  std::array<std::uint64_t, 64> made{};
+struct Samples {
+  std::array<std::uint8_t, 8> packed;
+  alignas(4) std::array<std::uint8_t, 64> sampled;
+};
+
+constexpr unsigned pin = 5;
+
+std::array<Samples, 64> biss_samples() {
+  std::array<Samples, 64> made{};
   for (std::uint64_t i = 0; i < made.size(); ++i) {
-    BitBuffer<128> samples;
-    biss::encode({.word = "position:32 error:1! warning:1!"_word},
-                 {.ack_bits = static_cast<unsigned>(1 + i % 20), .word = {.position = i * 0x9E3779B1}}, samples);
+    BitBuffer<64> samples;
+    biss::encode(known, {.ack_bits = static_cast<unsigned>(1 + i % 20), .word = {.position = i * 0x9E3779B1}}, samples);
     while (samples.size() < 64) samples.append(0, 1);
-    made[i] = samples.view().load(0, 64);
+    std::copy_n(samples.bytes().begin(), 8, made[i].packed.begin());
+    for (std::size_t bit = 0; bit < 64; ++bit) made[i].sampled[bit] = samples.view()[bit] ? 1u << pin : 0;
   }
   return made;
 }
 
-struct BissPosition {
-  std::uint32_t position;
-  bool error;
-  bool warning;
-};
-
-BissPosition biss_position(std::uint64_t samples, std::size_t first) {
-  const std::uint64_t data = samples << first;
-  return {static_cast<std::uint32_t>(data >> 32), (data >> 31 & 1) == 0, (data >> 30 & 1) == 0};
-}
-
-void biss_32_bits(benchmark::State& state) {
+// What comes out is the position, or the benchmark ends.
+template <class Decode>
+void run_biss(benchmark::State& state, Decode&& decode) {
   const auto frames = biss_samples();
   std::size_t i = 0;
   for (auto _ : state) {
-    const std::uint64_t samples = frames[i++ % frames.size()];
-    const Result<biss::Framing> framing = biss::find_frame(biss_data_bits, samples);
-    Result<BissPosition> result = framing.error();
-    if (framing) result = biss_position(samples, framing->first);
-    benchmark::DoNotOptimize(result);
-  }
-}
-BENCHMARK(biss_32_bits);
-
-// The same with the CRC taken bit by bit, the frame found in the same fast way.
-void biss_32_bits_reference(benchmark::State& state) {
-  const auto frames = biss_samples();
-  std::size_t i = 0;
-  for (auto _ : state) {
-    const std::uint64_t samples = frames[i++ % frames.size()];
-    const auto idle = static_cast<unsigned>(std::countl_one(samples));
-    const unsigned first = idle + static_cast<unsigned>(std::countl_zero(samples << idle)) + 2;
-    Result<BissPosition> result = Error::truncated;
-    if (first + biss_data_bits <= 64) {
-      std::uint32_t remainder = 0;
-      for (unsigned bit = first; bit < first + 34; ++bit) {
-        const bool feedback = ((remainder >> 5 & 1) != 0) != ((samples >> (63 - bit) & 1) != 0);
-        remainder = (remainder << 1 & 0x3F) ^ (feedback ? 0x03u : 0);
-      }
-      const bool good = (remainder ^ 0x3F) == (samples >> (64 - first - biss_data_bits) & 0x3F);
-      result = good ? Result<BissPosition>(biss_position(samples, first)) : Result<BissPosition>(Error::bad_checksum);
+    const std::size_t frame = i++ % frames.size();
+    if (decode(frames[frame]) != (frame * 0x9E37'79B1 & 0xFFFF'FFFF)) {
+      state.SkipWithError("a wrong position");
+      break;
     }
-    benchmark::DoNotOptimize(result);
   }
 }
-BENCHMARK(biss_32_bits_reference);
+
+void biss_known_format(benchmark::State& state) {
+  run_biss(state, [](const Samples& samples) {
+    const auto reply = biss::decode<known>({samples.packed, 64});
+    benchmark::DoNotOptimize(reply);
+    return reply ? reply->word.position : 0;
+  });
+}
+BENCHMARK(biss_known_format);
+
+void biss_any_format(benchmark::State& state) {
+  biss::Format format = known;
+  benchmark::DoNotOptimize(format);
+  run_biss(state, [&format](const Samples& samples) {
+    const Result<biss::Reply> reply = biss::decode(format, {samples.packed, 64});
+    benchmark::DoNotOptimize(reply);
+    return reply ? reply->word.position : 0;
+  });
+}
+BENCHMARK(biss_any_format);
+
+// The reference of both.
+void biss_peer(benchmark::State& state) {
+  bench::SampledPeer peer{pin, 32};
+  benchmark::DoNotOptimize(peer);
+  run_biss(state, [&peer](const Samples& samples) {
+    const bench::SampledPosition result = bench::take(peer, samples.sampled);
+    benchmark::DoNotOptimize(result);
+    return result.error == bench::SampledPosition::Error::none ? result.position : 0;
+  });
+}
+BENCHMARK(biss_peer)->Name("biss_known_format_reference");
+BENCHMARK(biss_peer)->Name("biss_any_format_reference");
 
 }  // namespace
 

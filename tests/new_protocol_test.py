@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./dev new-protocol` makes a unit that builds, is listed, and fails the generic battery until it is written."""
+"""`./dev new-protocol` makes a unit that builds, is listed, and whose tests fail until it is written."""
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -42,9 +43,17 @@ class NewProtocol(unittest.TestCase):
         battery = subprocess.run([str(program)], capture_output=True, text=True)
         self.assertEqual(battery.returncode, 1)
         failed = [line for line in battery.stdout.splitlines() if line.startswith("[  FAILED  ]")]
-        self.assertTrue(any("my_encoder_001" in line for line in failed), failed)
-        self.assertTrue(any("HasBothRoles" in line for line in failed), failed)
-        self.assertFalse(any("tformat" in line for line in failed), failed)
+        self.assertEqual([line.split()[3].rstrip(",") for line in failed[:-1]],
+                         ["ProtocolName.IsNoLongerTheInventedOne"])
+
+    def test_the_example_is_of_the_template(self):
+        """What CONTRIBUTING shows is compiled by the test above."""
+        text = (SOURCE / "CONTRIBUTING.md").read_text(encoding="utf-8")
+        template = (SOURCE / "docs/protocol-template/unit.cpp").read_text(encoding="utf-8")
+        examples = re.findall(r"^( *)```cpp\n(.*?)^ *```", text, re.MULTILINE | re.DOTALL)
+        self.assertTrue(examples)
+        for indent, example in examples:
+            self.assertIn(re.sub(f"^{indent}", "", example, flags=re.MULTILINE), template)
 
     def test_refuses_names_that_are_none_or_taken(self):
         self.assertEqual(self.new_protocol("tformat").returncode, 1)

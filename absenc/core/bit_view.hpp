@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
@@ -23,22 +25,56 @@ struct BitView {
 
   /// `count` bits (0 to 64) from `first` on, the first one the most significant. All of them must be there.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
+    if (count == 0) return 0;
     std::uint64_t value = 0;
-    while (count > 0) {
-      const auto left = static_cast<unsigned>(8 - first % 8);
-      const unsigned take = std::min(left, count);
-      value = value << take | ((bytes[first / 8] >> (left - take)) & low_mask(take));
-      first += take;
-      count -= take;
+    for (; count > window_bits; first += window_bits, count -= window_bits) {
+      value = value << window_bits | window(first) >> (register_bits - window_bits);
     }
-    return value;
+    return value << count | window(first) >> (register_bits - count);
   }
 
   /// Where the run of equal bits that begins at `first` ends; `size` when it does not.
   [[nodiscard]] constexpr std::size_t end_of_run(std::size_t first) const {
-    std::size_t end = first + 1;
-    while (end < size && (*this)[end] == (*this)[first]) ++end;
-    return std::min(end, size);
+    const std::size_t ones = first < size && (*this)[first] ? 0 : ~std::size_t{0};
+    for (std::size_t at = first; at < size; at += window_bits) {
+      const auto run = static_cast<unsigned>(std::countl_one(window(at) ^ ones));
+      if (run < window_bits) return std::min(at + run, size);
+    }
+    return size;
+  }
+
+ private:
+  static constexpr unsigned register_bits = sizeof(std::size_t) * 8;
+  static constexpr unsigned window_bits = register_bits - 7;
+
+  // A register of the bits from `first` on, the first one at the top: `window_bits` at least, zeros behind the end.
+  [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
+    if (bytes.size() < sizeof(std::size_t)) return short_window(first);
+    const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
+    return register_at(at, std::make_index_sequence<sizeof(std::size_t)>{}) << (first - 8 * at);
+  }
+  // Written without a loop it becomes one load where the processor has one.
+  template <std::size_t... i>
+  [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
+    const std::uint8_t* from = bytes.data() + at;
+    return ((std::size_t{from[i]} << (register_bits - 8 - 8 * i)) | ...);
+  }
+  // Where all bytes together are fewer than a register has.
+  [[nodiscard, gnu::noinline]] constexpr std::size_t short_window(std::size_t first) const {
+    std::size_t value = 0;
+    unsigned shift = register_bits;
+    for (const std::uint8_t byte : bytes) value |= std::size_t{byte} << (shift -= 8);
+    return value << first;
+  }
+};
+
+/// The same of bits that are all in one number, the first one its most significant.
+struct BitNumber {
+  std::uint64_t number;
+  unsigned size;  // 1 to 64
+
+  [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
+    return count == 0 ? 0 : number >> (size - first - count) & low_mask(count);
   }
 };
 
@@ -69,8 +105,8 @@ class BitBuffer {
 
 /// The CRC of `count` bits from `first` on. Where their number is no multiple of 8 zeros are put before them, which
 /// change nothing as long as the remainder begins at 0.
-template <CrcParameters parameters, CrcTable table = CrcTable::byte>
-[[nodiscard]] constexpr auto crc_of(BitView bits, std::size_t first, std::size_t count) {
+template <CrcParameters parameters, CrcTable table = CrcTable::byte, class Bits>
+[[nodiscard]] constexpr auto crc_of(const Bits& bits, std::size_t first, std::size_t count) {
   static_assert(parameters.init == 0 && !parameters.refin);
   Crc<parameters, table> crc;
   const auto odd = static_cast<unsigned>(count % 8);

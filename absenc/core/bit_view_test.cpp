@@ -3,21 +3,55 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 namespace absenc {
 namespace {
 
 constexpr std::array<std::uint8_t, 10> bytes{0x80, 0xFF, 0x12, 0x34, 0x56, 0x78, 0x9A, 0xBC, 0xDE, 0xF0};
 
+// Also at the end of memory that is smaller than a register.
 TEST(BitView, LoadsAnyRunAtAnyPlace) {
-  const BitView bits{bytes, 80};
-  for (std::size_t first = 0; first < 80; ++first) {
-    for (unsigned count = 0; count <= 64 && first + count <= 80; ++count) {
-      std::uint64_t value = 0;
-      for (std::size_t i = first; i < first + count; ++i) value = value << 1 | (bits[i] ? 1 : 0);
-      EXPECT_EQ(bits.load(first, count), value) << first << ' ' << count;
+  for (std::size_t size = 8; size <= 80; size += 8) {
+    const std::vector<std::uint8_t> end(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size / 8));
+    const BitView bits{end, size};
+    for (std::size_t first = 0; first < size; ++first) {
+      for (unsigned count = 0; count <= 64 && first + count <= size; ++count) {
+        std::uint64_t value = 0;
+        for (std::size_t i = first; i < first + count; ++i) value = value << 1 | (bits[i] ? 1 : 0);
+        EXPECT_EQ(bits.load(first, count), value) << first << ' ' << count;
+      }
     }
   }
-  EXPECT_EQ(bits.load(0, 64), 0x80FF123456789ABCu);
+  EXPECT_EQ((BitView{bytes, 80}.load(0, 64)), 0x80FF123456789ABCu);
+}
+
+TEST(BitNumber, LoadsAsTheViewOfItsBits) {
+  const BitView bits{bytes, 80};
+  for (unsigned size = 1; size <= 64; ++size) {
+    const BitNumber number{bits.load(5, size), size};
+    for (unsigned first = 0; first < size; ++first) {
+      for (unsigned count = 0; first + count <= size; ++count) {
+        EXPECT_EQ(number.load(first, count), bits.load(5 + first, count)) << size << ' ' << first << ' ' << count;
+      }
+    }
+  }
+}
+
+TEST(BitView, FindsTheEndOfARunOfAnyLength) {
+  for (std::size_t begin = 0; begin < 20; ++begin) {
+    for (std::size_t length = 1; length <= 200; ++length) {
+      for (const bool level : {false, true}) {
+        BitBuffer<256> buffer;
+        for (std::size_t i = 0; i < begin; ++i) buffer.append(level ? 0 : 1, 1);
+        for (std::size_t i = 0; i < length; ++i) buffer.append(level ? 1 : 0, 1);
+        const std::vector<std::uint8_t> exact(buffer.bytes().begin(), buffer.bytes().end());
+        EXPECT_EQ((BitView{exact, begin + length}.end_of_run(begin)), begin + length) << begin << ' ' << length;
+        buffer.append(level ? 0 : 1, 1);
+        EXPECT_EQ(buffer.view().end_of_run(begin), begin + length) << begin << ' ' << length;
+      }
+    }
+  }
 }
 
 TEST(BitView, FindsTheEndOfARun) {

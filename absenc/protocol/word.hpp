@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bit_view.hpp"
@@ -17,15 +18,18 @@
 namespace absenc {
 
 /// Fields that the word does not carry are 0.
-struct Word {
+template <std::size_t size>
+struct WordWith {
+  static constexpr std::size_t capacity = size;
   std::uint64_t position = 0;
   std::uint64_t multiturn = 0;
   bool error = false;
   bool warning = false;
-  std::array<std::uint64_t, WordFormat::maximum_fields> values{};  // those of Meaning::value, by the field's index
+  std::array<std::uint64_t, size> values{};  // those of Meaning::value, by the field's index
 
-  friend constexpr bool operator==(const Word&, const Word&) = default;
+  friend constexpr bool operator==(const WordWith&, const WordWith&) = default;
 };
+using Word = WordWith<WordFormat::maximum_fields>;
 
 /// Bits of Reading::alarms.
 inline constexpr std::uint32_t word_error = 1;
@@ -66,86 +70,134 @@ struct Scale {
   double unit_um = 0;  // linear: micrometres a count; 0: not known
 };
 
+/// A field and its place in the word.
+struct PlacedField {
+  std::size_t index;
+  unsigned first;
+  Meaning meaning;
+  unsigned bits;
+  bool active_low;
+};
+
+/// What the functions of a position word are written with: its format, that of the protocol around it, and a way over
+/// its fields, which calls `use` with each until it returns false.
+template <class Format>
+struct Given {
+  using Word = absenc::Word;
+  const Format& format;
+  const WordFormat& word;
+
+  template <class Use>
+  constexpr bool each(Use use) const {
+    unsigned first = 0;
+    for (std::size_t i = 0; i < word.fields().size(); ++i) {
+      const WordField& field = word.fields()[i];
+      if (!use(PlacedField{i, first, field.meaning, field.bits, field.active_low})) return false;
+      first += field.bits;
+    }
+    return true;
+  }
+};
+
+/// The same of a format that is known when the program is written: nothing of it is left to run time.
+template <const auto& known>
+struct Known {
+  static constexpr const auto& format = known;
+  static constexpr const WordFormat& word = known.word;
+  static constexpr std::size_t size = word.fields().size();
+  using Word = WordWith<word.find(Meaning::value) == nullptr ? 0 : size>;
+
+  template <std::size_t i>
+  struct Field {
+    static constexpr std::size_t index = i;
+    static constexpr unsigned first = word.first_of(i);
+    static constexpr Meaning meaning = word.fields()[i].meaning;
+    static constexpr unsigned bits = word.fields()[i].bits;
+    static constexpr bool active_low = word.fields()[i].active_low;
+  };
+
+  template <class Use>
+  static constexpr bool each(Use use) {
+    return each(use, std::make_index_sequence<size>{});
+  }
+
+ private:
+  template <class Use, std::size_t... i>
+  static constexpr bool each(Use& use, std::index_sequence<i...>) {
+    return (use(Field<i>{}) && ...);
+  }
+};
+
 namespace detail {
 
-// Position and turns as one number, in the order of the wire.
-constexpr std::uint64_t joined(const WordFormat& format, const Word& word) {
-  std::uint64_t number = 0;
-  for (const WordField& field : format.fields()) {
-    if (field.meaning == Meaning::position) number = (field.bits < 64 ? number << field.bits : 0) | word.position;
-    if (field.meaning == Meaning::multiturn) number = (field.bits < 64 ? number << field.bits : 0) | word.multiturn;
-  }
-  return number;
-}
-
-constexpr void split(const WordFormat& format, std::uint64_t number, Word& word) {
-  for (std::size_t i = format.fields().size(); i-- > 0;) {
-    const WordField& field = format.fields()[i];
-    if (field.meaning != Meaning::position && field.meaning != Meaning::multiturn) continue;
-    (field.meaning == Meaning::position ? word.position : word.multiturn) = number & low_mask(field.bits);
-    number = field.bits < 64 ? number >> field.bits : 0;
-  }
-}
-
-constexpr bool parity_of(BitView bits, std::size_t first, std::size_t end) {
+template <class Bits>
+constexpr bool parity_of(const Bits& bits, std::size_t first, std::size_t end) {
   bool odd = false;
   for (; first + 64 <= end; first += 64) odd ^= odd_parity(bits.load(first, 64));
   return odd ^ odd_parity(bits.load(first, static_cast<unsigned>(end - first)));
+}
+
+// Of a Gray-coded number that goes on from field to field: each needs the last bit of the one before.
+class GrayFields {
+ public:
+  constexpr std::uint64_t decode(std::uint64_t gray, unsigned bits) {
+    const std::uint64_t binary = gray_decode(gray) ^ (odd_ ? low_mask(bits) : 0);
+    odd_ = (binary & 1) != 0;
+    return binary;
+  }
+  constexpr std::uint64_t encode(std::uint64_t binary, unsigned bits) {
+    const std::uint64_t gray = gray_encode(binary) ^ (odd_ ? std::uint64_t{1} << (bits - 1) : 0);
+    odd_ = (binary & 1) != 0;
+    return gray;
+  }
+
+ private:
+  bool odd_ = false;
+};
+
+// `Bits`: BitView or BitNumber.
+template <class Source, class Bits>
+constexpr Error take_word(const Source& source, const Bits& bits, std::size_t first, typename Source::Word& word) {
+  if (bits.size < first || bits.size - first < source.word.bits()) return Error::wrong_length;
+  GrayFields gray;
+  const bool holds = source.each([&](auto field) {
+    std::uint64_t value = bits.load(first + field.first, field.bits);
+    if (field.active_low) value ^= low_mask(field.bits);
+    const bool counts = field.meaning == Meaning::position || field.meaning == Meaning::multiturn;
+    if (counts && source.word.gray()) value = gray.decode(value, field.bits);
+    if (field.meaning == Meaning::position) word.position = value;
+    if (field.meaning == Meaning::multiturn) word.multiturn = value;
+    if (field.meaning == Meaning::error) word.error = value != 0;
+    if (field.meaning == Meaning::warning) word.warning = value != 0;
+    if constexpr (Source::Word::capacity != 0) {
+      if (field.meaning == Meaning::value) word.values[field.index] = value;
+    }
+    return field.meaning != Meaning::parity || (value != 0) == parity_of(bits, first, first + field.first);
+  });
+  return holds ? Error::none : Error::bad_checksum;
 }
 
 }  // namespace detail
 
 /// The word that begins at bit `first`. Errors: wrong_length (fewer bits are there), bad_checksum (parity).
 [[nodiscard]] constexpr Result<Word> decode_word(const WordFormat& format, BitView bits, std::size_t first = 0) {
-  if (bits.size < first || bits.size - first < format.bits()) return Error::wrong_length;
   Word word;
-  std::size_t at = first;
-  for (std::size_t i = 0; i < format.fields().size(); ++i) {
-    const WordField& field = format.fields()[i];
-    std::uint64_t value = bits.load(at, field.bits);
-    if (field.active_low) value ^= low_mask(field.bits);
-    switch (field.meaning) {
-      case Meaning::position:
-        word.position = value;
-        break;
-      case Meaning::multiturn:
-        word.multiturn = value;
-        break;
-      case Meaning::error:
-        word.error = value != 0;
-        break;
-      case Meaning::warning:
-        word.warning = value != 0;
-        break;
-      case Meaning::parity:
-        if ((value != 0) != detail::parity_of(bits, first, at)) return Error::bad_checksum;
-        break;
-      case Meaning::value:
-        word.values[i] = value;
-        break;
-      case Meaning::skip:
-        break;
-    }
-    at += field.bits;
-  }
-  if (format.gray()) detail::split(format, gray_decode(detail::joined(format, word)), word);
-  return word;
+  const Error error = detail::take_word(Given<WordFormat>{format, format}, bits, first, word);
+  return error == Error::none ? Result(word) : error;
 }
 
 /// Appends the word; what does not fit into a field is cut off. False when `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < format.bits()) return false;
-  Word coded = word;
-  coded.position &= low_mask(format.bits_of(Meaning::position));
-  coded.multiturn &= low_mask(format.bits_of(Meaning::multiturn));
-  if (format.gray()) detail::split(format, gray_encode(detail::joined(format, coded)), coded);
+  detail::GrayFields gray;
   const std::size_t first = out.size();
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];
     std::uint64_t value = 0;
-    if (field.meaning == Meaning::position) value = coded.position;
-    if (field.meaning == Meaning::multiturn) value = coded.multiturn;
+    const bool counts = field.meaning == Meaning::position || field.meaning == Meaning::multiturn;
+    if (counts) value = (field.meaning == Meaning::position ? word.position : word.multiturn) & low_mask(field.bits);
+    if (counts && format.gray()) value = gray.encode(value, field.bits);
     if (field.meaning == Meaning::error) value = word.error ? 1 : 0;
     if (field.meaning == Meaning::warning) value = word.warning ? 1 : 0;
     if (field.meaning == Meaning::parity) value = detail::parity_of(out.view(), first, out.size()) ? 1 : 0;

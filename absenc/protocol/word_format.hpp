@@ -92,6 +92,12 @@ class WordFormat {
   [[nodiscard]] constexpr std::span<const WordField> fields() const { return {fields_.data(), size_}; }
   [[nodiscard]] constexpr unsigned bits() const { return bits_; }
   [[nodiscard]] constexpr bool gray() const { return gray_; }
+  /// Where the field at `index` begins.
+  [[nodiscard]] constexpr unsigned first_of(std::size_t index) const {
+    unsigned first = 0;
+    for (std::size_t i = 0; i < index; ++i) first += fields_[i].bits;
+    return first;
+  }
 
   /// Null when the word has none.
   [[nodiscard]] constexpr const WordField* find(Meaning meaning) const {

@@ -2,59 +2,82 @@
 #include "absenc/protocol/protocol_name/unit.hpp"
 
 #include <array>
+#include <optional>
 
-#include "absenc/protocol/protocol_name/frame.hpp"
-#include "absenc/protocol/protocol_name/vectors.hpp"
+#include "absenc/protocol/author/unit.hpp"
 
 namespace absenc::protocol_name {
 
 namespace {
 
-constexpr std::array<Model, 1> models{{{"unnamed", "one sentence", 6000, {}}}};
+using namespace author;
+using Line = LineOf<Protocol>;
+using Found = Looked<Protocol>;
 
-constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position"}}};
-
-Error decode(const Options&, Frame, Frame reply, FieldSink& sink) {
-  const Result<Reply> result = decode_reply(reply.bytes);
-  if (!result) return result.error();
-  sink.put({&fields[0], result->singleturn});
-  // Give sink.put_reading the position too: captures take it from there.
-  return Error::none;
+template <Ask ask>
+constexpr Request request(const Format& format, Arguments = {}) {
+  return {ask, format.address};
 }
 
-Result<std::size_t> encode(const Options&, const Command&, Arguments, MutableBytes) { return Error::unsupported; }
+// ---- Procedures: each reads like its paragraph
 
-Delimit delimit(const Options&, Direction, Bytes) { return {Delimit::Kind::no_frame}; }
+Procedure set_zero(Line& line, Found& found) {
+  const Request position = request<Ask::position>(line.format());
+  const bool still = co_await stands_still(line, found, position);
+  if (!still) co_return {Error::invalid_argument, "the shaft is turning: nothing was sent"};
+  co_await line.ask(request<Ask::zero>(line.format())).or_say("whether the encoder obeyed is not known");
+  co_await line.rest(20ms);  // it writes its memory
+  const std::uint64_t now = co_await look(line, found, position);
+  if (!is_near(now, 0, 16)) co_return {Error::cross_check_failed, "the position is still not zero"};
+  co_return done;
+}
 
-// The machines: host.hpp (one class a conversation) and device.hpp (the virtual encoder), as in tformat.
-Any<Conversation> host(const Options&, const Command&, Arguments, std::span<std::byte>) { return {}; }
-Any<Device> device(const Options&, const Shaft&, std::span<std::byte>) { return {}; }
+// ---- The virtual encoder: what it answers
 
-Resolution resolution(const Options&) { return {.singleturn_bits = 17}; }
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its zero
+ public:
+  using BusDevice::BusDevice;
+  [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }
+  std::optional<Reply> answer(const Request& asked, Time at) {
+    if (asked.ask == Ask::zero) store_zero(at, 0);
+    return Reply{static_cast<std::uint16_t>(counts(at, 16, 0) & 0xFFFF)};
+  }
+};
+
+// ---- What is declared
+
+struct Values {
+  std::optional<std::uint16_t> singleturn{};
+};
+
+struct Definition : Declares<Definition, Protocol> {
+  using Encoder = protocol_name::Encoder;
+  static constexpr std::string_view id = "protocol_name", name = "maker and protocol", document = "title of the document";
+  static constexpr LinkKind link = LinkKind::half_duplex;
+  static constexpr std::size_t frames_size = 1200;
+
+  static constexpr OptionsOf options{option<&Format::address>("address", "of the encoder on its line", 0, 255)};
+  static constexpr std::array models{ModelText{"unnamed", "one sentence", 6000, ""}};
+  static constexpr auto fields = fields_of<Values>(field<&Values::singleturn>(
+      {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Shows::position}));
+  static constexpr std::array commands{
+      reading<request<Ask::position>>({"position", Verb::read, 0, "position"}),
+      command<Found, set_zero, request<Ask::zero>>(
+          {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
+  };
+  static constexpr std::array vectors{
+      VectorText{"protocol_name-1", "a position", "invented", "", "5001", "123447", "singleturn=4660"},
+      VectorText{"protocol_name-2", "a wrong sum", "invented", "", "5001", "123448", "bad_checksum"},
+  };
+
+  static constexpr Request guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
+  static constexpr Values values(const Format&, const Request&) { return {}; }
+  static constexpr Values values(const Format&, const Request&, const Reply& reply) { return {reply.singleturn}; }
+  static constexpr Values values(const Format&, const Found& found) { return {found.reply.singleturn}; }
+};
 
 }  // namespace
 
-constinit const Unit unit{
-    .id = "protocol_name",
-    .name = "maker and protocol",
-    .document = "title of the document",
-    .link = LinkKind::half_duplex,
-    .line = {.rate = 2'500'000},
-    .options = {},
-    .models = models,
-    .fields = fields,
-    .commands = commands,
-    .vectors = vectors,
-    .status = nullptr,
-    .alarms = nullptr,
-    .host_storage = 0,
-    .device_storage = 0,
-    .decode = decode,
-    .encode = encode,
-    .delimit = delimit,
-    .host = host,
-    .device = device,
-    .resolution = resolution,
-};
+constinit const Unit unit = UnitOf<Definition>::make();
 
 }  // namespace absenc::protocol_name

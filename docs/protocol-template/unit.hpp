@@ -1,10 +1,90 @@
 // SPDX-License-Identifier: Apache-2.0
+// Maker and encoder: its frames. README.md draws them. What stands here is an invented encoder: put the document's own in
+// its place.
 #pragma once
 
-#include "absenc/protocol/unit.hpp"
+#include <cstdint>
+
+#include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/look.hpp"
 
 namespace absenc::protocol_name {
 
-extern constinit const Unit unit;
+using namespace std::chrono_literals;
+
+/// What the options make of the frames.
+struct Format {
+  std::uint8_t address = 1;
+
+  [[nodiscard]] constexpr LineSettings line() const { return {.rate = 1'000'000}; }
+  [[nodiscard]] constexpr Resolution resolution() const { return {.singleturn_bits = 16}; }
+};
+
+enum class Ask : std::uint8_t { position = 0x50, zero = 0x5A };
+
+struct Request {
+  Ask ask = Ask::position;
+  std::uint8_t address = 1;
+};
+
+struct Reply {
+  std::uint16_t singleturn = 0;
+};
+
+struct Protocol {
+  using Format = protocol_name::Format;
+  using Request = protocol_name::Request;
+  using Reply = protocol_name::Reply;
+  static constexpr std::size_t longest_reply = 3;
+
+  static constexpr author::Wire wire(const Format&) { return {.answer_limit = 100us, .gap_limit = 50us}; }
+  /// What changes the encoder is never sent twice.
+  static constexpr author::Manner manner(const Format&, const Request& request) {
+    return {.attempts = request.ask == Ask::position ? 3u : 1u};
+  }
+
+  // Request: code, address.
+  static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
+    ByteBuffer<2> bytes;
+    bytes.push_back(static_cast<std::uint8_t>(request.ask));
+    bytes.push_back(request.address);
+    return bytes;
+  }
+  static constexpr std::size_t request_size(Bytes begin) { return begin[0] == 0x50 || begin[0] == 0x5A ? 2 : 0; }
+  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
+    if (bytes.size() != 2) return Error::wrong_length;
+    if (request_size(bytes) == 0) return Error::bad_framing;
+    return Request{static_cast<Ask>(bytes[0]), bytes[1]};
+  }
+
+  // Reply: position high byte first, then the sum of all bytes with the address.
+  static constexpr std::size_t reply_size(const Format&, const Request&) { return longest_reply; }
+  static constexpr std::uint8_t sum(std::uint8_t address, std::uint8_t high, std::uint8_t low) {
+    return static_cast<std::uint8_t>(address + high + low);
+  }
+  static constexpr ByteBuffer<longest_reply> encode_reply(const Format&, const Request& request, const Reply& reply) {
+    const auto high = static_cast<std::uint8_t>(reply.singleturn >> 8);
+    const auto low = static_cast<std::uint8_t>(reply.singleturn & 0xFF);
+    ByteBuffer<longest_reply> bytes;
+    for (const std::uint8_t byte : {high, low, sum(request.address, high, low)}) bytes.push_back(byte);
+    return bytes;
+  }
+  /// Checks in this order: length, checksum, echo or address, refusal, fixed bits, range, cross checks.
+  static constexpr Result<Reply> decode(const Format&, const Request& request, Bytes bytes) {
+    if (bytes.empty()) return Error::timeout;
+    if (bytes.size() != longest_reply) return Error::wrong_length;
+    if (bytes[2] != sum(request.address, bytes[0], bytes[1])) return Error::bad_checksum;
+    return Reply{static_cast<std::uint16_t>(bytes[0] << 8 | bytes[1])};
+  }
+  static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
+    return author::position_reading(reply.singleturn, 16);
+  }
+
+  static constexpr author::DeviceTimes device_times(const Format& format) {
+    return {.character = format.line().character(), .answer_time = 10us, .start_time = 100ms};
+  }
+};
+
+extern const Unit unit;
 
 }  // namespace absenc::protocol_name

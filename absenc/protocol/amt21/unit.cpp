@@ -4,8 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "absenc/protocol/amt21/frame.hpp"
-#include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/author/scan.hpp"
 #include "absenc/protocol/author/unit.hpp"
 
 namespace absenc::amt21 {
@@ -17,34 +16,30 @@ using Line = LineOf<Protocol>;
 
 // ---- Procedures
 
-struct Found {
-  Reading reading{};
-  Request request{};
-  std::int32_t turns = 0;
+struct Found : Looked<Protocol> {
+  std::optional<std::int32_t> turns{};
 };
 
-Part<std::uint32_t> look(Line& line, Found& found) {
-  const Request request{Ask::position, line.format().address};
-  const Reply reply = co_await line.ask(request);
-  found.reading = Protocol::reading(line.format(), request, reply);
-  found.reading.latched = line.sent_at();
-  found.reading.received = line.received_at();
-  co_return static_cast<std::uint32_t>(reply.value);
+template <Ask ask>
+constexpr Request request(const Format& format, Arguments = {}) {
+  return {ask, format.address};
 }
+constexpr Request request_to(std::size_t node) { return {Ask::position, static_cast<std::uint8_t>(4 * node)}; }
+constexpr std::size_t addresses = 64;
 
 // Position and turns are asked for one after the other: between two positions on the same side of zero the turns hold.
 Procedure read_both(Line& line, Found& found) {
-  const unsigned bits = line.format().singleturn_bits;
-  std::uint32_t before = co_await look(line, found);
+  const Format format = line.format();
+  std::uint64_t before = co_await look(line, found, request<Ask::position>(format));
   for (int tries = 0; tries < 3; ++tries) {
-    const Reply turns = co_await line.ask({Ask::turns, line.format().address});
-    const std::uint32_t now = co_await look(line, found);
-    const bool passed_zero = (now < before) != (wrapped_difference(now, before, bits) < 0);
+    const Reply counted = co_await line.ask(request<Ask::turns>(format));
+    const std::uint64_t now = co_await look(line, found, request<Ask::position>(format));
+    const bool passed_zero = (now < before) != (wrapped_difference(now, before, format.singleturn_bits) < 0);
     before = now;
     if (passed_zero) continue;
-    found.turns = turns.value;
-    found.reading.multiturn = static_cast<std::uint64_t>(turns.value) & 0x3FFF;
-    found.reading.multiturn_bits = 14;
+    found.turns = counted.value;
+    found.reading.multiturn = turns_reading(counted.value, turns_bits).multiturn;
+    found.reading.multiturn_bits = turns_bits;
     found.reading.multiturn_valid = true;
     co_return done;
   }
@@ -52,82 +47,58 @@ Procedure read_both(Line& line, Found& found) {
 }
 
 Procedure restart(Line& line, Found& found, Ask act) {
-  const unsigned bits = line.format().singleturn_bits;
-  const std::uint32_t first = co_await look(line, found);
-  co_await line.rest(between_looks);
-  const std::uint32_t second = co_await look(line, found);
-  if (act == Ask::zero && !is_near(second, first, bits)) {
+  const bool still = co_await stands_still(line, found, request<Ask::position>(line.format()));
+  if (act == Ask::zero && !still) {
     co_return {Error::invalid_argument, "the shaft is turning: zero needs it standing still; nothing was sent"};
   }
   co_await line.ask({act, line.format().address});
   co_await line.rest(restart_time + between_looks);
-  const Result<Reply> answer = co_await line.attempt({Ask::position, line.format().address});
+  const Result<Reply> answer = co_await line.attempt(request<Ask::position>(line.format()));
   if (!answer) co_return {answer.error(), "it was sent, but whether the encoder obeyed could not be read"};
-  const std::uint32_t now = co_await look(line, found);
-  if (act == Ask::zero && !is_near(now, 0, bits)) {
+  const std::uint64_t now = co_await look(line, found, request<Ask::position>(line.format()));
+  if (act == Ask::zero && !is_near(now, 0, line.format().singleturn_bits)) {
     co_return {Error::cross_check_failed, "the position is still not zero"};
   }
   co_return done;
 }
 
-struct Nodes {
-  std::array<bool, 64> there{};
-  std::array<bool, 64> clash{};  // what came is damaged every time: two of one address, or a bad line
-};
-
-// Two answers, because one of noise is good in four.
-Procedure scan(Line& line, Nodes& nodes) {
-  bool any = false;
-  for (unsigned i = 0; i < nodes.there.size(); ++i) {
-    const Request request{Ask::position, static_cast<std::uint8_t>(4 * i)};
-    const Result<Reply> first = co_await line.attempt(request);
-    if (!first && first.error() == Error::timeout) continue;
-    const Result<Reply> second = co_await line.attempt(request);
-    nodes.there[i] = any = true;
-    nodes.clash[i] = !first && !second;
-  }
-  if (!any) co_return {Error::timeout, "no address was answered at this rate"};
-  co_return done;
-}
-
 // ---- The virtual encoder
 
-constexpr std::int64_t counts_of(const Format& format, std::int64_t position) {
-  return position >> (32 - format.singleturn_bits);
-}
-
-class Encoder final : public BusDevice<Protocol, Encoder, 2> {  // memory: the place of the zero, of 14 bits
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its zero
  public:
-  Encoder(const Format& format, const Shaft& shaft) : BusDevice(format, shaft) {}
+  using BusDevice::BusDevice;
+  [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }
 
-  [[nodiscard]] bool is_mine(const Request& request) const { return request.address == format().address; }
-
-  std::optional<Reply> answer(const Request& request, Time at) {
-    if (request.ask == Ask::zero && format().multiturn_bits != 0) {
-      violate("zero sent to an encoder with turns", at);
-      return std::nullopt;
+  std::optional<Reply> answer(const Request& asked, Time at) {
+    const unsigned bits = format().singleturn_bits;
+    switch (asked.ask) {
+      case Ask::position:
+        return Reply{static_cast<std::int32_t>(counts(at, bits, 0) & ((1 << bits) - 1))};
+      case Ask::turns:
+        return Reply{static_cast<std::int32_t>(wrapped_difference(turns(at) - lost_, 0, turns_bits))};
+      case Ask::zero:
+        if (format().multiturn_bits != 0) {
+          violate("zero sent to an encoder with turns", at);
+          return std::nullopt;
+        }
+        store_zero(at, 0);
+        [[fallthrough]];
+      case Ask::reset:
+        restart(at + restart_time);
+        return std::nullopt;
     }
-    if (request.ask == Ask::zero) {
-      const std::int64_t place = counts_of({.singleturn_bits = 14}, shaft(at).position);
-      store(0, static_cast<std::uint8_t>(place & 0xFF));
-      store(1, static_cast<std::uint8_t>(place >> 8 & 0x3F));
-    }
-    if (request.ask == Ask::zero || request.ask == Ask::reset) {
-      restart(at + restart_time);
-      return std::nullopt;
-    }
-    const std::int64_t counts = counts_of(format(), shaft(at).position - zero());
-    if (request.ask == Ask::turns) {
-      return Reply{static_cast<std::int32_t>(((counts >> format().singleturn_bits) - turns_at_start_ + 8192) & 16383) -
-                   8192};
-    }
-    return Reply{static_cast<std::int32_t>(counts & ((1 << format().singleturn_bits) - 1))};
+    return std::nullopt;
   }
+  void set_condition(std::size_t, std::int64_t value, Time) override { battery_ = value != 0; }
 
  private:
-  [[nodiscard]] std::int64_t zero() const { return (std::int64_t{stored(1)} << 8 | stored(0)) << 18; }
-  // Its turns are counted by a battery that this one has; without one they would begin at 0.
-  std::int64_t turns_at_start_ = 0;
+  void started(Time at) override {
+    if (!battery_) lost_ = turns(at);
+  }
+  [[nodiscard]] std::uint64_t turns(Time at) const { return static_cast<std::uint64_t>(counts(at, 0, 0)); }
+
+  bool battery_ = true;
+  std::uint64_t lost_ = 0;  // turns before the last start without a battery
 };
 
 // ---- What is declared
@@ -142,8 +113,7 @@ struct Values {
 
 constexpr std::array<std::string_view, 5> rate_names{"2000000", "115200", "38400", "19200", "9600"};
 
-struct Definition {
-  using Protocol = amt21::Protocol;
+struct Definition : Declares<Definition, Protocol> {
   using Encoder = amt21::Encoder;
   static constexpr std::string_view id = "amt21", name = "CUI AMT21 (RS-485)",
                                     document = "CUI Devices AMT21, 2019-11-21";
@@ -172,12 +142,6 @@ struct Definition {
       field<&Values::clash>(
           {"clash", boolean, "", "what came was damaged: two encoders of one address, or a bad line"}));
 
-  static constexpr Request position(const Format& format) { return {Ask::position, format.address}; }
-  static constexpr Request turns(const Format& format) { return {Ask::turns, format.address}; }
-  template <Ask act>
-  static constexpr Request act_on(const Format& format, Arguments) {
-    return {act, format.address};
-  }
   static constexpr std::string_view no_turns(const Format& format) {
     return format.multiturn_bits == 0 ? "this encoder has no turns (multiturn_bits=14 says that it has)" : "";
   }
@@ -187,17 +151,17 @@ struct Definition {
   static constexpr bool has_turns(const Format& format) { return format.multiturn_bits != 0; }
   static constexpr Command read{"position", Verb::read, 0, "position, and turns where it has them"};
   static constexpr std::array commands{
-      reading<Definition, Protocol, position>(read).or_when(
-          has_turns, command<Definition, Protocol, Found, read_both, act_on<Ask::position>>(read)),
-      reading<Definition, Protocol, turns>({"turns", Verb::read_part, 0, "turns"}).unless(no_turns),
-      command<Definition, Protocol, Found, restart, act_on<Ask::zero>, Ask::zero>(
+      reading<request<Ask::position>>(read).or_when(has_turns, command<Found, read_both, request<Ask::position>>(read)),
+      reading<request<Ask::turns>>({"turns", Verb::read_part, 0, "turns"}).unless(no_turns),
+      command<Found, restart, request<Ask::zero>, Ask::zero>(
           {"zero", Verb::zero, 0, "make this the zero of the turn: it restarts, 200 ms", {}, true, false})
           .unless(no_zero),
-      command<Definition, Protocol, Found, restart, act_on<Ask::reset>, Ask::reset>(
+      command<Found, restart, request<Ask::reset>, Ask::reset>(
           {"reset", Verb::run, 0, "restart it, 200 ms", {}, true, false}),
-      command<Definition, Protocol, Nodes, scan, act_on<Ask::position>>(
+      command<Nodes<addresses>, scan<Protocol, addresses, request_to>, request<Ask::position>>(
           {"scan", Verb::scan, 0, "ask each of the 64 addresses"}),
   };
+  static constexpr std::array conditions{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
   static constexpr std::string_view source = document;
   static constexpr std::string_view d14 = "singleturn_bits=14 multiturn_bits=14";
   static constexpr std::array vectors{
@@ -216,33 +180,24 @@ struct Definition {
       VectorText{"amt21-10", "a reset has no reply", source, "", "5675", "3492", "wrong_length"},
   };
 
-  static constexpr LineSettings line(const Format& format) { return format.line(); }
-  static constexpr Resolution resolution(const Format& format) {
-    return {format.singleturn_bits, format.multiturn_bits};
+  static constexpr Request guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
+
+  static constexpr Values values(const Format&, const Request& asked) {
+    return {.encoder_address = asked.address, .command = ask_names[static_cast<std::size_t>(asked.ask)]};
   }
-  static constexpr std::size_t reply_size(const Format&, Bytes) { return 2; }
-  static constexpr Request guess_request(const Format& format, Bytes) { return position(format); }
-  static constexpr Values values(const Request& request) {
-    return {.encoder_address = request.address, .command = ask_names[static_cast<std::size_t>(request.ask)]};
+  static constexpr Values values(const Format& format, const Request& asked, const Reply& reply) {
+    Values all = values(format, asked);
+    (asked.ask == Ask::turns ? all.multiturn : all.singleturn) = reply.value;
+    return all;
   }
-  static constexpr void put(FieldSink& sink, const Format&, const Request& request) {
-    fields.put(sink, values(request));
+  static constexpr Values values(const Format& format, const Found& found) {
+    Values all = values(format, found.request, found.reply);
+    all.multiturn = found.turns;
+    return all;
   }
-  static constexpr void put(FieldSink& sink, const Format&, const Request& request, const Reply& reply) {
-    Values all = values(request);
-    (request.ask == Ask::turns ? all.multiturn : all.singleturn) = reply.value;
-    fields.put(sink, all);
-  }
-  static void put(FieldSink& sink, const Format& format, const Found& found) {
-    Values all = values(position(format));
-    all.singleturn = static_cast<std::int32_t>(found.reading.singleturn);
-    if (found.reading.multiturn_valid) all.multiturn = found.turns;
-    fields.put(sink, all);
-  }
-  static void put(FieldSink& sink, const Format&, const Nodes& nodes) {
-    for (unsigned i = 0; i < nodes.there.size(); ++i) {
-      if (nodes.there[i])
-        fields.put(sink, {.encoder_address = static_cast<std::uint8_t>(4 * i), .clash = nodes.clash[i]});
+  static void put(FieldSink& sink, const Format&, const Nodes<addresses>& nodes) {
+    for (std::size_t i = 0; i < addresses; ++i) {
+      if (nodes.there[i]) fields.put(sink, {.encoder_address = request_to(i).address, .clash = nodes.clash[i]});
     }
   }
 };

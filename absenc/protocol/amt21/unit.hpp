@@ -1,10 +1,121 @@
 // SPDX-License-Identifier: Apache-2.0
-// CUI Devices AMT21: RS-485, 12 or 14 bits, with or without turns.
+// CUI AMT21: one byte asks, two answer. README.md draws them.
 #pragma once
 
-#include "absenc/protocol/unit.hpp"
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/core/bits.hpp"
+#include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/look.hpp"
 
 namespace absenc::amt21 {
+
+using namespace std::chrono_literals;
+
+inline constexpr std::array<std::uint32_t, 5> rates{2'000'000, 115'200, 38'400, 19'200, 9'600};
+/// From the end of a request to its reply, at each rate.
+inline constexpr std::array<Time, 5> turn_around{3us, 10'800ns, 30us, 56us, 110us};
+inline constexpr Time restart_time = 200ms;
+inline constexpr unsigned turns_bits = 14;
+
+struct Format {
+  std::uint8_t singleturn_bits = 14;
+  std::uint8_t multiturn_bits = 0;
+  std::uint8_t address = 0x54;
+  std::uint8_t rate = 0;        // index into rates
+  bool drops_low_bits = false;  // of an encoder of 14 bits read as one of 12
+
+  [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
+  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits}; }
+};
+
+enum class Ask : std::uint8_t { position, turns, zero, reset };
+inline constexpr std::array<std::string_view, 4> ask_names{"position", "turns", "zero", "reset"};
+inline constexpr std::uint8_t zero_code = 0x5E;
+inline constexpr std::uint8_t reset_code = 0x75;
+
+struct Request {
+  Ask ask = Ask::position;
+  std::uint8_t address = 0x54;
+};
+
+/// Of a position counts; of turns revolutions, -8192 to 8191.
+struct Reply {
+  std::int32_t value = 0;
+};
+
+/// K1 and K0 make the number of ones among the odd and among the even bits odd.
+[[nodiscard]] constexpr bool checks(std::uint16_t word) {
+  return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
+}
+
+struct Protocol {
+  using Format = amt21::Format;
+  using Request = amt21::Request;
+  using Reply = amt21::Reply;
+  static constexpr std::size_t longest_reply = 2;
+
+  static constexpr author::Wire wire(const Format& format) {
+    const Time character = format.line().character();
+    return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
+  }
+  /// One wrong reply in four passes the two parity bits: it must be one of two bytes, with silence behind it.
+  static constexpr author::Manner manner(const Format&, const Request& request) {
+    const bool answered = request.ask == Ask::position || request.ask == Ask::turns;
+    return {.attempts = answered ? 3u : 1u, .answered = answered, .ends_by_silence = true};
+  }
+  static constexpr std::size_t request_size(Bytes begin) {
+    return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];
+  }
+  static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
+    const auto place = std::min<unsigned>(static_cast<unsigned>(request.ask), 2);
+    ByteBuffer<2> bytes;
+    bytes.push_back(static_cast<std::uint8_t>(request.address + place));
+    if (place == 2) bytes.push_back(request.ask == Ask::zero ? zero_code : reset_code);
+    return bytes;
+  }
+  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
+    if (bytes.empty() || bytes.size() != request_size(bytes)) return Error::wrong_length;
+    Request request{static_cast<Ask>(bytes[0] & 3), static_cast<std::uint8_t>(bytes[0] & 0xFC)};
+    if (bytes.size() == 1) return request;
+    if (bytes[1] != zero_code && bytes[1] != reset_code) return Error::unexpected_reply;
+    request.ask = bytes[1] == zero_code ? Ask::zero : Ask::reset;
+    return request;
+  }
+  static constexpr std::size_t reply_size(const Format&, const Request& request) {
+    return request.ask == Ask::position || request.ask == Ask::turns ? 2 : 0;
+  }
+  static constexpr ByteBuffer<2> encode_reply(const Format& format, const Request& request, const Reply& reply) {
+    const unsigned shift = request.ask == Ask::position ? 14u - format.singleturn_bits : 0u;
+    auto word = static_cast<std::uint16_t>(static_cast<unsigned>(reply.value) << shift & 0x3FFF);
+    if (!odd_parity(word & 0xAAAA)) word |= 0x8000;
+    if (!odd_parity(word & 0x5555)) word |= 0x4000;
+    ByteBuffer<2> bytes;
+    bytes.push_back(static_cast<std::uint8_t>(word & 0xFF));
+    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
+    return bytes;
+  }
+  static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
+    if (bytes.empty()) return Error::timeout;
+    if (bytes.size() != reply_size(format, request)) return Error::wrong_length;
+    const auto word = static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
+    if (!checks(word)) return Error::bad_checksum;
+    const std::int32_t value = word & 0x3FFF;
+    if (request.ask == Ask::turns) return Reply{(value ^ 0x2000) - 0x2000};
+    const unsigned padding = 14u - format.singleturn_bits;
+    if ((value & ((1 << padding) - 1)) != 0 && !format.drops_low_bits) return Error::out_of_range;
+    return Reply{value >> padding};
+  }
+  static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
+    if (request.ask == Ask::turns) return author::turns_reading(reply.value, turns_bits);
+    return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
+  }
+  static constexpr author::DeviceTimes device_times(const Format& format) {
+    return {format.line().character(), turn_around[format.rate], restart_time};
+  }
+};
 
 extern const Unit unit;
 

@@ -31,10 +31,24 @@ class Refusal final : public Conversation<Item> {
   std::string_view why_;
 };
 
-/// What a unit hands out: the conversation, and the words for people that firmware does not link. `Definition` says
-/// what is reported: `put(sink, format, found)` of a procedure, `put(sink, format, request, reply)` of a reading; and
-/// what the document says of a bad reply: `explain(format, error, request, reply)`, where it says something. In their
-/// place `put(sink, conversation)` and `explain(conversation)`, of what only the conversation knows.
+/// Puts the fields of what `values` are made of: a request, a request and its reply, what a procedure found. A
+/// Definition has `values(format, ...)`, whose result its `fields` show; or `put(sink, format, ...)`, where one table
+/// cannot say it.
+template <class Definition, class Format, class... What>
+constexpr void put_values(FieldSink& sink, const Format& format, const What&... what) {
+  if constexpr (requires { Definition::put(sink, format, what...); }) {
+    Definition::put(sink, format, what...);
+  } else {
+    Definition::fields.put(sink, Definition::values(format, what...));
+  }
+}
+
+/// What a unit hands out: the conversation, and the words for people that firmware does not link. What the document
+/// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something and the
+/// procedure has not said what to do. `noise_advice`, where a line that is never silent means something. What a
+/// procedure that is broken off leaves: `put_left(sink, format, found)`, and `left(found)` in words. Of what only the
+/// conversation knows `put(sink, conversation)` and `explain(conversation)`; where words must be put together,
+/// `tell(sentence, format, engine)` of the exchange that went wrong.
 template <class Definition, class Base>
 class Told final : public Base {
  public:
@@ -45,36 +59,80 @@ class Told final : public Base {
     if constexpr (requires { Definition::put(sink, self()); }) {
       Definition::put(sink, self());
     } else if constexpr (requires { this->found(); }) {
-      Definition::put(sink, this->format(), this->found());
+      put_values<Definition>(sink, this->format(), this->found());
     } else {
-      Definition::put(sink, this->format(), this->request(), this->last());
+      put_values<Definition>(sink, this->format(), this->request(), this->last());
+    }
+    if (const Reading* reading = this->reading()) sink.put_reading(*reading);
+  }
+  void report_left(FieldSink& sink) const override {
+    if constexpr (requires { Definition::put_left(sink, this->format(), this->found()); }) {
+      Definition::put_left(sink, this->format(), this->found());
     }
   }
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
-    words_.add(explained().found).add_part(Base::detail());
+    const std::string_view own = Base::detail();
+    if (this->error() != Error::none && this->is_noisy()) {
+      if (own != endless_noise.found) words_.add(endless_noise.found);
+    } else if constexpr (requires { Definition::tell(words_, this->format(), *this); }) {
+      if (this->error() != Error::none) Definition::tell(words_, this->format(), *this);
+    } else {
+      words_.add(explained().found);
+    }
+    words_.add_part(own).add_part(left());
     return words_.view();
   }
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
+    if constexpr (requires { Definition::noise_advice; }) {
+      if (own == endless_noise.advice) return Definition::noise_advice;
+    }
     return own.empty() ? explained().advice : own;
   }
 
  private:
   [[nodiscard]] const Base& self() const { return *this; }
   [[nodiscard]] Explanation explained() const {
+    const auto exchange = this->exchange();
     if constexpr (requires { Definition::explain(self()); }) {
-      return this->error() == Error::none || this->is_noisy() ? Explanation{} : Definition::explain(self());
-    } else if constexpr (requires { Definition::explain(this->format(), Error::none, Bytes{}, Bytes{}); }) {
-      if (this->error() == Error::none || this->is_noisy()) return {};
-      return Definition::explain(this->format(), this->error(), this->exchange().sent, this->exchange().received);
+      return this->error() == Error::none || this->is_alone() || !Base::advice().empty() ? Explanation{}
+                                                                                         : Definition::explain(self());
+    } else if constexpr (requires {
+                           Definition::explain(this->format(), Error::none, exchange.sent, exchange.received);
+                         }) {
+      if (this->error() == Error::none || this->is_alone() || !Base::advice().empty()) return {};
+      return Definition::explain(this->format(), this->error(), exchange.sent, exchange.received);
     } else {
       return {};
     }
   }
 
+  [[nodiscard]] std::string_view left() const {
+    if constexpr (requires { Definition::left(this->found()); }) {
+      if (this->error() != Error::none) return Definition::left(this->found());
+    }
+    return {};
+  }
+
   mutable Sentence words_;
 };
+
+namespace detail {
+template <class P>
+struct ItemOf {
+  using Item = std::uint8_t;
+};
+template <class P>
+requires requires { typename P::Item; }
+struct ItemOf<P> {
+  using Item = typename P::Item;
+};
+}  // namespace detail
+
+/// What the lines of a protocol carry: characters where it does not say otherwise.
+template <class P>
+using ItemOf = typename detail::ItemOf<P>::Item;
 
 template <class P>
 struct CommandOf {
@@ -82,8 +140,9 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;
-  /// The one request that does its work; procedures send more. Null: what it sends is not known beforehand.
-  Request (*request)(const Format&, Arguments);
+  /// The one request that does its work; procedures send more. Or why there is none with these arguments: an error, or
+  /// one that P::encode makes nothing of. Null: what it sends is not known beforehand.
+  Result<Request> (*request)(const Format&, Arguments);
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  // bytes of storage, without those of frames
   /// Why an encoder of this format does not have it; empty: it has. Null: every one has.
@@ -91,10 +150,17 @@ struct CommandOf {
   /// Of formats of which `is_other` is true, in place of `make`. Null: of none.
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
   bool (*is_other)(const Format&) = nullptr;
+  /// Of formats of which this is false no conversation is made: the options contradict it. Null: of all one is.
+  bool (*possible)(const Format&) = nullptr;
 
   [[nodiscard]] constexpr CommandOf unless(std::string_view (*why)(const Format&)) const {
     CommandOf one = *this;
     one.missing = why;
+    return one;
+  }
+  [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
+    CommandOf one = *this;
+    one.possible = is_possible;
     return one;
   }
   /// Of these formats `other` carries it out.
@@ -105,15 +171,37 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
+  // Whether there is a request with these arguments.
+  [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
+    if (request == nullptr) return true;
+    const Result<Request> asked = request(format, arguments);
+    if constexpr (requires { P::encode(format, *asked).empty(); }) {
+      return asked && !P::encode(format, *asked).empty();
+    } else {
+      return asked.has_value();
+    }
+  }
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
-    if (!why.empty()) return make_host<Refusal<std::uint8_t>>(storage, why);
+    if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, why);
+    if (possible != nullptr && !possible(format)) return {};
+    if (!can_ask(format, arguments)) return {};
     const bool other = is_other != nullptr && is_other(format);
     return (other ? make_other : make)(format, arguments, storage);
   }
 };
 
 namespace detail {
+// Made of the format, and of arguments, of which there are none.
+template <auto request, class Format>
+constexpr auto request_of(const Format& format) {
+  if constexpr (std::is_invocable_v<decltype(request), const Format&>) {
+    return request(format);
+  } else {
+    return request(format, Arguments{});
+  }
+}
+
 template <class Machine>
 constexpr std::size_t aligned_size = (sizeof(Machine) + alignof(std::max_align_t) - 1) / alignof(std::max_align_t) *
                                      alignof(std::max_align_t);
@@ -127,22 +215,31 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 }
 }  // namespace detail
 
-/// A position, or another value, that one request asks for: `request` makes it of the format.
-template <class Definition, class P, auto request>
+/// A position, or another value, that one request asks for: `request` makes it of the format, and Reader reads it.
+template <class Definition, class P, auto request, class Reader = ReadPosition<P>>
 [[nodiscard]] constexpr CommandOf<P> reading(const Command& info) {
-  using Made = Told<Definition, ReadPosition<P>>;
+  using Made = Told<Definition, Reader>;
   return {.info = info,
-          .request = [](const typename P::Format& format, Arguments) { return request(format); },
-          .make = [](const typename P::Format& format, Arguments,
-                     std::span<std::byte> storage) { return make_host<Made>(storage, format, request(format)); },
+          .request = [](const typename P::Format& format, Arguments) -> Result<typename P::Request> {
+            return detail::request_of<request>(format);
+          },
+          .make =
+              [](const typename P::Format& format, Arguments, std::span<std::byte> storage) {
+                return make_host<Made>(storage, format, detail::request_of<request>(format));
+              },
           .size = sizeof(Made)};
 }
 
-/// What a procedure does. `request(format, arguments)`: see CommandOf.
+/// What a procedure does. `request(format, arguments)`: see CommandOf; a Request, or a Result.
 template <class Definition, class P, class Found, auto procedure, auto request, auto... bound>
 [[nodiscard]] constexpr CommandOf<P> command(const Command& info) {
   using Made = Told<Definition, Run<P, Found, procedure, bound...>>;
-  return {.info = info, .request = request, .make = detail::make_run<Made>, .size = detail::aligned_size<Made>};
+  return {.info = info,
+          .request = [](const typename P::Format& format, Arguments arguments) -> Result<typename P::Request> {
+            return request(format, arguments);
+          },
+          .make = detail::make_run<Made>,
+          .size = detail::aligned_size<Made>};
 }
 
 }  // namespace absenc::author

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/author/device.hpp"
 
+#include <utility>
+
 namespace absenc::author {
 
 using ByteStep = Step<std::uint8_t>;
@@ -11,16 +13,16 @@ using ByteEvent = Event<std::uint8_t>;
 void Responder::power_on(Time now, PowerOn kind) {
   power_ = Power::starting;
   ready_at_ = kind == PowerOn::skip ? now : now + times_.start_time;
-  request_.clear();
-  skipping_ = 0;
-  reply_pending_ = transmitting_ = false;
+  kept_.clear();
   static_cast<void>(is_on(now));
 }
 
 void Responder::power_off(Time now) {
   if (is_on(now)) stopped(now);
   power_ = Power::off;
-  reply_pending_ = transmitting_ = false;
+  forget();
+  kept_.clear();
+  refusing_ = reply_pending_ = transmitting_ = false;
 }
 
 void Responder::restart(Time until) {
@@ -44,8 +46,12 @@ ByteStep Responder::next(Time) {
     return {.kind = ByteStep::Kind::transfer, .out = reply_, .at = reply_at_};
   }
   ByteStep step{.expect = 1, .at = never};
-  if (!request_.empty()) step.expect = request_size(request_) - request_.size();
-  if (!request_.empty() || skipping_ != 0) step.gap = 2 * times_.character;
+  // Another encoder may be absent: behind its request any pause is enough.
+  if (damaged_ || skipping_ != 0) step.expect = 0;
+  if (!damaged_ && !request_.empty()) step.expect = request_size(request_) - request_.size();
+  if (damaged_ || !request_.empty() || skipping_ != 0 || refusing_) {
+    step.gap = times_.gap != Time{} ? times_.gap : 2 * times_.character;
+  }
   return step;
 }
 
@@ -54,39 +60,94 @@ void Responder::feed(const ByteEvent& event) {
     case ByteEvent::Kind::received:
       for (const std::uint8_t byte : event.items) hear(byte, event.at);
       break;
-    case ByteEvent::Kind::sent:
+    case ByteEvent::Kind::sent: {
       transmitting_ = false;
+      const ByteBuffer<64> kept = kept_;
+      kept_.clear();
+      for (const std::uint8_t byte : kept.view()) hear(byte, event.at);
+      break;
+    }
+    case ByteEvent::Kind::line_error:
+      damage(event.at);
       break;
     case ByteEvent::Kind::silence:
-    case ByteEvent::Kind::line_error:  // what was begun is none
-      request_.clear();
-      skipping_ = 0;
+      end_run(event.at);
       break;
     default:
       break;
   }
 }
 
+void Responder::forget() {
+  request_.clear();
+  skipping_ = 0;
+  damaged_ = false;
+}
+
+// The rest of what was begun is none either, until the line is silent.
+void Responder::damage(Time at) {
+  if (!is_on(at) || transmitting_) return forget();
+  heard_at_ = at;
+  damaged_ = true;
+  refusing_ = is_refused(Flaw::damaged, request_) || refusing_;
+}
+
+// Silence: what was begun is no request.
+void Responder::end_run(Time at) {
+  reply_.clear();
+  longer_ = {};
+  if (is_on(at) && !transmitting_) {
+    if (!damaged_ && !request_.empty()) refusing_ = is_refused(Flaw::cut_short, request_) || refusing_;
+    if (std::exchange(refusing_, false)) {
+      refuse(at, reply_);
+      begin_reply(heard_at_ + times_.answer_time);
+    } else if (damaged_ && !request_.empty()) {
+      ended(respond_to_damaged(request_, heard_at_, reply_), heard_at_);
+    }
+  }
+  forget();
+}
+
 void Responder::hear(std::uint8_t byte, Time at) {
   if (!is_on(at)) return;
+  if (transmitting_ && times_.keeps_requests) {
+    kept_.push_back(byte);
+    return;
+  }
   if (transmitting_) {
     if (interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) {
       violate("request during the encoder's transmission", at);
     }
     return;
   }
+  heard_at_ = at;
+  if (refusing_) return;
+  heard_at_ = at;
+  if (damaged_ || refusing_) return;
   if (skipping_ != 0) {
     --skipping_;
     return;
   }
   request_.push_back(byte);
   const std::size_t size = request_size(request_);
-  if (size == 0) return request_.clear();
+  if (size == 0) {
+    refusing_ = is_refused(Flaw::unknown, request_);
+    return request_.clear();
+  }
   if (request_.size() < size) return;
   reply_.clear();
-  switch (respond(request_, at, reply_)) {
+  longer_ = {};
+  ended(respond(request_, at, reply_), at);
+  request_.clear();
+}
+
+void Responder::ended(Answer answer, Time at) {
+  switch (answer) {
     case Answer::sent:
-      begin_reply(at + times_.answer_time);
+      begin_reply(at + times_.answer_time + longer_);
+      break;
+    case Answer::refused:
+      refusing_ = true;
       break;
     case Answer::none:
       ++answered_;
@@ -95,7 +156,6 @@ void Responder::hear(std::uint8_t byte, Time at) {
       skipping_ = others_reply_size(request_);
       break;
   }
-  request_.clear();
 }
 
 void Responder::begin_reply(Time at) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string_view>
 
+#include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/conversation.hpp"
@@ -21,6 +22,9 @@ struct DeviceTimes {
   Time character{};    // of its line: a pause of two ends a request that is not whole
   Time answer_time{};  // from the end of a request to its reply
   Time start_time{};   // from power on to the first request that is answered
+  Time gap{};          // the pause that ends a request, where it is not two characters
+  /// Full duplex with a memory for what comes while it sends: that is answered afterwards.
+  bool keeps_requests = false;
 };
 
 /// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
@@ -57,9 +61,27 @@ class Responder : public Device<std::uint8_t> {
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
   /// How many bytes follow this request, which is another encoder's.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
-  enum class Answer : std::uint8_t { sent, none, for_others };
+  enum class Answer : std::uint8_t {
+    sent,
+    none,
+    for_others,
+    refused,  // when the line is silent: see `refuse`
+  };
+  /// For `respond`: this reply takes so much longer.
+  void take_longer(Time time) { longer_ = time; }
   /// A whole request. Its reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
+  /// A request of which a character was damaged, as far as it came before. Its host ended at `at`; the line is silent.
+  virtual Answer respond_to_damaged(Bytes, Time, ByteBuffer<64>&) { return Answer::for_others; }
+  enum class Flaw : std::uint8_t {
+    damaged,    // a character
+    unknown,    // no request begins so
+    cut_short,  // by silence
+  };
+  /// Whether what is no request is refused. What is not is as if it had not come.
+  virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
+  /// The line is silent after something that is refused: the reply to it.
+  virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
   /// Power has come, and the start-up is over, at the time at which it was.
   virtual void started(Time) {}
   virtual void stopped(Time) {}
@@ -68,14 +90,23 @@ class Responder : public Device<std::uint8_t> {
   enum class Power : std::uint8_t { off, starting, on };
   void hear(std::uint8_t byte, Time at);
   void begin_reply(Time at);
+  void ended(Answer answer, Time at);
+  void damage(Time at);
+  void end_run(Time at);
+  void forget();
 
   DeviceTimes times_;
   Power power_ = Power::off;
   Time ready_at_{};
   ByteBuffer<32> request_;
+  bool damaged_ = false;  // a character of it: the rest is none until the line is silent
+  Time heard_at_{};
   std::size_t skipping_ = 0;  // characters of another encoder's reply
+  bool refusing_ = false;     // what was heard is answered when the line is silent
   ByteBuffer<64> reply_;
   Time reply_at_{};
+  Time longer_{};
+  ByteBuffer<64> kept_;  // what came while it sends
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;
@@ -90,7 +121,7 @@ class Responder : public Device<std::uint8_t> {
 /// off. Of the protocol it needs besides:
 ///
 ///   static DeviceTimes device_times(const Format&);
-///   static std::size_t request_size(Bytes begin);
+///   static std::size_t request_size(Bytes begin);                      // or (const Format&, Bytes begin)
 ///   static std::size_t reply_size(const Format&, const Request&);      // 0: it is not answered
 ///   static Result<Request> decode_request(const Format&, Bytes);
 ///   static ByteBuffer<N> encode_reply(const Format&, const Request&, const Reply&);
@@ -104,16 +135,28 @@ class BusDevice : public Responder {
   using Request = typename P::Request;
   using Reply = typename P::Reply;
 
-  [[nodiscard]] MutableBytes memory() final { return memory_; }
-
- protected:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   BusDevice(const Format& format, const Shaft& shaft)
       : Responder(P::device_times(format)), format_(format), shaft_(&shaft) {}
+  [[nodiscard]] MutableBytes memory() final { return memory_; }
+
+ protected:
   ~BusDevice() = default;
 
   [[nodiscard]] const Format& format() const { return format_; }
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
+  /// Counts of 2^-bits revolution since the zero that `store_zero` keeps in four bytes from this address on; they go on
+  /// from turn to turn, and are negative below zero.
+  [[nodiscard]] std::int64_t counts(Time at, unsigned bits, std::size_t zero_address) const {
+    const auto zero = static_cast<std::int64_t>(load_little_endian(Bytes(memory_).subspan(zero_address, 4)));
+    return (shaft(at).position - zero) >> (32 - bits);
+  }
+  /// The zero is here.
+  void store_zero(Time at, std::size_t zero_address) {
+    const auto here = static_cast<std::uint64_t>(shaft(at).position) & low_mask(32);
+    store_little_endian(MutableBytes(memory_).subspan(zero_address, 4), here);
+    change_memory();
+  }
   [[nodiscard]] std::uint8_t stored(std::size_t address) const { return memory_[address]; }
   void store(std::size_t address, std::uint8_t value) {
     memory_[address] = value;
@@ -121,7 +164,13 @@ class BusDevice : public Responder {
   }
 
  private:
-  [[nodiscard]] std::size_t request_size(Bytes begin) const final { return P::request_size(begin); }
+  [[nodiscard]] std::size_t request_size(Bytes begin) const final {
+    if constexpr (requires { P::request_size(format_, begin); }) {
+      return P::request_size(format_, begin);
+    } else {
+      return P::request_size(begin);
+    }
+  }
   [[nodiscard]] std::size_t others_reply_size(Bytes bytes) const final {
     const Result<Request> request = P::decode_request(format_, bytes);
     return request ? P::reply_size(format_, *request) : 0;

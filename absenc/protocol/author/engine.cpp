@@ -19,6 +19,7 @@ void Engine::send(Bytes request, const Manner& manner, Time earliest) {
 }
 
 void Engine::start(Time earliest) {
+  noise_.clear();  // it counts anew
   earliest_ = earliest;
   --attempts_left_;
   state_ = State::ready;
@@ -27,6 +28,14 @@ void Engine::start(Time earliest) {
 void Engine::sleep(Time time) {
   earliest_ = time;
   state_ = State::sleeping;
+}
+
+void Engine::listen(Time duration) {
+  listening_ = duration;
+  earliest_ = never;
+  out_ = {};
+  size_ = 0;
+  state_ = State::listening;
 }
 
 void Engine::finish(const Outcome& outcome) {
@@ -43,8 +52,11 @@ ByteStep Engine::next(Time now) {
   begun_ = true;
   if (rate_ != 0) return {.kind = ByteStep::Kind::configure, .settings = {.rate = std::exchange(rate_, 0)}};
   if (std::exchange(emitting_, false)) return {.kind = ByteStep::Kind::emit};
-  if (state_ == State::sleeping) {
+  if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
+  if (state_ == State::sleeping || state_ == State::listening) {
     if (now < earliest_) return {.at = earliest_};
+    if (state_ == State::listening) received_at_ = earliest_;
+    state_ = State::over;  // unless the subclass goes on
     woken();
     return next(now);
   }
@@ -60,7 +72,9 @@ ByteStep Engine::next(Time now) {
       disturbed_ = false;
       noise_.clear();
       size_ = 0;
-      step.kind = ByteStep::Kind::transfer;
+      step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
+      step.width = manner_.pulse;
+      step.line = manner_.line;
       step.out = out_;
       step.expect = manner_.answered ? expected({}) : 0;
       step.at = std::max(earliest_, wire_.silence != Time{} ? now : Time{});
@@ -75,6 +89,7 @@ ByteStep Engine::next(Time now) {
     case State::sending:
     case State::settling:
     case State::sleeping:
+    case State::listening:
       break;
     case State::ending:
     case State::over:
@@ -91,22 +106,25 @@ void Engine::feed(const ByteEvent& event) {
   using Kind = ByteEvent::Kind;
   switch (event.kind) {
     case Kind::sent:
-      sent_at_ = received_at_ = event.at;
-      if (state_ != State::sending) break;
-      if (!manner_.answered) return conclude_with(Error::none);
-      state_ = disturbed_ ? State::settling : State::receiving;
+      sent(event.at);
       break;
     case Kind::received: {
       if (state_ == State::ending || state_ == State::over) break;
       received_at_ = event.at;
+      if (state_ == State::listening) {
+        keep(event.items);
+        return heard(event.items);
+      }
       const State before = state_;
-      if (before != State::receiving && before != State::settling) disturbed_ = true;
+      const bool pulsing = before == State::sending && manner_.pulse != Time{};  // its edge is past already
+      if (before != State::receiving && before != State::settling && !pulsing) disturbed_ = true;
       noise_.heard(event.at);
       received(event.items);
       end_noise(before);
       break;
     }
     case Kind::line_error:
+      if (state_ == State::listening) return heard({});
       disturbed_ = true;
       noise_.heard(event.at);
       if (state_ == State::receiving) state_ = State::settling;
@@ -120,12 +138,25 @@ void Engine::feed(const ByteEvent& event) {
   }
 }
 
+void Engine::sent(Time at) {
+  sent_at_ = at - manner_.pulse;
+  received_at_ = at;
+  if (state_ != State::sending) return;
+  if (!manner_.answered) return conclude_with(Error::none);
+  state_ = disturbed_ ? State::settling : State::receiving;
+  if (size_ != 0) received({});  // what came during a pulse
+}
+
 // What no longer fits changes nothing: it is too long already.
-void Engine::received(Bytes bytes) {
+void Engine::keep(Bytes bytes) {
   const std::size_t taken = std::min(bytes.size(), storage_.size() - size_);
   std::copy_n(bytes.begin(), taken, storage_.begin() + static_cast<std::ptrdiff_t>(size_));
   size_ += taken;
-  if (state_ != State::receiving || manner_.ends_by_silence) return;
+}
+
+void Engine::received(Bytes bytes) {
+  keep(bytes);
+  if (state_ != State::receiving || manner_.ends_by_silence || manner_.any_reply) return;
   const std::size_t whole = expected(reply());
   if (whole == 0 || size_ < whole) return;
   const Error error = check(reply());
@@ -134,9 +165,10 @@ void Engine::received(Bytes bytes) {
 }
 
 void Engine::conclude() {
-  if (size_ == 0) return conclude_with(disturbed_ ? Error::bad_framing : check({}));
+  if (disturbed_ && size_ == 0) return conclude_with(Error::bad_framing);
   // Bytes that are not this reply's.
-  conclude_with(disturbed_ || is_noisy() ? Error::wrong_length : check(reply()));
+  if (size_ != 0 && (disturbed_ || is_noisy())) return conclude_with(Error::wrong_length);
+  conclude_with(manner_.any_reply ? Error::none : check(reply()));
 }
 
 void Engine::conclude_with(Error error) {

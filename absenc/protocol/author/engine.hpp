@@ -28,8 +28,12 @@ struct Manner {
   Time pause{};                  // before it is repeated: from what was last sent or heard
   bool answered = true;          // false: no reply is due, and none is waited for
   bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
-  Time answer_limit{};           // in place of that of the wire; 0: that
-  Time hold{};                   // after an error: so long the encoder may be busy with it all the same
+  bool any_reply = false;  // no document says what its reply is, or whether there is one: what comes is not looked
+                           // at, and that it ends by silence is enough
+  Time answer_limit{};     // in place of that of the wire; 0: that
+  Time hold{};             // after an error: so long the encoder may be busy with it all the same
+  Time pulse{};            // in place of bytes a pulse so long on `line`, whose edge is the request
+  Line line{};
 };
 
 /// A subclass says what a whole reply is, and what becomes of it. LineOf makes one from a protocol.
@@ -44,6 +48,8 @@ class Engine : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override {
     return outcome_.advice.empty() ? noise_.explanation().advice : outcome_.advice;
   }
+  /// Nothing: the names and texts of fields are not linked where nobody asks for them. Told (command.hpp) has them.
+  void report(FieldSink&) const override {}
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
   /// Begin of the last request, which a link that exchanges answers with what holds at that time.
@@ -69,8 +75,14 @@ class Engine : public Conversation<std::uint8_t> {
   void emit() { emitting_ = true; }
   /// This end of the line is set to `rate` before anything else is sent, and before the end.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
+  /// Its times are others from here on, as they are at another rate.
+  void set_wire(const Wire& wire) { wire_ = wire; }
   /// Nothing is sent until `time`; then `woken`.
   void sleep(Time time);
+  /// Nothing is sent for `duration`, which the next step begins: `heard` for all that comes, `woken` at the end.
+  void listen(Time duration);
+  /// From within `heard`: goes on.
+  void listen_on() { state_ = State::listening; }
   /// The conversation is over. Its texts must stay.
   void finish(const Outcome& outcome);
   [[nodiscard]] const Manner& manner() const { return manner_; }
@@ -85,6 +97,9 @@ class Engine : public Conversation<std::uint8_t> {
   /// `none`, or why the last attempt failed. Calls `send`, `sleep` or `finish`.
   virtual void answered(Error error) = 0;
   virtual void woken() {}
+  /// While it listens; nothing: a damaged character.
+  virtual void heard(Bytes) {}
+  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
  private:
   enum class State : std::uint8_t {
@@ -93,16 +108,18 @@ class Engine : public Conversation<std::uint8_t> {
     receiving,  // the reply is due
     settling,   // something is wrong: until the line is silent
     sleeping,
+    listening,
     ending,  // the result is known, but told only after a time the encoder needs
     over,
   };
 
+  void keep(Bytes bytes);
   void received(Bytes bytes);
+  void sent(Time at);
   void conclude();
   void conclude_with(Error error);
   void end_noise(State before);
   void start(Time earliest);
-  [[nodiscard]] Time due(Time now);
 
   Wire wire_;
   Noise noise_;
@@ -112,6 +129,7 @@ class Engine : public Conversation<std::uint8_t> {
   Manner manner_{};
   unsigned attempts_left_ = 0;
   Time earliest_{};
+  Time listening_{};
   Time begun_at_{};
   Time sent_at_{};
   Time received_at_{};

@@ -14,12 +14,13 @@
 
 namespace absenc::author {
 
+/// `member` shows a member, or what a function makes of all: `T (*)(const Values&)`.
 template <auto member>
 struct FieldOf {
   FieldInfo info;
 };
 
-/// `member` may be an optional: what it does not hold is not put.
+/// What is shown may be an optional: what it does not hold is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(const FieldInfo& info) {
   return {info};
@@ -32,18 +33,47 @@ struct FieldsOf {
 
   constexpr void put(FieldSink& sink, const Values& values) const {
     std::size_t index = 0;
-    (put_one(sink, infos[index++], values.*members), ...);
+    (put_one(sink, infos[index++], shown<members>(values)), ...);
+  }
+
+  /// What is declared of this member.
+  template <auto member>
+  [[nodiscard]] constexpr const FieldInfo& info() const {
+    std::size_t index = 0;
+    static_cast<void>(((index += same_member<member, members>() ? 0 : 1, same_member<member, members>()) || ...));
+    return infos[index];
+  }
+  /// Of the field that shows this member.
+  template <auto member>
+  [[nodiscard]] constexpr const FieldInfo* of() const {
+    std::size_t index = 0;
+    static_cast<void>(((std::is_same_v<FieldOf<member>, FieldOf<members>> || (++index, false)) || ...));
+    return &infos[index];
   }
 
   std::array<FieldInfo, sizeof...(members)> infos;
 
  private:
+  template <auto one, auto other>
+  static constexpr bool same_member() {
+    return std::is_same_v<FieldOf<one>, FieldOf<other>>;
+  }
+  template <auto member>
+  static constexpr auto shown(const Values& values) {
+    if constexpr (std::is_member_pointer_v<decltype(member)>) {
+      return values.*member;
+    } else {
+      return member(values);
+    }
+  }
   template <class T>
   static constexpr void put_one(FieldSink& sink, const FieldInfo& info, const T& value) {
     if constexpr (std::is_same_v<T, double>) {
       sink.put({.info = &info, .real = value});
+    } else if constexpr (std::is_same_v<T, Bytes>) {
+      sink.put({.info = &info, .bytes = value});
     } else if constexpr (std::is_same_v<T, std::string_view>) {
-      ByteBuffer<32> text;
+      ByteBuffer<96> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
       sink.put({.info = &info, .bytes = text});
     } else if constexpr (std::is_same_v<T, Bytes>) {

@@ -23,7 +23,8 @@ namespace absenc::author {
 ///     static Wire wire(const Format&);
 ///     static Manner manner(const Format&, const Request&);
 ///     static ByteBuffer<N> encode(const Format&, const Request&);
-///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine::expected
+///     static std::size_t reply_size(const Format&, const Request&);              // 0: it is not answered
+///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine; left out: reply_size
 ///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of no bytes: Error::timeout
 ///     static bool is_whole(Error);                                   // see Engine; left out: never
 ///   };
@@ -40,6 +41,8 @@ class HostOf : public Engine {
   [[nodiscard]] const Request& request() const { return request_; }
   /// The last good one.
   [[nodiscard]] const Reply& last() const { return last_; }
+  /// Nothing: who prints takes the conversation of the unit, which is Told (command.hpp).
+  void report(FieldSink&) const override {}
 
  protected:
   explicit HostOf(const Format& format) : Engine(P::wire(format), storage_), format_(format) {}
@@ -53,7 +56,13 @@ class HostOf : public Engine {
   }
 
  private:
-  [[nodiscard]] std::size_t expected(Bytes reply) const final { return P::expected(format_, request_, reply); }
+  [[nodiscard]] std::size_t expected(Bytes reply) const final {
+    if constexpr (requires { P::expected(format_, request_, reply); }) {
+      return P::expected(format_, request_, reply);
+    } else {
+      return P::reply_size(format_, request_);
+    }
+  }
   [[nodiscard]] Error check(Bytes reply) final {
     const Result<Reply> result = P::decode(format_, request_, reply);
     if (result) last_ = *result;
@@ -76,7 +85,8 @@ class HostOf : public Engine {
 };
 
 /// A position, asked for once: what a drive repeats ten thousand times a second. `P::reading(format, request, reply)`
-/// makes a Reading of the reply; its times are those of the exchange.
+/// makes a Reading of the reply; its times are those of the exchange. Where the document says when the encoder takes
+/// the position, `P::latched(format, sent_at)` is that time.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
@@ -92,7 +102,11 @@ class ReadPosition : public HostOf<P> {
   void answered(Error error) final {
     if (error == Error::none) {
       reading_ = P::reading(this->format(), this->request(), this->last());
-      reading_.latched = this->sent_at();  // the latest it can have been taken
+      if constexpr (requires { P::latched(this->format(), this->sent_at()); }) {
+        reading_.latched = P::latched(this->format(), this->sent_at());
+      } else {
+        reading_.latched = this->sent_at();  // the latest it can have been taken
+      }
       reading_.received = this->received_at();
     }
     this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
@@ -169,8 +183,30 @@ class LineOf : public HostOf<P>, public Routine {
   }
   /// Hands out an intermediate result before what is asked next.
   void emit() { HostOf<P>::emit(); }
-  /// This end of the line speaks at `rate` from here on.
-  void set_rate(std::uint32_t rate) { HostOf<P>::set_rate(rate); }
+  /// This end of the line speaks at `rate` from here on; where the times of the line follow the rate, the protocol has
+  /// `wire(format, rate)`.
+  void set_rate(std::uint32_t rate) {
+    HostOf<P>::set_rate(rate);
+    if constexpr (requires { P::wire(this->format(), rate); }) this->set_wire(P::wire(this->format(), rate));
+  }
+  /// Nothing is sent for so long, which what is awaited next begins: `heard` tells what comes, until it is over.
+  void listen(Time duration) {
+    heard_ = {};
+    HostOf<P>::listen(duration);
+  }
+  struct Heard {
+    Bytes bytes{};  // none, and it is not over: a damaged character. They are there until something is awaited
+    bool over = false;
+  };
+  [[nodiscard]] auto heard() {
+    struct Hear {
+      LineOf& line;
+      [[nodiscard]] bool await_ready() const { return false; }
+      void await_suspend(std::coroutine_handle<>) { line.listen_on(); }
+      Heard await_resume() const { return line.heard_; }
+    };
+    return Hear{*this};
+  }
   /// From here on it leaves the encoder as it was when it is asked to end early; `is_aborted` tells.
   void restores(bool yes = true) { restores_ = yes; }
   [[nodiscard]] bool is_aborted() const { return aborted_; }
@@ -199,7 +235,14 @@ class LineOf : public HostOf<P>, public Routine {
     if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
     resume();
   }
-  void woken() final { resume(); }
+  void woken() final {
+    heard_ = {.over = true};
+    resume();
+  }
+  void heard(Bytes bytes) final {
+    heard_ = {bytes, false};
+    resume();
+  }
   void ended(const Outcome& outcome) final { this->finish(outcome); }
 
   Request next_{};
@@ -207,6 +250,7 @@ class LineOf : public HostOf<P>, public Routine {
   Time earliest_{};
   std::string_view words_{};
   Error failure_ = Error::none;
+  Heard heard_{};
   bool must_ = false;
   bool restores_ = false;
   bool aborted_ = false;
@@ -218,7 +262,7 @@ struct CarrierOf {
   using Type = LineOf<P>;
 };
 template <class P>
-  requires requires { typename P::Line; }
+requires requires { typename P::Line; }
 struct CarrierOf<P> {
   using Type = typename P::Line;
 };
@@ -235,8 +279,7 @@ using CarrierOf = typename detail::CarrierOf<P>::Type;
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public CarrierOf<P> {
  public:
-  Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena)
-      : CarrierOf<P>(format, arena) {
+  Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena) : CarrierOf<P>(format, arena) {
     for (const std::int64_t argument : arguments) static_cast<void>(arguments_.push_back(argument));
     if constexpr (std::is_invocable_v<decltype(procedure), CarrierOf<P>&, Found&, decltype(bound)..., Arguments>) {
       this->begin(procedure(*this, found_, bound..., arguments_.view()).handle);

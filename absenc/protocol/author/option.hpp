@@ -20,6 +20,15 @@ template <class Format, class Member>
 Format format_of(Member Format::*);
 template <class Format, class Member>
 Member member_of(Member Format::*);
+// Of a time nanoseconds.
+template <class Value>
+constexpr std::int64_t number_of(const Value& value) {
+  if constexpr (requires { value.count(); }) {
+    return value.count();
+  } else {
+    return static_cast<std::int64_t>(value);
+  }
+}
 }  // namespace detail
 
 template <auto member>
@@ -29,6 +38,9 @@ struct OptionOf {
   Option info;
 
   constexpr void put(Format& format, std::int64_t value) const { format.*member = static_cast<Member>(value); }
+  [[nodiscard]] constexpr std::int64_t get(const Format& format) const {
+    return static_cast<std::int64_t>(format.*member);
+  }
 };
 
 /// A number from `minimum` to `maximum` in steps; its default is that of the member.
@@ -38,7 +50,7 @@ template <auto member>
   const auto value = typename OptionOf<member>::Format{}.*member;
   return {{.name = name,
            .meaning = meaning,
-           .default_value = static_cast<std::int64_t>(value),
+           .default_value = detail::number_of(value),
            .minimum = minimum,
            .maximum = maximum,
            .step = step}};
@@ -65,6 +77,25 @@ template <auto member>
   return one;
 }
 
+/// The same option, which a word format says instead.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> describing_word(OptionOf<member> one) {
+  one.info.describes_word = true;
+  return one;
+}
+
+/// The same option, of which the user writes so many digits behind a point: its values are in units of the last one.
+template <unsigned decimals, auto member>
+[[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
+  one.info.decimals = decimals;
+  return one;
+}
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> with_decimals(unsigned decimals, OptionOf<member> one) {
+  one.info.decimals = decimals;
+  return one;
+}
+
 template <auto... members>
 struct OptionsOf {
   using Format = std::common_type_t<typename OptionOf<members>::Format...>;
@@ -77,6 +108,23 @@ struct OptionsOf {
     std::size_t index = 0;
     std::apply([&](const auto&... one) { (one.put(made, values[index++]), ...); }, each);
     return made;
+  }
+  /// The option of this index alone.
+  constexpr void put(Format& format, std::size_t option, std::int64_t value) const {
+    std::size_t index = 0;
+    const auto put_one = [&](const auto& one) {
+      if (index++ == option) one.put(format, value);
+    };
+    std::apply([&](const auto&... one) { (put_one(one), ...); }, each);
+  }
+  [[nodiscard]] constexpr std::int64_t get(const Format& format, std::size_t option) const {
+    std::size_t index = 0;
+    std::int64_t value = 0;
+    const auto get_one = [&](const auto& one) {
+      if (index++ == option) value = one.get(format);
+    };
+    std::apply([&](const auto&... one) { (get_one(one), ...); }, each);
+    return value;
   }
   /// Index of the option with this name; the number of options when there is none.
   [[nodiscard]] constexpr std::size_t find(std::string_view name) const {

@@ -16,9 +16,7 @@
 #include "absenc/core/time.hpp"
 
 // Without optimisation g++ 12 takes the frame's own operators for a pair that does not match, in every coroutine.
-#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
-#endif
 
 namespace absenc::author {
 
@@ -28,6 +26,7 @@ struct Outcome {
   std::string_view detail{};  // which step failed, what was found
   std::string_view advice{};  // what to do, in place of the error's own advice
   Time hold{};                // so long after what was last sent or heard the encoder must not be disturbed
+  bool alone = false;         // these texts say all: what the document says of the last reply is not added
 };
 
 /// `co_return done;`
@@ -152,10 +151,10 @@ struct [[nodiscard]] Part {
       };
       return Back{};
     }
-    void return_value(const T& value) { result = value; }
+    void return_value(const T& value) { result.emplace(value); }
 
     std::coroutine_handle<> caller{};
-    T result{};
+    std::optional<T> result{};
   };
 
   [[nodiscard]] bool await_ready() const { return false; }
@@ -171,7 +170,7 @@ struct [[nodiscard]] Part {
   }
   // By value: a reference would point into the frame, which is given back here.
   T await_resume() {
-    const T result = handle.promise().result;
+    const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;
     void* const frame = handle.address();
     handle.destroy();

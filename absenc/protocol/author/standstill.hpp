@@ -14,13 +14,22 @@ namespace absenc::author {
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// What noise may make of it.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
+/// How far from 0 a zero may be that was set, where the document does not say how exact it is.
+inline constexpr std::uint32_t zero_millidegrees = 350;
 
-/// Whether two places on a circle of 2^bits counts (1 to 40) are no further apart than this angle, or one count.
+/// This angle on a circle of 2^bits counts (1 to 64), one count at least.
+[[nodiscard]] constexpr std::int64_t counts_of_angle(unsigned bits,
+                                                     std::uint32_t millidegrees = standstill_millidegrees) {
+  const unsigned more = bits > 40 ? bits - 40 : 0;
+  const std::uint64_t counts = (std::uint64_t{millidegrees} << (bits - more)) / 360'000 << more;
+  return std::max<std::int64_t>(static_cast<std::int64_t>(counts), 1);
+}
+
+/// Whether two places on a circle of 2^bits counts (1 to 63) are no further apart than this angle, or one count.
 [[nodiscard]] constexpr bool is_near(std::uint64_t counts, std::uint64_t other, unsigned bits,
                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const std::int64_t apart = wrapped_difference(counts, other, bits);
-  const auto limit =
-      std::max<std::int64_t>(static_cast<std::int64_t>((std::uint64_t{millidegrees} << bits) / 360'000), 1);
+  const std::int64_t limit = counts_of_angle(bits, millidegrees);
   return apart <= limit && -apart <= limit;
 }
 

@@ -13,8 +13,9 @@
 
 namespace absenc::author {
 
-/// A frame with what it must decode to: `fields` is "name=value name=value" with whole numbers or texts, or the name of
-/// an error. Frames are hexadecimal.
+/// A frame with what it must decode to: `fields` is "name=value name=value", or the name of an error. A value is a
+/// whole number, a real one where it has a point, or a text. Frames are hexadecimal, or themselves where they are
+/// texts.
 struct VectorText {
   std::string_view id;
   std::string_view meaning;
@@ -60,10 +61,44 @@ constexpr bool to_number(std::string_view text, std::int64_t& number) {
   return true;
 }
 
+/// A decimal number with a point.
+constexpr bool to_real(std::string_view text, double& number) {
+  const bool negative = text.starts_with('-');
+  if (negative) text.remove_prefix(1);
+  std::int64_t digits = 0;
+  long double divisor = 0;  // 0: no point yet
+  for (const char c : text) {
+    if (c == '.' && divisor == 0) {
+      divisor = 1;
+    } else if (c >= '0' && c <= '9') {
+      digits = digits * 10 + (c - '0');
+      divisor *= 10;
+    } else {
+      return false;
+    }
+  }
+  if (divisor == 0) return false;
+  number = static_cast<double>(static_cast<long double>(negative ? -digits : digits) / divisor);  // rounded once
+  return true;
+}
+
+/// A decimal number, with a point or without, in units of its `decimals`th digit behind the point.
+constexpr bool to_decimal(std::string_view text, unsigned decimals, std::int64_t& number) {
+  const std::size_t point = text.find('.') < text.size() ? text.find('.') : text.size();
+  const std::string_view fraction = point < text.size() ? text.substr(point + 1) : std::string_view{};
+  if (fraction.size() > decimals || !to_number(text.substr(0, point), number)) return false;
+  for (unsigned i = 0; i < decimals; ++i) {
+    const char digit = i < fraction.size() ? fraction[i] : '0';
+    if (digit < '0' || digit > '9') return false;
+    number = number * 10 + (digit - '0');
+  }
+  return true;
+}
+
 /// The value of an option: a number, or one of its choices.
 constexpr bool to_value(const Option& option, std::string_view text, std::int64_t& value) {
   if (option.choices.empty()) {
-    return to_number(text, value) && value >= option.minimum && value <= option.maximum &&
+    return to_decimal(text, option.decimals, value) && value >= option.minimum && value <= option.maximum &&
            (value - option.minimum) % option.step == 0;
   }
   for (std::size_t i = 0; i < option.choices.size(); ++i) {
@@ -78,16 +113,18 @@ constexpr bool to_value(const Option& option, std::string_view text, std::int64_
 /// compile.
 struct VectorParts {
   constexpr VectorParts() = default;
-  constexpr explicit VectorParts(const VectorText& text) {
-    append(request, text.request);
-    append(reply, text.reply);
+  constexpr VectorParts(const VectorText& text, bool frames_are_texts) {
+    append(request, text.request, frames_are_texts);
+    append(reply, text.reply, frames_are_texts);
     for (std::size_t i = 1; i < error_texts.size(); ++i) {
       if (error_texts[i].name == text.fields) error = static_cast<Error>(i);
     }
     if (error != Error::none) return;
     const bool good = for_each_value(text.fields, [&](std::string_view name, std::string_view value) {
       std::int64_t number = 0;
+      double real = 0;
       if (to_number(value, number)) return fields.push_back({.field = name, .number = number});
+      if (to_real(value, real)) return fields.push_back({.field = name, .real = real});
       return fields.push_back({.field = name, .text = value});
     });
     if (!good) fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
@@ -99,7 +136,13 @@ struct VectorParts {
   Error error = Error::none;
 
  private:
-  static constexpr void append(ByteBuffer<32>& bytes, std::string_view hex) {
+  static constexpr void append(ByteBuffer<32>& bytes, std::string_view hex, bool is_text) {
+    for (std::size_t i = 0; is_text && i < hex.size(); ++i) {
+      if (!bytes.push_back(static_cast<std::uint8_t>(hex[i]))) {
+        a_frame_of_a_vector_is_hexadecimal_and_has_at_most_32_bytes();
+      }
+    }
+    if (is_text) return;
     for (std::size_t i = 0; i < hex.size(); i += 2) {
       if (i + 1 == hex.size() || hex_digit(hex[i]) < 0 || hex_digit(hex[i + 1]) < 0 ||
           !bytes.push_back(static_cast<std::uint8_t>(hex_digit(hex[i]) << 4 | hex_digit(hex[i + 1])))) {

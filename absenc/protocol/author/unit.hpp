@@ -21,30 +21,40 @@
 
 namespace absenc::author {
 
-/// `Definition` has:
+/// Shortens what a Definition that derives from it declares: `command<Found, procedure, request>({...})`.
+template <class Definition, class P>
+struct Declares {
+  using Protocol = P;
+  template <auto request>
+  [[nodiscard]] static constexpr CommandOf<P> reading(const Command& info) {
+    return author::reading<Definition, P, request>(info);
+  }
+  template <class Found, auto procedure, auto request, auto... bound>
+  [[nodiscard]] static constexpr CommandOf<P> command(const Command& info) {
+    return author::command<Definition, P, Found, procedure, request, bound...>(info);
+  }
+};
+
+/// A Definition has these, all static and constexpr:
 ///
-///   using Protocol;                                // line.hpp, device.hpp
-///   using Encoder;                                 // the virtual one: BusDevice, made of (format, shaft)
-///   static constexpr std::string_view id, name, document;
-///   static constexpr LinkKind link;
-///   static constexpr LineSettings line(const Format&);
-///   static constexpr OptionsOf options;            // option.hpp; their defaults are those of Format
-///   static constexpr std::array models;            // of ModelText
-///   static constexpr FieldsOf fields;              // field.hpp
-///   static constexpr std::array commands;          // of CommandOf, command.hpp
-///   static constexpr std::array vectors;           // of VectorText, text.hpp, or of Vector: they hold, or it does not
-///                                                  // compile
-///   static constexpr std::size_t frames_size;      // bytes of storage that the procedures' frames need at the most
-///   static constexpr Resolution resolution(const Format&);
-///   static constexpr void put(FieldSink&, const Format&, const Request&);
-///   static constexpr void put(FieldSink&, const Format&, const Request&, const Reply&);
-///   static constexpr std::size_t reply_size(const Format&, Bytes begin);    // of any reply that begins so; 0: none
-///   static constexpr Request guess_request(const Format&, Bytes reply);     // what was asked, of a reply alone
-///   static constexpr Format format(const Options&);      // left out: what the options make of it
-///   static constexpr Error decode(const Format&, Frame asked, Frame reply, FieldSink&);    // in place of P's, put and
-///                                                                                         // guess_request
-///   static constexpr Explanation explain(...);     // command.hpp; may be left out
-///   static constexpr const FieldInfo *status, *alarms;   // may be left out, as `conditions`, `timing` and `covered`
+/// - `Protocol` (line.hpp, device.hpp), and `Encoder`, the virtual one, made of (format, shaft): BusDevice
+/// - `id`, `name`, `document`, `link`
+/// - `options`: OptionsOf (option.hpp), whose defaults are those of Format; or `Format format(const Options&)`
+/// - `models`: an array of ModelText
+/// - `fields`: FieldsOf (field.hpp)
+/// - `commands`: an array of CommandOf (command.hpp)
+/// - `vectors`: an array of VectorText (text.hpp) or of Vector; they hold, or it does not compile. `frames_are_texts`:
+///   those of the texts are no hexadecimal
+/// - `frames_size`: bytes of storage that the procedures' frames need at the most
+/// - `values(format, request)`, `values(format, request, reply)`, `values(format, found)`: see put_values (command.hpp)
+/// - `Request guess_request(const Format&, Bytes reply)`: what was asked, of a reply alone; or a Result, where it
+///   may not tell
+///
+/// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
+/// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
+/// false: no virtual encoder is made; `answer_to_bad(error, reply)`, of a request that is none; `status`, `alarms`,
+/// `conditions`, `timing`, `covered`, `memory`, `probe`, `streams`, `extra_lines` as in Unit; and `decode`, `delimit`,
+/// `answered` themselves, with the parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -62,32 +72,40 @@ struct UnitOf {
   // ---- The functions of the descriptor
 
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
-    if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
+    if constexpr (requires { Definition::decode(values, asked, frame, sink); }) {
+      return Definition::decode(values, asked, frame, sink);
+    } else if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
       return Definition::decode(format(values), asked, frame, sink);
     } else {
-      return decode_reply(format(values), asked, frame, sink);
+      return decode_bytes(format(values), asked, frame, sink);
     }
   }
 
-  static constexpr Error decode_reply(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
-    Request request = Definition::guess_request(f, frame.bytes);
-    if (!asked.bytes.empty()) {
-      const Result<Request> result = P::decode_request(f, asked.bytes);
-      if (!result) return result.error();
-      request = *result;
-    } else if (frame.bytes.empty()) {
-      return Error::wrong_length;
-    }
+  static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
+    const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
+    if (!request) return request.error();
     if (frame.bytes.empty()) {
-      Definition::put(sink, f, request);
+      put_values<Definition>(sink, f, *request);
       return Error::none;
     }
-    const auto reply = P::decode(f, request, frame.bytes);
+    const auto reply = P::decode(f, *request, frame.bytes);
     if (!reply) return reply.error();
-    Definition::put(sink, f, request, *reply);
-    const Reading reading = P::reading(f, request, *reply);
+    put_values<Definition>(sink, f, *request, *reply);
+    const Reading reading = P::reading(f, *request, *reply);
     if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
     return Error::none;
+  }
+
+  static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
+    if (asked.empty()) {
+      if (reply.empty()) return Error::wrong_length;
+      return Definition::guess_request(f, reply);
+    }
+    const Result<Request> request = P::decode_request(f, asked);
+    if constexpr (requires { Definition::answer_to_bad(request.error(), reply); }) {
+      if (!request) return Definition::answer_to_bad(request.error(), reply);
+    }
+    return request;
   }
 
   static constexpr const CommandOf<P>& find(const Command& command) { return Definition::commands[command.id]; }
@@ -96,20 +114,39 @@ struct UnitOf {
                                     MutableBytes out) {
     const Format f = format(values);
     const CommandOf<P>& one = find(command);
-    if (one.request == nullptr || (one.missing != nullptr && !one.missing(f).empty())) return Error::unsupported;
-    const auto bytes = P::encode(f, one.request(f, arguments));
+    if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
+    if (one.request == nullptr) return Error::unsupported;
+    const Result<Request> request = one.request(f, arguments);
+    if (!request) return request.error();
+    const auto bytes = P::encode(f, *request);
     if (bytes.empty()) return Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
     return bytes.size();
   }
 
+  static constexpr std::size_t request_size(const Options& values, Bytes begin) {
+    if constexpr (requires { P::request_size(format(values), begin); }) {
+      return P::request_size(format(values), begin);
+    } else {
+      return P::request_size(begin);
+    }
+  }
+
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
-    if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
-    const std::size_t size =
-        direction == Direction::request ? P::request_size(bytes) : Definition::reply_size(format(values), bytes);
-    if (size == 0) return {Delimit::Kind::no_frame};
-    return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
+    if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
+      return Definition::delimit(values, direction, bytes);
+    } else {
+      if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
+      std::size_t size = P::longest_reply;
+      if (direction == Direction::request) {
+        size = request_size(values, bytes);
+      } else if constexpr (requires { Definition::reply_size(Format{}, bytes); }) {
+        size = Definition::reply_size(format(values), bytes);
+      }
+      if (size == 0) return {Delimit::Kind::no_frame};
+      return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
+    }
   }
 
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
@@ -118,20 +155,52 @@ struct UnitOf {
   }
 
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-    return make_device<typename Definition::Encoder>(storage, format(values), shaft);
+    const Format f = format(values);
+    if constexpr (requires { Definition::is_usable(f); }) {
+      if (!Definition::is_usable(f)) return {};
+    }
+    return make_device<typename Definition::Encoder>(storage, f, shaft);
   }
 
-  static constexpr Resolution resolution(const Options& values) { return Definition::resolution(format(values)); }
-  static constexpr LineSettings settings(const Options& values) { return Definition::line(format(values)); }
+  static constexpr Resolution resolution(const Options& values) {
+    if constexpr (requires { Definition::resolution(Format{}); }) {
+      return Definition::resolution(format(values));
+    } else {
+      return format(values).resolution();
+    }
+  }
+  static constexpr LineSettings line_of(const Format& f) {
+    if constexpr (requires { Definition::line(f); }) {
+      return Definition::line(f);
+    } else {
+      return f.line();
+    }
+  }
+  static constexpr LineSettings settings(const Options& values) { return line_of(format(values)); }
 
   static bool answered(const Options& values, Frame asked) {
-    const Format f = format(values);
-    const Result<Request> request = P::decode_request(f, asked.bytes);
-    return !request || P::reply_size(f, *request) != 0;
+    if constexpr (requires { Definition::answered(values, asked); }) {
+      return Definition::answered(values, asked);
+    } else {
+      const Format f = format(values);
+      const Result<Request> request = P::decode_request(f, items(asked));
+      if (!request) return true;
+      const Manner manner = P::manner(f, *request);
+      return manner.answered && !manner.any_reply;
+    }
+  }
+
+  // As the links of the protocol carry it.
+  static constexpr std::span<const ItemOf<P>> items(const Frame& frame) {
+    if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
+      return {frame.can, frame.can != nullptr ? 1u : 0u};
+    } else {
+      return frame.bytes;
+    }
   }
 
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
-    return Definition::explain(format(values), error, asked.bytes, reply.bytes);
+    return Definition::explain(format(values), error, items(asked), items(reply));
   }
 
   // ---- Its tables
@@ -146,13 +215,14 @@ struct UnitOf {
   }();
 
   static constexpr std::size_t host_storage = [] {
-    std::size_t most = sizeof(Refusal<std::uint8_t>);
+    std::size_t most = sizeof(Refusal<ItemOf<P>>);
     for (const CommandOf<P>& one : Definition::commands) most = std::max(most, one.size);
     return most + Definition::frames_size;
   }();
 
   static constexpr auto model_values = [] {
-    std::array<Buffer<OptionValue, maximum_options>, Definition::models.size()> made{};
+    // Without {}: g++ 12 refuses it where no model has a value.
+    std::array<Buffer<OptionValue, maximum_options>, Definition::models.size()> made;
     for (std::size_t i = 0; i < made.size(); ++i) {
       const bool good = for_each_value(Definition::models[i].values, [&](std::string_view name, std::string_view text) {
         const std::size_t option = Definition::options.find(name);
@@ -169,26 +239,24 @@ struct UnitOf {
     for (std::size_t i = 0; i < made.size(); ++i) {
       const ModelText& text = Definition::models[i];
       made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
-      if (!text.values.empty()) made[i].values = model_values[i].view();  // g++ 12 cannot look into an empty one
+      if (!text.values.empty()) made[i].values = model_values[i].view();  // g++ 12 cannot view an empty one
     }
     return made;
   }();
 
-  static constexpr bool vectors_are_texts =
-      std::is_same_v<typename decltype(Definition::vectors)::value_type, VectorText>;
+  static constexpr bool has_texts = std::is_same_v<std::remove_cvref_t<decltype(Definition::vectors[0])>, VectorText>;
   static constexpr auto vector_parts = [] {
-    if constexpr (vectors_are_texts) {
-      std::array<VectorParts, Definition::vectors.size()> made{};
-      for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i]);
-      return made;
-    } else {
-      return 0;
+    std::array<VectorParts, has_texts ? Definition::vectors.size() : 0> made{};
+    if constexpr (has_texts) {
+      const bool are_texts = requires { Definition::frames_are_texts; };
+      for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i], are_texts);
     }
+    return made;
   }();
   static constexpr auto vectors = [] {
-    std::array<Vector, Definition::vectors.size()> made{};
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      if constexpr (vectors_are_texts) {
+    if constexpr (has_texts) {
+      std::array<Vector, Definition::vectors.size()> made{};
+      for (std::size_t i = 0; i < made.size(); ++i) {
         const VectorText& text = Definition::vectors[i];
         const VectorParts& parts = vector_parts[i];
         made[i] = {text.id,
@@ -199,26 +267,56 @@ struct UnitOf {
                    parts.reply.view(),
                    parts.fields.view(),
                    parts.error};
-      } else {
-        made[i] = Definition::vectors[i];
       }
+      return made;
+    } else {
+      return Definition::vectors;
     }
-    return made;
   }();
 
-  static constexpr bool holds(const Vector& vector) {
-    Options values;
+  static constexpr Error decode_vector(const Options& values, const Vector& vector, FieldSink& sink) {
+    if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
+      const CanFrame request = can_frame_of_text(vector.request);
+      const CanFrame reply = can_frame_of_text(vector.reply);
+      return decode(values, {.can = vector.request.empty() ? nullptr : &request},
+                    {.can = vector.reply.empty() ? nullptr : &reply}, sink);
+    } else {
+      return decode(values, {.bytes = vector.request}, {.bytes = vector.reply}, sink);
+    }
+  }
+
+  // Whether the text is understood. Without model: the defaults.
+  static constexpr bool resolve(std::string_view text, const Model* model, Options& values) {
     for (std::size_t i = 0; i < Definition::options.infos.size(); ++i) {
       values.values[i] = Definition::options.infos[i].default_value;
     }
-    const bool known = for_each_value(vector.options, [&](std::string_view name, std::string_view text) {
+    if (model != nullptr) {
+      for (const OptionValue& one : model->values) values.values[one.option] = one.value;
+    }
+    return for_each_value(text, [&](std::string_view name, std::string_view value) {
       const std::size_t option = Definition::options.find(name);
       return option < Definition::options.infos.size() &&
-             to_value(Definition::options.infos[option], text, values.values[option]);
+             to_value(Definition::options.infos[option], value, values.values[option]);
     });
+  }
+  static constexpr bool agrees(const Model& model, const Options& values) {
+    return std::all_of(model.values.begin(), model.values.end(),
+                       [&](const OptionValue& one) { return values.values[one.option] == one.value; });
+  }
+
+  static constexpr bool holds(const Vector& vector) {
+    Options values;
+    bool known = resolve(vector.options, nullptr, values);
+    // The first model that agrees with what is said, as resolve_options has it.
+    for (const Model& model : models) {
+      Options of_model;
+      known = known && resolve(vector.options, &model, of_model);
+      if (!agrees(model, of_model)) continue;
+      values = of_model;
+      break;
+    }
     VectorCheck check(vector.fields);
-    return known && decode(values, {.bytes = vector.request}, {.bytes = vector.reply}, check) == vector.error &&
-           check.all();
+    return known && decode_vector(values, vector, check) == vector.error && check.all();
   }
   static_assert(std::all_of(vectors.begin(), vectors.end(), holds), "a vector does not decode to what it says");
 
@@ -227,7 +325,7 @@ struct UnitOf {
               .name = Definition::name,
               .document = Definition::document,
               .link = Definition::link,
-              .line = Definition::line(Format{}),
+              .line = line_of(Format{}),
               .options = Definition::options.infos,
               .models = models,
               .fields = Definition::fields.infos,
@@ -244,13 +342,22 @@ struct UnitOf {
               .device = device,
               .resolution = resolution,
               .settings = settings};
-    if constexpr (requires { P::reply_size(Format{}, Request{}); }) unit.answered = answered;
+    if constexpr (
+        requires { P::reply_size(Format{}, Request{}); } || requires { &Definition::answered; }) {
+      unit.answered = answered;
+    }
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
+    if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
     if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
     if constexpr (requires { Definition::covered; }) unit.covered = Definition::covered;
-    if constexpr (requires { Definition::explain(Format{}, Error::none, Bytes{}, Bytes{}); }) unit.explain = explain;
+    if constexpr (requires { Definition::probe; }) unit.probe = Definition::probe;
+    if constexpr (requires { Definition::streams; }) unit.streams = Definition::streams;
+    if constexpr (requires { Definition::extra_lines; }) unit.extra_lines = Definition::extra_lines;
+    if constexpr (requires { Definition::explain(Format{}, Error::none, items({}), items({})); }) {
+      unit.explain = explain;
+    }
     return unit;
   }
 };

@@ -14,9 +14,8 @@ namespace absenc::biss {
 using namespace std::chrono_literals;
 
 inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
-inline constexpr Time shortest_period = 100ns;     // of MA: 10 MHz
-inline constexpr Time timeout_minimum = 12'500ns;  // SLO stays low so long after the last clock
-inline constexpr Time timeout_maximum = 40us;      // the host clocks no earlier
+inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
+inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
 
 /// ACK bits of an encoder that needs `latency` from the second rising edge of MA until its position is ready.
 [[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
@@ -26,12 +25,6 @@ inline constexpr Time timeout_maximum = 40us;      // the host clocks no earlier
 /// Clocks that a whole frame needs.
 [[nodiscard]] constexpr unsigned clocks(const Format& format, Time latency, Time period) {
   return idle_bits + ack_bits(latency, period) + 2 + data_bits(format);
-}
-
-/// The longest ACK with which a frame still fits into so many samples; 0: none does.
-[[nodiscard]] constexpr unsigned longest_ack(const Format& format, unsigned samples) {
-  const unsigned rest = idle_bits + 2 + data_bits(format);
-  return samples > rest ? samples - rest : 0;
 }
 
 }  // namespace absenc::biss

@@ -35,8 +35,7 @@ Explanation explain_samples(const Format& format, Error error, Bytes reply) {
     case Error::cross_check_failed:
       return {"the bits behind the word are not what after_word says", "check the number of bits"};
     case Error::wrong_length:
-      return {"the interface answers with 16 hexadecimal digits and CR",
-              "check that it is an E201-9S and does not stream (stream-off)"};
+      return {"the interface answers with 16 hexadecimal digits and CR", check_stream};
     default:
       return {};
   }
@@ -44,14 +43,13 @@ Explanation explain_samples(const Format& format, Error error, Bytes reply) {
 
 }  // namespace
 
-Explanation explain(const Format& format, Error error, std::uint8_t letter, Bytes reply) {
-  if (letter == command::samples) return explain_samples(format, error, reply);
+Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {
+  if (request.empty() || request[0] == letter::samples) return explain_samples(format, error, reply);
   switch (error) {
     case Error::timeout:
       return {"the interface is silent", "check that it is an E201-9S"};
     case Error::wrong_length:
-      return {"the interface answers with a line that ends with CR",
-              "check that it is an E201-9S and does not stream (stream-off)"};
+      return {"the interface answers with a line that ends with CR", check_stream};
     case Error::bad_framing:
       return {"this is no answer to that command", "check that it is an E201-9S"};
     default:

@@ -2,14 +2,14 @@
 // What is wrong with a reply in words, and what the E201-9S document says to do about it.
 #pragma once
 
-#include <cstdint>
-
 #include "absenc/protocol/conversation.hpp"
 #include "absenc/protocol/e201/frame.hpp"
 
 namespace absenc::e201 {
 
-/// `reply` to the command `letter`, which the checks of frame.hpp refuse with `error`, or nothing (timeout).
-[[nodiscard]] Explanation explain(const Format& format, Error error, std::uint8_t letter, Bytes reply);
+inline constexpr std::string_view check_stream = "check that it is an E201-9S and does not stream (stream-off)";
+
+/// `reply` to `request`, which Protocol::decode refuses with `error`, or nothing (timeout).
+[[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
 }  // namespace absenc::e201

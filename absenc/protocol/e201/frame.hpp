@@ -1,22 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // RLS E201-9S USB interface: one-letter commands and the ASCII that answers them. README.md lists them and says where
-// each comes from. What no document describes is read as leniently as possible.
+// each comes from. What no document describes is read as leniently as possible: text.hpp.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string_view>
 
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/hex.hpp"
 #include "absenc/core/text.hpp"
+#include "absenc/protocol/author/line.hpp"
 #include "absenc/protocol/biss/frame.hpp"
+#include "absenc/protocol/e201/text.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
+#include "absenc/protocol/word_options.hpp"
 
 namespace absenc::e201 {
 
-namespace command {
+using namespace std::chrono_literals;
+
+namespace letter {
 inline constexpr std::uint8_t samples = '4';
 inline constexpr std::uint8_t version = 'v';
 inline constexpr std::uint8_t serial = 's';
@@ -24,63 +28,103 @@ inline constexpr std::uint8_t supply = 'e';
 inline constexpr std::uint8_t supply_on = 'n';
 inline constexpr std::uint8_t supply_off = 'f';
 inline constexpr std::uint8_t decimal = '?';
-inline constexpr std::uint8_t hexadecimal = '>';
 inline constexpr std::uint8_t zero = 'z';
 inline constexpr std::uint8_t clear_zero = 'a';
 inline constexpr std::uint8_t stream_off = '0';
-inline constexpr std::uint8_t stream_on = '1';
 inline constexpr std::uint8_t set_clock = 'M';
 inline constexpr std::uint8_t clock = 'm';
-inline constexpr std::uint8_t set_width = 'B';
 inline constexpr std::uint8_t width = 'b';
-inline constexpr std::string_view all = "4vsenf?>za01MmBb";
-[[nodiscard]] constexpr bool is_known(std::uint8_t letter) {
-  return index_of(all, static_cast<char>(letter)) < all.size();
+inline constexpr std::string_view all = "4vse?mbnfza0M";
+inline constexpr std::string_view answered_by_a_line = "vse?mb";
+
+[[nodiscard]] constexpr bool is_in(std::string_view letters, std::uint8_t one) {
+  return index_of(letters, static_cast<char>(one)) < letters.size();
 }
-}  // namespace command
+}  // namespace letter
 
-/// What M1 to M8 make MA, kHz.
-inline constexpr std::array<std::uint16_t, 8> clocks_khz{35, 70, 140, 280, 560, 1100, 2200, 4400};
-
-inline constexpr char end_of_line = '\r';
 inline constexpr std::size_t sample_bits = 64;
 inline constexpr std::size_t samples_length = 17;  // 16 hexadecimal digits and CR
-inline constexpr std::size_t request_capacity = 4;
-inline constexpr std::size_t reply_capacity = 64;
-using RequestText = ByteBuffer<request_capacity>;
-using ReplyText = ByteBuffer<reply_capacity>;
 
-/// What is behind the adapter.
+// ---- Times. No document gives any: the interface clocks 64 bits and answers as fast as USB does.
+
+/// A virtual COM port: the rate means nothing to the interface.
+inline constexpr LineSettings line_settings{.rate = 115'200};
+
+inline constexpr Time answer_limit = 50ms;  // 64 clocks at 35 kHz are 1.8 ms
+inline constexpr Time gap_limit = 20ms;     // within a reply
+inline constexpr Time reply_limit = 100ms;  // a reply is over then, whatever still comes
+inline constexpr Time silent_limit = 10ms;  // a command that may have no reply has none
+inline constexpr Time supply_time = 200ms;  // until the encoder is up, or the supply down, after `n` and `f`
+
+/// One period of MA at clock 1 to 8.
+[[nodiscard]] constexpr Time clock_period(unsigned clock) {
+  return LineSettings{.rate = clocks_khz[clock - 1] * 1000u}.bits(1);
+}
+
+// ---- What the samples carry
+
+/// What is behind the interface.
 enum class Carries : std::uint8_t { biss, ssi };
 
 struct Format {
+  WordFormat word = biss::Format{}.word;
+  Scale scale{};
   Carries carries = Carries::biss;
-  biss::Format biss{};
-  ssi::Format ssi{};
+  ssi::AfterWord after_word = ssi::AfterWord::repeat;
+  // Of the virtual interface and its encoder.
+  Version firmware{1, 16};
+  Time latency = 10us;
+  Time line_delay{};
 
-  [[nodiscard]] constexpr const WordFormat& word() const { return carries == Carries::biss ? biss.word : ssi.word; }
-  [[nodiscard]] constexpr const Scale& scale() const { return carries == Carries::biss ? biss.scale : ssi.scale; }
+  [[nodiscard]] constexpr biss::Format biss() const { return {.word = word, .scale = scale}; }
+  [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
 };
 
-/// `value` for set_clock (1 to 8) and set_width (0 to 99).
-[[nodiscard]] constexpr RequestText encode_request(std::uint8_t letter, unsigned value = 0) {
-  RequestText text;
-  text.push_back(letter);
-  if (letter == command::set_width) text.push_back(static_cast<std::uint8_t>('0' + value / 10 % 10));
-  if (letter != command::set_width && letter != command::set_clock) return text;
-  text.push_back(static_cast<std::uint8_t>('0' + value % 10));
-  text.push_back(end_of_line);
-  return text;
+/// Whether the word fits into the samples: of BiSS with the shortest ACK.
+[[nodiscard]] constexpr bool fits(const Format& format) {
+  const bool is_biss = format.carries == Carries::biss;
+  return is_usable(format.word) &&
+         (is_biss ? biss::idle_bits + 3 + biss::data_bits(format.biss()) : 1 + format.word.bits()) <= sample_bits;
 }
 
-[[nodiscard]] constexpr ReplyText encode_samples(std::uint64_t samples) {
-  ReplyText text;
-  for (unsigned i = 64; i > 0; i -= 4) {
-    text.push_back(static_cast<std::uint8_t>("0123456789abcdef"[samples >> (i - 4) & 0xF]));
+struct Position {
+  unsigned ack_bits = 0;  // BiSS
+  std::uint16_t crc = 0;  // BiSS
+  Word word{};
+};
+
+/// Errors: invalid_argument (the word does not fit), line_stuck (all samples alike), bad_framing (not 110 at the
+/// beginning, no start bit, CDS is 1), truncated (the frame goes on behind the samples), bad_checksum; of SSI
+/// bad_framing (the line is not idle before the word) and those of ssi::decode_clocked_on.
+[[nodiscard]] constexpr Result<Position> decode_position(const Format& format, std::uint64_t samples) {
+  if (!fits(format)) return Error::invalid_argument;
+  if (samples == 0 || samples == ~std::uint64_t{0}) return Error::line_stuck;
+  std::array<std::uint8_t, 8> bytes{};
+  store_big_endian(bytes, samples);
+  const BitView bits{bytes, sample_bits};
+  if (format.carries == Carries::ssi) {
+    // The first sample is before the first rising edge, which shifts out the MSB; the encoder is clocked on.
+    if (!bits[0]) return Error::bad_framing;
+    const Result<Word> word = ssi::decode_clocked_on(format.ssi(), bits, 1);
+    return word ? Result(Position{.word = *word}) : word.error();
   }
-  text.push_back(end_of_line);
-  return text;
+  if (bits.load(0, 3) != 0b110) return Error::bad_framing;  // SLO goes low on the second rising edge
+  const Result<biss::Reply> reply = biss::decode(format.biss(), bits);
+  return reply ? Result(Position{reply->ack_bits, reply->crc, reply->word}) : reply.error();
 }
+
+// ---- Commands and replies
+
+struct Request {
+  std::uint8_t letter = letter::samples;
+  unsigned clock = 0;  // set_clock: 1 to 8
+};
+
+struct Reply {
+  std::uint64_t samples = 0;
+  std::int64_t number = 0;  // ? m b
+  Text text{};              // of a line, without what is around it
+};
 
 /// Errors: wrong_length (not 16 characters and CR), bad_framing (not hexadecimal).
 [[nodiscard]] constexpr Result<std::uint64_t> decode_samples(Bytes reply) {
@@ -94,147 +138,84 @@ struct Format {
   return samples;
 }
 
-struct Position {
-  unsigned ack_bits = 0;  // BiSS
-  std::uint16_t crc = 0;  // BiSS
-  std::uint8_t life_counter = 0;
-  Word word{};
-};
-
-namespace detail {
-
-[[nodiscard]] constexpr Result<Position> decode_biss(const Format& format, BitView samples) {
-  if (samples.load(0, 3) != 0b110) return Error::bad_framing;  // SLO goes low on the second rising edge
-  const Result<biss::Reply> reply = biss::decode(format.biss, samples);
-  if (!reply) return reply.error();
-  return Position{reply->ack_bits, reply->crc, reply->life_counter, reply->word};
-}
-
-// The first sample is before the first rising edge, which shifts out the MSB; the encoder is clocked on.
-[[nodiscard]] constexpr Result<Position> decode_ssi(const Format& format, BitView samples) {
-  if (!samples[0]) return Error::bad_framing;
-  if (format.ssi.word.bits() > sample_bits - 1) return Error::truncated;
-  const Result<Word> word = ssi::decode_clocked_on(format.ssi, samples, 1);
-  if (!word) return word.error();
-  return Position{.word = *word};
-}
-
-}  // namespace detail
-
-/// The reply to `4`. Errors, besides those of decode_samples: line_stuck (all samples alike), bad_framing (not 110 at
-/// the beginning, no start bit, CDS is 1), truncated (the frame goes on behind the samples), bad_checksum; of SSI those
-/// of ssi::decode_clocked_on.
-[[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes reply) {
-  const Result<std::uint64_t> samples = decode_samples(reply);
-  if (!samples) return samples.error();
-  if (*samples == 0 || *samples == ~std::uint64_t{0}) return Error::line_stuck;
-  std::array<std::uint8_t, 8> bytes{};
-  store_big_endian(bytes, *samples);
-  const BitView bits{bytes, sample_bits};
-  return format.carries == Carries::biss ? detail::decode_biss(format, bits) : detail::decode_ssi(format, bits);
-}
-
-// ---- Texts that no document describes
-
-/// Without the CR, spaces and LF around it.
-[[nodiscard]] constexpr Bytes trimmed(Bytes text) {
-  const auto blank = [](std::uint8_t c) { return c == ' ' || c == '\r' || c == '\n' || c == '\t'; };
-  while (!text.empty() && blank(text.front())) text = text.subspan(1);
-  while (!text.empty() && blank(text.back())) text = text.first(text.size() - 1);
-  return text;
-}
-
-struct Version {
-  unsigned major;
-  unsigned minor;
-};
-
-/// `4` exists since then (E201-9S document).
-[[nodiscard]] constexpr bool has_samples(Version version) {
-  return version.major > 1 || (version.major == 1 && version.minor >= 16);
-}
-
-namespace detail {
-
-constexpr bool is_digit(std::uint8_t c) { return c >= '0' && c <= '9'; }
-
-// Digits from `at` on, at most 9 of them; `at` is moved behind.
-constexpr unsigned number_at(Bytes text, std::size_t& at) {
-  unsigned number = 0;
-  for (unsigned digits = 0; at < text.size() && is_digit(text[at]) && digits < 9; ++at, ++digits) {
-    number = number * 10 + static_cast<unsigned>(text[at] - '0');
-  }
-  return number;
-}
-
-constexpr bool skip_to_digit(Bytes text, std::size_t& at) {
-  while (at < text.size() && !is_digit(text[at])) ++at;
-  return at < text.size();
-}
-
-}  // namespace detail
-
-/// The first two numbers with a point between them, wherever they stand.
-[[nodiscard]] constexpr std::optional<Version> find_version(Bytes text) {
-  for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
-    const unsigned major = detail::number_at(text, at);
-    if (at + 1 >= text.size() || text[at] != '.' || !detail::is_digit(text[at + 1])) continue;
-    return Version{major, detail::number_at(text, ++at)};
-  }
-  return std::nullopt;
-}
-
-/// The first whole number; nothing when there is none.
-[[nodiscard]] constexpr std::optional<unsigned> find_number(Bytes text) {
-  std::size_t at = 0;
-  if (!detail::skip_to_digit(text, at)) return std::nullopt;
-  return detail::number_at(text, at);
-}
-
-/// The reply to `m`: 1 to 8, or the clock itself in kHz.
-[[nodiscard]] constexpr std::optional<unsigned> find_clock(Bytes text) {
-  const std::optional<unsigned> number = find_number(text);
-  if (!number) return std::nullopt;
-  if (*number >= 1 && *number <= clocks_khz.size()) return number;
-  for (unsigned i = 0; i < clocks_khz.size(); ++i) {
-    if (clocks_khz[i] == *number) return i + 1;
-  }
-  return std::nullopt;
-}
-
-/// Thousandths of the first number that is followed by `unit` (V or A) or by m and `unit`.
-[[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, std::uint8_t unit) {
-  for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
-    std::uint64_t milli = std::uint64_t{detail::number_at(text, at)} * 1000;
-    if (at < text.size() && text[at] == '.') {
-      unsigned weight = 100;
-      for (++at; at < text.size() && detail::is_digit(text[at]); ++at, weight /= 10) {
-        milli += weight * static_cast<unsigned>(text[at] - '0');
-      }
-    }
-    std::size_t after = at;
-    while (after < text.size() && text[after] == ' ') ++after;
-    const bool thousandths = after + 1 < text.size() && text[after] == 'm' && text[after + 1] == unit;
-    if (thousandths) return static_cast<unsigned>(milli / 1000);
-    if (after < text.size() && text[after] == unit) return static_cast<unsigned>(milli);
-  }
-  return std::nullopt;
-}
-
-/// The reply to `?` (base 10, with sign) or `>` (base 16): the digits of the text. Error: bad_framing.
-[[nodiscard]] constexpr Result<std::int64_t> decode_number(Bytes text, unsigned base) {
-  text = trimmed(text);
-  const bool negative = !text.empty() && text[0] == '-';
-  if (!text.empty() && (text[0] == '-' || text[0] == '+')) text = text.subspan(1);
-  if (text.empty() || text.size() > 20) return Error::bad_framing;
-  std::uint64_t number = 0;
+/// A reply of one line. Errors: wrong_length (no such line, or more), bad_framing (no answer to that command).
+[[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
+  const std::size_t end = end_of_first_line(bytes);
+  const Bytes text = trimmed(bytes.first(end));
+  if (end == 0 || text.empty() || !trimmed(bytes.subspan(end)).empty()) return Error::wrong_length;
   for (const std::uint8_t c : text) {
-    const int digit = hex_digit(static_cast<char>(c));
-    if (digit < 0 || static_cast<unsigned>(digit) >= base) return Error::bad_framing;
-    if (number > (~std::uint64_t{0} - static_cast<unsigned>(digit)) / base) return Error::bad_framing;
-    number = number * base + static_cast<unsigned>(digit);
+    if (c < 0x20 || c > 0x7E) return Error::bad_framing;
   }
-  return static_cast<std::int64_t>(negative ? 0 - number : number);
+  Result<std::int64_t> number = std::int64_t{0};
+  if (asked == letter::decimal) number = decode_number(text);
+  if (asked == letter::clock) number = find_clock(text);
+  if (asked == letter::width) number = find_number(text);
+  if (!number) return number.error();
+  Reply reply{.number = *number};
+  if (!reply.text.append(text)) return Error::wrong_length;
+  return reply;
 }
+
+/// author/line.hpp says what each of these is.
+struct Protocol {
+  using Format = e201::Format;
+  using Request = e201::Request;
+  using Reply = e201::Reply;
+  static constexpr std::size_t longest_reply = 32;  // nobody says how long a line may be: three times that is kept
+
+  static constexpr author::Wire wire(const Format&) {
+    return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
+  }
+  static constexpr author::Manner manner(const Format&, const Request& request) {
+    if (request.letter == letter::samples || letter::is_in(letter::answered_by_a_line, request.letter)) return {};
+    return {.any_reply = true, .answer_limit = silent_limit};
+  }
+  /// Nothing of a clock that there is not.
+  static constexpr ByteBuffer<3> encode(const Format&, const Request& request) {
+    ByteBuffer<3> text;
+    const bool is_clock = request.letter == letter::set_clock;
+    if (is_clock && (request.clock < 1 || request.clock > clocks_khz.size())) return text;
+    text.push_back(request.letter);
+    if (is_clock) text.push_back(static_cast<std::uint8_t>('0' + request.clock));
+    if (is_clock) text.push_back(end_of_line);
+    return text;
+  }
+  static constexpr std::size_t request_size(Bytes begin) {
+    if (!letter::is_in(letter::all, begin[0])) return 0;
+    return begin[0] == letter::set_clock ? 3 : 1;
+  }
+  /// With its CR or without. Errors: unsupported (no such letter), wrong_length, out_of_range (no such clock).
+  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
+    const Bytes text = trimmed(bytes);
+    if (text.empty()) return Error::wrong_length;
+    if (!letter::is_in(letter::all, text[0])) return Error::unsupported;
+    const bool is_clock = text[0] == letter::set_clock;
+    if (text.size() != (is_clock ? 2 : 1) || (is_clock && !is_digit(text[1]))) return Error::wrong_length;
+    const auto clock = static_cast<unsigned>(is_clock ? text[1] - '0' : 0);
+    if (is_clock && (clock < 1 || clock > clocks_khz.size())) return Error::out_of_range;
+    return Request{text[0], clock};
+  }
+  static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
+    if (request.letter == letter::samples) return samples_length;
+    return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
+  }
+  /// What has its CR where it belongs is whole, whatever it says.
+  static constexpr bool is_whole(Error error) { return error != Error::wrong_length; }
+  /// Errors: timeout; those of decode_samples and decode_position, or of decode_line; unsupported (no document says
+  /// what this one answers).
+  static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
+    if (bytes.empty()) return Error::timeout;
+    if (letter::is_in(letter::answered_by_a_line, request.letter)) return decode_line(request.letter, bytes);
+    if (request.letter != letter::samples) return Error::unsupported;
+    const Result<std::uint64_t> samples = decode_samples(bytes);
+    if (!samples) return samples.error();
+    const Error error = decode_position(format, *samples).error();
+    return error == Error::none ? Result(Reply{.samples = *samples}) : error;
+  }
+  static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
+    if (request.letter != letter::samples) return {};
+    return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);
+  }
+};
 
 }  // namespace absenc::e201

@@ -1,86 +1,138 @@
 // SPDX-License-Identifier: Apache-2.0
+// Frames and texts that no vector has.
 #include "absenc/protocol/e201/frame.hpp"
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <string>
-
-#include "absenc/protocol/e201/bench_test.hpp"
-#include "absenc/protocol/e201/fields.hpp"
 
 namespace absenc::e201 {
 namespace {
 
 Bytes bytes(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
 
-Error error_of(std::string_view reply, const Format& format = testing::biss_format({.position = 19})) {
-  return decode_position(format, bytes(reply)).error();
+std::string name(Error error) { return std::string(text_of(error).name); }
+
+Result<Reply> decode(std::uint8_t letter, std::string_view reply, const Format& format = {}) {
+  return Protocol::decode(format, {letter}, bytes(reply));
 }
 
+Format ssi_format(const WordFormat& word, ssi::AfterWord after = ssi::AfterWord::repeat) {
+  return {.word = word, .carries = Carries::ssi, .after_word = after};
+}
+
+WordFormat position_of(unsigned bits) { return biss::word_with_status({.position = bits}); }
+
 TEST(E201Frame, FailuresAreToldApart) {
-  EXPECT_EQ(error_of("c0014328ff300000\r"), Error::none);
-  EXPECT_EQ(error_of("C0014328FF300000\r"), Error::none);
-  EXPECT_EQ(error_of("c0014328ff300000"), Error::wrong_length);
-  EXPECT_EQ(error_of("c0014328ff300000\n"), Error::wrong_length);
-  EXPECT_EQ(error_of("c0014328ff3000000\r"), Error::wrong_length);
-  EXPECT_EQ(error_of("c0014328ff300000\r\n"), Error::wrong_length);
-  EXPECT_EQ(error_of(""), Error::wrong_length);
-  EXPECT_EQ(error_of("c0014328ff30000g\r"), Error::bad_framing);
-  EXPECT_EQ(error_of("c0014328ff3000\r0\r"), Error::bad_framing);
-  EXPECT_EQ(error_of("0000000000000000\r"), Error::line_stuck);
-  EXPECT_EQ(error_of("ffffffffffffffff\r"), Error::line_stuck);
-  EXPECT_EQ(error_of("80014328ff300000\r"), Error::bad_framing);  // 100
-  EXPECT_EQ(error_of("40014328ff300000\r"), Error::bad_framing);  // 010
-  EXPECT_EQ(error_of("e0014328ff300000\r"), Error::bad_framing);  // 111
-  EXPECT_EQ(error_of("c000000000000000\r"), Error::bad_framing);  // no start bit
-  EXPECT_EQ(error_of("c001c328ff300000\r"), Error::bad_framing);  // CDS
-  EXPECT_EQ(error_of("c000000000000001\r"), Error::truncated);
-  EXPECT_EQ(error_of("c000000000000002\r"), Error::truncated);
-  EXPECT_EQ(error_of("c000000000000003\r"), Error::bad_framing);  // CDS, and truncated
-  EXPECT_EQ(error_of("c0014328ff310000\r"), Error::none);         // behind the CRC
-  EXPECT_EQ(error_of("c0014328fe300000\r"), Error::bad_checksum);
+  for (const auto& [reply, error] : std::to_array<std::pair<std::string_view, Error>>({
+           {"c0014328ff300000\n", Error::wrong_length},    // LF for CR
+           {"c0014328ff3000000\r", Error::wrong_length},   // one more
+           {"c0014328ff300000\r\n", Error::wrong_length},  // one behind
+           {"c0014328ff3000\r0\r", Error::bad_framing},    // a CR among the digits
+           {"80014328ff300000\r", Error::bad_framing},     // 100
+           {"c000000000000002\r", Error::truncated},       // the CDS is the last sample
+           {"c000000000000003\r", Error::bad_framing},     // CDS, and truncated
+           {"c0014328ff310000\r", Error::none},            // behind the CRC
+           {"c0014328fe300000\r", Error::bad_checksum},
+           {"", Error::timeout},
+       })) {
+    EXPECT_EQ(name(decode('4', reply).error()), name(error)) << reply;
+  }
 }
 
 TEST(E201Frame, TheLongestAckThatFits) {
   for (unsigned bits = 1; bits <= 51; ++bits) {
-    const Format format = testing::biss_format({.position = bits});
+    const Format format{.word = position_of(bits)};
     const unsigned longest = 64 - 4 - (bits + 8);
-    EXPECT_EQ(biss::longest_ack(format.biss, 64), longest);
     for (const unsigned ack : {1u, longest, longest + 1}) {
       BitBuffer<128> samples;
-      ASSERT_TRUE(biss::encode(format.biss, {.ack_bits = ack, .word = {.position = low_mask(bits)}}, samples));
+      ASSERT_TRUE(biss::encode(format.biss(), {.ack_bits = ack, .word = {.position = low_mask(bits)}}, samples));
       while (samples.size() < 64) samples.append(0, 1);
-      const ReplyText reply = encode_samples(samples.view().load(0, 64));
-      const Result<Position> position = decode_position(format, reply);
-      EXPECT_EQ(position.error(), ack > longest ? Error::truncated : Error::none) << bits << ' ' << ack;
+      const Result<Position> position = decode_position(format, samples.view().load(0, 64));
+      EXPECT_EQ(name(position.error()), name(ack > longest ? Error::truncated : Error::none)) << bits << ' ' << ack;
       EXPECT_EQ(position.value_or({}).word.position, ack > longest ? 0 : low_mask(bits));
     }
   }
 }
 
+TEST(E201Frame, TheWidestWordThatFits) {
+  EXPECT_TRUE(fits({.word = position_of(51)}));
+  EXPECT_FALSE(fits({.word = position_of(52)}));
+  EXPECT_TRUE(fits(ssi_format("position:63"_word)));
+  EXPECT_FALSE(fits(ssi_format("position:63 error:1"_word)));
+  EXPECT_FALSE(fits({.word = WordFormat{}}));
+  EXPECT_EQ(name(decode('4', "0000000000000000\r", {.word = position_of(52)}).error()), "invalid_argument");
+}
+
 TEST(E201Frame, AnSsiWordFollowsTheFirstSample) {
   for (const ssi::AfterWord after : {ssi::AfterWord::repeat, ssi::AfterWord::zero, ssi::AfterWord::one}) {
-    const Format format = testing::ssi_format(after);
+    const Format format = ssi_format("multiturn:12 position:13 gray"_word, after);
     const Word word{.position = 0x1234, .multiturn = 0xABC};
     BitBuffer<64> samples;
     samples.append(1, 1);
-    ASSERT_TRUE(ssi::encode(format.ssi, word, 63, samples));
+    ASSERT_TRUE(ssi::encode(format.ssi(), word, 63, samples));
     const std::uint64_t number = samples.view().load(0, 64);
-    ASSERT_TRUE(decode_position(format, encode_samples(number)));
-    EXPECT_EQ(decode_position(format, encode_samples(number))->word, word);
-    EXPECT_EQ(decode_position(format, encode_samples(number ^ 1)).error(), Error::cross_check_failed);
-    EXPECT_EQ(decode_position(format, encode_samples(number & ~(std::uint64_t{1} << 63))).error(), Error::bad_framing);
+    ASSERT_TRUE(decode_position(format, number));
+    EXPECT_EQ(decode_position(format, number)->word, word);
+    EXPECT_EQ(name(decode_position(format, number ^ 1).error()), "cross_check_failed");
+    EXPECT_EQ(name(decode_position(format, number & ~(std::uint64_t{1} << 63)).error()), "bad_framing");
   }
 }
 
 TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
-  const auto text = [](const RequestText& request) {
-    return std::string(request.view().begin(), request.view().end());
-  };
-  EXPECT_EQ(text(encode_request('4')), "4");
-  EXPECT_EQ(text(encode_request('M', 8)), "M8\r");
-  EXPECT_EQ(text(encode_request('B', 26)), "B26\r");
-  EXPECT_EQ(text(encode_request('B', 5)), "B05\r");
+  for (const auto& [request, text] : std::to_array<std::pair<Request, std::string_view>>(
+           {{{'4'}, "4"}, {{'M', 1}, "M1\r"}, {{'M', 8}, "M8\r"}, {{'M', 0}, ""}, {{'M', 9}, ""}, {{'b'}, "b"}})) {
+    const ByteBuffer<3> encoded = Protocol::encode({}, request);
+    EXPECT_EQ(std::string(encoded.view().begin(), encoded.view().end()), text);
+    if (text.empty()) continue;
+    EXPECT_EQ(Protocol::request_size(bytes(text)), text.size());
+    const Result<Request> decoded = Protocol::decode_request({}, encoded);
+    ASSERT_TRUE(decoded) << text;
+    EXPECT_EQ(decoded->letter, request.letter);
+    EXPECT_EQ(decoded->clock, request.clock);
+  }
+  EXPECT_EQ(Protocol::decode_request({}, bytes("M5")).value().clock, 5u);  // its CR may be missing
+  for (const auto& [text, error] :
+       std::to_array<std::pair<std::string_view, std::string_view>>({{"", "wrong_length"},
+                                                                     {"q", "unsupported"},
+                                                                     {"44", "wrong_length"},
+                                                                     {"M\r", "wrong_length"},
+                                                                     {"M44", "wrong_length"},
+                                                                     {"Mx", "wrong_length"},
+                                                                     {"M0", "out_of_range"},
+                                                                     {"M9", "out_of_range"}})) {
+    EXPECT_EQ(name(Protocol::decode_request({}, bytes(text)).error()), error) << text;
+  }
+  EXPECT_EQ(Protocol::request_size(bytes("q")), 0u);
+}
+
+TEST(E201Frame, RepliesOfOneLine) {
+  const std::string longest(64, 'x');
+  for (const auto& [letter, reply, error] : std::to_array<std::tuple<char, std::string, std::string_view>>(
+           {{'v', "anything 1\r", "none"},
+            {'s', "\n anything ~\r\n", "none"},  // a LF of the line before, one of its own
+            {'e', longest + "\r", "none"},
+            {'e', longest + "x\r", "wrong_length"},
+            {'v', "anything 1", "wrong_length"},
+            {'v', " \r", "wrong_length"},
+            {'v', "one\rtwo", "wrong_length"},
+            {'v', "any\001thing\r", "bad_framing"},
+            {'v', "any\177thing\r", "bad_framing"},
+            {'m', "5\r", "none"},
+            {'m', "9\r", "bad_framing"},
+            {'b', "26\r", "none"},
+            {'b', "none\r", "bad_framing"},
+            {'?', "-5\r", "none"},
+            {'?', "1f\r", "bad_framing"},
+            {'z', "ok\r", "unsupported"}})) {
+    EXPECT_EQ(name(decode(static_cast<std::uint8_t>(letter), reply).error()), error) << letter << reply;
+  }
+  const Text text = decode('s', "\n anything ~\r\n")->text;
+  EXPECT_EQ(std::string(text.view().begin(), text.view().end()), "anything ~");
+  EXPECT_EQ(Protocol::expected({}, {'v'}, bytes("5\rx")), 2u);
+  EXPECT_EQ(Protocol::expected({}, {'v'}, bytes("5")), 0u);
+  EXPECT_EQ(Protocol::expected({}, {'z'}, bytes("5\r")), 0u);
 }
 
 TEST(E201Frame, VersionsWhereverTheyStand) {
@@ -102,46 +154,19 @@ TEST(E201Frame, NumbersInTextsThatNobodyDescribes) {
   EXPECT_EQ(find_milli(bytes("U = 5012 mV, I = 0.0625 A"), 'V'), 5012u);
   EXPECT_EQ(find_milli(bytes("U = 5012 mV, I = 0.0625 A"), 'A'), 62u);
   EXPECT_EQ(find_milli(bytes("5"), 'V'), std::nullopt);
-  EXPECT_EQ(find_clock(bytes("5\r")), 5u);
-  EXPECT_EQ(find_clock(bytes("M3")), 3u);
-  EXPECT_EQ(find_clock(bytes("1100 kHz")), 6u);
-  EXPECT_EQ(find_clock(bytes("9")), std::nullopt);
-  EXPECT_EQ(find_clock(bytes("M")), std::nullopt);
-  EXPECT_EQ(decode_number(bytes("-17\r"), 10).value(), -17);
-  EXPECT_EQ(decode_number(bytes(" 0ff \r"), 16).value(), 255);
-  EXPECT_EQ(decode_number(bytes("ffffffffffffffff"), 16).value(), -1);
-  for (const std::string_view words : {"", "-", "ff", "1 2", "18446744073709551616"}) {
-    EXPECT_EQ(decode_number(bytes(words), 10).error(), Error::bad_framing) << words;
+  EXPECT_EQ(find_milli(bytes("5 m"), 'V'), std::nullopt);
+  for (const auto& [words, clock] : std::to_array<std::pair<std::string_view, std::int64_t>>(
+           {{"5", 5}, {"M3", 3}, {"1", 1}, {"8", 8}, {"1100 kHz", 6}, {"35", 1}, {"4400", 8}, {"9", 0}, {"0", 0}})) {
+    EXPECT_EQ(find_clock(bytes(words)).value_or(0), clock) << words;
   }
-}
-
-Error decode_text(std::string_view request, std::string_view reply) {
-  struct Counting final : FieldSink {
-    void put(const FieldValue&) override { ++count; }
-    unsigned count = 0;
-  } sink;
-  const Error error = decode(testing::biss_format(), bytes(request), bytes(reply), sink);
-  EXPECT_EQ(error == Error::none, sink.count > 0);
-  return error;
-}
-
-TEST(E201Frame, RepliesToTheOtherCommands) {
-  for (const std::string_view request : {"v", "s", "e"}) {
-    EXPECT_EQ(decode_text(request, "anything 1\r"), Error::none);
-    EXPECT_EQ(decode_text(request, "anything 1"), Error::wrong_length);
-    EXPECT_EQ(decode_text(request, "\r"), Error::wrong_length);
-    EXPECT_EQ(decode_text(request, "any\001thing\r"), Error::bad_framing);
+  EXPECT_EQ(find_number(bytes("B1234567890")).value(), 123'456'789);  // nine digits are enough for anything
+  EXPECT_EQ(decode_number(bytes("-17")).value(), -17);
+  EXPECT_EQ(decode_number(bytes("+17")).value(), 17);
+  EXPECT_EQ(decode_number(bytes("-9223372036854775808")).value(), std::numeric_limits<std::int64_t>::min());
+  EXPECT_EQ(decode_number(bytes("18446744073709551615")).value(), -1);
+  for (const std::string_view words : {"", "-", "--1", "ff", "1 2", "18446744073709551616", "000000000000000000001"}) {
+    EXPECT_EQ(name(decode_number(bytes(words)).error()), "bad_framing") << words;
   }
-  EXPECT_EQ(decode_text("m", "5\r"), Error::none);
-  EXPECT_EQ(decode_text("m", "9\r"), Error::bad_framing);
-  EXPECT_EQ(decode_text("b", "26\r"), Error::none);
-  EXPECT_EQ(decode_text("?", "-5\r"), Error::none);
-  EXPECT_EQ(decode_text(">", "1f\r"), Error::none);
-  EXPECT_EQ(decode_text("?", "1f\r"), Error::bad_framing);
-  EXPECT_EQ(decode_text("z", "ok\r"), Error::unsupported);
-  EXPECT_EQ(decode_text("q", "ok\r"), Error::unsupported);
-  EXPECT_EQ(decode_text("M5\r", ""), Error::none);
-  EXPECT_EQ(decode_text("", ""), Error::wrong_length);
 }
 
 }  // namespace

@@ -1,251 +1,311 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/e201/unit.hpp"
 
-#include <algorithm>
 #include <array>
 #include <bit>
+#include <optional>
 
+#include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/biss/fields.hpp"
 #include "absenc/protocol/e201/device.hpp"
-#include "absenc/protocol/e201/fields.hpp"
-#include "absenc/protocol/e201/host.hpp"
-#include "absenc/protocol/e201/timing.hpp"
+#include "absenc/protocol/e201/explain.hpp"
+#include "absenc/protocol/e201/procedures.hpp"
 #include "absenc/protocol/e201/vectors.hpp"
-#include "absenc/protocol/make.hpp"
-#include "absenc/protocol/word_options.hpp"
 
 namespace absenc::e201 {
 
 namespace {
 
+using namespace author;
+
+// ---- Options
+
+/// As they are given.
+struct Settings {
+  std::uint8_t singleturn_bits = 0;
+  std::uint8_t multiturn_bits = 0;
+  bool multiturn_first = true;
+  std::uint8_t position_bits = 0;
+  std::int64_t unit_pm = 0;
+  Carries carries = Carries::biss;
+  bool gray = false;
+  ssi::AfterWord after_word = ssi::AfterWord::repeat;
+  std::int64_t latency_ns = 10'000;
+  std::int64_t line_delay_ns = 0;
+  unsigned firmware = 116;  // hundredths
+};
+
 constexpr std::array<std::string_view, 2> carries_choices{"biss", "ssi"};
 
-constexpr std::array<Option, 11> options{{
-    singleturn_bits_option,
-    multiturn_bits_option,
-    multiturn_first_option,
-    position_bits_option,
-    unit_um_option,
-    {.name = "carries", .meaning = "what the encoder speaks", .default_value = 0, .choices = carries_choices},
-    {.name = "gray",
-     .meaning = "SSI: turns and position are one Gray-coded number",
-     .default_value = 0,
-     .choices = boolean_choices,
-     .describes_word = true},
-    after_word_option,
-    {.name = "latency_us",
-     .meaning = "virtual encoder: time until its position is ready, us",
-     .default_value = 10'000,
-     .minimum = 0,
-     .maximum = 1'000'000,
-     .decimals = 3},
-    {.name = "line_delay_ns",
-     .meaning = "virtual encoder: delay of the line, there and back",
-     .default_value = 0,
-     .minimum = 0,
-     .maximum = 100'000},
-    {.name = "firmware",
-     .meaning = "virtual interface: version; reading needs 1.16",
-     .default_value = 116,
-     .minimum = 0,
-     .maximum = 9999,
-     .decimals = 2},
-}};
-static_assert(options[option_unit_um].name == "unit_um" && options[option_firmware].name == "firmware");
+constexpr OptionsOf options{
+    OptionOf<&Settings::singleturn_bits>{singleturn_bits_option},
+    OptionOf<&Settings::multiturn_bits>{multiturn_bits_option},
+    OptionOf<&Settings::multiturn_first>{multiturn_first_option},
+    OptionOf<&Settings::position_bits>{position_bits_option},
+    OptionOf<&Settings::unit_pm>{unit_um_option},
+    option<&Settings::carries>("carries", "what the encoder speaks", carries_choices),
+    describing_word(option<&Settings::gray>("gray", "SSI: turns and position are one Gray-coded number")),
+    OptionOf<&Settings::after_word>{after_word_option},
+    decimal<3>(option<&Settings::latency_ns>("latency_us", "virtual encoder: time until its position is ready, us", 0,
+                                             1'000'000)),
+    option<&Settings::line_delay_ns>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0, 100'000),
+    decimal<2>(option<&Settings::firmware>("firmware", "virtual interface: version; reading needs 1.16", 0, 9999)),
+};
 
-constexpr auto models =
-    position_models<option_singleturn_bits, option_multiturn_bits, option_position_bits, option_unit_um>;
+constexpr WordFormat word_of(const Settings& given) {
+  const PositionBits bits = given.position_bits != 0
+                                ? PositionBits{.position = given.position_bits}
+                                : PositionBits{given.singleturn_bits, given.multiturn_bits, given.multiturn_first};
+  if (given.carries == Carries::biss) return biss::word_with_status(bits);
+  return ssi::word_with(bits, given.gray, ssi::ErrorBit::none, Parity::none);
+}
 
-constexpr std::array<Argument, 1> clock_arguments{
-    {{"clock", "1 to 8, or 35 70 140 280 560 1100 2200 4400 kHz", 1, 4400}}};
-constexpr std::array<Argument, 1> width_arguments{{{"bits", "of the position that ? and > give", 1, 64}}};
-constexpr std::array<Argument, 1> sweep_arguments{{{"frames", "to read at each clock", 1, 1000, 20, false}}};
+constexpr Format format_of(const Settings& given, const WordFormat* word) {
+  return {.word = word != nullptr ? *word : word_of(given),
+          // A word is linear when there is a unit.
+          .scale = {.linear = (word != nullptr ? given.unit_pm : given.position_bits) != 0,
+                    .unit_um = static_cast<double>(given.unit_pm) / 1e6},
+          .carries = given.carries,
+          .after_word = given.after_word,
+          .firmware = {given.firmware / 100, given.firmware % 100},
+          .latency = Time(given.latency_ns),
+          .line_delay = Time(given.line_delay_ns)};
+}
 
-constexpr std::array<Command, 14> commands{{
-    {"position", Verb::read, command::samples, "position, turns, error and warning"},
-    {"info", Verb::info, command::version, "version, serial number, supply and MA clock of the interface"},
-    {"clock", Verb::config_get, command::clock, "MA clock"},
-    {"set-clock", Verb::config_set, command::set_clock, "set the MA clock", clock_arguments, true, false, "clock"},
-    {"width", Verb::config_get, command::width, "width of the position that ? and > give"},
-    {"set-width", Verb::config_set, command::set_width, "set that width", width_arguments, true, false, "width"},
-    {"set-zero",
-     Verb::run,
-     command::zero,
-     "the interface's own zero: decimal and hexadecimal count from here",
-     {},
-     true,
-     false},
-    {"clear-zero", Verb::run, command::clear_zero, "take that zero away", {}, true, false},
-    {"decimal", Verb::read_part, command::decimal, "position from that zero, by ?"},
-    {"hexadecimal", Verb::read_part, command::hexadecimal, "position from that zero, by >"},
-    {"supply-on", Verb::run, command::supply_on, "switch the encoder's supply on", {}, true, false},
-    {"supply-off", Verb::run, command::supply_off, "switch the encoder's supply off", {}, true, false},
-    {"stream-off", Verb::run, command::stream_off, "end the stream of positions that somebody began"},
-    {"clock-sweep", Verb::run, 0, "count the good frames at every MA clock and recommend one", sweep_arguments, false,
-     false},
-}};
+// ---- Fields
 
-constexpr auto fields = joined_fields(joined_fields(word_fields, biss::own_fields), own_fields);
+struct Values {
+  std::optional<Bytes> command{};
+  std::optional<Bytes> version{};
+  std::optional<Bytes> serial{};
+  std::optional<Bytes> supply{};
+  std::optional<unsigned> supply_mv{};
+  std::optional<unsigned> supply_ma{};
+  std::optional<std::int64_t> clock{};
+  std::optional<std::int64_t> width{};
+  std::optional<std::int64_t> counts{};
+  std::optional<unsigned> frames{};
+  std::array<std::optional<unsigned>, clocks_khz.size()> valid{};
+  std::optional<unsigned> recommended{};
+  std::optional<unsigned> restored{};
+  std::optional<bool> aborted{};
+  std::optional<unsigned> left{};
+  std::optional<unsigned> previous{};
+};
 
-// Whether a frame fits into the samples: of BiSS with the shortest ACK.
-bool is_usable(const Format& format) {
+template <std::size_t i>
+constexpr std::optional<unsigned> valid(const Values& values) {
+  return values.valid[i];
+}
+template <auto clock>
+constexpr std::optional<unsigned> khz(const Values& values) {
+  if (!(values.*clock)) return std::nullopt;
+  return clocks_khz[static_cast<std::size_t>(*(values.*clock)) - 1];
+}
+
+using enum FieldInfo::Kind;
+constexpr auto own_fields = fields_of<Values>(
+    field<&Values::command>({"command", text, "", "the request"}),
+    field<&Values::version>({"version", text, "", "firmware of the interface"}),
+    field<&Values::serial>({"serial", text, "", "serial number of the interface"}),
+    field<&Values::supply>({"supply", text, "", "supply of the encoder, as the interface says it"}),
+    field<&Values::supply_mv>({"supply_mv", number, "mV", "voltage in that text"}),
+    field<&Values::supply_ma>({"supply_ma", number, "mA", "current in that text"}),
+    field<&Values::clock>({"clock", number, "", "setting of the MA clock, 1 to 8"}),
+    field<khz<&Values::clock>>({"clock_khz", number, "kHz", "MA clock"}),
+    field<&Values::width>({"width", number, "bits", "width of the position that ? gives"}),
+    field<&Values::counts>({"counts", number, "counts", "position, the interface's zero taken off"}),
+    field<&Values::frames>({"frames", number, "", "frames read at each clock"}),
+    field<valid<0>>({"valid_35_khz", number, "", "good frames at 35 kHz"}),
+    field<valid<1>>({"valid_70_khz", number, "", "good frames at 70 kHz"}),
+    field<valid<2>>({"valid_140_khz", number, "", "good frames at 140 kHz"}),
+    field<valid<3>>({"valid_280_khz", number, "", "good frames at 280 kHz"}),
+    field<valid<4>>({"valid_560_khz", number, "", "good frames at 560 kHz"}),
+    field<valid<5>>({"valid_1100_khz", number, "", "good frames at 1100 kHz"}),
+    field<valid<6>>({"valid_2200_khz", number, "", "good frames at 2200 kHz"}),
+    field<valid<7>>({"valid_4400_khz", number, "", "good frames at 4400 kHz"}),
+    field<&Values::recommended>({"recommended_clock", number, "", "to be set with set-clock"}),
+    field<khz<&Values::recommended>>({"recommended_khz", number, "kHz", "that clock"}),
+    field<&Values::restored>({"restored_clock", number, "", "what it was before and is again"}),
+    field<&Values::aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}),
+    field<&Values::left>({"left_clock", number, "", "the clock that the sweep set last"}),
+    field<khz<&Values::left>>({"left_khz", number, "kHz", "that clock"}),
+    field<&Values::previous>({"previous_clock", number, "", "what it was before: give it back with set-clock"}));
+
+/// What a reply of one line says.
+constexpr void take(Values& values, std::uint8_t asked, const Reply& reply) {
+  const Bytes text = reply.text;
+  if (asked == letter::version) values.version = text;
+  if (asked == letter::serial) values.serial = text;
+  if (asked == letter::supply) values.supply = text;
+  if (asked == letter::supply) values.supply_mv = find_milli(text, 'V');
+  if (asked == letter::supply) values.supply_ma = find_milli(text, 'A');
+  if (asked == letter::clock) values.clock = reply.number;
+  if (asked == letter::width) values.width = reply.number;
+  if (asked == letter::decimal) values.counts = reply.number;
+}
+
+constexpr void put_samples(FieldSink& sink, const Format& format, std::uint64_t samples) {
+  const Position position = decode_position(format, samples).value();
   const bool is_biss = format.carries == Carries::biss;
-  const unsigned samples = is_biss ? biss::idle_bits + 3 + biss::data_bits(format.biss) : 1 + format.ssi.word.bits();
-  return absenc::is_usable(format.word()) && samples <= sample_bits;
+  if (is_biss) sink.put({&biss::own_fields[biss::field_ack_bits], position.ack_bits});
+  put_word(sink, format.word, position.word, format.scale);
+  if (is_biss) sink.put({&biss::own_fields[biss::field_crc], position.crc});
 }
 
-Error decode_frame(const Options& values, Frame request, Frame reply, FieldSink& sink) {
-  const Format format = to_format(values);
-  if (!is_usable(format)) return Error::invalid_argument;
-  return decode(format, request.bytes, reply.bytes, sink);
-}
+// ---- What is declared
 
-// 1 to 8; 0 when the argument is neither that nor one of the frequencies.
-unsigned clock_of(std::int64_t argument) {
-  if (argument <= static_cast<std::int64_t>(clocks_khz.size())) return static_cast<unsigned>(argument);
-  const auto found = std::find(clocks_khz.begin(), clocks_khz.end(), argument);
-  return found == clocks_khz.end() ? 0 : static_cast<unsigned>(found - clocks_khz.begin()) + 1;
-}
+struct Definition {
+  using Protocol = e201::Protocol;
+  using Encoder = VirtualInterface;
+  static constexpr std::string_view id = "e201", name = "RLS E201-9S USB interface",
+                                    document = "RLS E201-9S Decoding the BiSS information";
+  static constexpr LinkKind link = LinkKind::full_duplex;
+  static constexpr LineTiming timing{.turnaround_limit = answer_limit};
+  static constexpr std::size_t frames_size = 1200;
+  static constexpr bool frames_are_texts = true;
+  static constexpr std::string_view noise_advice = check_stream;
 
-// A sweep has no request of its own: it reads.
-Result<std::size_t> encode(const Options&, const Command& command, Arguments arguments, MutableBytes request) {
-  const std::uint8_t letter = command.id != 0 ? command.id : command::samples;
-  unsigned value = 0;
-  if (letter == command::set_clock) value = clock_of(arguments[0]);
-  if (letter == command::set_clock && value == 0) return Error::invalid_argument;
-  if (letter == command::set_width) value = static_cast<unsigned>(arguments[0]);
-  const RequestText text = encode_request(letter, value);
-  if (text.size() > request.size()) return Error::buffer_too_small;
-  std::copy_n(text.view().begin(), text.size(), request.begin());
-  return text.size();
-}
+  static constexpr auto options = e201::options;
+  // Those of the document's examples. No speed is given for them.
+  static constexpr std::array models{
+      ModelText{"rotary-19", "single-turn, 19 bits (example 4)", 0,
+                "singleturn_bits=19 multiturn_bits=0 position_bits=0"},
+      ModelText{"rotary-19-16", "19 bits, 65536 turns (example 3)", 0,
+                "singleturn_bits=19 multiturn_bits=16 position_bits=0"},
+      ModelText{"linear-26-1um", "linear, 26 bits of 1 um (example 2)", 0,
+                "singleturn_bits=0 multiturn_bits=0 position_bits=26 unit_um=1"},
+      ModelText{"linear-32-0.05um", "linear, 32 bits of 0.05 um (example 1)", 0,
+                "singleturn_bits=0 multiturn_bits=0 position_bits=32 unit_um=0.05"},
+  };
+  static constexpr struct {
+    decltype(joined_fields(joined_fields(word_fields, biss::own_fields), own_fields.infos)) infos;
+  } fields{joined_fields(joined_fields(word_fields, biss::own_fields), own_fields.infos)};
+  static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
+  static constexpr auto vectors = e201::vectors;
 
-Delimit delimit(const Options&, Direction direction, Bytes bytes) {
-  if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
-  if (direction == Direction::request) {
-    if (!command::is_known(bytes[0])) return {Delimit::Kind::no_frame};
-    const std::size_t length = encode_request(bytes[0]).size();
-    return {bytes.size() < length ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
+  static constexpr Format format(const Options& values) {
+    return format_of(options.format(values), values.has_word() ? &values.word : nullptr);
   }
-  const auto end = std::find(bytes.begin(), bytes.end(), static_cast<std::uint8_t>(end_of_line));
-  const auto length = static_cast<std::size_t>(end - bytes.begin()) + 1;
-  return {end == bytes.end() ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
-}
-
-Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
-                       std::span<std::byte> storage) {
-  const Format format = to_format(values);
-  const bool readable = is_usable(format) && absenc::is_usable(format.scale());
-  switch (command.id) {
-    case command::samples:
-      return readable ? make_host<ReadPosition>(storage, format) : Any<Conversation>{};
-    case command::version:
-      return make_host<Info>(storage);
-    case command::set_clock:
-      if (clock_of(arguments[0]) == 0) return {};
-      return make_host<Set>(storage, command::set_clock, clock_of(arguments[0]));
-    case command::set_width:
-      return make_host<Set>(storage, command::set_width, static_cast<unsigned>(arguments[0]));
-    case command::zero:
-      return make_host<Zero>(storage, format);
-    case command::supply_on:
-    case command::supply_off:
-      return make_host<SwitchSupply>(storage, command.id == command::supply_on);
-    case command::clear_zero:
-    case command::stream_off:
-      return make_host<Tell>(storage, command.id);
-    case 0:
-      return readable ? make_host<ClockSweep>(storage, format, static_cast<unsigned>(arguments[0]))
-                      : Any<Conversation>{};
-    default:
-      return make_host<Query>(storage, command.id);
+  static constexpr bool is_usable(const Format& format) { return fits(format); }
+  // Readings can be told from angles only when a linear encoder has its unit.
+  static constexpr bool is_readable(const Format& format) { return fits(format) && absenc::is_usable(format.scale); }
+  static constexpr LineSettings line(const Format&) { return line_settings; }
+  static constexpr Resolution resolution(const Format& format) { return resolution_of(format.word, format.scale); }
+  static constexpr std::size_t reply_size(const Format&, Bytes begin) {
+    const std::size_t end = end_of_first_line(begin);
+    return end != 0 ? end : begin.size() + 1;
   }
-}
+  static constexpr Request guess_request(const Format&, Bytes) { return {letter::samples}; }
 
-Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-  const Format format = to_format(values);
-  if (!is_usable(format)) return {};
-  const auto firmware = static_cast<unsigned>(values[option_firmware]);
-  const AdapterSettings settings{
-      .firmware = {firmware / 100, firmware % 100},
-      .behaviour = {.latency = Time(values[option_latency_us]), .line_delay = Time(values[option_line_delay_ns])}};
-  return make_device<VirtualAdapter>(storage, format, shaft, settings);
-}
+  template <std::uint8_t one>
+  static constexpr Request asks(const Format&) {
+    return {one};
+  }
+  template <std::uint8_t one>
+  static constexpr Request does(const Format&, Arguments) {
+    return {one};
+  }
+  static constexpr Request selects(const Format&, Arguments arguments) {
+    return {letter::set_clock, clock_of(arguments[0])};
+  }
+  static constexpr std::array<Argument, 1> clock_arguments{
+      {{"clock", "1 to 8, or 35 70 140 280 560 1100 2200 4400 kHz", 1, 4400}}};
+  static constexpr std::array<Argument, 1> sweep_arguments{{{"frames", "to read at each clock", 1, 1000, 20, false}}};
+  static constexpr std::array commands{
+      command<Definition, Protocol, Samples, read, does<letter::samples>>(
+          {"position", Verb::read, 0, "position, turns, error and warning"})
+          .only_if(is_readable),
+      command<Definition, Protocol, Info, inform, does<letter::version>>(
+          {"info", Verb::info, 0, "version, serial number, supply and MA clock of the interface"}),
+      reading<Definition, Protocol, asks<letter::clock>>({"clock", Verb::config_get, 0, "MA clock"}),
+      command<Definition, Protocol, ReadBack, set_clock, selects>(
+          {"set-clock", Verb::config_set, 0, "set the MA clock", clock_arguments, true, false, "clock"}),
+      reading<Definition, Protocol, asks<letter::width>>(
+          {"width", Verb::config_get, 0, "width of the position that ? gives"}),
+      command<Definition, Protocol, ReadBack, set_zero, does<letter::zero>>(
+          {"set-zero", Verb::run, 0, "the interface's own zero: decimal counts from here", {}, true, false}),
+      reading<Definition, Protocol, asks<letter::clear_zero>>(
+          {"clear-zero", Verb::run, 0, "take that zero away", {}, true, false}),
+      reading<Definition, Protocol, asks<letter::decimal>>(
+          {"decimal", Verb::read_part, 0, "position from that zero, by ?"}),
+      command<Definition, Protocol, ReadBack, switch_supply, does<letter::supply_on>, true>(
+          {"supply-on", Verb::run, 0, "switch the encoder's supply on", {}, true, false}),
+      command<Definition, Protocol, ReadBack, switch_supply, does<letter::supply_off>, false>(
+          {"supply-off", Verb::run, 0, "switch the encoder's supply off", {}, true, false}),
+      reading<Definition, Protocol, asks<letter::stream_off>>(
+          {"stream-off", Verb::run, 0, "end the stream of positions that somebody began"}),
+      command<Definition, Protocol, Sweep, sweep_clocks, does<letter::samples>>(
+          {"clock-sweep", Verb::run, 0, "count the good frames at every MA clock and recommend one", sweep_arguments,
+           false, false})
+          .only_if(is_readable),
+  };
 
-Resolution resolution(const Options& values) {
-  const Format format = to_format(values);
-  return resolution_of(format.word(), format.scale());
-}
+  static constexpr void put(FieldSink& sink, const Format& format, const Request& request) {
+    const auto bytes = Protocol::encode(format, request);
+    own_fields.put(sink, {.command = trimmed(bytes)});
+  }
+  static constexpr void put(FieldSink& sink, const Format& format, const Request& request, const Reply& reply) {
+    if (request.letter == letter::samples) return put_samples(sink, format, reply.samples);
+    if (!letter::is_in(letter::answered_by_a_line, request.letter)) return put(sink, format, request);
+    Values values;
+    take(values, request.letter, reply);
+    own_fields.put(sink, values);
+  }
+  static void put(FieldSink& sink, const Format& format, const Samples& found) {
+    put_samples(sink, format, found.samples);
+  }
+  static void put(FieldSink& sink, const Format& format, const ReadBack& found) {
+    put(sink, format, found.request, found.reply);
+  }
+  static void put(FieldSink& sink, const Format&, const Info& found) {
+    Values values;
+    for (std::size_t i = 0; i < info_letters.size(); ++i) {
+      if (!found.replies[i].text.empty()) take(values, info_letters[i], found.replies[i]);
+    }
+    own_fields.put(sink, values);
+  }
+  static void put(FieldSink& sink, const Format&, const Sweep& found) {
+    Values values{.frames = found.frames};
+    for (unsigned i = 0; i < found.measured; ++i) values.valid[i] = found.valid[i];
+    if (found.restored) {
+      if (!found.aborted && found.recommended() != 0) values.recommended = found.recommended();
+      values.restored = found.previous;
+      values.aborted = found.aborted;
+    }
+    own_fields.put(sink, values);
+  }
+  static void put_left(FieldSink& sink, const Format&, const Sweep& found) {
+    if (found.left != 0) own_fields.put(sink, {.left = found.left, .previous = found.previous});
+  }
 
-Explanation explain_frame(const Options& values, Error error, Frame request, Frame reply) {
-  const std::uint8_t letter = request.bytes.empty() ? command::samples : request.bytes[0];
-  return explain(to_format(values), error, letter, reply.bytes);
-}
+  static Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {
+    return e201::explain(format, error, request, reply);
+  }
 
-// No document says whether the others have a reply.
-bool answered(const Options&, Frame request) {
-  constexpr std::string_view lines = "4vse?>mb";
-  return index_of(lines, static_cast<char>(request.bytes[0])) < lines.size();
-}
-
-// What follows the CRC is ignored, capitals are the same digits, and SSI has no checksum.
-bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
-  const Format format = to_format(values);
-  if (!request.bytes.empty() && request.bytes[0] != command::samples) return false;  // text
-  const Result<Position> position = decode_position(format, reply.bytes);
-  if (!position || format.carries == Carries::ssi) return false;
-  const std::size_t character = bit / 8;
-  if (character + 1 == samples_length) return true;
-  const std::uint8_t right = reply.bytes[character];
-  const int before = hex_digit(static_cast<char>(right));
-  const int after = hex_digit(static_cast<char>(right ^ 1u << bit % 8));
-  if (after < 0) return true;
-  const auto changed = static_cast<unsigned>(before ^ after);
-  if (changed == 0) return false;
-  const std::size_t first_changed = character * 4 + static_cast<unsigned>(std::countl_zero(changed << 28));
-  return first_changed < biss::idle_bits + position->ack_bits + 2 + biss::data_bits(format.biss);
-}
+  // What follows the CRC is ignored, capitals are the same digits, and SSI has no checksum.
+  static bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
+    const Format f = format(values);
+    if (!request.bytes.empty() && request.bytes[0] != letter::samples) return false;  // text
+    const Result<std::uint64_t> samples = decode_samples(reply.bytes);
+    if (!samples || f.carries == Carries::ssi) return false;
+    const Result<Position> position = decode_position(f, *samples);
+    if (!position) return false;
+    const std::size_t character = bit / 8;
+    if (character + 1 == samples_length) return true;
+    const std::uint8_t right = reply.bytes[character];
+    const int before = hex_digit(static_cast<char>(right));
+    const int after = hex_digit(static_cast<char>(right ^ 1u << bit % 8));
+    if (after < 0) return true;
+    const auto changed = static_cast<unsigned>(before ^ after);
+    if (changed == 0) return false;
+    const std::size_t first_changed = character * 4 + static_cast<unsigned>(std::countl_zero(changed << 28));
+    return first_changed < biss::idle_bits + position->ack_bits + 2 + biss::data_bits(f.biss());
+  }
+};
 
 }  // namespace
 
-Format to_format(const Options& values) {
-  const PositionBits bits = position_bits(values, option_singleturn_bits);
-  const Scale scale = scale_of(values, option_position_bits, option_unit_um);
-  Format format;
-  format.carries = static_cast<Carries>(values[option_carries]);
-  format.biss = {.word = biss::word_with_status(bits), .scale = scale};
-  format.ssi = {.word = ssi::word_with(bits, values[option_gray] != 0, ssi::ErrorBit::none, Parity::none),
-                .after_word = static_cast<ssi::AfterWord>(values[option_after_word]),
-                .scale = scale};
-  if (values.has_word()) format.biss.word = format.ssi.word = values.word;
-  return format;
-}
-
-constinit const Unit unit{
-    .id = "e201",
-    .name = "RLS E201-9S USB interface",
-    .document = "RLS E201-9S Decoding the BiSS information",
-    .link = LinkKind::full_duplex,
-    .line = line_settings,
-    .options = options,
-    .models = models,
-    .fields = fields,
-    .commands = commands,
-    .vectors = vectors,
-    .status = nullptr,
-    .alarms = &fields[word_field_alarms],
-    .host_storage = std::max({sizeof(ReadPosition), sizeof(Query), sizeof(Info), sizeof(Set), sizeof(SwitchSupply),
-                              sizeof(Zero), sizeof(Tell), sizeof(ClockSweep)}),
-    .device_storage = sizeof(VirtualAdapter),
-    .decode = decode_frame,
-    .encode = encode,
-    .delimit = delimit,
-    .host = host,
-    .device = device,
-    .resolution = resolution,
-    .covered = covered,
-    .explain = explain_frame,
-    .timing = {.turnaround_limit = answer_limit},
-    .answered = answered,
-};
+constinit const Unit unit = UnitOf<Definition>::make();
 
 }  // namespace absenc::e201

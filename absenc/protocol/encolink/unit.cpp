@@ -48,36 +48,36 @@ struct Protocol {
 };
 
 template <Config config>
-Request frame(const Format&, Arguments) {
-  return {config};
+Result<Request> frame(const Format&, Arguments) {
+  return Request{config};
 }
 
 template <std::size_t index>
-Request reading_of(const Format&, Arguments) {
-  return {Config::position, read_request(registers[index].address, registers[index].size)};
+Result<Request> reading_of(const Format&, Arguments) {
+  return Request{Config::position, read_request(registers[index].address, registers[index].size)};
 }
 
 template <std::size_t index>
-Request writing_of(const Format&, Arguments arguments) {
+Result<Request> writing_of(const Format&, Arguments arguments) {
   const auto value = static_cast<std::uint64_t>(arguments[0]);
-  return {Config::position, write_request(registers[index].address, registers[index].size, value)};
+  return Request{Config::position, write_request(registers[index].address, registers[index].size, value)};
 }
 
 template <std::uint8_t code>
-Request order(const Format&, Arguments) {
-  return {Config::position, write_request(registers[command_register].address, 1, code)};
+Result<Request> order(const Format&, Arguments) {
+  return Request{Config::position, write_request(registers[command_register].address, 1, code)};
 }
 
-Request memory_reading(const Format&, Arguments arguments) {
+Result<Request> memory_reading(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  return {Config::position, read_request(address, size_of(address, arguments[1]))};
+  return Request{Config::position, read_request(address, size_of(address, arguments[1]))};
 }
 
-Request memory_writing(const Format&, Arguments arguments) {
+Result<Request> memory_writing(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
   const std::uint16_t size = size_of(address, arguments[2]);
-  if (size > 8) return {Config::position, RegisterRequest{}};
-  return {Config::position, write_request(address, size, static_cast<std::uint64_t>(arguments[1]))};
+  if (size > 8) return Request{Config::position, RegisterRequest{}};
+  return Request{Config::position, write_request(address, size, static_cast<std::uint64_t>(arguments[1]))};
 }
 
 constexpr auto not_known = nullptr;  // the value depends on the position, or nothing is sent
@@ -120,7 +120,7 @@ constexpr std::array<Argument, 2> preset_arguments{{{"turns", "", 0, 65535, 0, f
 constexpr std::array<Argument, 1> listen_arguments{{{"count", "frames", 1, UINT32_MAX, 100, false}}};
 
 template <class Found, auto procedure, auto... bound>
-constexpr CommandOf<Protocol> command(const Command& info, Request (*request)(const Format&, Arguments)) {
+constexpr CommandOf<Protocol> command(const Command& info, Result<Request> (*request)(const Format&, Arguments)) {
   CommandOf<Protocol> made =
       author::command<Report, Protocol, Found, procedure, frame<Config::position>, bound...>(info);
   made.request = request;

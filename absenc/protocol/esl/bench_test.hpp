@@ -1,33 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual QS35 encoders and a host on one line in virtual time.
+// For tests: virtual QS35 encoders and a host on one line in virtual time, by the unit's own commands.
 #pragma once
 
 #include <functional>
 #include <map>
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "absenc/protocol/esl/bus.hpp"
 #include "absenc/protocol/esl/device.hpp"
-#include "absenc/protocol/esl/host.hpp"
-#include "absenc/protocol/esl/memory.hpp"
+#include "absenc/protocol/esl/options.hpp"
+#include "absenc/protocol/esl/reply.hpp"
+#include "absenc/protocol/esl/unit.hpp"
 #include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/line.hpp"
 
 namespace absenc::esl::testing {
 
 using TestShaft = sim::testing::TestShaft<24>;
+using Wire = std::vector<std::uint8_t>;
+
+inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
+inline Wire wire(const Reply& reply) { return wire(encode_reply({}, reply).view()); }
 
 struct RawHost final : sim::testing::RawHost {
-  explicit RawHost(std::vector<std::uint8_t> request, Time at = {})
+  explicit RawHost(Wire request, Time at = {})
       : sim::testing::RawHost(std::move(request), answer_limit, gap_limit, at) {}
 };
 
 /// Changes the n-th reply (from 0) of an encoder as a script wants, on its way to the line.
 class Tampered final : public Machine<std::uint8_t> {
  public:
-  using Tamper = std::function<void(unsigned index, std::vector<std::uint8_t>& reply)>;
+  using Tamper = std::function<void(unsigned index, Wire& reply)>;
   Tampered(VirtualEncoder& encoder, Tamper tamper) : encoder_(encoder), tamper_(std::move(tamper)) {}
   void feed(const Event<std::uint8_t>& event) override { encoder_.feed(event); }
   Step<std::uint8_t> next(Time now) override {
@@ -44,8 +48,64 @@ class Tampered final : public Machine<std::uint8_t> {
   VirtualEncoder& encoder_;
   Tamper tamper_;
   unsigned replies_ = 0;
-  std::vector<std::uint8_t> out_;
+  Wire out_;
 };
+
+/// How a command ended.
+struct Outcome final : FieldSink {
+  void put(const FieldValue& value) override {
+    fields[std::string(value.info->name)] = value.number;
+    if (!value.bytes.empty()) data = wire(value.bytes);
+  }
+  Error error{};
+  std::string detail;
+  std::optional<Reading> reading;
+  std::map<std::string, std::int64_t> fields;
+  Wire data;
+  Wire sent;
+  Time received_at{};
+  bool ended = false;
+};
+
+inline Options options_of(const Profile& profile) {
+  Options values;
+  for (std::size_t i = 0; i < options.infos.size(); ++i) values.values[i] = options.get(profile, i);
+  return values;
+}
+
+/// A line with one host at a time.
+struct HostedLine : sim::Line<std::uint8_t> {
+  HostedLine() : Line(LinkKind::half_duplex, line_settings) {}
+  bool converse(Machine<std::uint8_t>& host) {
+    if (node) {
+      replace(*node, host);
+    } else {
+      node = attach(sim::Role::host, host);
+    }
+    return run(*node, now() + std::chrono::seconds(10));
+  }
+  std::optional<std::size_t> node{};
+};
+
+/// Runs a command of the unit; `arguments` may leave out the last ones.
+inline Outcome run(HostedLine& line, const Profile& profile, std::string_view command,
+                   std::vector<std::int64_t> arguments = {}) {
+  const Command& info = *find_command(unit, command);
+  for (std::size_t i = arguments.size(); i < info.arguments.size(); ++i) {
+    arguments.push_back(info.arguments[i].default_value);
+  }
+  std::vector<std::byte> storage(unit.host_storage);
+  Conversation<std::uint8_t>& host = *unit.host(options_of(profile), info, arguments, storage).bytes;
+  Outcome outcome;
+  outcome.ended = line.converse(host);
+  outcome.error = host.error();
+  outcome.detail = host.detail();
+  if (host.reading() != nullptr) outcome.reading = *host.reading();
+  host.report(outcome);
+  outcome.sent = wire(host.exchange().sent);
+  outcome.received_at = host.exchange().received_at;
+  return outcome;
+}
 
 /// One encoder on a line of its own.
 struct Bench {
@@ -55,49 +115,34 @@ struct Bench {
     line.attach(sim::Role::device, device);
   }
 
-  /// Runs a conversation to its end and returns it.
-  template <class Conversation>
-  Conversation& run(Conversation& conversation) {
-    if (host == none) {
-      host = line.attach(sim::Role::host, conversation);
-    } else {
-      line.replace(host, conversation);
-    }
-    finished = line.run(host, line.now() + std::chrono::seconds(10));
-    return conversation;
+  Outcome run(std::string_view command, std::vector<std::int64_t> arguments = {}) {
+    return testing::run(line, profile, command, std::move(arguments));
   }
-  std::vector<std::uint8_t> raw(std::vector<std::uint8_t> request) {
-    RawHost raw_host(std::move(request), line.now());
-    return run(raw_host).reply;
+  Wire raw(Wire request) {
+    RawHost host(std::move(request), line.now());
+    return raw(host);
   }
-  std::vector<std::uint8_t> raw(const Request& request) {
-    const RequestBytes bytes = encode_request(profile, request);
-    return raw(std::vector<std::uint8_t>(bytes.view().begin(), bytes.view().end()));
+  Wire raw(RawHost& host) {
+    line.converse(host);
+    return host.reply;
+  }
+  Wire raw(Request request) {
+    request.encoder_address = profile.address;
+    return raw(wire(encode_request(profile, request).view()));
   }
   Reply read(DataId id = DataId::position) {
-    Read conversation(profile, id);
-    run(conversation);
-    return conversation.reply();
+    const Wire bytes = raw(Request{id});
+    return decode_reply(profile, {id, profile.address}, bytes).value();
   }
+  void set(condition::Index index, std::int64_t value) { encoder.set_condition(index, value, line.now()); }
   void pass(Time time) { line.run_until(line.now() + time); }
+  [[nodiscard]] std::uint32_t violations() const { return encoder.violation_count(); }
 
-  static constexpr std::size_t none = ~std::size_t{0};
   Profile profile;
   TestShaft shaft;
   VirtualEncoder encoder;
   Tampered device;
-  sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
-  std::size_t host = none;
-  bool finished = true;
+  HostedLine line;
 };
-
-inline std::map<std::string, std::int64_t> report(const Conversation<std::uint8_t>& conversation) {
-  struct Collector final : FieldSink {
-    void put(const FieldValue& value) override { fields[std::string(value.info->name)] = value.number; }
-    std::map<std::string, std::int64_t> fields;
-  } collector;
-  conversation.report(collector);
-  return collector.fields;
-}
 
 }  // namespace absenc::esl::testing

@@ -90,7 +90,14 @@ inline constexpr std::array<CheckText, 31> check_texts{{
 }};
 static_assert(check_texts.size() == static_cast<std::size_t>(Check::request_not_accepted) + 1);
 
+/// The errors alone, so that firmware does not link the sentences.
+inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
+  std::array<Error, check_texts.size()> errors{};
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = check_texts[i].error;
+  return errors;
+}();
+
 [[nodiscard]] constexpr const CheckText& text_of(Check check) { return check_texts[static_cast<std::size_t>(check)]; }
-[[nodiscard]] constexpr Error error_of(Check check) { return text_of(check).error; }
+[[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
 
 }  // namespace absenc::esl

@@ -5,13 +5,12 @@ namespace absenc::esl {
 
 namespace {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 constexpr std::int32_t overspeed_above = 10'000'000;  // 1/1000 rpm (Table 8)
 constexpr std::int32_t under_voltage_below = 2900;    // mV, typical
 constexpr std::int32_t over_voltage_above = 3700;
 constexpr std::int32_t standing_still = 1'000;  // 1/1000 rpm: what a servo at rest may tremble
+constexpr std::int32_t warning_above = 105;     // degC: the document gives no limit
+constexpr Time start_up = 100ms;                // until ready; the document gives none
 constexpr Time reset_interval_least = 35us;     // "typical 40 us": what is surely too fast
 
 constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
@@ -19,160 +18,86 @@ constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<st
 
 }  // namespace
 
-VirtualEncoder::VirtualEncoder(const Profile& profile, const Shaft& shaft) : profile_(profile), shaft_(&shaft) {}
-
-// ---- The line
-
-ByteStep VirtualEncoder::next(Time) {
-  ByteStep step{.at = never};
-  if (reply_pending_) {
-    reply_pending_ = false;
-    step.kind = ByteStep::Kind::transfer;
-    step.out = reply_;
-    step.at = reply_at_;
-    return step;
-  }
-  step.expect = 1;
-  if (ignoring_ || !request_.empty()) {
-    step.gap = idle_time;
-    if (!ignoring_ && !stop_wrong_) step.expect = request_length(profile_, *data_id(request_[0])) - request_.size();
-  }
-  if (ignoring_) step.expect = foreign_end_ > heard_ ? static_cast<std::size_t>(foreign_end_ - heard_) : 0;
-  return step;
-}
-
-void VirtualEncoder::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::received:
-      for (const std::uint8_t byte : event.items) {
-        ++heard_;
-        byte_received(byte, event.at);
-      }
-      break;
-    case ByteEvent::Kind::sent:
-      transmitting_ = false;
-      break;
-    case ByteEvent::Kind::silence:
-      frame_set_ended();
-      break;
-    case ByteEvent::Kind::line_error:
-      heard_at_ = event.at;
-      if (!on_ || transmitting_ || ignoring_) break;
-      if (request_.empty()) {
-        ignore();
-      } else {
-        stop_wrong_ = true;  // answered when the host has ended
-      }
-      break;
-    default:
-      break;
-  }
-}
-
-void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
-  if (!on_) return;
-  update(at);
-  if (transmitting_) return interrupted(byte, at);
-  heard_at_ = at;
-  if (ignoring_ || stop_wrong_) return;
-  request_.push_back(byte);
-  if (request_.size() == 1 && (address_of(byte) != profile_.address || !data_id(byte))) return ignore_request(byte);
-  if (request_.size() == request_length(profile_, *data_id(request_[0]))) request_complete(at);
-}
-
-// Of another encoder, which may be absent: behind its last byte any pause is enough.
-void VirtualEncoder::ignore_request(std::uint8_t control_field) {
-  const auto id = data_id(control_field);
-  foreign_end_ = heard_ + (id ? request_length(profile_, *id) - 1 : 0);
-  ignore();
-}
-
-// A missing start bit ends the frame set: what was cut short is no request.
-void VirtualEncoder::frame_set_ended() {
-  if (stop_wrong_) report_bad_request(status::stop_error, heard_at_);
-  stop_wrong_ = ignoring_ = false;
-  request_.clear();
-}
-
-void VirtualEncoder::interrupted(std::uint8_t byte, Time at) {
-  const auto id = data_id(byte);
-  const bool is_request = id && byte == control_field(profile_, address_of(byte), *id);
-  const std::size_t length = is_request ? request_length(profile_, *id) : 0;
-  if (interruption_.begins_request(length, at, line_settings.character())) {
-    violate("something was sent during the encoder's transmission", at);
-  }
-}
-
-void VirtualEncoder::request_complete(Time at) {
-  const Result<Request> request = decode_request(profile_, request_);
-  if (request) return answer(*request, at);
-  const bool crc_wrong =
-      request_.size() > 1 &&
-      checksum8(profile_.crc_bit_order, request_.view().first(request_.size() - 1)) != request_[request_.size() - 1];
-  if (crc_wrong || request.error() == Error::out_of_range) {
-    in_a_row_ = 0;
-    return ignore();
-  }
-  report_bad_request(status::parity_error, at);
-}
-
-// Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF. CF is echoed as it came.
-void VirtualEncoder::report_bad_request(std::uint8_t status_bit, Time at) {
-  in_a_row_ = 0;
-  const std::uint8_t field = request_[0];
-  const DataId id = *data_id(field);
-  if (profile_.bad_request == BadRequest::silent || is_memory_access(id)) return ignore();
-  Reply reply = reply_to(id, at);
-  reply.one.status |= status_bit;
-  reply.two.status |= status_bit;
-  send(encode_reply(profile_, reply, field), at);
-}
-
-void VirtualEncoder::send(const ReplyBytes& reply, Time at) {
-  request_.clear();
-  reply_ = reply;
-  reply_at_ = at + answer_time;
-  reply_pending_ = true;
-  transmitting_ = true;
-  interruption_.begin();
-  ++answered_;
-}
-
-void VirtualEncoder::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
+VirtualEncoder::VirtualEncoder(const Profile& profile, const Shaft& shaft)
+    : Responder({.character = line_settings.character(), .answer_time = answer_time}),
+      profile_(profile),
+      shaft_(&shaft) {
+  for (std::size_t i = 0; i < conditions.size(); ++i) condition_[i] = static_cast<std::int32_t>(conditions[i].normal);
 }
 
 // ---- Requests
 
-void VirtualEncoder::answer(const Request& request, Time at) {
-  if (is_reset(request.id) && in_a_row_ > 0 && request.id == last_id_ && at - last_reset_ < reset_interval_least) {
+// Whatever its parity bit: a wrong one is reported.
+std::size_t VirtualEncoder::request_size(Bytes begin) const {
+  const std::optional<DataId> id = data_id(begin[0]);
+  return id ? request_length(profile_, *id) : 0;
+}
+
+std::size_t VirtualEncoder::others_reply_size(Bytes request) const {
+  return address_of(request[0]) == profile_.address ? 0 : reply_length(*data_id(request[0]));
+}
+
+author::Responder::Answer VirtualEncoder::respond(Bytes bytes, Time at, ByteBuffer<64>& reply) {
+  if (magnitude(shaft_->at(at).speed_millirpm) > overspeed_above) latches_ |= alarms::overspeed;
+  if (address_of(bytes[0]) != profile_.address) return Answer::for_others;
+  const Result<Request> request = decode_request(profile_, bytes);
+  if (!request) {
+    const bool crc_wrong =
+        bytes.size() > 1 && checksum8(profile_.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back();
+    in_a_row_ = 0;
+    if (crc_wrong || request.error() == Error::out_of_range) return Answer::for_others;
+    return report_bad_request(bytes[0], status::parity_error, at, reply);
+  }
+  count(request->id, at);
+  if (is_memory_access(request->id)) return answer_memory(*request, at, reply);
+  static_cast<void>(reply.append(encode_reply(profile_, reply_to(request->id, at))));
+  if (is_reset(request->id)) count_reset(request->id, at);  // after the reply, which still shows the old state
+  return Answer::sent;
+}
+
+author::Responder::Answer VirtualEncoder::respond_to_damaged(Bytes begin, Time at, ByteBuffer<64>& reply) {
+  if (address_of(begin[0]) != profile_.address) return Answer::for_others;
+  in_a_row_ = 0;
+  return report_bad_request(begin[0], status::stop_error, at, reply);
+}
+
+// Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF. CF is echoed as it came.
+author::Responder::Answer VirtualEncoder::report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at,
+                                                             ByteBuffer<64>& reply) {
+  const DataId id = *data_id(field);
+  if (profile_.bad_request == BadRequest::silent || is_memory_access(id)) return Answer::for_others;
+  Reply report = reply_to(id, at);
+  report.one.status |= status_bit;
+  report.two.status |= status_bit;
+  static_cast<void>(reply.append(encode_reply(profile_, report, field)));
+  return Answer::sent;
+}
+
+void VirtualEncoder::count(DataId id, Time at) {
+  if (is_reset(id) && in_a_row_ > 0 && id == last_id_ && at - last_reset_ < reset_interval_least) {
     violate("reset sent too fast: much less than 40 us after the one before", at);
     in_a_row_ = 0;
   }
-  in_a_row_ = request.id == last_id_ ? in_a_row_ + 1 : 1;
-  last_id_ = request.id;
-  if (request.id == DataId::encoder_id && in_a_row_ == reset_requests) {
+  in_a_row_ = id == last_id_ ? in_a_row_ + 1 : 1;
+  last_id_ = id;
+  if (id == DataId::encoder_id && in_a_row_ == reset_requests) {
     violate("ID 8 sent eight times in a row: dynamic addressing, which nothing describes", at);
   }
-  if (profile_.sequence_step == SequenceStep::request || has_sequence(request.id)) {
+  if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) {
     for (std::uint8_t& counter : counters_) ++counter;
   }
-  if (is_memory_access(request.id)) return answer_memory(request, at);
-  send(encode_reply(profile_, reply_to(request.id, at)), at);
-  if (is_reset(request.id)) count_reset(request.id, at);  // after the reply, which still shows the old state
 }
 
-void VirtualEncoder::answer_memory(const Request& request, Time at) {
-  if (profile_.bus) {
+author::Responder::Answer VirtualEncoder::answer_memory(const Request& request, Time at, ByteBuffer<64>& bytes) {
+  if (profile_.bus == sharing_yes) {
     violate("memory access with several encoders on the line", at);
-    return ignore();
+    return Answer::for_others;
   }
   const bool writing = request.id == DataId::write_memory;
   const bool selecting = request.memory_address == page_select_address;
   const MemoryArea* area = find_area(page_, request.memory_address);
   const bool exists = selecting ? !writing || is_page(request.value) : area != nullptr;
-  if (!exists) return ignore();  // not said: it is not acknowledged then
+  if (!exists) return Answer::for_others;  // not said: it is not acknowledged then
   Reply reply{.id = request.id,
               .encoder_address = profile_.address,
               .memory_address = request.memory_address,
@@ -189,7 +114,8 @@ void VirtualEncoder::answer_memory(const Request& request, Time at) {
     read_byte(request, reply, at);
   }
   if (reply.busy) reply.value = 0;
-  send(encode_reply(profile_, reply), at);
+  static_cast<void>(bytes.append(encode_reply(profile_, reply)));
+  return Answer::sent;
 }
 
 void VirtualEncoder::read_byte(const Request& request, Reply& reply, Time at) {
@@ -226,8 +152,7 @@ void VirtualEncoder::write_byte(const Request& request, Reply& reply, Time at) {
     page14_[address - 0x20] = request.value;
   } else {
     *stored(page_, address) = request.value;
-    ++memory_version_;
-    ++writes_;
+    change_memory();
     busy_until_ = at + eeprom_write_time;
   }
 }
@@ -254,49 +179,44 @@ void VirtualEncoder::execute_reset(DataId id, Time at) {
     return;
   }
   const std::uint16_t turns_before = turns(at);
-  if (id == DataId::zero || environment_.d_clears_singleturn) {
+  if (id == DataId::zero || value_of(condition::id_d_clears_singleturn) != 0) {
     // Each channel takes its own measurement as its zero.
     store_little_endian(MutableBytes(memory_).subspan(zero_at, 4), counts_of(shaft_->at(at).position));
     store_little_endian(MutableBytes(memory_).subspan(zero2_at, 4), counts_of(shaft_->at(at).position));
   }
   if (id == DataId::reset_multiturn) turns_cleared_ = true;
   set_turns(id == DataId::reset_multiturn ? 0 : turns_before, at);
-  ++writes_;
   busy_until_ = at + eeprom_write_time;
 }
 
 // ---- State
 
-std::uint32_t VirtualEncoder::singleturn_one(Time now) const {
-  const ChannelFault& fault = faults_[0];
-  if (fault.singleturn) return *fault.singleturn;
-  const auto zero = static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(zero_at, 4)));
-  return (counts_of(shaft_->at(now).position) - zero) & 0xFFFFFF;
-}
-
-// From its own sight of the shaft and its own zero.
-std::uint32_t VirtualEncoder::singleturn_two(Time now) const {
-  const ChannelFault& fault = faults_[1];
-  const auto zero = static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(zero2_at, 4)));
-  const std::uint32_t counts = fault.singleturn ? *fault.singleturn : counts_of(shaft_->at(now).position) - zero;
-  return (counts + (fault.redundant_offset << 15)) & 0xFFFFFF;
+// Each channel from its own sight of the shaft and its own zero.
+std::uint32_t VirtualEncoder::singleturn(Channel channel, Time now) const {
+  const std::size_t at = channel == Channel::one ? zero_at : zero2_at;
+  const auto zero = static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
+  const std::int32_t stuck = value_of(condition::ch1_stuck, channel);
+  return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : counts_of(shaft_->at(now).position) - zero) & 0xFFFFFF;
 }
 
 // Turns change where the zeroed position wraps.
-std::int64_t VirtualEncoder::shaft_turns(Time now) const {
+std::uint64_t VirtualEncoder::shaft_turns(Time now) const {
   const std::uint64_t zero = load_little_endian(Bytes(memory_).subspan(zero_at, 4));
-  return (shaft_->at(now).position - static_cast<std::int64_t>(zero << 8)) >> 32;
+  return static_cast<std::uint64_t>((shaft_->at(now).position - static_cast<std::int64_t>(zero << 8)) >> 32);
 }
 
 std::uint16_t VirtualEncoder::turns(Time now) const {
   const std::uint64_t offset = load_little_endian(Bytes(memory_).subspan(turns_at, 8));
-  return static_cast<std::uint16_t>(static_cast<std::uint64_t>(shaft_turns(now)) - offset);
+  return static_cast<std::uint16_t>(shaft_turns(now) - offset);
 }
 
 void VirtualEncoder::set_turns(std::uint16_t turns, Time now) {
-  const std::uint64_t offset = static_cast<std::uint64_t>(shaft_turns(now)) - turns;
-  store_little_endian(MutableBytes(memory_).subspan(turns_at, 8), offset);
-  ++memory_version_;
+  store_little_endian(MutableBytes(memory_).subspan(turns_at, 8), shaft_turns(now) - turns);
+  change_memory();
+}
+
+void VirtualEncoder::set_condition(std::size_t index, std::int64_t value, Time) {
+  condition_[index] = static_cast<std::int32_t>(value);
 }
 
 void VirtualEncoder::raise_alarms(std::uint32_t bits) {
@@ -311,32 +231,33 @@ void VirtualEncoder::lower_alarms(std::uint32_t bits) {
 
 std::uint8_t VirtualEncoder::alarms_now() const {
   unsigned bits = latches_ | forced_;
-  if (environment_.supply_millivolts < under_voltage_below) bits |= alarms::under_voltage;
-  if (environment_.supply_millivolts > over_voltage_above) bits |= alarms::over_voltage;
+  if (value_of(condition::supply_voltage) < under_voltage_below) bits |= alarms::under_voltage;
+  if (value_of(condition::supply_voltage) > over_voltage_above) bits |= alarms::over_voltage;
   return static_cast<std::uint8_t>(bits);
 }
 
 std::uint8_t VirtualEncoder::error_info() const {
   if ((latches_ & alarms::led_or_lissajous_error) == 0) return 0;
-  return lissajous_ ? error_info_lissajous : error_info_led;
+  return value_of(condition::lissajous) != 0 ? error_info_lissajous : error_info_led;
 }
 
 ChannelReply VirtualEncoder::channel_now(Channel channel, Time now) const {
-  const ChannelFault& fault = faults_[static_cast<std::size_t>(channel)];
-  const auto alarms = static_cast<std::uint8_t>(alarms_now() | fault.alarms);
-  const unsigned led = lissajous_ ? 0u : unsigned{alarms::led_or_lissajous_error};
+  const unsigned alarms = alarms_now() | static_cast<unsigned>(value_of(condition::ch1_alarms, channel));
+  const unsigned led = value_of(condition::lissajous) != 0 ? 0u : unsigned{alarms::led_or_lissajous_error};
   const unsigned safety = alarms::singleturn_error | alarms::memory_error | alarms::voltage | led;
   unsigned bits = channel == Channel::two ? status::channel_2 : 0u;
   if ((alarms & safety) != 0) bits |= status::safety_error;
-  if ((alarms & ~safety & 0xFF) != 0) bits |= status::non_safety_error;
-  if (environment_.temperature > environment_.warning_above) bits |= status::temperature_warning;
-  if (ready(now)) bits |= status::ready;
-  if (environment_.forced_test_passed) bits |= status::forced_test_passed;
-  const std::uint8_t counter = counters_[static_cast<std::size_t>(channel)];
-  const std::uint8_t sequence = fault.sequence.value_or(counter);
-  return {.status = static_cast<std::uint8_t>((bits | fault.status_set) & ~unsigned{fault.status_clear}),
-          .alarms = alarms,
-          .sequence = channel == Channel::one ? sequence : static_cast<std::uint8_t>(sequence & 0x7F),
+  if ((alarms & ~safety) != 0) bits |= status::non_safety_error;
+  if (value_of(condition::temperature) > warning_above) bits |= status::temperature_warning;
+  if (now >= ready_at_) bits |= status::ready;
+  if (value_of(condition::forced_test) != 0) bits |= status::forced_test_passed;
+  bits |= static_cast<unsigned>(value_of(condition::ch1_status_set, channel));
+  bits &= ~static_cast<unsigned>(value_of(condition::ch1_status_clear, channel));
+  const std::int32_t stuck = value_of(condition::ch1_sequence, channel);
+  const int counter = stuck >= 0 ? stuck : counters_[static_cast<std::size_t>(channel)];
+  return {.status = static_cast<std::uint8_t>(bits),
+          .alarms = static_cast<std::uint8_t>(alarms),
+          .sequence = static_cast<std::uint8_t>(channel == Channel::one ? counter : counter & 0x7F),
           .encoder_id = 0xD8};
 }
 
@@ -344,24 +265,25 @@ Reply VirtualEncoder::reply_to(DataId id, Time now) const {
   Reply reply{.id = id, .encoder_address = profile_.address};
   reply.one = channel_now(Channel::one, now);
   reply.two = channel_now(Channel::two, now);
-  reply.singleturn = singleturn_one(now);
+  reply.singleturn = singleturn(Channel::one, now);
   reply.multiturn = turns(now);
   const bool wide = id == DataId::calibration && profile_.id6_rs == Id6Redundant::bits_16;
-  reply.redundant = static_cast<std::uint16_t>(singleturn_two(now) >> (wide ? 8 : 15));
-  reply.temperature = static_cast<std::uint8_t>(environment_.temperature);
+  const auto offset = static_cast<std::uint32_t>(value_of(condition::redundant_offset)) << 15;
+  const std::uint32_t two = (singleturn(Channel::two, now) + offset) & 0xFFFFFF;
+  reply.redundant = static_cast<std::uint16_t>(two >> (wide ? 8 : 15));
+  reply.temperature = static_cast<std::uint8_t>(value_of(condition::temperature));
   return reply;
-}
-
-void VirtualEncoder::update(Time now) {
-  if (magnitude(shaft_->at(now).speed_millirpm) > overspeed_above) latches_ |= alarms::overspeed;
 }
 
 // ---- Power
 
+// It answers from the first moment on: SF tells when it is ready.
 void VirtualEncoder::power_on(Time now, PowerOn kind) {
-  if (on_) return;
-  on_ = true;
-  ready_at_ = kind == PowerOn::real ? now + environment_.start_up : now;
+  ready_at_ = kind == PowerOn::real ? now + start_up : now;
+  Responder::power_on(now, kind);
+}
+
+void VirtualEncoder::started(Time) {
   page_ = register_page;
   page_ready_at_ = busy_until_ = Time{};
   page8_.fill(0);
@@ -369,12 +291,10 @@ void VirtualEncoder::power_on(Time now, PowerOn kind) {
   counters_.fill(0);
 }
 
-void VirtualEncoder::power_off(Time) {
-  on_ = false;
+void VirtualEncoder::stopped(Time) {
   latches_ &= alarms::turns_wrong;  // the others need a power cycle; these an ID C
   turns_cleared_ = false;
-  byte_pending_ = ignoring_ = stop_wrong_ = reply_pending_ = transmitting_ = false;
-  request_.clear();
+  byte_pending_ = false;
   in_a_row_ = 0;
 }
 

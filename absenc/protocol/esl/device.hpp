@@ -5,61 +5,70 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 
 #include "absenc/core/shaft.hpp"
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/esl/frame.hpp"
 #include "absenc/protocol/esl/timing.hpp"
-#include "absenc/protocol/interruption.hpp"
+#include "absenc/protocol/unit.hpp"
 
 namespace absenc::esl {
 
-/// Of the virtual encoder's environment; the defaults are those of a healthy installation.
-struct Environment {
-  std::int32_t supply_millivolts = 3300;  // as Table 8 measures it
-  std::int32_t temperature = 35;          // degC
-  std::int32_t warning_above = 105;       // degC: the document gives no limit
-  bool forced_test_passed = false;
-  Time start_up = 100ms;             // until ready; the document gives none
-  bool d_clears_singleturn = false;  // ID D as the change log of rev 1.4 has it
+/// What can be set around the virtual encoder, and what can be wrong inside one channel, whose CRC is right all the
+/// same. Indexes of `conditions`.
+namespace condition {
+enum Index : std::size_t {
+  supply_voltage,
+  temperature,
+  forced_test,
+  lissajous,
+  id_d_clears_singleturn,
+  redundant_offset,
+  ch1_stuck,  // of channel 2 what follows each
+  ch2_stuck,
+  ch1_sequence,
+  ch2_sequence,
+  ch1_alarms,
+  ch2_alarms,
+  ch1_status_set,
+  ch2_status_set,
+  ch1_status_clear,
+  ch2_status_clear,
 };
+}  // namespace condition
 
-/// What is wrong inside one channel. Its CRC is right all the same.
-struct ChannelFault {
-  std::optional<std::uint32_t> singleturn{};  // stuck position: ABS, or what RS is made of, 24 bits
-  std::optional<std::uint8_t> sequence{};     // stuck sequence counter
-  std::uint32_t redundant_offset = 0;         // channel two: wrong RS, 1/512 turn
-  std::uint8_t alarms = 0;                    // raised in this channel only
-  std::uint8_t status_set = 0;                // bits of SF stuck at 1
-  std::uint8_t status_clear = 0;              // and at 0
-};
+inline constexpr std::array<Condition, 16> conditions{{
+    {"supply_voltage", "mV", "as the encoder measures it: alarms below 2900 and above 3700 (Table 8)", 0, 6000, 3300},
+    {"temperature", "degC", "inside the encoder; above 105 it warns (assumed: the document gives no limit)", -128, 127,
+     35},
+    {"forced_test", "", "the forced test has passed", 0, 1, 0},
+    {"lissajous", "", "led_or_lissajous_error is the disc's signals, not the LED", 0, 1, 0},
+    {"id_d_clears_singleturn", "", "ID D clears the single-turn position too, as the change log of rev 1.4 has it", 0,
+     1, 0},
+    {"redundant_offset", "", "RS is so many 1/512 turns off", 0, 511, 0},
+    {"ch1_stuck", "counts", "ABS stands still here; -1: it follows the shaft", -1, 0xFFFFFF, -1},
+    {"ch2_stuck", "counts", "the position behind RS stands still here; -1: it follows the shaft", -1, 0xFFFFFF, -1},
+    {"ch1_sequence", "", "SC1 stands still here; -1: it counts", -1, 255, -1},
+    {"ch2_sequence", "", "SC2 stands still here; -1: it counts", -1, 255, -1},
+    {"ch1_alarms", "", "bits of ALM that channel 1 alone raises", 0, 255, 0},
+    {"ch2_alarms", "", "bits of ALM that channel 2 alone raises", 0, 255, 0},
+    {"ch1_status_set", "", "bits of SF of channel 1 that are stuck at 1", 0, 255, 0},
+    {"ch2_status_set", "", "bits of SF of channel 2 that are stuck at 1", 0, 255, 0},
+    {"ch1_status_clear", "", "bits of SF of channel 1 that are stuck at 0", 0, 255, 0},
+    {"ch2_status_clear", "", "bits of SF of channel 2 that are stuck at 0", 0, 255, 0},
+}};
 
-class VirtualEncoder final : public Device<std::uint8_t> {
+class VirtualEncoder final : public author::Responder {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   VirtualEncoder(const Profile& profile, const Shaft& shaft);
 
-  void feed(const Event<std::uint8_t>& event) override;
-  Step<std::uint8_t> next(Time now) override;
-
   void power_on(Time now, PowerOn kind) override;
-  void power_off(Time now) override;
   void raise_alarms(std::uint32_t bits) override;
   void lower_alarms(std::uint32_t bits) override;
+  void set_condition(std::size_t index, std::int64_t value, Time now) override;
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  [[nodiscard]] std::uint32_t memory_version() const override { return memory_version_; }
-  [[nodiscard]] std::span<const Violation> violations() const override { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const override { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const override { return answered_; }
 
-  void set_environment(const Environment& environment) { environment_ = environment; }
-  void set_fault(Channel channel, const ChannelFault& fault) { faults_[static_cast<std::size_t>(channel)] = fault; }
-  /// Which of the two is behind led_or_lissajous_error when it is raised: LED by default.
-  void set_lissajous(bool lissajous) { lissajous_ = lissajous; }
-  void set_turns(std::uint16_t turns, Time now);
-  /// EEPROM and MTP writes since it was made: of 1 000 000 and 100 000 in a life.
-  [[nodiscard]] std::uint32_t writes() const { return writes_; }
   /// What a reply to `id` would say now.
   [[nodiscard]] Reply reply_to(DataId id, Time now) const;
   /// The byte of a page in the EEPROM or MTP image; null for registers and what does not exist.
@@ -67,59 +76,50 @@ class VirtualEncoder final : public Device<std::uint8_t> {
 
  private:
   static constexpr std::size_t page_size = 0x7F;
-  static constexpr std::size_t tables_at = 4 * page_size;  // pages 4 and 5
-  static constexpr std::size_t page6_at = 6 * page_size;
+  static constexpr std::size_t page6_at = 6 * page_size;  // behind pages 0 to 5
   static constexpr std::size_t mtp_at = page6_at + 0x0C;
   static constexpr std::size_t zero_at = mtp_at + 0x20;  // channel one, 4 bytes, little endian
   static constexpr std::size_t zero2_at = zero_at + 4;   // channel two
   static constexpr std::size_t turns_at = zero2_at + 4;  // what is taken off the turns of the shaft, 8 bytes
   static constexpr std::size_t memory_size = turns_at + 8;
 
-  void byte_received(std::uint8_t byte, Time at);
-  void request_complete(Time at);
-  void frame_set_ended();
-  void interrupted(std::uint8_t byte, Time at);
-  void ignore() {
-    request_.clear();
-    ignoring_ = true;
-  }
-  void ignore_request(std::uint8_t control_field);
-  void report_bad_request(std::uint8_t status_bit, Time at);
-  void send(const ReplyBytes& reply, Time at);
+  [[nodiscard]] std::size_t request_size(Bytes begin) const override;
+  [[nodiscard]] std::size_t others_reply_size(Bytes request) const override;
+  Answer respond(Bytes bytes, Time at, ByteBuffer<64>& reply) override;
+  Answer respond_to_damaged(Bytes begin, Time at, ByteBuffer<64>& reply) override;
+  void started(Time at) override;
+  void stopped(Time at) override;
 
-  void answer(const Request& request, Time at);
-  void answer_memory(const Request& request, Time at);
+  Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply);
+  void count(DataId id, Time at);
+  Answer answer_memory(const Request& request, Time at, ByteBuffer<64>& reply);
   void read_byte(const Request& request, Reply& reply, Time at);
   void write_byte(const Request& request, Reply& reply, Time at);
   void count_reset(DataId id, Time at);
   void execute_reset(DataId id, Time at);
 
-  void update(Time now);
-  [[nodiscard]] bool ready(Time now) const { return now >= ready_at_; }
-  [[nodiscard]] std::uint32_t singleturn_one(Time now) const;
-  [[nodiscard]] std::uint32_t singleturn_two(Time now) const;
+  [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const;
   [[nodiscard]] std::uint16_t turns(Time now) const;
-  [[nodiscard]] std::int64_t shaft_turns(Time now) const;
+  [[nodiscard]] std::uint64_t shaft_turns(Time now) const;
+  void set_turns(std::uint16_t turns, Time now);
   [[nodiscard]] std::uint8_t alarms_now() const;
   [[nodiscard]] ChannelReply channel_now(Channel channel, Time now) const;
   [[nodiscard]] std::uint8_t error_info() const;
-  void violate(std::string_view rule, Time at);
+  // Of channel 2 the one behind that of channel 1.
+  [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
+    return condition_[index + (channel == Channel::two ? 1 : 0)];
+  }
 
   Profile profile_;
   const Shaft* shaft_;
-  Environment environment_{};
-  std::array<ChannelFault, 2> faults_{};
+  std::array<std::int32_t, conditions.size()> condition_{};
   std::array<std::uint8_t, memory_size> memory_{};
   std::array<std::uint8_t, 0x30> page8_{};   // registers are lost at power off
   std::array<std::uint8_t, 0x20> page14_{};  // 20 to 3F
-  std::uint32_t memory_version_ = 0;
-  std::uint32_t writes_ = 0;
 
-  bool on_ = false;
   Time ready_at_{};
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;  // voltage alarms raised from outside
-  bool lissajous_ = false;
+  std::uint8_t forced_ = 0;     // voltage alarms raised from outside
   bool turns_cleared_ = false;  // ID D was done: ID C may clear multiturn_error
   std::array<std::uint8_t, 2> counters_{};
 
@@ -133,21 +133,6 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   DataId last_id_{};
   unsigned in_a_row_ = 0;  // requests of `last_id_`
   Time last_reset_{};
-
-  RequestBytes request_;
-  ReplyBytes reply_;
-  bool ignoring_ = false;          // until the line is idle
-  bool stop_wrong_ = false;        // a character of the request had a wrong stop bit: told when the line is idle
-  Time heard_at_{};                // the last character
-  std::uint64_t heard_ = 0;        // bytes so far
-  std::uint64_t foreign_end_ = 0;  // of them, when another encoder's request is over
-  Interruption interruption_;
-  bool reply_pending_ = false;
-  bool transmitting_ = false;
-  Time reply_at_{};
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
-  std::uint64_t answered_ = 0;
 };
 
 }  // namespace absenc::esl

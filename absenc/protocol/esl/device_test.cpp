@@ -11,11 +11,9 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
+using testing::Wire;
+using testing::wire;
 using PowerOn = Device<std::uint8_t>::PowerOn;
-using Wire = std::vector<std::uint8_t>;
-
-Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
-Wire wire(const Reply& reply) { return wire(encode_reply({}, reply).view()); }
 
 Request memory_read(std::uint8_t address) { return {DataId::read_memory, 0, address}; }
 Request memory_write(std::uint8_t address, std::uint8_t value) { return {DataId::write_memory, 0, address, value}; }
@@ -43,7 +41,7 @@ TEST(EslDevice, AnswersEveryIdWithItsLength) {
 TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   Bench bench;
   testing::RawHost host(wire(hex<"0875">), 5us);
-  bench.run(host);
+  bench.raw(host);
   EXPECT_EQ(host.sent_at, 7us);
   EXPECT_EQ(host.first_byte_at, 7us + 2us + 1us);
   EXPECT_EQ(host.reply.size(), 18u);
@@ -59,7 +57,7 @@ TEST(EslDevice, SequenceCounters) {
   EXPECT_EQ(second.one.sequence, 2);
   EXPECT_EQ(second.two.sequence, 2);
   Bench each({.sequence_step = SequenceStep::request});
-  each.read(DataId::temperature);
+  each.raw(Request{DataId::temperature});
   EXPECT_EQ(each.read(DataId::position).one.sequence, 2);
   for (unsigned i = 2; i < 256; ++i) bench.read(DataId::position);
   EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // 8 bits and 7 bits
@@ -68,11 +66,11 @@ TEST(EslDevice, SequenceCounters) {
 
 TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
   Bench bench;
-  EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());             // CRC
-  EXPECT_TRUE(bench.raw(Request{DataId::position, 3}).empty());  // another address
-  EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());               // no such id
-  EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());               // cut short
-  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);           // and it is ready for the next
+  EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());                                       // CRC
+  EXPECT_TRUE(bench.raw(wire(encode_request({}, {DataId::position, 3}).view())).empty());  // another address
+  EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());                                         // no such id
+  EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                                         // cut short
+  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);  // and it is ready for the next
   EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
   EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // page 8 ends at 2F
   EXPECT_EQ(bench.encoder.answered(), 1u);
@@ -82,7 +80,7 @@ TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {
   for (std::uint8_t address = 0; address < 8; ++address) {
     for (const ParityScope scope : {ParityScope::command, ParityScope::all}) {
       Bench bench({.parity_scope = scope, .address = address});
-      Wire wrong = wire(encode_request(bench.profile, {DataId::position, address}));
+      Wire wrong = wire(encode_request(bench.profile, {DataId::position, address}).view());
       wrong[0] ^= 0x80;
       wrong[1] = checksum8(CrcBitOrder::lsb, Bytes(wrong).first(1));
       const Wire reply = bench.raw(wrong);
@@ -110,8 +108,8 @@ TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
   EXPECT_EQ(encoder.next(2us).kind, Step<std::uint8_t>::Kind::wait);
   encoder.feed({.kind = Happening::Kind::received, .at = 3us, .items = last});
   EXPECT_EQ(encoder.next(3us).kind, Step<std::uint8_t>::Kind::wait);
-  encoder.feed({.kind = Happening::Kind::silence, .at = 3us + idle_time});
-  const Step<std::uint8_t> step = encoder.next(3us + idle_time);
+  encoder.feed({.kind = Happening::Kind::silence, .at = 3us + 2 * line_settings.character()});
+  const Step<std::uint8_t> step = encoder.next(3us + 2 * line_settings.character());
   ASSERT_EQ(step.kind, Step<std::uint8_t>::Kind::transfer);
   EXPECT_EQ(step.at, 3us + answer_time);
   EXPECT_EQ(step.out[1] & status::rejected, status::stop_error);
@@ -120,11 +118,10 @@ TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
 
 TEST(EslDevice, ARequestDuringItsTransmissionIsOneViolation) {
   Bench bench;
-  Wire requests = wire(encode_request({}, {DataId::position}));
-  const Wire memory = wire(encode_request({}, memory_write(0x20, 7)));
+  Wire requests = wire(encode_request({}, {DataId::position}).view());
+  const Wire memory = wire(encode_request({}, memory_write(0x20, 7)).view());
   requests.insert(requests.end(), memory.begin(), memory.end());
-  testing::RawHost host(requests);
-  bench.run(host);
+  bench.raw(requests);
   EXPECT_EQ(bench.encoder.violation_count(), 1u);
 }
 
@@ -136,7 +133,7 @@ TEST(EslDevice, ReadyOnlyAfterStartUp) {
   bench.encoder.power_on(on, PowerOn::real);
   EXPECT_EQ(bench.read().one.status & status::ready, 0);
   EXPECT_EQ(bench.read().two.status & status::ready, 0);
-  bench.line.run_until(on + Environment{}.start_up);
+  bench.line.run_until(on + 100ms);
   EXPECT_EQ(bench.read().one.status, status::ready);
   EXPECT_EQ(bench.read().two.status, status::ready | status::channel_2);
 }
@@ -158,7 +155,7 @@ TEST(EslDevice, RegistersAtOnceTheEepromInTwoSteps) {
   bench.pass(eeprom_read_time);
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), false, 0x77));
   EXPECT_EQ(*bench.encoder.stored(0, 6), 0);  // was not executed
-  EXPECT_EQ(bench.encoder.writes(), 1u);
+  EXPECT_EQ(bench.encoder.memory_version(), 1u);
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
   bench.raw(memory_read(7));
   EXPECT_EQ(bench.raw(memory_read(7)), memory_reply(memory_read(7), true, 0));
@@ -241,14 +238,20 @@ TEST(EslDevice, WhatClearsWhichAlarm) {
 
 TEST(EslDevice, SupplySpeedAndTemperature) {
   Bench bench;
-  bench.encoder.set_environment({.supply_millivolts = 2899});
-  EXPECT_EQ(bench.read().one.alarms, alarms::under_voltage);
-  bench.encoder.set_environment({.supply_millivolts = 3701});
-  EXPECT_EQ(bench.read().one.alarms, alarms::over_voltage);
-  EXPECT_EQ(bench.read().one.status, status::ready | status::safety_error);
-  bench.encoder.set_environment({.temperature = 120});
-  EXPECT_EQ(bench.read().one.status, status::ready | status::temperature_warning);
-  bench.encoder.set_environment({});
+  for (const auto& [index, value, alarms, status] :
+       {std::tuple{condition::supply_voltage, 2900, 0, status::ready + 0},
+        std::tuple{condition::supply_voltage, 2899, alarms::under_voltage + 0, status::ready | status::safety_error},
+        std::tuple{condition::supply_voltage, 3700, 0, status::ready + 0},
+        std::tuple{condition::supply_voltage, 3701, alarms::over_voltage + 0, status::ready | status::safety_error},
+        std::tuple{condition::temperature, 105, 0, status::ready + 0},
+        std::tuple{condition::temperature, 106, 0, status::ready | status::temperature_warning}}) {
+    bench.set(index, value);
+    EXPECT_EQ(bench.read().one.alarms, alarms) << value;
+    EXPECT_EQ(bench.read().one.status, status) << value;
+    bench.set(index, conditions[index].normal);
+  }
+  bench.set(condition::temperature, -10);
+  EXPECT_EQ(bench.run("temperature").fields.at("temperature_c"), -10);
   bench.shaft.spin(10'000, bench.line.now());
   EXPECT_EQ(bench.read(DataId::alarms).one.alarms, 0);
   bench.shaft.spin(-10'001, bench.line.now());
@@ -287,7 +290,8 @@ TEST(EslDevice, AResetOnATurningShaftIsAViolation) {
 TEST(EslDevice, FaultsStayInTheirChannel) {
   Bench bench;
   bench.shaft.put(0, 0x800000);
-  bench.encoder.set_fault(Channel::two, {.singleturn = 0, .alarms = alarms::singleturn_error});
+  bench.set(condition::ch2_stuck, 0);
+  bench.set(condition::ch2_alarms, alarms::singleturn_error);
   const Wire bytes = bench.raw(Request{DataId::alarms});
   EXPECT_EQ(bytes[2], 0);
   EXPECT_EQ(bytes[6], alarms::singleturn_error);

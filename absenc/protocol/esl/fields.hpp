@@ -3,10 +3,10 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
+#include <optional>
 
+#include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/esl/reply.hpp"
-#include "absenc/protocol/field.hpp"
 
 namespace absenc::esl {
 
@@ -41,148 +41,150 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_voltage", "the supply is above 3.7 V", "check the supply; it clears with the voltage"},
 }};
 
-inline constexpr std::array<FlagInfo, 8> address_flags{{
-    {"address_0", "", ""},
-    {"address_1", "", ""},
-    {"address_2", "", ""},
-    {"address_3", "", ""},
-    {"address_4", "", ""},
-    {"address_5", "", ""},
-    {"address_6", "", ""},
-    {"address_7", "", ""},
-}};
-
-enum FieldIndex : std::size_t {
-  field_data_id,
-  field_control_field,
-  field_encoder_address,
-  field_ch1_status,
-  field_ch1_alarms,
-  field_singleturn,
-  field_multiturn,
-  field_ch1_sequence,
-  field_encoder_id,
-  field_safety,
-  field_multiturn_bytes,
-  field_singleturn_bits,
-  field_temperature,
-  field_ch2_status,
-  field_ch2_alarms,
-  field_redundant_singleturn,
-  field_ch2_sequence,
-  field_memory_address,
-  field_busy,
-  field_value,
-  field_page,
-  field_data,
-  field_written,
-  field_led_error,
-  field_lissajous_error,
-  field_safe_singleturn,
-  field_answering,
-  field_disturbed,
-  field_clash,
-  field_page_left,
+/// Each is there where a frame or a command has it.
+struct Values {
+  std::optional<DataId> data_id{};
+  std::optional<std::uint8_t> control_field{};
+  std::optional<std::uint8_t> encoder_address{};
+  std::optional<bool> clash{};
+  std::optional<std::uint8_t> ch1_status{};
+  std::optional<std::uint8_t> ch1_alarms{};
+  std::optional<std::uint32_t> singleturn{};
+  std::optional<std::uint16_t> multiturn{};
+  std::optional<std::uint8_t> encoder_id{};
+  std::optional<unsigned> safety{};
+  std::optional<unsigned> multiturn_bytes{};
+  std::optional<unsigned> singleturn_bits{};
+  std::optional<std::uint8_t> ch1_sequence{};
+  std::optional<std::int8_t> temperature{};  // its sign is assumed
+  std::optional<std::uint8_t> ch2_status{};
+  std::optional<std::uint8_t> ch2_alarms{};
+  std::optional<std::uint16_t> redundant{};
+  std::optional<std::uint8_t> ch2_sequence{};
+  std::optional<std::uint8_t> page{};
+  std::optional<std::uint8_t> memory_address{};
+  std::optional<bool> busy{};
+  std::optional<std::uint8_t> value{};
+  std::optional<Bytes> data{};
+  std::optional<bool> written{};
+  std::optional<bool> led_error{};
+  std::optional<bool> lissajous_error{};
+  std::optional<std::uint32_t> safe_singleturn{};
+  std::optional<std::uint8_t> page_left{};
 };
 
-inline constexpr std::array<FieldInfo, 30> fields{{
-    {"data_id", FieldInfo::Kind::number, "", "which data was asked for (Table 3)"},
-    {"control_field", FieldInfo::Kind::number, "", "CF: encoder address, data id, parity"},
-    {"encoder_address", FieldInfo::Kind::number, "", "EAD: which encoder on the line"},
-    {"ch1_status", FieldInfo::Kind::flags, "", "SF of channel 1", status_flags},
-    {"ch1_alarms", FieldInfo::Kind::flags, "", "ALM of channel 1", alarm_flags},
-    {"singleturn", FieldInfo::Kind::number, "counts", "ABS: position within the turn", {}, Shows::position},
-    {"multiturn", FieldInfo::Kind::number, "revolutions", "ABM", {}, Shows::turns},
-    {"ch1_sequence", FieldInfo::Kind::number, "", "SC1: counts the replies, 0 to 255"},
-    {"encoder_id", FieldInfo::Kind::number, "", "ENID: D8 multi-turn, 98 single-turn"},
-    {"safety", FieldInfo::Kind::number, "", "1: a safety encoder (ENID bit 7)"},
-    {"multiturn_bytes", FieldInfo::Kind::number, "", "of turns (ENID bits 6 and 5)"},
-    {"singleturn_bits", FieldInfo::Kind::number, "", "of the position within the turn (ENID bits 4 to 0)"},
-    {"temperature_c", FieldInfo::Kind::number, "degC", "inside the encoder"},
-    {"ch2_status", FieldInfo::Kind::flags, "", "SF of channel 2", status_flags},
-    {"ch2_alarms", FieldInfo::Kind::flags, "", "ALM of channel 2", alarm_flags},
-    {"redundant_singleturn",
-     FieldInfo::Kind::number,
-     "counts",
-     "RS: the position of channel 2, 9 bits (ID 6: 16)",
-     {},
-     Shows::position},
-    {"ch2_sequence", FieldInfo::Kind::number, "", "SC2: counts the replies, 0 to 127"},
-    {"memory_address", FieldInfo::Kind::number, "", "ADF: 0 to 126; 127 selects the page"},
-    {"busy", FieldInfo::Kind::number, "", "1 while the memory is read or written: the request was not executed"},
-    {"value", FieldInfo::Kind::number, "", "EDF: the byte in memory"},
-    {"page", FieldInfo::Kind::number, "", "memory page"},
-    {"data", FieldInfo::Kind::bytes, "", "the bytes in memory from `memory_address` on"},
-    {"written", FieldInfo::Kind::boolean, "", "false when the value was there already"},
-    {"led_error", FieldInfo::Kind::boolean, "", "the LED current is out of its range"},
-    {"lissajous_error", FieldInfo::Kind::boolean, "", "the signals of the disc are out of their range"},
-    {"safe_singleturn", FieldInfo::Kind::number, "counts", "the position, every check of a safety reader passed"},
-    {"answering", FieldInfo::Kind::flags, "", "addresses with an encoder that answers well", address_flags},
-    {"disturbed", FieldInfo::Kind::flags, "",
-     "addresses whose answer is damaged: check the line, and whether two encoders share the address", address_flags},
-    {"clash", FieldInfo::Kind::boolean, "",
-     "yes: its answer is damaged every time; two encoders share the address, or the line is bad"},
-    {"page_left", FieldInfo::Kind::number, "",
-     "memory page that is left selected, also for whoever reads next: which one was before is not known"},
-}};
-
-constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }
+using Kind = FieldInfo::Kind;
+inline constexpr auto fields = author::fields_of<Values>(
+    author::field<&Values::data_id>({"data_id", Kind::number, "", "which data was asked for (Table 3)"}),
+    author::field<&Values::control_field>({"control_field", Kind::number, "", "CF: encoder address, data id, parity"}),
+    author::field<&Values::encoder_address>({"encoder_address", Kind::number, "", "EAD: which encoder on the line"}),
+    author::field<&Values::clash>(
+        {"clash", Kind::boolean, "",
+         "yes: its answer is damaged every time; two encoders share the address, or the line is bad"}),
+    author::field<&Values::ch1_status>({"ch1_status", Kind::flags, "", "SF of channel 1", status_flags}),
+    author::field<&Values::ch1_alarms>({"ch1_alarms", Kind::flags, "", "ALM of channel 1", alarm_flags}),
+    author::field<&Values::singleturn>(
+        {"singleturn", Kind::number, "counts", "ABS: position within the turn", {}, Shows::position}),
+    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Shows::turns}),
+    author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID: D8 multi-turn, 98 single-turn"}),
+    author::field<&Values::safety>({"safety", Kind::number, "", "1: a safety encoder (ENID bit 7)"}),
+    author::field<&Values::multiturn_bytes>({"multiturn_bytes", Kind::number, "", "of turns (ENID bits 6 and 5)"}),
+    author::field<&Values::singleturn_bits>(
+        {"singleturn_bits", Kind::number, "", "of the position within the turn (ENID bits 4 to 0)"}),
+    author::field<&Values::ch1_sequence>({"ch1_sequence", Kind::number, "", "SC1: counts the replies, 0 to 255"}),
+    author::field<&Values::temperature>({"temperature_c", Kind::number, "degC", "inside the encoder"}),
+    author::field<&Values::ch2_status>({"ch2_status", Kind::flags, "", "SF of channel 2", status_flags}),
+    author::field<&Values::ch2_alarms>({"ch2_alarms", Kind::flags, "", "ALM of channel 2", alarm_flags}),
+    author::field<&Values::redundant>({"redundant_singleturn",
+                                       Kind::number,
+                                       "counts",
+                                       "RS: the position of channel 2, 9 bits (ID 6: 16)",
+                                       {},
+                                       Shows::position}),
+    author::field<&Values::ch2_sequence>({"ch2_sequence", Kind::number, "", "SC2: counts the replies, 0 to 127"}),
+    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
+    author::field<&Values::memory_address>({"memory_address", Kind::number, "", "ADF: 0 to 126; 127 selects the page"}),
+    author::field<&Values::busy>(
+        {"busy", Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
+    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory"}),
+    author::field<&Values::data>({"data", Kind::bytes, "", "the bytes in memory from `memory_address` on"}),
+    author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
+    author::field<&Values::led_error>({"led_error", Kind::boolean, "", "the LED current is out of its range"}),
+    author::field<&Values::lissajous_error>(
+        {"lissajous_error", Kind::boolean, "", "the signals of the disc are out of their range"}),
+    author::field<&Values::safe_singleturn>(
+        {"safe_singleturn", Kind::number, "counts", "the position, every check of a safety reader passed"}),
+    author::field<&Values::page_left>(
+        {"page_left", Kind::number, "",
+         "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
 
 /// Every field that the request carries.
-constexpr void put_fields(FieldSink& sink, const Profile& profile, const Request& request) {
-  put(sink, field_data_id, static_cast<std::int64_t>(request.id));
-  put(sink, field_control_field, control_field(profile, request.encoder_address, request.id));
-  put(sink, field_encoder_address, request.encoder_address);
-  if (is_memory_access(request.id)) put(sink, field_memory_address, request.memory_address);
-  if (request.id == DataId::write_memory) put(sink, field_value, request.value);
+[[nodiscard]] constexpr Values values_of(const Profile& profile, const Request& request) {
+  Values values{.data_id = request.id,
+                .control_field = control_field(profile, request.encoder_address, request.id),
+                .encoder_address = request.encoder_address};
+  if (is_memory_access(request.id)) values.memory_address = request.memory_address;
+  if (request.id == DataId::write_memory) values.value = request.value;
+  return values;
 }
 
 namespace detail {
 
-constexpr void put_part(FieldSink& sink, Part part, const Reply& reply, const ChannelReply& channel, bool first) {
+constexpr void put_part(Values& values, Part part, const Reply& reply, bool first) {
+  const ChannelReply& channel = first ? reply.one : reply.two;
   switch (part) {
     case Part::status:
-      return put(sink, first ? field_ch1_status : field_ch2_status, channel.status);
+      (first ? values.ch1_status : values.ch2_status) = channel.status;
+      break;
     case Part::alarms:
-      return put(sink, first ? field_ch1_alarms : field_ch2_alarms, channel.alarms);
+      (first ? values.ch1_alarms : values.ch2_alarms) = channel.alarms;
+      break;
     case Part::singleturn:
-      return put(sink, field_singleturn, reply.singleturn);
+      values.singleturn = reply.singleturn;
+      break;
     case Part::multiturn:
-      return put(sink, field_multiturn, reply.multiturn);
+      values.multiturn = reply.multiturn;
+      break;
     case Part::sequence:
-      return put(sink, field_ch1_sequence, channel.sequence);
-    case Part::encoder_id:
-      if (!first) return;  // the same as in channel 1
-      put(sink, field_encoder_id, channel.encoder_id);
-      put(sink, field_safety, channel.encoder_id >> 7);
-      put(sink, field_multiturn_bytes, channel.encoder_id >> 5 & 3);
-      return put(sink, field_singleturn_bits, channel.encoder_id & 0x1F);
-    case Part::temperature:  // its sign is assumed
-      return put(sink, field_temperature, static_cast<std::int8_t>(reply.temperature));
+      values.ch1_sequence = channel.sequence;
+      break;
+    case Part::encoder_id:  // the same in both channels
+      values.encoder_id = channel.encoder_id;
+      values.safety = channel.encoder_id >> 7;
+      values.multiturn_bytes = channel.encoder_id >> 5 & 3;
+      values.singleturn_bits = channel.encoder_id & 0x1F;
+      break;
+    case Part::temperature:
+      values.temperature = static_cast<std::int8_t>(reply.temperature);
+      break;
     case Part::redundant_sequence:
-      put(sink, field_redundant_singleturn, reply.redundant);
-      return put(sink, field_ch2_sequence, channel.sequence);
+      values.redundant = reply.redundant;
+      [[fallthrough]];
     case Part::zero_sequence:
-      return put(sink, field_ch2_sequence, channel.sequence);
+      values.ch2_sequence = channel.sequence;
+      break;
     case Part::redundant_alone:
     case Part::redundant_calibration:
-      return put(sink, field_redundant_singleturn, reply.redundant);
+      values.redundant = reply.redundant;
+      break;
     case Part::memory_address:
-      put(sink, field_memory_address, reply.memory_address);
-      return put(sink, field_busy, reply.busy ? 1 : 0);
+      values.memory_address = reply.memory_address;
+      values.busy = reply.busy;
+      break;
     case Part::value:
-      return put(sink, field_value, reply.value);
+      values.value = reply.value;
+      break;
   }
 }
 
 }  // namespace detail
 
-/// Every field that a reply of this id carries, in the order of the wire.
-constexpr void put_fields(FieldSink& sink, const Reply& reply) {
-  put(sink, field_data_id, static_cast<std::int64_t>(reply.id));
-  put(sink, field_encoder_address, reply.encoder_address);
-  for (const Part part : layout_of(reply.id).one()) detail::put_part(sink, part, reply, reply.one, true);
-  for (const Part part : layout_of(reply.id).two()) detail::put_part(sink, part, reply, reply.two, false);
+/// Every field that a reply of this id carries.
+[[nodiscard]] constexpr Values values_of(const Reply& reply) {
+  Values values{.data_id = reply.id, .encoder_address = reply.encoder_address};
+  for (const Part part : layout_of(reply.id).one()) detail::put_part(values, part, reply, true);
+  for (const Part part : layout_of(reply.id).two()) detail::put_part(values, part, reply, false);
+  return values;
 }
 
 /// What was asked: the request, or without one what the reply's own control field says; the address of a memory access
@@ -198,22 +200,6 @@ constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes 
     asked.value = reply[2];
   }
   return asked;
-}
-
-/// Decodes a reply to `request`, or `request` alone when there is no reply.
-constexpr Error decode(const Profile& profile, Bytes request, Bytes reply, FieldSink& sink) {
-  const Result<Request> asked = asked_by(profile, request, reply);
-  if (!asked) return asked.error();
-  if (reply.empty()) {
-    put_fields(sink, profile, *asked);
-    return Error::none;
-  }
-  const Result<Reply> result = decode_reply(profile, *asked, reply);
-  if (!result) return result.error();
-  put_fields(sink, *result);
-  const Reading reading = to_reading(*result);
-  if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
-  return Error::none;
 }
 
 }  // namespace absenc::esl

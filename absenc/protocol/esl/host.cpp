@@ -1,180 +1,247 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/esl/host.hpp"
 
-#include "absenc/protocol/esl/fields.hpp"
+#include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/esl/words.hpp"
 
 namespace absenc::esl {
 
+using author::done;
+using author::Procedure;
+
 namespace {
 
-constexpr unsigned attempts_in_procedures = 3;
-constexpr Time between_looks = 10ms;              // two positions that far apart show whether the shaft turns
-constexpr std::int64_t noise = 1 << 10;           // counts of 24 bits that a shaft at rest may tremble: 0.02 degrees
-constexpr std::int64_t zero_tolerance = 1 << 14;  // 0.35 degrees, as T-format encoders have; the document gives none
+constexpr unsigned attempts = 3;  // of what only reads, or selects a page: resets, writes and ID 8 are never repeated
 constexpr unsigned safe_attempts = 6;
 
-constexpr std::int64_t distance(std::uint32_t to, std::uint32_t from) {
-  const std::int64_t difference = wrapped_difference(to, from, singleturn_bits);
-  return difference < 0 ? -difference : difference;
+Request request_of(const Line& line, DataId id) { return {id, line.format().address}; }
+
+Reading reading_of(const Line& line, const Reply& reply) {
+  Reading reading = to_reading(reply);
+  reading.latched = latch_time(line.format(), line.sent_at());
+  reading.received = line.received_at();
+  return reading;
 }
 
 }  // namespace
 
-// ---- Read
-
-Read::Read(const Profile& profile, DataId id) : Procedure(profile, 1), id_(id) {
-  ask(id == DataId::encoder_id ? DataId::singleturn_short : id);
+Procedure read_encoder_id(Line& line, Identity& found) {
+  co_await line.ask(request_of(line, DataId::singleturn_short));
+  found.reply = co_await line.ask(request_of(line, DataId::encoder_id));
+  co_return done;
 }
 
-void Read::answered(const Reply& reply) {
-  if (reply.id != id_) return ask(id_);
-  reply_ = reply;
-  reading_ = reading_of(reply);
-  finish();
-}
-
-const Reading* Read::reading() const {
-  return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
-}
-
-void Read::report(FieldSink& sink) const {
-  if (error() == Error::none) put_fields(sink, reply_);
-}
-
-// ---- ReadSafePosition
-
-ReadSafePosition::ReadSafePosition(const Profile& profile) : Procedure(profile, 1), monitor_(profile) {
-  ask(monitor_.next_id());
-}
-
-void ReadSafePosition::answered(const Reply& reply) {
-  const SafetyVerdict verdict = monitor_.judge(request(), reply_bytes(), sent_at());
-  ++exchanges_;
-  failed_ = verdict.failed;
-  reply_ = reply;
-  reading_ = reading_of(reply);
-  position_ = verdict.position;
-  if (position_) return finish();
-  if (failed_ == Check::sequence_unknown && exchanges_ < safe_attempts) return ask(monitor_.next_id());
-  finish(error_of(failed_), text_of(failed_).sentence);
-}
-
-const SafePosition* ReadSafePosition::position() const {
-  return error() == Error::none && position_ ? &*position_ : nullptr;
-}
-
-const Reading* ReadSafePosition::reading() const { return position() != nullptr ? &reading_ : nullptr; }
-
-void ReadSafePosition::report(FieldSink& sink) const {
-  if (position() == nullptr) return;
-  put_fields(sink, reply_);
-  put(sink, field_safe_singleturn, position()->singleturn());
-}
-
-// ---- Reset
-
-Reset::Reset(const Profile& profile, DataId id) : Procedure(profile, attempts_in_procedures), id_(id) {
-  ask(DataId::position);
-}
-
-void Reset::answered(const Reply& reply) {
-  switch (phase_) {
-    case Phase::first_look:
-      before_ = reply.singleturn;
-      phase_ = Phase::second_look;
-      ask(DataId::position, received_at() + between_looks);
-      break;
-    case Phase::second_look:
-      second_look(reply);
-      break;
-    case Phase::requests:
-      go_on();
-      break;
-    case Phase::verify:
-      verify(reply);
-      break;
+Procedure read_safely(Line& line, Safe& found) {
+  SafetyMonitor monitor(line.format());
+  for (unsigned i = 0; i < safe_attempts && found.failed == Check::sequence_unknown; ++i) {
+    const Request request = request_of(line, monitor.next_id());
+    found.reply = co_await line.ask(request);
+    found.reading = reading_of(line, found.reply);
+    const SafetyVerdict verdict = monitor.judge(request, line.reply(), line.sent_at());
+    found.position = verdict.position;
+    found.failed = verdict.failed;
   }
+  co_return {error_of(found.failed), text_of(found.failed).sentence};
 }
 
-void Reset::second_look(const Reply& reply) {
-  if (!to_reading(reply).ready) {
-    return finish(Error::invalid_argument, "the encoder is not ready yet; nothing was sent");
-  }
-  if (distance(reply.singleturn, before_) > noise) {
-    return finish(Error::invalid_argument, "the shaft is turning: a reset needs it standing still; nothing was sent");
-  }
-  before_ = reply.singleturn;
-  phase_ = Phase::requests;
-  go_on();
+// ---- Resets (Table 4)
+
+namespace {
+
+// The eight of them are 40 us apart, from start to start; a slow line takes longer.
+Time pause_between_resets(const Line& line, DataId id) {
+  const Time duration = line_settings.character() * static_cast<std::int64_t>(request_length(line.format(), id));
+  return line.sent_at() - duration + reset_interval - line.received_at();
 }
 
-// About 40 us from request to request; a slow line takes longer.
-void Reset::go_on() {
-  if (sent_requests_ < reset_requests) {
-    const Time duration = line_settings.character() * static_cast<std::int64_t>(request_length(profile(), id_));
-    const Time earliest = sent_requests_ == 0 ? Time{} : sent_at() + reset_interval - duration;
-    ++sent_requests_;
-    return ask(id_, earliest);
+author::Outcome judge(AfterReset& found, DataId id, std::uint32_t before) {
+  const Reply& reply = found.reply;
+  const auto remaining = static_cast<std::uint8_t>(reply.one.alarms | reply.two.alarms);
+  if (id == DataId::zero && !author::is_near(reply.singleturn, 0, singleturn_bits)) {
+    return {Error::cross_check_failed, "the position is still not zero"};
   }
-  phase_ = Phase::verify;
-  // B saves the zero in the EEPROM; D may do the same.
-  ask(DataId::position, received_at() + (id_ == DataId::clear_alarms ? reset_interval : eeprom_write_time + 1ms));
-}
-
-void Reset::failed(Error error) {
-  // When the last reply is lost, the reset may have been done all the same: reading tells.
-  if (phase_ == Phase::requests && sent_requests_ == reset_requests) return go_on();
-  if (phase_ == Phase::requests) {
-    return finish(error,
-                  "one of the eight requests was not answered well, so the encoder has most likely done nothing: read "
-                  "the position before you try again");
-  }
-  if (phase_ == Phase::verify) {
-    return finish(error, "all eight requests were sent, but whether the encoder obeyed could not be read");
-  }
-  finish(error);
-}
-
-void Reset::verify(const Reply& reply) {
-  reply_ = reply;
-  reading_ = reading_of(reply);
-  if (id_ == DataId::zero && distance(reply.singleturn, 0) > zero_tolerance) {
-    return finish(Error::cross_check_failed, "the position is still not zero");
-  }
-  if (id_ == DataId::reset_multiturn && reply.multiturn != 0) {
-    return finish(Error::cross_check_failed, "the turns are still not zero");
+  if (id == DataId::reset_multiturn && reply.multiturn != 0) {
+    return {Error::cross_check_failed, "the turns are still not zero"};
   }
   // Rev 1.4 of the document added a single-turn clear to ID D and left it out elsewhere.
-  if (id_ == DataId::reset_multiturn && distance(reply.singleturn, before_) > noise) {
-    return finish(Error::cross_check_failed,
-                  "the turns are zero, but the encoder has moved its single-turn zero too: find the origin again");
+  if (id == DataId::reset_multiturn && !author::is_near(reply.singleturn, before, singleturn_bits)) {
+    return {Error::cross_check_failed,
+            "the turns are zero, but the encoder has moved its single-turn zero too: find the origin again"};
   }
-  if (id_ == DataId::clear_alarms && remaining() != 0) {
-    name_what_remains();
-    return finish(Error::cross_check_failed);
+  if (id == DataId::clear_alarms && remaining != 0) {
+    name_what_remains(found.words, remaining);
+    return {Error::cross_check_failed, found.words.view()};
   }
-  finish();
+  return done;
 }
 
-void Reset::name_what_remains() {
-  Sentence& sentence = explanation();
-  sentence.clear();
-  bool power_cycle = false;
-  for (unsigned bit = 0; bit < 8; ++bit) {
-    if ((remaining() >> bit & 1) == 0) continue;
-    sentence.add(sentence.empty() ? "" : ", ").add(alarm_flags[bit].name);
-    power_cycle = power_cycle || bit == 2 || bit == 3 || bit == 4 || bit == 5;  // Table 8
+}  // namespace
+
+Procedure reset(Line& line, AfterReset& found, DataId id) {
+  const Request look = request_of(line, DataId::position);
+  const Reply first = co_await line.ask(look).repeated(attempts);
+  const Reply before = co_await line.ask(look).repeated(attempts).after(author::between_looks);
+  if (!to_reading(before).ready) {
+    co_return {Error::invalid_argument, "the encoder is not ready yet; nothing was sent"};
   }
-  sentence.add((remaining() & (remaining() - 1)) == 0 ? " remains" : " remain");
-  if ((remaining() & alarms::multiturn_error) != 0) sentence.add("; multiturn_error: reset-multiturn first");
-  if (power_cycle) sentence.add("; switch the encoder off and on");
-  if ((remaining() & alarms::voltage) != 0) sentence.add("; the supply voltage is wrong");
+  if (!author::is_near(before.singleturn, first.singleturn, singleturn_bits)) {
+    co_return {Error::invalid_argument, "the shaft is turning: a reset needs it standing still; nothing was sent"};
+  }
+  for (unsigned i = 0; i < reset_requests; ++i) {
+    const Time pause = i == 0 ? Time{} : pause_between_resets(line, id);
+    const Result<Reply> reply = co_await line.attempt(request_of(line, id)).after(pause);
+    // When the last reply is lost, the reset may have been done all the same: reading tells.
+    if (reply || i + 1 == reset_requests) continue;
+    co_return {reply.error(),
+               "one of the eight requests was not answered well, so the encoder has most likely done nothing: read the "
+               "position before you try again"};
+  }
+  // B saves the zero in the EEPROM; D may do the same.
+  const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
+  found.reply = co_await line.ask(look).repeated(attempts).after(pause).or_say(
+      "all eight requests were sent, but whether the encoder obeyed could not be read");
+  found.reading = reading_of(line, found.reply);
+  co_return judge(found, id, before.singleturn);
 }
 
-const Reading* Reset::reading() const { return error() == Error::none ? &reading_ : nullptr; }
+// ---- Memory
 
-void Reset::report(FieldSink& sink) const {
-  if (error() == Error::none) put_fields(sink, reply_);
+namespace {
+
+constexpr Time busy_limit = 2 * page_time;  // the document gives no maximum
+
+constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
+
+// Nothing in the temporary register stands between such a byte and its reader.
+bool is_immediate(std::uint8_t page, std::uint8_t address) {
+  const MemoryArea* area = find_area(page, address);
+  return address == page_select_address || (area != nullptr && area->kind == MemoryArea::Kind::registers);
+}
+
+// What comes when the memory is no longer busy. A busy encoder has not executed the request, so even a write may be
+// sent again. `after_busy`: only what follows a busy answer is believed, because the temporary register may hold what
+// somebody else once asked for.
+author::Part<Result<Reply>> settled(Line& line, Request request, Time pause, bool after_busy) {
+  const bool writes = request.id == DataId::write_memory && !selects_page(request);
+  const Time busy_pause = Protocol::manner(line.format(), request).pause;
+  Time limit = never;
+  for (;;) {
+    const Result<Reply> reply = co_await line.attempt(request).repeated(writes ? 1 : attempts).after(pause);
+    if (!reply || (!reply->busy && !after_busy)) co_return reply;
+    if (reply->busy) after_busy = false;
+    limit = std::min(limit, line.received_at() + busy_limit);
+    if (line.received_at() > limit) {
+      co_await line.stop({Error::busy,
+                          "the memory stays busy longer than a write may take; the last request was not executed",
+                          {},
+                          busy_pause});
+    }
+    pause = busy_pause;
+  }
+}
+
+// `words`: what the error says where the procedure ends here.
+author::Part<std::uint8_t> select(Line& line, std::uint8_t page, std::string_view words) {
+  const Request request{DataId::write_memory, line.format().address, page_select_address, page};
+  const Result<Reply> reply = co_await settled(line, request, {}, false);
+  if (!reply) co_await line.stop({reply.error(), words, {}, page_time});
+  co_return page;
+}
+
+author::Part<std::uint8_t> read_byte(Line& line, std::uint8_t page, std::uint8_t address, Time pause,
+                                     std::string_view words) {
+  const Request request{DataId::read_memory, line.format().address, address};
+  const Result<Reply> reply = co_await settled(line, request, pause, !is_immediate(page, address));
+  if (!reply) co_await line.stop({reply.error(), words, {}, eeprom_read_pause});
+  co_return reply->value;
+}
+
+}  // namespace
+
+Procedure read_memory(Line& line, MemoryBytes& found, Arguments arguments) {
+  found.address = static_cast<std::uint8_t>(arguments[0]);
+  found.page = static_cast<std::uint8_t>(arguments[1]);
+  const auto end = static_cast<unsigned>(found.address + arguments[2]);
+  for (unsigned i = found.address; i < end; ++i) {
+    if (find_area(found.page, i) == nullptr) co_return {Error::invalid_argument, unknown_area};
+  }
+  co_await select(line, found.page, {});
+  for (unsigned i = found.address; i < end; ++i) {
+    const Time pause = i == found.address ? page_time : Time{};
+    const std::uint8_t value = co_await read_byte(line, found.page, static_cast<std::uint8_t>(i), pause, {});
+    found.data.push_back(value);
+  }
+  co_return done;
+}
+
+Procedure write_memory(Line& line, Written& found, Arguments arguments) {
+  found.address = static_cast<std::uint8_t>(arguments[0]);
+  found.value = static_cast<std::uint8_t>(arguments[1]);
+  found.page = static_cast<std::uint8_t>(arguments[2]);
+  const bool force = arguments[3] != 0;
+  constexpr std::string_view nothing_written = "nothing was written";
+  const MemoryArea* const area = find_area(found.page, found.address);
+  if (area == nullptr) co_return {Error::invalid_argument, unknown_area};
+  if (!area->user && !force) {
+    found.words.add("this page is not for the user: it holds ").add(area->meaning);
+    found.words.add_part("writing there can spoil the encoder and needs force; nothing was sent");
+    co_return {Error::invalid_argument, found.words.view()};
+  }
+  co_await select(line, found.page, nothing_written);
+  const std::uint8_t before = co_await read_byte(line, found.page, found.address, page_time, nothing_written);
+  if (before == found.value) co_return done;
+  found.sent = true;
+  // A lost reply does not tell whether the write was done: reading back does.
+  const Request write{DataId::write_memory, line.format().address, found.address, found.value};
+  static_cast<void>(co_await settled(line, write, {}, false));
+  const Time pause = is_immediate(found.page, found.address) ? Time{} : eeprom_write_pause;
+  const std::uint8_t now =
+      co_await read_byte(line, found.page, found.address, pause, "the byte was written, but could not be read back");
+  if (now == found.value) co_return done;
+  co_return {Error::cross_check_failed, "reading back gave another value: the write has failed", {}, eeprom_read_pause};
+}
+
+Procedure select_page(Line& line, Selected& found, Arguments arguments) {
+  found.page = static_cast<std::uint8_t>(arguments[0]);
+  if (!is_page(found.page)) co_return {Error::invalid_argument, "Table 11 lists no such page; nothing was sent"};
+  co_await select(line, found.page, {});
+  const std::uint8_t now = co_await read_byte(line, found.page, page_select_address, page_time, {});
+  if (now == found.page) co_return done;
+  co_return {Error::cross_check_failed, "another page is selected", {}, eeprom_read_pause};
+}
+
+Procedure read_error_info(Line& line, ErrorInfo& found) {
+  constexpr std::string_view page_may_be_left = "page 8 may be left selected, where it was another before";
+  const Request which{DataId::read_memory, line.format().address, page_select_address};
+  const Result<Reply> before = co_await settled(line, which, {}, false);
+  const bool known = before && is_page(before->value);
+  const std::uint8_t page = known ? before->value : register_page;
+  co_await select(line, register_page, page_may_be_left);
+  found.flags = co_await read_byte(line, register_page, error_info_address, page_time, page_may_be_left);
+  found.page_left = !known;
+  if (page == register_page) co_return done;
+  // What was asked for is known, whatever becomes of this: reading it back tells what the next user finds.
+  const Request restore{DataId::write_memory, line.format().address, page_select_address, page};
+  static_cast<void>(co_await settled(line, restore, {}, false));
+  const Result<Reply> after = co_await settled(line, which, page_time, false);
+  found.page_left = !after || after->value != page;
+  co_return done;
+}
+
+// ---- Several encoders on one line
+
+Procedure scan(Line& line, Nodes& found) {
+  bool any = false;
+  for (std::uint8_t address = 0; address < most_encoders; ++address) {
+    const Request request{DataId::singleturn_short, address};
+    const Result<Reply> reply = co_await line.attempt(request).repeated(attempts).after(request_pause);
+    if (!reply && line.is_noisy()) co_return {reply.error()};
+    if (reply) found.answers[address] = *reply;
+    found.disturbed[address] = !reply && reply.error() != Error::timeout;
+    any = any || reply || found.disturbed[address];
+  }
+  if (!any) co_return {Error::timeout};
+  co_return done;
 }
 
 }  // namespace absenc::esl

@@ -1,84 +1,89 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of ESL, what concerns position, id, temperature, alarms and resets: each class is one conversation, a
-// machine without port, clock or heap. README.md describes the procedures; memory.hpp and bus.hpp have the others.
+// Host side of ESL: what takes more than one exchange. A single position is author::ReadPosition<Protocol>. README.md
+// describes the procedures.
 #pragma once
 
-#include "absenc/protocol/esl/procedure.hpp"
+#include <array>
+#include <optional>
+
+#include "absenc/protocol/esl/protocol.hpp"
 #include "absenc/protocol/esl/safety.hpp"
+#include "absenc/protocol/sentence.hpp"
 
 namespace absenc::esl {
 
-/// One reply of any ID that only reads: 1, 2, 4, 5, 6, 8, 9, A. ID 8 is preceded by an ID 5, so that eight of these
-/// conversations in a row are not eight IDs 8 in a row.
-class Read final : public Procedure {
- public:
-  explicit Read(const Profile& profile, DataId id = DataId::position);
+using Line = author::LineOf<Protocol>;
 
-  /// Null for replies without a position. Not a safe position.
-  [[nodiscard]] const Reading* reading() const override;
-  void report(FieldSink& sink) const override;
-  [[nodiscard]] const Reply& reply() const { return reply_; }
-
- private:
-  void answered(const Reply& reply) override;
-
-  DataId id_;
-  Reply reply_{};
-  Reading reading_{};
+struct Identity {
+  Reply reply{};
 };
+/// ID 8, preceded by an ID 5, so that eight of these in a row are not eight IDs 8 in a row.
+author::Procedure read_encoder_id(Line& line, Identity& found);
 
+struct Safe {
+  Reply reply{};
+  Reading reading{};
+  std::optional<SafePosition> position{};  // unless every check passed: none
+  Check failed = Check::sequence_unknown;
+};
 /// IDs 1 and 2 until the monitor trusts the line: two exchanges when all is well. Errors: those of the check that
-/// failed, which `check` names.
-class ReadSafePosition final : public Procedure {
- public:
-  explicit ReadSafePosition(const Profile& profile);
+/// failed.
+author::Procedure read_safely(Line& line, Safe& found);
 
-  [[nodiscard]] const Reading* reading() const override;
-  void report(FieldSink& sink) const override;
-  /// Null unless every check passed.
-  [[nodiscard]] const SafePosition* position() const;
-  [[nodiscard]] Check failed_check() const { return failed_; }
-
- private:
-  void answered(const Reply& reply) override;
-
-  SafetyMonitor monitor_;
-  std::optional<SafePosition> position_{};
-  Check failed_ = Check::sequence_unknown;
-  unsigned exchanges_ = 0;
-  Reply reply_{};
-  Reading reading_{};
+struct AfterReset {
+  Reply reply{};
+  Reading reading{};
+  Sentence words{};
 };
-
 /// IDs B (single-turn zero here), C (clear alarms) and D (turns): makes sure that the shaft stands still, sends eight
 /// requests, reads back what became of it. Errors: invalid_argument (the shaft turns, the encoder is not ready),
-/// cross_check_failed (the encoder did not do it; `detail` names what remains), or that of an exchange.
-class Reset final : public Procedure {
- public:
-  Reset(const Profile& profile, DataId id);
+/// cross_check_failed (the encoder did not do it; the words name what remains), or that of an exchange.
+author::Procedure reset(Line& line, AfterReset& found, DataId id);
 
-  [[nodiscard]] const Reading* reading() const override;  // after the reset
-  void report(FieldSink& sink) const override;
-  /// The alarms that are still set.
-  [[nodiscard]] std::uint8_t remaining() const {
-    return static_cast<std::uint8_t>(reply_.one.alarms | reply_.two.alarms);
-  }
+// ---- Memory (Tables 9 to 11, Figures 14 and 15). One-to-one only
 
- private:
-  enum class Phase : std::uint8_t { first_look, second_look, requests, verify };
-  void answered(const Reply& reply) override;
-  void failed(Error error) override;
-  void second_look(const Reply& reply);
-  void verify(const Reply& reply);
-  void go_on();
-  void name_what_remains();
-
-  DataId id_;
-  Phase phase_ = Phase::first_look;
-  unsigned sent_requests_ = 0;
-  std::uint32_t before_ = 0;  // single-turn position
-  Reply reply_{};
-  Reading reading_{};
+struct MemoryBytes {
+  std::uint8_t page = 0;
+  std::uint8_t address = 0;
+  ByteBuffer<last_address + 1> data{};
 };
+/// Arguments: address, page, count. Errors: invalid_argument (not in Table 11), busy.
+author::Procedure read_memory(Line& line, MemoryBytes& found, Arguments arguments);
+
+struct Written {
+  std::uint8_t page = 0;
+  std::uint8_t address = 0;
+  std::uint8_t value = 0;
+  bool sent = false;  // false: the byte held the value already
+  Sentence words{};
+};
+/// Reads, writes what differs, waits, reads back. Arguments: address, value, page, force. Errors: invalid_argument (not
+/// in Table 11, or not without force), busy, cross_check_failed (another value is there now).
+author::Procedure write_memory(Line& line, Written& found, Arguments arguments);
+
+struct Selected {
+  std::uint8_t page = 0;
+};
+/// For whoever reads or writes by himself. Arguments: page.
+author::Procedure select_page(Line& line, Selected& found, Arguments arguments);
+
+struct ErrorInfo {
+  std::uint8_t flags = 0;
+  bool page_left = false;  // page 8 stays selected: which one was before is not known
+};
+/// Page 8 address 1A: which of the two is behind led_or_lissajous_error. The page before is selected again.
+author::Procedure read_error_info(Line& line, ErrorInfo& found);
+
+// ---- Several encoders on one line
+
+inline constexpr unsigned most_encoders = 8;  // 3 address bits
+
+struct Nodes {
+  std::array<std::optional<Reply>, most_encoders> answers{};  // the last good reply of each
+  std::array<bool, most_encoders> disturbed{};
+};
+/// Asks every address for ID 5, never for ID 8: eight of these in a row are "dynamic addressing". An answer that is
+/// damaged every time tells of two encoders with one address, or of a bad line. Error: timeout when nobody answers.
+author::Procedure scan(Line& line, Nodes& found);
 
 }  // namespace absenc::esl

@@ -1,86 +1,85 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host conversations against the virtual QS35 in virtual time.
+// The unit's commands against the virtual QS35 in virtual time.
 #include "absenc/protocol/esl/host.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <memory>
+#include <tuple>
+
 #include "absenc/protocol/esl/bench_test.hpp"
-#include "absenc/protocol/esl/settings.hpp"
 
 namespace absenc::esl {
 namespace {
 
 using testing::Bench;
-using testing::report;
-using Wire = std::vector<std::uint8_t>;
+using testing::Outcome;
+using testing::Wire;
+using testing::wire;
 
-Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
+bool says(const Outcome& outcome, std::string_view words) { return outcome.detail.find(words) != std::string::npos; }
 
 TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   Bench bench;
   bench.shaft.put(4660, 0xABCDEF);
-  Read read({});
-  bench.run(read);
-  ASSERT_EQ(read.error(), Error::none);
+  const Outcome read = bench.run("position");
+  ASSERT_EQ(read.error, Error::none);
   EXPECT_EQ(bench.line.now(), 2us + answer_time + 18us);
-  ASSERT_NE(read.reading(), nullptr);
-  EXPECT_EQ(read.reading()->singleturn, 0xABCDEFu);
-  EXPECT_EQ(read.reading()->multiturn, 4660u);
-  EXPECT_TRUE(read.reading()->singleturn_valid() && read.reading()->multiturn_valid && read.reading()->ready);
-  EXPECT_EQ(read.reading()->latched, 1us + position_time);  // the end bit of CF is over after one character
-  EXPECT_EQ(read.reading()->received, 22us);
-  EXPECT_EQ(report(read)["redundant_singleturn"], 0xABCDEF >> 15);
+  ASSERT_TRUE(read.reading.has_value());
+  EXPECT_EQ(read.reading->singleturn, 0xABCDEFu);
+  EXPECT_EQ(read.reading->multiturn, 4660u);
+  EXPECT_TRUE(read.reading->singleturn_valid() && read.reading->multiturn_valid && read.reading->ready);
+  EXPECT_EQ(read.reading->latched, 1us + position_time);  // the end bit of CF is over after one character
+  EXPECT_EQ(read.reading->received, 22us);
+  EXPECT_EQ(read.fields.at("redundant_singleturn"), 0xABCDEF >> 15);
 }
 
 TEST(EslHost, ReadsEveryId) {
   Bench bench;
   bench.shaft.put(4660, 0xABCDEF);
-  bench.encoder.set_environment({.temperature = -10});
-  EXPECT_EQ(bench.read(DataId::singleturn).singleturn, 0xABCDEFu);
-  EXPECT_EQ(bench.read(DataId::position_short).multiturn, 4660u);
-  EXPECT_EQ(bench.read(DataId::singleturn_short).singleturn, 0xABCDEFu);
-  EXPECT_EQ(bench.read(DataId::calibration).redundant, 0xABCDu);
-  EXPECT_EQ(bench.read(DataId::alarms).one.alarms, 0);
-  Read temperature({}, DataId::temperature);
-  bench.run(temperature);
-  EXPECT_EQ(report(temperature)["temperature_c"], -10);
-  EXPECT_EQ(temperature.reading(), nullptr);
-  Read id({}, DataId::encoder_id);
-  bench.run(id);
-  EXPECT_EQ(report(id)["encoder_id"], 0xD8);
-  EXPECT_EQ(report(id)["safety"], 1);
-  EXPECT_EQ(report(id)["multiturn_bytes"], 2);
-  EXPECT_EQ(report(id)["singleturn_bits"], 24);
-  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  for (const auto& [command, field, value] :
+       {std::tuple{"singleturn", "singleturn", 0xABCDEF}, std::tuple{"position-short", "multiturn", 4660},
+        std::tuple{"singleturn-short", "singleturn", 0xABCDEF},
+        std::tuple{"calibration", "redundant_singleturn", 0xABCD}, std::tuple{"alarms", "ch2_alarms", 0},
+        std::tuple{"temperature", "temperature_c", 35}, std::tuple{"encoder-id", "encoder_id", 0xD8},
+        std::tuple{"encoder-id", "safety", 1}, std::tuple{"encoder-id", "multiturn_bytes", 2},
+        std::tuple{"encoder-id", "singleturn_bits", 24}, std::tuple{"safe-position", "safe_singleturn", 0xABCDEF}}) {
+    const Outcome outcome = bench.run(command);
+    EXPECT_EQ(outcome.error, Error::none) << command;
+    ASSERT_TRUE(outcome.fields.contains(field)) << command;
+    EXPECT_EQ(outcome.fields.at(field), value) << command;
+  }
+  EXPECT_FALSE(bench.run("temperature").reading.has_value());
+  EXPECT_EQ(bench.violations(), 0u);
 }
 
 TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   Bench bench;
-  for (unsigned i = 0; i < 20; ++i) EXPECT_EQ(bench.read(DataId::encoder_id).one.encoder_id, 0xD8);
-  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  for (unsigned i = 0; i < 20; ++i) EXPECT_EQ(bench.run("encoder-id").error, Error::none);
+  EXPECT_EQ(bench.violations(), 0u);
   for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::encoder_id});
-  ASSERT_EQ(bench.encoder.violation_count(), 1u);  // the rule is watched
+  ASSERT_EQ(bench.violations(), 1u);  // the rule is watched
 }
 
 // Every profile on both sides; another address too.
 TEST(EslHost, EveryProfileIsSpokenOnBothSides) {
   for (std::size_t option = 0; option < open_options; ++option) {
-    for (std::size_t value = 0; value < options[option].choices.size(); ++value) {
+    for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
+      SCOPED_TRACE(std::string(options.infos[option].name) + "=" + std::string(options.infos[option].choices[value]));
       Profile profile{.address = 5};
-      set_option(profile, option, static_cast<std::int64_t>(value));
+      options.put(profile, option, static_cast<std::int64_t>(value));
       Bench bench(profile);
       bench.shaft.put(-1, 0xABCDEF);
-      ReadSafePosition safe(profile);
-      ASSERT_EQ(bench.run(safe).error(), Error::none) << options[option].name << "=" << options[option].choices[value];
-      EXPECT_EQ(safe.position()->singleturn(), 0xABCDEFu);
-      EXPECT_EQ(safe.position()->encoder_address(), 5);
-      EXPECT_EQ(bench.read(DataId::position).multiturn, 0xFFFFu);
-      EXPECT_EQ(bench.read(DataId::calibration).singleturn, 0xABCDEFu);
-      ReadErrorInfo info(profile);
-      EXPECT_EQ(bench.run(info).error(), Error::none);
-      Reset zero(profile, DataId::zero);
-      EXPECT_EQ(bench.run(zero).error(), Error::none) << zero.detail();
-      EXPECT_EQ(bench.encoder.violation_count(), 0u);
+      const Outcome safe = bench.run("safe-position");
+      ASSERT_EQ(safe.error, Error::none) << safe.detail;
+      EXPECT_EQ(safe.fields.at("safe_singleturn"), 0xABCDEF);
+      EXPECT_EQ(safe.fields.at("encoder_address"), 5);
+      EXPECT_EQ(bench.run("position").reading->multiturn, 0xFFFFu);
+      EXPECT_EQ(bench.run("calibration").reading->singleturn, 0xABCDEFu);
+      EXPECT_EQ(bench.run("led-or-lissajous").error, Error::none);
+      EXPECT_EQ(bench.run("zero").error, Error::none);
+      EXPECT_EQ(bench.violations(), 0u);
     }
   }
 }
@@ -88,11 +87,12 @@ TEST(EslHost, EveryProfileIsSpokenOnBothSides) {
 TEST(EslHost, SilenceIsATimeout) {
   Bench bench;
   bench.encoder.power_off(Time{});
-  Read read({});
-  EXPECT_EQ(bench.run(read).error(), Error::timeout);
+  const Outcome read = bench.run("position");
+  EXPECT_EQ(read.error, Error::timeout);
   EXPECT_EQ(bench.line.now(), 2us + answer_limit);
-  EXPECT_NE(read.detail().find("request_crc"), std::string_view::npos);
-  EXPECT_EQ(read.exchange().sent.size(), 2u);
+  EXPECT_EQ(read.detail, "it is also silent when request_crc, crc_bit_order or address is another");
+  EXPECT_EQ(read.sent.size(), 2u);
+  EXPECT_TRUE(says(bench.run("memory-read", {0}), "(Figure 18)"));
 }
 
 // Each with its own name and sentence.
@@ -102,7 +102,6 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
     Error error;
     testing::Tampered::Tamper tamper;
   };
-  const Profile other_address{.address = 1};
   const std::vector<Row> rows{
       {"CRC of channel 1 is wrong", Error::bad_checksum, [](unsigned, Wire& reply) { reply[4] ^= 1; }},
       {"CRC of channel 2 is wrong", Error::bad_checksum, [](unsigned, Wire& reply) { reply[13] ^= 1; }},
@@ -111,78 +110,47 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
       {"channel 2 is missing", Error::wrong_length, [](unsigned, Wire& reply) { reply.resize(11); }},
       {"number of bytes", Error::wrong_length, [](unsigned, Wire& reply) { reply.pop_back(); }},
       {"address of another encoder", Error::unexpected_reply,
-       [&](unsigned, Wire& reply) {
-         reply = wire(encode_reply(other_address, {.encoder_address = 1, .one = {.status = status::ready}}));
-       }},
+       [&](unsigned, Wire& reply) { reply = wire({.encoder_address = 1, .one = {.status = status::ready}}); }},
       {"wrong parity bit in the request", Error::request_rejected,
-       [](unsigned, Wire& reply) { reply = wire(encode_reply({}, {.one = {.status = status::parity_error}})); }},
+       [](unsigned, Wire& reply) { reply = wire({.one = {.status = status::parity_error}}); }},
   };
   for (const Row& row : rows) {
     Bench bench({}, row.tamper);
-    Read read({});
-    EXPECT_EQ(text_of(bench.run(read).error()).name, text_of(row.error).name) << row.sentence;
-    EXPECT_NE(read.detail().find(row.sentence), std::string_view::npos) << read.detail();
-    EXPECT_EQ(read.reading(), nullptr);
-    EXPECT_GE(bench.line.now(), read.exchange().received_at + gap_limit) << row.sentence;
-    EXPECT_EQ(bench.encoder.violation_count(), 0u);
-  }
-}
-
-TEST(EslHost, ARepeatedFrameMakesNoSafePosition) {
-  Wire kept;
-  Bench bench({}, [&kept](unsigned index, Wire& reply) {
-    if (index == 2) kept = reply;
-    if (index == 3) reply = kept;
-  });
-  bench.shaft.spin(60, Time{});
-  SafetyMonitor monitor({});
-  struct OneRead final : Procedure {
-    OneRead(SafetyMonitor& safety, DataId id) : Procedure({}, 1), monitor(safety) { ask(id); }
-    void answered(const Reply&) override {
-      verdict = monitor.judge(request(), reply_bytes(), sent_at());
-      finish(error_of(verdict.failed), text_of(verdict.failed).sentence);
-    }
-    void report(FieldSink&) const override {}
-    SafetyMonitor& monitor;
-    SafetyVerdict verdict;
-  };
-  for (const auto& [id, failed] :
-       {std::pair{DataId::position, Check::sequence_unknown}, std::pair{DataId::singleturn, Check::passed},
-        std::pair{DataId::position, Check::passed}, std::pair{DataId::position, Check::sequence_still}}) {
-    OneRead read(monitor, id);
-    bench.run(read);
-    EXPECT_EQ(read.verdict.failed, failed);
-    EXPECT_EQ(read.verdict.position.has_value(), failed == Check::passed);
-    EXPECT_EQ(read.error(), failed == Check::passed ? Error::none : Error::sequence_mismatch);
-    EXPECT_EQ(read.detail(), text_of(failed).sentence);
+    const Outcome read = bench.run("position");
+    EXPECT_EQ(text_of(read.error).name, text_of(row.error).name) << row.sentence;
+    EXPECT_TRUE(says(read, row.sentence)) << read.detail;
+    EXPECT_FALSE(read.reading.has_value());
+    EXPECT_GE(bench.line.now(), read.received_at + gap_limit) << row.sentence;
+    EXPECT_EQ(bench.violations(), 0u);
   }
 }
 
 TEST(EslHost, AProfileThatDoesNotFitIsNamed) {
+  const Profile plain;
   struct Row {
-    const char* host;     // what the host believes
-    const char* encoder;  // what the encoder is
-    DataId id;
+    Profile host;     // what the host believes
+    Profile encoder;  // what the encoder is
+    const char* command;
     const char* sentence;
   };
   for (const Row& row : {
-           Row{"", "status_order=tformat", DataId::position, "status_order=tformat"},
-           Row{"status_order=tformat", "", DataId::position, "status_order=document"},
-           Row{"", "rs1_sc2=b0", DataId::position, "rs1_sc2=b0"},
-           Row{"", "crc16_byte_order=high", DataId::position, "crc16_byte_order=high"},
-           Row{"", "crc16_byte_order=table12", DataId::position, "crc16_byte_order=table12"},
-           Row{"", "crc16_byte_order=high status_order=tformat", DataId::position,
+           Row{plain, {.status_order = FieldOrder::tformat}, "position", "status_order=tformat"},
+           Row{{.status_order = FieldOrder::tformat}, plain, "position", "status_order=document"},
+           Row{plain, {.rs1_sc2 = RedundantBit::b0}, "position", "rs1_sc2=b0"},
+           Row{plain, {.crc16_byte_order = CrcByteOrder::high}, "position", "crc16_byte_order=high"},
+           Row{plain, {.crc16_byte_order = CrcByteOrder::table12}, "position", "crc16_byte_order=table12"},
+           Row{plain,
+               {.crc16_byte_order = CrcByteOrder::high, .status_order = FieldOrder::tformat},
+               "position",
                "crc16_byte_order=high status_order=tformat"},
-           Row{"address=1", "address=1 parity_scope=all", DataId::position, "parity_scope=all"},
-           Row{"", "idc_rs1=b0", DataId::clear_alarms, "idc_rs1=b0"},
-           Row{"id6_rs=9", "", DataId::calibration, "id6_rs=16"},
+           Row{{.address = 1}, {.parity_scope = ParityScope::all, .address = 1}, "position", "parity_scope=all"},
+           Row{{.id6_rs = Id6Redundant::bits_9}, plain, "calibration", "id6_rs=16"},
        }) {
-    const Profile encoder = to_profile(row.encoder);
-    Bench bench(encoder);
+    Bench bench(row.encoder);
     bench.shaft.put(0, 0xABCDEF);
-    Read read(to_profile(row.host), row.id);
-    EXPECT_NE(bench.run(read).error(), Error::none) << row.encoder;
-    EXPECT_NE(read.detail().find(row.sentence), std::string_view::npos) << row.encoder << ": " << read.detail();
+    const Outcome read = testing::run(bench.line, row.host, row.command);
+    EXPECT_NE(read.error, Error::none) << row.sentence;
+    EXPECT_TRUE(says(read, row.sentence)) << row.sentence << ": " << read.detail;
   }
 }
 
@@ -196,14 +164,17 @@ TEST(EslHost, ANodeThatNeverStopsDoesNotHoldTheHost) {
     }
     bool free = true;
     Wire noise = Wire(100, 0x55);
-  } shouting;
-  Bench bench;
-  bench.line.attach(sim::Role::device, shouting);
-  Read read({});
-  EXPECT_EQ(bench.run(read).error(), Error::wrong_length);
-  EXPECT_TRUE(bench.finished);
-  EXPECT_NE(read.detail().find("without a pause"), std::string_view::npos) << read.detail();
-  EXPECT_LE(bench.line.now(), 2 * noise_limit);
+  };
+  for (const char* command : {"position", "zero", "scan"}) {
+    Shouting shouting;
+    Bench bench;
+    bench.line.attach(sim::Role::device, shouting);
+    const Outcome read = bench.run(command);
+    EXPECT_EQ(read.error, Error::wrong_length);
+    EXPECT_TRUE(read.ended);
+    EXPECT_TRUE(says(read, "without a pause")) << read.detail;
+    EXPECT_LE(bench.line.now(), 2 * noise_limit);
+  }
 }
 
 // ---- Resets
@@ -212,19 +183,19 @@ TEST(EslHost, Resets) {
   Bench bench;
   bench.shaft.put(12, 4'000'000);
   bench.encoder.raise_alarms(alarms::xc_error);
-  Reset clear({}, DataId::clear_alarms);
-  EXPECT_EQ(bench.run(clear).error(), Error::none) << clear.detail();
-  EXPECT_EQ(clear.reading()->alarms, 0u);
-  EXPECT_EQ(clear.reading()->multiturn, 12u);
-  Reset zero({}, DataId::zero);
-  EXPECT_EQ(bench.run(zero).error(), Error::none) << zero.detail();
-  EXPECT_EQ(zero.reading()->singleturn, 0u);
-  EXPECT_EQ(zero.reading()->multiturn, 12u);
-  Reset turns({}, DataId::reset_multiturn);
-  EXPECT_EQ(bench.run(turns).error(), Error::none) << turns.detail();
-  EXPECT_EQ(turns.reading()->multiturn, 0u);
-  EXPECT_EQ(turns.reading()->singleturn, 0u);
-  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  Outcome after = bench.run("clear-alarms");
+  EXPECT_EQ(after.error, Error::none) << after.detail;
+  EXPECT_EQ(after.reading->alarms, 0u);
+  EXPECT_EQ(after.reading->multiturn, 12u);
+  after = bench.run("zero");
+  EXPECT_EQ(after.error, Error::none) << after.detail;
+  EXPECT_EQ(after.reading->singleturn, 0u);
+  EXPECT_EQ(after.reading->multiturn, 12u);
+  after = bench.run("reset-multiturn");
+  EXPECT_EQ(after.error, Error::none) << after.detail;
+  EXPECT_EQ(after.reading->multiturn, 0u);
+  EXPECT_EQ(after.reading->singleturn, 0u);
+  EXPECT_EQ(bench.violations(), 0u);
   // The zero survives power off, in both channels.
   bench.encoder.power_off(bench.line.now());
   bench.encoder.power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::skip);
@@ -233,35 +204,44 @@ TEST(EslHost, Resets) {
   EXPECT_EQ(bench.read().multiturn, 0u);
 }
 
-TEST(EslHost, ResetRequestsAre40MicrosecondsApart) {
-  Bench bench;
-  std::vector<Time> starts;
-  bench.line.observe([&starts](auto sender, Time start, Time, std::uint8_t byte) {
-    if (sender == 1 && byte == control_field({}, 0, DataId::zero)) starts.push_back(start);
-  });
-  Reset zero({}, DataId::zero);
-  bench.run(zero);
-  ASSERT_EQ(starts.size(), 8u);
-  for (std::size_t i = 1; i < 8; ++i) EXPECT_EQ(starts[i] - starts[i - 1], reset_interval);
+// Between the looks 10 ms, between the eight requests 40 us from start to start, then the time of the EEPROM.
+TEST(EslHost, TheTimesOfAReset) {
+  for (const auto& [command, id, last] : {std::tuple{"zero", DataId::zero, eeprom_write_pause},
+                                          std::tuple{"reset-multiturn", DataId::reset_multiturn, eeprom_write_pause},
+                                          std::tuple{"clear-alarms", DataId::clear_alarms, reset_interval}}) {
+    Bench bench;
+    std::vector<Time> looks;
+    std::vector<Time> starts;
+    bench.line.observe([&, field = control_field({}, 0, id)](auto sender, Time start, Time, std::uint8_t byte) {
+      if (sender != 1) return;
+      if (byte == field) starts.push_back(start);
+      if (byte == control_field({}, 0, DataId::position)) looks.push_back(start);
+    });
+    EXPECT_EQ(bench.run(command).error, Error::none);
+    ASSERT_EQ(starts.size(), 8u);
+    for (std::size_t i = 1; i < 8; ++i) EXPECT_EQ(starts[i] - starts[i - 1], reset_interval);
+    ASSERT_EQ(looks.size(), 3u);
+    const Time reply = 18us + answer_time + 2us;
+    EXPECT_EQ(looks[1] - looks[0], reply + 10ms);
+    EXPECT_EQ(looks[2] - starts[7], 2us + answer_time + reply_length(id) * 1us + last);
+  }
 }
 
 TEST(EslHost, WhatCannotBeClearedIsNamed) {
-  struct Row {
-    std::uint8_t raised;
-    const char* sentence;
-  };
-  for (const Row& row :
-       {Row{alarms::overspeed, "overspeed remains; switch the encoder off and on"},
-        Row{alarms::multiturn_error, "multiturn_error remains; multiturn_error: reset-multiturn first"},
-        Row{alarms::under_voltage, "under_voltage remains; the supply voltage is wrong"},
-        Row{alarms::memory_error | alarms::singleturn_error | alarms::xc_error,
-            "memory_error, singleturn_error remain; switch the encoder off and on"}}) {
+  for (const auto& [raised, sentence] :
+       {std::pair{alarms::overspeed + 0, "overspeed remains; switch the encoder off and on"},
+        std::pair{alarms::multiturn_error + 0, "multiturn_error remains; multiturn_error: reset-multiturn first"},
+        std::pair{alarms::under_voltage + 0, "under_voltage remains; the supply voltage is wrong"},
+        std::pair{alarms::led_or_lissajous_error | alarms::over_voltage,
+                  "led_or_lissajous_error, over_voltage remain; switch the encoder off and on; the supply voltage is "
+                  "wrong"},
+        std::pair{alarms::memory_error | alarms::singleturn_error | alarms::xc_error,
+                  "memory_error, singleturn_error remain; switch the encoder off and on"}}) {
     Bench bench;
-    bench.encoder.raise_alarms(row.raised);
-    Reset clear({}, DataId::clear_alarms);
-    EXPECT_EQ(bench.run(clear).error(), Error::cross_check_failed);
-    EXPECT_EQ(clear.detail(), row.sentence);
-    EXPECT_EQ(clear.remaining(), row.raised & ~alarms::xc_error);
+    bench.encoder.raise_alarms(static_cast<std::uint32_t>(raised));
+    const Outcome clear = bench.run("clear-alarms");
+    EXPECT_EQ(clear.error, Error::cross_check_failed);
+    EXPECT_EQ(clear.detail, sentence);
   }
 }
 
@@ -269,64 +249,144 @@ TEST(EslHost, AMultiturnErrorNeedsDThenC) {
   Bench bench;
   bench.shaft.put(7, 100);
   bench.encoder.raise_alarms(alarms::multiturn_error);
-  Reset turns({}, DataId::reset_multiturn);
-  EXPECT_EQ(bench.run(turns).error(), Error::none);
-  EXPECT_EQ(turns.remaining(), alarms::multiturn_error);
-  Reset clear({}, DataId::clear_alarms);
-  EXPECT_EQ(bench.run(clear).error(), Error::none);
-  EXPECT_EQ(clear.remaining(), 0);
+  const Outcome turns = bench.run("reset-multiturn");
+  EXPECT_EQ(turns.error, Error::none);
+  EXPECT_EQ(turns.fields.at("ch1_alarms"), alarms::multiturn_error);
+  const Outcome clear = bench.run("clear-alarms");
+  EXPECT_EQ(clear.error, Error::none);
+  EXPECT_EQ(clear.fields.at("ch1_alarms"), 0);
 }
 
 TEST(EslHost, AnIdDThatMovesTheSingleTurnZeroIsFound) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
-  bench.encoder.set_environment({.d_clears_singleturn = true});
-  Reset turns({}, DataId::reset_multiturn);
-  EXPECT_EQ(bench.run(turns).error(), Error::cross_check_failed);
-  EXPECT_NE(turns.detail().find("single-turn zero too"), std::string_view::npos);
+  bench.set(condition::id_d_clears_singleturn, 1);
+  const Outcome turns = bench.run("reset-multiturn");
+  EXPECT_EQ(turns.error, Error::cross_check_failed);
+  EXPECT_TRUE(says(turns, "single-turn zero too"));
 }
 
 TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
   for (const std::int32_t rpm : {5, -5}) {
     Bench bench;
     bench.shaft.spin(rpm, Time{});
-    Reset zero({}, DataId::zero);
-    EXPECT_EQ(bench.run(zero).error(), Error::invalid_argument);
+    const Outcome zero = bench.run("zero");
+    EXPECT_EQ(zero.error, Error::invalid_argument);
+    EXPECT_TRUE(says(zero, "nothing was sent"));
     EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
   }
   Bench starting;
   starting.encoder.power_off(Time{});
   starting.encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::real);
-  Reset zero({}, DataId::zero);
-  EXPECT_EQ(starting.run(zero).error(), Error::invalid_argument);
-  EXPECT_NE(zero.detail().find("not ready"), std::string_view::npos);
+  const Outcome zero = starting.run("zero");
+  EXPECT_EQ(zero.error, Error::invalid_argument);
+  EXPECT_TRUE(says(zero, "not ready"));
 }
 
+// Replies 0 and 1 are looks, 2 to 9 answer the requests, 10 and, when they fail, 11 and 12 are the verification.
 TEST(EslHost, ALostReplyStopsAResetUnlessItIsTheLast) {
-  // Replies 0 and 1 are looks; the requests are 2 to 9.
-  for (const unsigned lost : {5u, 9u}) {
-    Bench bench({}, [lost](unsigned index, Wire& reply) {
-      if (index == lost) reply.pop_back();
+  struct Row {
+    unsigned first;
+    unsigned last;
+    Error error;
+    const char* words;
+    std::uint64_t sent;
+    unsigned turns;
+  };
+  for (const Row& row :
+       {Row{5, 5, Error::wrong_length, "most likely done nothing", 6, 5}, Row{9, 9, Error::none, "", 11, 0},
+        Row{0, 2, Error::wrong_length, "", 3, 5}, Row{10, 12, Error::wrong_length, "whether the encoder obeyed", 13, 0},
+        Row{0, 1, Error::none, "", 13, 0}}) {
+    Bench bench({}, [&row](unsigned index, Wire& reply) {
+      if (index >= row.first && index <= row.last) reply.pop_back();
     });
     bench.shaft.put(5, 0);
-    Reset reset({}, DataId::reset_multiturn);
-    EXPECT_EQ(bench.run(reset).error(), lost == 9 ? Error::none : Error::wrong_length);
-    EXPECT_EQ(bench.encoder.reply_to(DataId::position, bench.line.now()).multiturn, lost == 9 ? 0u : 5u);
+    const Outcome reset = bench.run("reset-multiturn");
+    EXPECT_EQ(reset.error, row.error) << row.first;
+    EXPECT_TRUE(says(reset, row.words)) << reset.detail;
+    EXPECT_EQ(bench.encoder.answered(), row.sent) << row.first;
+    EXPECT_EQ(bench.encoder.reply_to(DataId::position, bench.line.now()).multiturn, row.turns) << row.first;
   }
 }
 
-// Replies 0 and 1 are looks, 2 to 9 answer the requests, 10 is the verification.
 TEST(EslHost, AResetThatDidNotHappenIsFound) {
-  for (const DataId id : {DataId::zero, DataId::reset_multiturn}) {
-    Bench bench({}, [](unsigned index, Wire& reply) {
-      Reply stale{.one = {.status = status::ready}, .two = {.status = status::ready | status::channel_2}};
-      stale.singleturn = (1 << 14) + 1;
-      stale.multiturn = 1;
-      if (index == 10) reply = wire(encode_reply({}, stale));
+  for (const auto& [command, counts, turns, words] :
+       {std::tuple{"zero", 933 + 1, 0, "not zero"}, std::tuple{"reset-multiturn", 0, 1, "turns are still not zero"}}) {
+    Bench bench({}, [counts = counts, turns = turns](unsigned index, Wire& reply) {
+      if (index != 10) return;
+      reply = wire({.one = {.status = status::ready},
+                    .two = {.status = status::ready | status::channel_2},
+                    .singleturn = static_cast<std::uint32_t>(counts),
+                    .multiturn = static_cast<std::uint16_t>(turns)});
     });
-    Reset reset({}, id);
-    EXPECT_EQ(bench.run(reset).error(), Error::cross_check_failed);
-    EXPECT_EQ(reset.reading(), nullptr);
+    const Outcome reset = bench.run(command);
+    EXPECT_EQ(reset.error, Error::cross_check_failed);
+    EXPECT_TRUE(says(reset, words)) << reset.detail;
+    EXPECT_FALSE(reset.reading.has_value());
+  }
+}
+
+// ---- Several encoders on one line
+
+struct Line8 {
+  explicit Line8(const std::vector<std::uint8_t>& addresses) {
+    for (const std::uint8_t address : addresses) {
+      const auto place = static_cast<std::int64_t>(shafts.size());
+      shafts.push_back(std::make_unique<testing::TestShaft>());
+      shafts.back()->put(place, place * 1'000'000 + 77);
+      encoders.push_back(
+          std::make_unique<VirtualEncoder>(Profile{.address = address, .bus = sharing_yes}, *shafts.back()));
+      encoders.back()->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+      line.attach(sim::Role::device, *encoders.back());
+    }
+  }
+  std::vector<std::unique_ptr<testing::TestShaft>> shafts;
+  std::vector<std::unique_ptr<VirtualEncoder>> encoders;
+  testing::HostedLine line;
+};
+
+TEST(EslBus, EachAnswersItsOwnRequestsAtOnceBehindThoseOfOthers) {
+  Line8 bus({0, 1, 2, 3, 4, 5, 6, 7});
+  bus.encoders[3]->power_off(Time{});
+  for (unsigned round = 0; round < 100; ++round) {
+    for (std::uint8_t address = 0; address < most_encoders; ++address) {
+      const Outcome read = testing::run(bus.line, {.address = address}, "position");
+      ASSERT_EQ(read.error, address == 3 ? Error::timeout : Error::none) << round << " " << int{address};
+      if (address == 3) continue;
+      EXPECT_EQ(read.reading->singleturn, address * 1'000'000u + 77);
+    }
+  }
+  for (const auto& encoder : bus.encoders) EXPECT_EQ(encoder->violation_count(), 0u);
+}
+
+TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
+  struct Scan final : FieldSink {
+    void put(const FieldValue& value) override {
+      if (value.info->name == "encoder_address") nodes.push_back(static_cast<int>(value.number));
+      if (value.info->name == "clash" && value.number != 0) clashes.push_back(nodes.back());
+    }
+    std::vector<int> nodes;
+    std::vector<int> clashes;
+  };
+  for (const auto& [there, nodes, clashes] : {std::tuple{Wire{1, 4, 6}, std::vector{1, 4, 6}, std::vector<int>{}},
+                                              std::tuple{Wire{1, 4, 4}, std::vector{1, 4}, std::vector{4}},
+                                              std::tuple{Wire{}, std::vector<int>{}, std::vector<int>{}}}) {
+    Line8 bus(there);
+    const Command& info = *find_command(unit, "scan");
+    std::vector<std::byte> storage(unit.host_storage);
+    Conversation<std::uint8_t>& host = *unit.host(testing::options_of({}), info, {}, storage).bytes;
+    EXPECT_TRUE(bus.line.converse(host));
+    EXPECT_EQ(host.error(), nodes.empty() ? Error::timeout : Error::none);
+    Scan found;
+    host.report(found);
+    EXPECT_EQ(found.nodes, nodes);
+    EXPECT_EQ(found.clashes, clashes);
+    for (const auto& encoder : bus.encoders) {
+      if (clashes.empty()) {
+        EXPECT_EQ(encoder->violation_count(), 0u);
+      }
+      EXPECT_EQ(encoder->answered(), clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // ID 5 and never ID 8
+    }
   }
 }
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory conversations against the virtual QS35 in virtual time.
-#include "absenc/protocol/esl/memory.hpp"
-
+// The memory commands against the virtual QS35 in virtual time.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/esl/bench_test.hpp"
@@ -10,143 +8,173 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
-using testing::report;
-using Wire = std::vector<std::uint8_t>;
+using testing::Outcome;
+using testing::Wire;
+using testing::wire;
 
-Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
+bool says(const Outcome& outcome, std::string_view words) { return outcome.detail.find(words) != std::string::npos; }
+
+// Arguments of memory-read: address, page, count; of memory-write: address, value, page, force.
+constexpr const char* read = "memory-read";
+constexpr const char* write = "memory-write";
 
 TEST(EslMemory, MemoryIsWrittenReadBackAndSparedWear) {
   Bench bench;
-  WriteMemory write({}, 0, 0x7E, 0x5A);
-  EXPECT_EQ(bench.run(write).error(), Error::none) << write.detail();
-  EXPECT_TRUE(write.written());
+  const Outcome first = bench.run(write, {0x7E, 0x5A, 0});
+  EXPECT_EQ(first.error, Error::none) << first.detail;
+  EXPECT_EQ(first.fields.at("written"), 1);
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
-  EXPECT_EQ(bench.encoder.writes(), 1u);
-  WriteMemory same({}, 0, 0x7E, 0x5A);
-  EXPECT_EQ(bench.run(same).error(), Error::none);
-  EXPECT_FALSE(same.written());
-  WriteMemory insist({}, 0, 0x7E, 0x5A, Force::no, Wear::accept);
-  EXPECT_EQ(bench.run(insist).error(), Error::none);
-  EXPECT_EQ(bench.encoder.writes(), 2u);
-  ReadMemory read({}, 0, 0x78, 7);
-  EXPECT_EQ(bench.run(read).error(), Error::none) << read.detail();
-  ASSERT_EQ(read.data().size(), 7u);
-  EXPECT_EQ(read.data()[6], 0x5A);
-  EXPECT_EQ(read.data()[5], 0x00);
-  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  const Outcome same = bench.run(write, {0x7E, 0x5A, 0});
+  EXPECT_EQ(same.error, Error::none);
+  EXPECT_EQ(same.fields.at("written"), 0);
+  EXPECT_EQ(bench.encoder.memory_version(), 1u);
+  const Outcome bytes = bench.run(read, {0x78, 0, 7});
+  EXPECT_EQ(bytes.error, Error::none) << bytes.detail;
+  EXPECT_EQ(bytes.data, (Wire{0, 0, 0, 0, 0, 0, 0x5A}));
+  EXPECT_EQ(bytes.fields.at("memory_address"), 0x78);
+  EXPECT_EQ(bench.violations(), 0u);
 }
 
 TEST(EslMemory, EveryAreaOfTable11IsReadAndWrittenWithForce) {
   for (const MemoryArea& area : memory_map) {
     Bench bench;
     for (const std::uint8_t address : {area.first, area.last}) {
-      if (area.page == register_page && address == error_info_address) continue;
-      WriteMemory closed({}, area.page, address, 0x42);
-      EXPECT_EQ(bench.run(closed).error(), area.user ? Error::none : Error::invalid_argument);
-      EXPECT_EQ(closed.detail().find("needs force") != std::string_view::npos, !area.user);
-      WriteMemory forced({}, area.page, address, 0x43, Force::yes);
-      EXPECT_EQ(bench.run(forced).error(), Error::none) << int{area.page} << " " << int{address} << forced.detail();
-      ReadMemory read({}, area.page, address);
-      EXPECT_EQ(bench.run(read).error(), Error::none);
-      EXPECT_EQ(read.data()[0], 0x43);
+      const Outcome closed = bench.run(write, {address, 0x42, area.page});
+      EXPECT_EQ(closed.error, area.user ? Error::none : Error::invalid_argument);
+      EXPECT_EQ(says(closed, "needs force") && says(closed, area.meaning), !area.user) << closed.detail;
+      const Outcome forced = bench.run(write, {address, 0x43, area.page, 1});
+      EXPECT_EQ(forced.error, Error::none) << int{area.page} << " " << int{address} << forced.detail;
+      const Outcome bytes = bench.run(read, {address, area.page});
+      EXPECT_EQ(bytes.error, Error::none);
+      EXPECT_EQ(bytes.fields.at("value"), 0x43);
     }
-    EXPECT_EQ(bench.encoder.violation_count(), 0u) << bench.encoder.violations()[0].rule;
+    EXPECT_EQ(bench.violations(), 0u);
   }
 }
 
 TEST(EslMemory, WhatTable11LacksIsRefusedBeforeAnythingIsSent) {
   Bench bench;
-  ReadMemory page_7({}, 7, 0);
-  EXPECT_EQ(bench.run(page_7).error(), Error::invalid_argument);
-  ReadMemory past_the_end({}, 0, 0x7E, 2);
-  EXPECT_EQ(bench.run(past_the_end).error(), Error::invalid_argument);
-  WriteMemory page_select({}, 0, page_select_address, 1, Force::yes);
-  EXPECT_EQ(bench.run(page_select).error(), Error::invalid_argument);
-  SelectPage page_9({}, 9);
-  EXPECT_EQ(bench.run(page_9).error(), Error::invalid_argument);
-  EXPECT_FALSE(page_9.detail().empty());
+  for (const auto& [command, arguments] :
+       {std::pair{read, std::vector<std::int64_t>{0, 7}}, std::pair{read, std::vector<std::int64_t>{0x7E, 0, 2}},
+        std::pair{write, std::vector<std::int64_t>{page_select_address, 1, 0, 1}},
+        std::pair{"select-page", std::vector<std::int64_t>{9}}}) {
+    const Outcome refused = bench.run(command, arguments);
+    EXPECT_EQ(refused.error, Error::invalid_argument);
+    EXPECT_TRUE(says(refused, "nothing was sent"));
+  }
   EXPECT_EQ(bench.encoder.answered(), 0u);
 }
 
 TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
   for (const std::uint8_t before : std::to_array<std::uint8_t>({0, 8, 14})) {
     Bench bench;
-    SelectPage select({}, before);
-    ASSERT_EQ(bench.run(select).error(), Error::none);
-    ReadErrorInfo info({});
-    EXPECT_EQ(bench.run(info).error(), Error::none);
-    EXPECT_EQ(testing::report(info).count("page_left"), 0u);
+    ASSERT_EQ(bench.run("select-page", {before}).error, Error::none);
+    const Outcome info = bench.run("led-or-lissajous");
+    EXPECT_EQ(info.error, Error::none);
+    EXPECT_FALSE(info.fields.contains("page_left"));
     EXPECT_EQ(bench.raw(Request{DataId::read_memory, 0, page_select_address})[2], before);
-    EXPECT_EQ(bench.encoder.violation_count(), 0u);
+    EXPECT_EQ(bench.violations(), 0u);
   }
-  Bench mute({}, [](unsigned index, auto& reply) {
-    if (index < 3) reply.clear();  // it does not say which page is selected
-  });
-  ReadErrorInfo info({});
-  EXPECT_EQ(mute.run(info).error(), Error::none);
-  EXPECT_EQ(testing::report(info)["page_left"], 8);
+  // It does not say which page is selected (asked three times); or, at the end, that the one before is again.
+  for (const auto& [first, last] : {std::pair{1u, 3u}, std::pair{5u, 5u}}) {
+    Bench bench({}, [first = first, last = last](unsigned index, Wire& reply) {
+      if (index < first || index > last) return;
+      reply = first == 1 ? Wire{} : wire({.id = DataId::read_memory, .memory_address = 0x7F, .value = 3});
+    });
+    bench.raw(Request{DataId::write_memory, 0, page_select_address, 0});
+    bench.pass(page_time);
+    const Outcome info = bench.run("led-or-lissajous");
+    EXPECT_EQ(info.error, Error::none);
+    ASSERT_TRUE(info.fields.contains("page_left")) << first;
+    EXPECT_EQ(info.fields.at("page_left"), 8);
+  }
 }
 
 TEST(EslMemory, MemoryOnABusIsRefused) {
-  Bench bench({.bus = true});
-  WriteMemory write(bench.profile, 0, 0, 1);
-  EXPECT_EQ(bench.run(write).error(), Error::unsupported);
-  EXPECT_NE(write.detail().find("several encoders on the line"), std::string_view::npos);
+  Bench bench({.bus = sharing_yes});
+  for (const auto& [command, arguments] :
+       {std::pair{read, std::vector<std::int64_t>{0}}, std::pair{write, std::vector<std::int64_t>{0, 1, 0}},
+        std::pair{"select-page", std::vector<std::int64_t>{0}},
+        std::pair{"led-or-lissajous", std::vector<std::int64_t>{}}}) {
+    const Outcome refused = bench.run(command, arguments);
+    EXPECT_EQ(refused.error, Error::unsupported);
+    EXPECT_TRUE(says(refused, "several encoders on the line")) << refused.detail;
+  }
   EXPECT_TRUE(bench.raw(Request{DataId::read_memory, 0, 1}).empty());
-  ASSERT_EQ(bench.encoder.violation_count(), 1u);
+  ASSERT_EQ(bench.violations(), 1u);
 }
 
 TEST(EslMemory, AMemoryThatStaysBusyIsGivenUp) {
   Bench bench({}, [](unsigned index, Wire& reply) {
-    if (index > 0) reply = wire(encode_reply({}, {.id = DataId::read_memory, .memory_address = 1, .busy = true}));
+    if (index > 0) reply = wire({.id = DataId::read_memory, .memory_address = 1, .busy = true});
   });
-  ReadMemory read({}, 0, 1);
-  EXPECT_EQ(bench.run(read).error(), Error::busy);
-  EXPECT_NE(read.detail().find("stays busy"), std::string_view::npos);
+  const Outcome bytes = bench.run(read, {1, 0});
+  EXPECT_EQ(bytes.error, Error::busy);
+  EXPECT_TRUE(says(bytes, "stays busy"));
+  EXPECT_GT(bench.line.now(), page_time + 2 * page_time);
   EXPECT_LT(bench.line.now(), 100ms);
 }
 
 // The temporary register may hold what somebody else once asked for.
 TEST(EslMemory, AnEepromByteIsNotBelievedWithoutABusyAnswerBefore) {
   Bench bench({}, [](unsigned index, Wire& reply) {
-    if (index == 1) reply = wire(encode_reply({}, {.id = DataId::read_memory, .memory_address = 5, .value = 0x77}));
+    if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = 5, .value = 0x77});
   });
   *bench.encoder.stored(0, 5) = 0x78;
-  ReadMemory read({}, 0, 5);
-  EXPECT_EQ(bench.run(read).error(), Error::none);
-  EXPECT_EQ(read.data()[0], 0x78);
+  const Outcome bytes = bench.run(read, {5, 0});
+  EXPECT_EQ(bytes.error, Error::none);
+  EXPECT_EQ(bytes.fields.at("value"), 0x78);
 }
 
-TEST(EslMemory, AWriteWhoseReplyIsLostIsJudgedByReadingBack) {
-  Bench bench({}, [](unsigned index, Wire& reply) {
-    if (index == 3) reply.pop_back();  // page select, two reads, write
-  });
-  WriteMemory write({}, 1, 10, 0x33);
-  EXPECT_EQ(bench.run(write).error(), Error::none) << write.detail();
-  EXPECT_EQ(bench.encoder.writes(), 1u);  // never repeated
-}
-
-TEST(EslMemory, AWriteThatDoesNotHoldIsFound) {
-  Bench bench({}, [](unsigned index, Wire& reply) {
-    if (index != 5) return;  // the second request of the read-back
-    reply = wire(encode_reply({}, {.id = DataId::read_memory, .memory_address = 10, .value = 0x32}));
-  });
-  WriteMemory write({}, 1, 10, 0x33);
-  EXPECT_EQ(bench.run(write).error(), Error::cross_check_failed);
+// Replies of a write: page select, two reads, write, two reads.
+TEST(EslMemory, WhatGoesWrongWithAWrite) {
+  struct Row {
+    unsigned index;
+    Error error;
+    const char* words;
+    std::uint32_t writes;
+    testing::Tampered::Tamper tamper;
+  };
+  const auto cut = [](unsigned, Wire& reply) { reply.pop_back(); };
+  const auto other = [](unsigned, Wire& reply) {
+    reply = wire({.id = DataId::read_memory, .memory_address = 10, .value = 0x32});
+  };
+  for (const Row& row : {Row{0, Error::none, "", 1, cut}, Row{2, Error::none, "", 1, cut},
+                         Row{3, Error::none, "", 1, cut},  // judged by reading back, never repeated
+                         Row{5, Error::cross_check_failed, "reading back gave another value", 1, other}}) {
+    Bench bench({}, [&row](unsigned index, Wire& reply) {
+      if (index == row.index) row.tamper(index, reply);
+    });
+    const Outcome outcome = bench.run(write, {10, 0x33, 1});
+    EXPECT_EQ(outcome.error, row.error) << row.index << outcome.detail;
+    EXPECT_TRUE(says(outcome, row.words)) << outcome.detail;
+    EXPECT_EQ(bench.encoder.memory_version(), row.writes) << row.index;
+    EXPECT_EQ(bench.violations(), 0u) << row.index;
+  }
+  for (const auto& [from, words] : {std::pair{0u, "nothing was written"}, std::pair{1u, "nothing was written"},
+                                    std::pair{4u, "could not be read back"}}) {
+    Bench bench({}, [from = from](unsigned index, Wire& reply) {
+      if (index >= from) reply[2] ^= 1;
+    });
+    const Outcome outcome = bench.run(write, {10, 0x33, 1});
+    EXPECT_EQ(outcome.error, Error::bad_checksum) << from;
+    EXPECT_TRUE(says(outcome, words)) << outcome.detail;
+    EXPECT_GE(bench.line.now(), outcome.received_at + (from == 0 ? page_time : eeprom_read_time));
+  }
 }
 
 TEST(EslMemory, LedAndLissajousAreToldApart) {
   for (const bool lissajous : {false, true}) {
     Bench bench;
-    bench.encoder.set_lissajous(lissajous);
+    bench.set(condition::lissajous, lissajous ? 1 : 0);
     bench.encoder.raise_alarms(alarms::led_or_lissajous_error);
     const std::uint8_t sf = bench.read().one.status;
     EXPECT_EQ(sf & (status::safety_error | status::non_safety_error),
               lissajous ? status::non_safety_error : status::safety_error);
-    ReadErrorInfo info({});
-    EXPECT_EQ(bench.run(info).error(), Error::none);
-    EXPECT_EQ(report(info)["led_error"], lissajous ? 0 : 1);
-    EXPECT_EQ(report(info)["lissajous_error"], lissajous ? 1 : 0);
+    const Outcome info = bench.run("led-or-lissajous");
+    EXPECT_EQ(info.error, Error::none);
+    EXPECT_EQ(info.fields.at("led_error"), lissajous ? 0 : 1);
+    EXPECT_EQ(info.fields.at("lissajous_error"), lissajous ? 1 : 0);
   }
 }
 

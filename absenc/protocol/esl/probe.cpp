@@ -5,7 +5,7 @@ namespace absenc::esl {
 
 namespace {
 
-constexpr std::size_t choice_count(std::size_t option) { return options[option].choices.size(); }
+constexpr std::size_t choice_count(std::size_t option) { return options.infos[option].choices.size(); }
 
 constexpr std::size_t combinations = [] {
   std::size_t product = 1;
@@ -21,8 +21,8 @@ Profile nth_profile(const Profile& base, std::size_t number) {
   for (std::size_t i = 0; i < open_options; ++i) {
     if (i == option_sequence_step) continue;
     const std::size_t count = choice_count(i);
-    const std::size_t value = (static_cast<std::size_t>(options[i].default_value) + number % count) % count;
-    set_option(profile, i, static_cast<std::int64_t>(value));
+    const std::size_t value = (static_cast<std::size_t>(options.infos[i].default_value) + number % count) % count;
+    options.put(profile, i, static_cast<std::int64_t>(value));
     number /= count;
   }
   return profile;
@@ -131,7 +131,7 @@ void judge_sequence(ProbeResult& result, std::span<const Capture> captures) {
     safety = request = 0;
   }
   for (std::size_t i = values.size(); i-- > 0;) {
-    if (values[i].possible) set_option(result.best, option_sequence_step, static_cast<std::int64_t>(i));
+    if (values[i].possible) options.put(result.best, option_sequence_step, static_cast<std::int64_t>(i));
   }
 }
 
@@ -147,13 +147,13 @@ ProbeResult probe(const Profile& base, std::span<const Capture> captures) {
     const Progress progress = progress_of(profile, captures);
     if (progress.fits() && result.profiles++ == 0) result.best = profile;
     for (std::size_t i = 0; i < open_options; ++i) {
-      Progress& so_far = best[i][static_cast<std::size_t>(get_option(profile, i))];
+      Progress& so_far = best[i][static_cast<std::size_t>(options.get(profile, i))];
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
   // Of one frame it changes nothing.
   best[option_sequence_step].fill(
-      best[option_sequence_step][static_cast<std::size_t>(get_option(result.best, option_sequence_step))]);
+      best[option_sequence_step][static_cast<std::size_t>(options.get(result.best, option_sequence_step))]);
   for (std::size_t i = 0; i < open_options; ++i) {
     for (std::size_t value = 0; value < choice_count(i); ++value) {
       const Progress& progress = best[i][value];
@@ -204,15 +204,15 @@ Change find_change(const Profile& profile, const Capture& capture) {
     for (std::size_t a = 0; changes_replies(first) && a < choice_count(first); ++a) {
       Profile one = profile;
       const OptionValue change{first, static_cast<std::int64_t>(a)};
-      set_option(one, first, change.value);
-      if (change.value == get_option(profile, first)) continue;
+      options.put(one, first, change.value);
+      if (change.value == options.get(profile, first)) continue;
       if (explains(one, capture.reply)) return {{change}, 1};
       for (std::size_t second = first + 1; pair.count == 0 && second < open_options; ++second) {
         for (std::size_t b = 0; changes_replies(second) && b < choice_count(second); ++b) {
           Profile two = one;
           const OptionValue also{second, static_cast<std::int64_t>(b)};
-          set_option(two, second, also.value);
-          if (also.value != get_option(profile, second) && explains(two, capture.reply)) pair = {{change, also}, 2};
+          options.put(two, second, also.value);
+          if (also.value != options.get(profile, second) && explains(two, capture.reply)) pair = {{change, also}, 2};
         }
       }
     }

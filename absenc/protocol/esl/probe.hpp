@@ -7,8 +7,8 @@
 #include <span>
 #include <string_view>
 
+#include "absenc/protocol/esl/options.hpp"
 #include "absenc/protocol/esl/reply.hpp"
-#include "absenc/protocol/esl/settings.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::esl {

@@ -10,7 +10,7 @@
 namespace absenc::esl {
 namespace {
 
-using Wire = std::vector<std::uint8_t>;
+using testing::Wire;
 
 struct Taken {
   Wire request;
@@ -43,24 +43,24 @@ const std::vector<Request> everything{{DataId::position},    {DataId::temperatur
 // Each value of each option is found, and is the only one left, when the frames carry it.
 TEST(EslProbe, EveryValueIsFound) {
   for (std::size_t option = 0; option < open_options; ++option) {
-    for (std::size_t value = 0; value < options[option].choices.size(); ++value) {
+    for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
       if (option == option_sequence_step && value == 0) continue;  // change: the others are special cases of it
       Profile profile{.address = 1};
-      set_option(profile, option, static_cast<std::int64_t>(value));
+      options.put(profile, option, static_cast<std::int64_t>(value));
       const ProbeResult result = probed(captured(profile, everything));
-      SCOPED_TRACE(std::string(options[option].name) + "=" + std::string(options[option].choices[value]));
+      SCOPED_TRACE(std::string(options.infos[option].name) + "=" + std::string(options.infos[option].choices[value]));
       ASSERT_GT(result.profiles, 0u);
       EXPECT_TRUE(result.values[option][value].possible);
       if (option == option_sequence_step) {
         EXPECT_EQ(result.possible(option), 2u);
-      } else if (option == option_id6_rs && value == 1) {
+      } else if (option == options.find("id6_rs") && value == 1) {
         EXPECT_TRUE(result.values[option][value].possible);  // nine bits may always be the top of sixteen
       } else {
         EXPECT_EQ(result.possible(option), 1u);
-        EXPECT_EQ(get_option(result.best, option), static_cast<std::int64_t>(value));
+        EXPECT_EQ(options.get(result.best, option), static_cast<std::int64_t>(value));
         EXPECT_EQ(sentence(result, option, value), "only this value explains all frames");
       }
-      for (std::size_t other = 0; other < options[option].choices.size(); ++other) {
+      for (std::size_t other = 0; other < options.infos[option].choices.size(); ++other) {
         if (!result.values[option][other].possible) {
           EXPECT_FALSE(sentence(result, option, other).empty());
           EXPECT_LT(result.values[option][other].capture, everything.size());
@@ -76,13 +76,14 @@ TEST(EslProbe, AReplyAloneTellsTheCrcAndTheStatus) {
                   .rs1_sc2 = RedundantBit::b0,
                   .status_order = FieldOrder::tformat};
   const ProbeResult result = probed(captured(profile, {{DataId::position}}), false);
-  for (const std::size_t option :
-       {option_crc_bit_order, option_crc16_byte_order, option_rs1_sc2, option_status_order}) {
-    EXPECT_EQ(result.possible(option), 1u) << options[option].name;
-    EXPECT_EQ(get_option(result.best, option), get_option(profile, option));
+  for (const std::size_t option : {option_crc_bit_order, options.find("crc16_byte_order"), options.find("rs1_sc2"),
+                                   options.find("status_order")}) {
+    EXPECT_EQ(result.possible(option), 1u) << options.infos[option].name;
+    EXPECT_EQ(options.get(result.best, option), options.get(profile, option));
   }
-  for (const std::size_t option : {option_idc_rs1, option_id6_rs, option_memory_address_order, option_request_crc}) {
-    EXPECT_EQ(result.possible(option), 2u) << options[option].name;
+  for (const std::size_t option :
+       {options.find("idc_rs1"), options.find("id6_rs"), options.find("memory_address_order"), option_request_crc}) {
+    EXPECT_EQ(result.possible(option), 2u) << options.infos[option].name;
     EXPECT_EQ(sentence(result, option, 0), "these frames do not tell");
   }
 }
@@ -91,7 +92,7 @@ TEST(EslProbe, TheWhyAndTheWhereAreGiven) {
   std::vector<Taken> taken =
       captured({.status_order = FieldOrder::tformat}, {{DataId::read_memory, 0, 0x1A}, {DataId::position}});
   const ProbeResult result = probed(taken);
-  const Evidence& evidence = result.values[option_status_order][0];
+  const Evidence& evidence = result.values[options.find("status_order")][0];
   EXPECT_FALSE(evidence.possible);
   EXPECT_EQ(evidence.capture, 1u);
   EXPECT_EQ(evidence.why, Check::stop_reported);
@@ -110,7 +111,7 @@ TEST(EslProbe, SilenceAndNoiseProveNothing) {
   const ProbeResult silence = probed({{Wire{0x08, 0x75}, {}}});
   EXPECT_GT(silence.profiles, 0u);
   for (std::size_t option = 0; option < open_options; ++option) {
-    EXPECT_EQ(silence.possible(option), options[option].choices.size());
+    EXPECT_EQ(silence.possible(option), options.infos[option].choices.size());
   }
   const ProbeResult noise = probed({{Wire{0x08, 0x75}, Wire(18, 0x55)}});
   EXPECT_EQ(noise.profiles, 0u);
@@ -122,12 +123,15 @@ TEST(EslProbe, OneChangeOrTwoAreFound) {
       captured({.crc16_byte_order = CrcByteOrder::high, .status_order = FieldOrder::tformat}, {{DataId::position}});
   const Change two = find_change({}, {.reply = taken[0].reply});
   ASSERT_EQ(two.count, 2u);
-  EXPECT_EQ(two.options[0].option, option_crc16_byte_order);
-  EXPECT_EQ(two.options[1].option, option_status_order);
+  EXPECT_EQ(two.options[0].option, options.find("crc16_byte_order"));
+  EXPECT_EQ(two.options[1].option, options.find("status_order"));
   const Change one = find_change({.crc16_byte_order = CrcByteOrder::high}, {.reply = taken[0].reply});
   ASSERT_EQ(one.count, 1u);
-  EXPECT_EQ(one.options[0].option, option_status_order);
-  EXPECT_EQ(find_change(to_profile("crc16_byte_order=high status_order=tformat"), {.reply = taken[0].reply}).count, 0u);
+  EXPECT_EQ(one.options[0].option, options.find("status_order"));
+  EXPECT_EQ(find_change({.crc16_byte_order = CrcByteOrder::high, .status_order = FieldOrder::tformat},
+                        {.reply = taken[0].reply})
+                .count,
+            0u);
   EXPECT_EQ(find_change({}, {}).count, 0u);
 }
 

@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include "absenc/protocol/options.hpp"
+
 namespace absenc::esl {
 
 enum class CrcBitOrder : std::uint8_t {
@@ -46,7 +48,7 @@ struct Profile {
   Id6Redundant id6_rs = Id6Redundant::bits_16;
 
   std::uint8_t address = 0;              // EAD, 0 to 7
-  bool bus = false;                      // several encoders share the line: memory cannot be reached (Figure 18)
+  Sharing bus = sharing_automatic;       // yes: others share the line, memory cannot be reached (Figure 18)
   bool require_forced_test = false;      // of a safe position
   std::uint8_t redundant_tolerance = 1;  // RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
   BadRequest bad_request = BadRequest::report;

@@ -2,8 +2,6 @@
 // Decoding an ESL reply: every check that the frame allows, in the order of check.hpp; and the reading it makes.
 #pragma once
 
-#include <utility>
-
 #include "absenc/protocol/esl/frame.hpp"
 
 namespace absenc::esl {
@@ -73,59 +71,26 @@ constexpr void decode_channel(const Profile& profile, std::span<const Part> part
   }
 }
 
-template <DataId id, bool first, std::size_t... part>
-constexpr void decode_unrolled(const Profile& profile, Bytes bytes, Reply& reply, ChannelReply& channel,
-                               std::index_sequence<part...>) {
-  constexpr std::span<const Part> parts = first ? layout_of(id).one() : layout_of(id).two();
-  std::size_t at = 1;
-  ((decode_part(profile, parts[part], bytes.subspan(at), reply, channel), at += size_of(parts[part])), ...);
-}
-
-// The same as below, for the replies that servo loops wait for.
-template <DataId id>
-constexpr void decode_safety_position(const Profile& profile, Bytes one, Bytes two, Reply& reply) {
-  decode_unrolled<id, true>(profile, one, reply, reply.one, std::make_index_sequence<layout_of(id).count_one>());
-  decode_unrolled<id, false>(profile, two, reply, reply.two, std::make_index_sequence<layout_of(id).count_two>());
-}
-
-constexpr void decode_both(const Profile& profile, DataId id, Bytes one, Bytes two, Reply& reply) {
-  if (id == DataId::position) return decode_safety_position<DataId::position>(profile, one, two, reply);
-  decode_channel(profile, layout_of(id).one(), one, reply, reply.one);
-  if (!two.empty()) decode_channel(profile, layout_of(id).two(), two, reply, reply.two);
-}
-
-/// The CRC of one channel's bytes as a function of bit order, channel and bytes: the bitwise reference is another.
-struct TableChecksum {
-  constexpr std::uint16_t operator()(CrcBitOrder order, Channel channel, Bytes bytes) const {
-    return checksum16(order, channel, bytes);
-  }
-};
-
-template <class Checksum16>
-constexpr bool checksum_holds(const Profile& profile, std::size_t crc_bytes, Channel channel, Bytes bytes,
-                              Checksum16 checksum) {
+constexpr bool checksum_holds(const Profile& profile, std::size_t crc_bytes, Channel channel, Bytes bytes) {
   const Bytes covered = bytes.first(bytes.size() - crc_bytes);
   if (crc_bytes == 1) return checksum8(profile.crc_bit_order, covered) == bytes.back();
-  const std::size_t at = covered.size();
+  const Bytes sent = bytes.subspan(covered.size());
   const bool low_first = low_byte_first(profile.crc16_byte_order, channel);
-  const Bytes sent = bytes.subspan(at);
-  const std::uint64_t crc = low_first ? load_little_endian(sent) : load_big_endian(sent);
-  return checksum(profile.crc_bit_order, channel, covered) == crc;
+  return checksum16(profile.crc_bit_order, channel, covered) ==
+         (low_first ? load_little_endian(sent) : load_big_endian(sent));
 }
 
-template <class Checksum16>
-constexpr Check check_checksums(const Profile& profile, const Layout& layout, Bytes one, Bytes two,
-                                Checksum16 checksum) {
-  const bool one_holds = checksum_holds(profile, layout.crc_bytes, Channel::one, one, checksum);
-  const bool two_holds = two.empty() || checksum_holds(profile, layout.crc_bytes, Channel::two, two, checksum);
+constexpr Check check_checksums(const Profile& profile, const Layout& layout, Bytes one, Bytes two) {
+  const bool one_holds = checksum_holds(profile, layout.crc_bytes, Channel::one, one);
+  const bool two_holds = two.empty() || checksum_holds(profile, layout.crc_bytes, Channel::two, two);
   if (one_holds && two_holds) return Check::passed;
   if (two.empty()) return Check::both_checksums;
   if (one_holds) return Check::ch2_checksum;
   if (two_holds) return Check::ch1_checksum;
   // Channel 2 in front of channel 1?
   const Bytes all(one.data(), one.size() + two.size());
-  const bool swapped = checksum_holds(profile, layout.crc_bytes, Channel::two, all.first(two.size()), checksum) &&
-                       checksum_holds(profile, layout.crc_bytes, Channel::one, all.subspan(two.size()), checksum);
+  const bool swapped = checksum_holds(profile, layout.crc_bytes, Channel::two, all.first(two.size())) &&
+                       checksum_holds(profile, layout.crc_bytes, Channel::one, all.subspan(two.size()));
   return swapped ? Check::channels_swapped : Check::both_checksums;
 }
 
@@ -167,23 +132,22 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 
 /// Checks in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. `reply` is filled as soon
 /// as the checksums hold, and to be used only when the result is `passed`. A busy memory reply passes.
-template <class Checksum16 = detail::TableChecksum>
-[[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply,
-                                          Checksum16 checksum = {}) {
+[[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
   const Layout& layout = layout_of(request.id);
   if (bytes.size() != layout.length_one + layout.length_two) {
     const bool first_only = layout.has_two() && bytes.size() == layout.length_one;
-    return first_only && detail::checksum_holds(profile, layout.crc_bytes, Channel::one, bytes, checksum)
+    return first_only && detail::checksum_holds(profile, layout.crc_bytes, Channel::one, bytes)
                ? Check::channel_2_missing
                : Check::length;
   }
   const Bytes one = bytes.first(layout.length_one);
   const Bytes two = bytes.subspan(layout.length_one);
-  const Check sums = detail::check_checksums(profile, layout, one, two, checksum);
+  const Check sums = detail::check_checksums(profile, layout, one, two);
   if (sums != Check::passed) return sums;
   reply.id = request.id;
   reply.encoder_address = address_of(one[0]);
-  detail::decode_both(profile, request.id, one, two, reply);
+  detail::decode_channel(profile, layout.one(), one, reply, reply.one);
+  if (layout.has_two()) detail::decode_channel(profile, layout.two(), two, reply, reply.two);
   const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
   const Check echo = detail::check_echo(asked, one[0], layout.has_two() ? two[0] : asked);
   if (echo != Check::passed) return echo;

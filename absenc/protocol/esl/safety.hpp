@@ -36,11 +36,6 @@ struct SafetyVerdict {
   Check failed = Check::passed;
 };
 
-/// The position is finished 4.3 us after the end of CF, which one CRC byte may follow.
-[[nodiscard]] constexpr Time latch_time(const Profile& profile, Time sent_at) {
-  return sent_at - (profile.request_crc ? line_settings.character() : Time{}) + position_time;
-}
-
 /// Judges the replies of one encoder, one after the other, from the bytes as they came.
 ///
 /// The sequence counter proves something only against an earlier reply. After the start, and after anything that went

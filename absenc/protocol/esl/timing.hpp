@@ -9,6 +9,7 @@
 
 #include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
+#include "absenc/protocol/esl/profile.hpp"
 
 namespace absenc::esl {
 
@@ -22,15 +23,21 @@ inline constexpr unsigned reset_requests = 8;    // of one kind make a reset (Ta
 inline constexpr Time reset_interval = 40us;     // between them, typical (Table 4)
 inline constexpr Time eeprom_read_time = 200us;  // between the two read requests (Figure 3)
 inline constexpr Time eeprom_write_time = 6ms;   // Figure 5; Figure 15 asks for 6 to 10 ms
-inline constexpr Time page_time = 18ms;          // after a page change (Table 11, note 3)
+inline constexpr Time eeprom_read_pause = eeprom_read_time + 20us;   // what a host leaves: "more than 200 us"
+inline constexpr Time eeprom_write_pause = eeprom_write_time + 1ms;  // "6~10ms" (Figure 15)
+inline constexpr Time page_time = 18ms;                              // after a page change (Table 11, note 3)
 
 /// Not in the document: how long the host waits for an answer, and for the next character of one.
 inline constexpr Time answer_limit = 20us;
 inline constexpr Time gap_limit = 3 * line_settings.character();
-/// Not in the document: the pause after which an encoder takes the line for idle, and the one a host leaves between a
-/// reply and the next request. A missing start bit ends a frame set, so one bit would do.
-inline constexpr Time idle_time = line_settings.bits(1);
+/// Not in the document: what a host leaves between a reply and the next request of a scan. A missing start bit ends a
+/// frame set, so one bit would do.
 inline constexpr Time request_pause = line_settings.bits(2);
+
+/// When the encoder takes a position: that is finished 4.3 us after the end of CF, which one CRC byte may follow.
+[[nodiscard]] constexpr Time latch_time(const Profile& profile, Time sent_at) {
+  return sent_at - (profile.request_crc ? line_settings.character() : Time{}) + position_time;
+}
 
 /// Table 11. `kind` tells how the bytes are reached.
 struct MemoryArea {

@@ -47,29 +47,47 @@ namespace detail {
   return Error::wrong_length;
 }
 
+template <class Source>
+constexpr Result<typename Source::Word> decode_clocked_on(const Source& source, BitView bits, std::size_t first) {
+  typename Source::Word word;
+  const Error error = absenc::detail::take_word(source, bits, first, word);
+  bool matches = true;
+  for (std::size_t i = source.word.bits(); first + i < bits.size; ++i) {
+    matches = matches && bits[first + i] == bit_behind(source.format, bits, i, first);
+  }
+  if (!matches && bits.end_of_run(first) == bits.size) return Error::line_stuck;
+  if (error != Error::none) return error;
+  if (!matches) return Error::cross_check_failed;
+  return word;
+}
+
+template <class Source>
+constexpr Result<typename Source::Word> decode_by(const Source& source, BitView bits) {
+  const Error error = check_length(source.format, bits);
+  if (error != Error::none) return error;
+  return decode_clocked_on(source, bits, 0);
+}
+
 }  // namespace detail
 
 /// The word in `bits` from `first` on, of which all that follow must be what the encoder sends behind it. Errors:
 /// line_stuck (all bits are alike, and behind the word they should not be), bad_checksum (parity), cross_check_failed
 /// (what follows the word is not what it should be).
 [[nodiscard]] constexpr Result<Word> decode_clocked_on(const Format& format, BitView bits, std::size_t first = 0) {
-  const Result<Word> word = decode_word(format.word, bits, first);
-  bool matches = true;
-  for (std::size_t i = format.word.bits(); first + i < bits.size; ++i) {
-    matches = matches && bits[first + i] == bit_behind(format, bits, i, first);
-  }
-  if (!matches && bits.end_of_run(first) == bits.size) return Error::line_stuck;
-  if (!word) return word.error();
-  if (!matches) return Error::cross_check_failed;
-  return word;
+  return detail::decode_clocked_on(Given<Format>{format, format.word}, bits, first);
 }
 
 /// A reading of `clocks(format)` bits, or of the word twice where no extra clocks are asked for. Errors: wrong_length;
 /// out_of_range (too many clocks, and what was read is no position); those of decode_clocked_on.
 [[nodiscard]] constexpr Result<Word> decode(const Format& format, BitView bits) {
-  const Error error = detail::check_length(format, bits);
-  if (error != Error::none) return error;
-  return decode_clocked_on(format, bits);
+  return detail::decode_by(Given<Format>{format, format.word}, bits);
+}
+
+/// The same of a format that is known when the program is written, at the cost of what a hand would write for it. The
+/// word has `values` only where the format has some.
+template <const Format& format>
+[[nodiscard]] constexpr Result<typename Known<format>::Word> decode(BitView bits) {
+  return detail::decode_by(Known<format>{}, bits);
 }
 
 /// Appends the word and what follows it, `count` bits in all. False when `out` is too small.

@@ -7,6 +7,7 @@
 
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/vector_check.hpp"
+#include "absenc/sim/random.hpp"
 
 namespace absenc::ssi {
 namespace {
@@ -89,6 +90,41 @@ TEST(SsiFrame, AWordOfTheUser) {
   const Result<Word> got = ssi::decode(format, read.view());
   ASSERT_TRUE(got);
   EXPECT_EQ(*got, sent);
+}
+
+// Good words, damaged and cut ones: a format known at compile time says the same as at run time.
+template <const Format& format>
+void agree() {
+  sim::Random random(1);
+  unsigned good = 0;
+  for (int i = 0; i < 10'000; ++i) {
+    BitBuffer<frame_capacity> read;
+    const Word word{.position = random.next(), .multiturn = random.next(), .error = random.chance(0.5)};
+    ASSERT_TRUE(encode(format, word, random.chance(0.8) ? clocks(format) : random.below(100), read));
+    std::array<std::uint8_t, frame_capacity / 8> copy{};
+    std::copy(read.bytes().begin(), read.bytes().end(), copy.begin());
+    if (random.chance(0.3)) copy[random.below(4)] ^= static_cast<std::uint8_t>(1u << random.below(8));
+    const auto known = ssi::decode<format>({Bytes(copy).first(read.bytes().size()), read.size()});
+    const Result<Word> given = ssi::decode(format, {copy, read.size()});
+    ASSERT_EQ(known.error(), given.error());
+    if (!given) continue;
+    ++good;
+    EXPECT_EQ(known->position, given->position);
+    EXPECT_EQ(known->multiturn, given->multiturn);
+    EXPECT_EQ(known->error, given->error);
+  }
+  EXPECT_GT(good, 4'000u);
+}
+
+constexpr Format plain{};
+constexpr Format zeros{
+    .word = "multiturn:12 position:13 gray error:1! parity:1"_word, .after_word = AfterWord::zero, .extra_clocks = 2};
+constexpr Format twice{.word = "position:24 gray"_word, .extra_clocks = 24};
+
+TEST(SsiFrame, AKnownFormatIsDecodedAsAnyOther) {
+  agree<plain>();
+  agree<zeros>();
+  agree<twice>();
 }
 
 }  // namespace

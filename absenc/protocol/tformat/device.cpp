@@ -7,9 +7,6 @@ namespace absenc::tformat {
 
 namespace {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 constexpr std::int32_t battery_error_below = 2750;  // mV, typical (5.4)
 constexpr std::int32_t battery_alarm_below = 3100;
 constexpr std::int32_t full_absolute_speed = 100'000;   // 1/1000 rpm (5.4.1)
@@ -23,172 +20,98 @@ constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value
 
 }  // namespace
 
-VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft) : format_(format), shaft_(&shaft) {
+VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
+    : Responder(Protocol::device_times(format)), format_(format), shaft_(&shaft) {
   if (format_.encoder_id < 0) format_.encoder_id = 0x11;
+  for (std::size_t i = 0; i < conditions.size(); ++i) conditions_[i] = conditions[i].normal;
   memory_[threshold_at] = overheat_at_shipping;
-}
-
-// ---- The line
-
-ByteStep VirtualEncoder::next(Time) {
-  ByteStep step{.at = never};
-  if (reply_pending_) {
-    reply_pending_ = false;
-    step.kind = ByteStep::Kind::transfer;
-    step.out = reply_;
-    step.at = reply_at_;
-    return step;
-  }
-  if (refusing_) {
-    step.expect = 1;
-    step.gap = line_settings.character();
-  } else if (!request_.empty()) {
-    step.expect = request_length(*data_id(request_[0])) - request_.size();
-    step.gap = line_settings.character();
-  } else {
-    step.expect = 1;
-  }
-  return step;
-}
-
-void VirtualEncoder::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::received:
-      for (const std::uint8_t byte : event.items) byte_received(byte, event.at);
-      break;
-    case ByteEvent::Kind::sent:
-      transmitting_ = false;
-      break;
-    case ByteEvent::Kind::silence:  // a missing start bit ends the frame (9.2): it was cut short, or is refused
-      if (refusing_ || !request_.empty()) answer_refused(event.at);
-      break;
-    case ByteEvent::Kind::line_error:
-      if (power_ == Power::starting) update(event.at);
-      if (power_ != Power::on || transmitting_) break;
-      heard_at_ = event.at;
-      refuse(status::delimiter_error);
-      break;
-    default:
-      break;
-  }
-}
-
-void VirtualEncoder::byte_received(std::uint8_t byte, Time at) {
-  update(at);
-  if (power_ != Power::on) return;
-  if (transmitting_) return interrupted(byte, at);
-  heard_at_ = at;
-  if (refusing_) return;
-  if (request_.empty()) {
-    if (!has_sync_code(byte)) return;  // no answer: it looks for the next start (8.1)
-    if (byte != control_field(byte >> 3)) return refuse(status::parity_error);
-    if (!data_id(byte)) return refuse(0);
-  }
-  request_.push_back(byte);
-  if (request_.size() == request_length(*data_id(request_[0]))) request_complete(at);
-}
-
-void VirtualEncoder::interrupted(std::uint8_t byte, Time at) {
-  const auto id = byte == control_field(byte >> 3) ? data_id(byte) : std::nullopt;
-  if (interruption_.begins_request(id ? request_length(*id) : 0, at, line_settings.character())) {
-    violate("request during the encoder's transmission", at);
-  }
-}
-
-void VirtualEncoder::request_complete(Time at) {
-  const Result<Request> request = decode_request(request_);
-  if (request) {
-    answer(*request, at);
-  } else {
-    refuse(0);
-  }
-}
-
-void VirtualEncoder::send(const Reply& reply, Time at) {
-  request_.clear();
-  reply_ = encode_reply(reply);
-  reply_at_ = at + answer_time;
-  reply_pending_ = true;
-  transmitting_ = true;
-  interruption_.begin();
-  ++answered_;
-}
-
-// Where the frame ends is not known yet: a missing start bit tells (8.2, 9.2). Nothing is sent before.
-void VirtualEncoder::refuse(std::uint8_t status_bits) {
-  request_.clear();
-  refusing_ = true;
-  refused_status_ |= status_bits;
-}
-
-void VirtualEncoder::answer_refused(Time at) {
-  reset_count_ = 0;
-  Reply reply = everything(at);
-  reply.status |= refused_status_;
-  refusing_ = false;
-  refused_status_ = 0;
-  send(reply, heard_at_);
-}
-
-void VirtualEncoder::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
 }
 
 // ---- Requests
 
-void VirtualEncoder::answer(const Request& request, Time at) {
+VirtualEncoder::Answer VirtualEncoder::respond(Bytes bytes, Time at, ByteBuffer<64>& reply) {
+  update(at);
+  const Result<Request> request = decode_request(bytes);
+  const std::optional<Reply> made = request ? answer(*request, at) : std::nullopt;
+  if (!made) return Answer::refused;
+  reply.append(encode_reply(*made).view());
+  return Answer::sent;
+}
+
+// It looks for the next start where there is none (8.1); where the frame ends is not known otherwise: a missing start
+// bit tells (8.2, 9.2).
+bool VirtualEncoder::is_refused(Flaw flaw, Bytes heard) {
+  if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
+  if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
+  if (flaw == Flaw::damaged) refused_status_ |= status::delimiter_error;
+  return true;
+}
+
+void VirtualEncoder::refuse(Time at, ByteBuffer<64>& reply) {
+  update(at);
+  reset_count_ = 0;
+  Reply refusal = everything(at);
+  refusal.status |= refused_status_;
+  refused_status_ = 0;
+  reply.append(encode_reply(refusal).view());
+}
+
+std::optional<Reply> VirtualEncoder::answer(const Request& request, Time at) {
   if (!is_reset(request.id)) reset_count_ = 0;
-  if (is_memory_access(request.id)) {
-    answer_memory(request, at);
-  } else {
-    answer_data(request, at);
-  }
-}
-
-void VirtualEncoder::answer_data(const Request& request, Time at) {
+  if (is_memory_access(request.id)) return access_memory(request, at);
   Reply reply = everything(at);
-  reply.id = request.id;  // encoding takes what this id carries
-  send(reply, at);
-  if (is_reset(request.id)) count_reset(request.id, at);  // after the reply: the tenth still shows the old errors
+  reply.id = request.id;                                  // encoding takes what this id carries
+  if (is_reset(request.id)) count_reset(request.id, at);  // the tenth still shows the old errors
+  return reply;
 }
 
-void VirtualEncoder::answer_memory(const Request& request, Time at) {
-  const bool writing = request.id == DataId::write_memory;
-  const bool selecting = request.address == page_select_address;
+// ---- Memory
+
+std::optional<Reply> VirtualEncoder::access_memory(const Request& request, Time at) {
   Reply reply{.id = request.id, .address = request.address, .value = request.value};
   if (at < busy_until_) {
     if (page_changing_) violate("memory access before the page is ready", at);
     reply.busy = true;
     reply.value = 0;
-    return send(reply, at);
+    return reply;
   }
-  const bool temperature = page_ == service_page && request.address == temperature_address;
-  const bool open = selecting ? !writing || request.value < user_pages || request.value == service_page
-                              : is_open(page_, request.address) && !(writing && temperature);
-  if (!open) return refuse(0);
-
-  const std::size_t index =
-      page_ == service_page ? threshold_at : std::size_t{page_} * page_addresses + request.address;
-  if (!writing) {
-    if (selecting) {
-      reply.value = page_;
-    } else {
-      reply.value = temperature ? static_cast<std::uint8_t>(environment_.temperature) : memory_[index];
-    }
-  } else {
+  const bool writing = request.id == DataId::write_memory;
+  const bool of_page = request.address == page_select_address;
+  const bool measured = page_ == service_page && request.address == temperature_address;
+  const bool open =
+      of_page ? !writing || is_page(request.value) : is_open(page_, request.address) && !(writing && measured);
+  if (!open) return std::nullopt;
+  if (writing) {
     busy_until_ = at + memory_time;
-    page_changing_ = selecting;
-    if (selecting) {
-      page_ = request.value;
-    } else {
-      memory_[index] = request.value;
-      ++memory_version_;
-      ++writes_;
-    }
+    page_changing_ = of_page;
+    write(request.address, request.value);
+  } else {
+    reply.value = value_at(request.address);
   }
-  send(reply, at);
+  return reply;
 }
+
+std::uint8_t VirtualEncoder::value_at(std::uint8_t address) const {
+  if (address == page_select_address) return page_;
+  if (page_ != service_page) return memory_[std::size_t{page_} * page_addresses + address];
+  return address == overheat_address ? memory_[threshold_at] : static_cast<std::uint8_t>(conditions_[temperature]);
+}
+
+void VirtualEncoder::write(std::uint8_t address, std::uint8_t value) {
+  if (address == page_select_address) {
+    page_ = value;
+    return;
+  }
+  memory_[page_ == service_page ? threshold_at : std::size_t{page_} * page_addresses + address] = value;
+  changed_memory();
+}
+
+void VirtualEncoder::changed_memory() {
+  change_memory();
+  ++writes_;
+}
+
+// ---- Resets
 
 void VirtualEncoder::count_reset(DataId id, Time at) {
   if (reset_count_ > 0 && at - last_reset_ < reset_interval) {
@@ -200,9 +123,7 @@ void VirtualEncoder::count_reset(DataId id, Time at) {
   last_reset_ = at;
   if (++reset_count_ < reset_requests) return;
   reset_count_ = 0;
-  if (magnitude(shaft_->at(at).speed_millirpm) > standing_still) {
-    return violate("reset while the shaft turns", at);
-  }
+  if (magnitude(shaft_->at(at).speed_millirpm) > standing_still) return violate("reset while the shaft turns", at);
   execute_reset(id, at);
 }
 
@@ -236,7 +157,7 @@ std::int64_t VirtualEncoder::turns(Time now) const { return (counts(now) >> form
 // How often the turn counter has gone round.
 std::int64_t VirtualEncoder::lap(Time now) const { return turns(now) >> format_.multiturn_bits; }
 
-void VirtualEncoder::set_turns(std::uint32_t turns, Time now) {
+void VirtualEncoder::set_turns(std::int64_t turns, Time now) {
   turn_offset_ = (counts(now) >> format_.singleturn_bits) - turns;
   counter_lap_ = 0;
 }
@@ -251,29 +172,22 @@ void VirtualEncoder::lower_alarms(std::uint32_t bits) {
   forced_ &= static_cast<std::uint8_t>(~bits);
 }
 
+void VirtualEncoder::set_condition(std::size_t index, std::int64_t value, Time now) {
+  if (is_on(now)) update(now);
+  conditions_[index] = value;
+  if (is_on(now)) update(now);
+}
+
 std::uint8_t VirtualEncoder::alarms_now() const {
   unsigned bits = latches_ | forced_;
   if (full_absolute_) bits |= alarms::full_absolute_status;
-  if (environment_.battery_millivolts < battery_alarm_below) bits |= alarms::battery_alarm;
+  if (conditions_[battery_voltage] < battery_alarm_below) bits |= alarms::battery_alarm;
   return static_cast<std::uint8_t>(bits);
 }
 
 // Brings everything that changes with time up to now.
 void VirtualEncoder::update(Time now) {
-  if (power_ == Power::off) return;
-  if (power_ == Power::starting) {
-    if (now < ready_at_) return;
-    power_ = Power::on;
-    full_absolute_ = magnitude(shaft_->at(ready_at_).speed_millirpm) >= full_absolute_speed;
-  }
-  if (zero_pending_ && now >= busy_until_) {
-    zero_pending_ = false;
-    const std::uint64_t zeroed = static_cast<std::uint64_t>(zero_request_) & low_mask(format_.singleturn_bits);
-    store_little_endian(MutableBytes(memory_).subspan(zero_at, 4), zeroed);
-    ++memory_version_;
-    ++writes_;
-    turn_offset_ = ((zero_request_ - zero()) >> format_.singleturn_bits) - zero_turns_;  // the turns stay
-  }
+  if (zero_pending_ && now >= busy_until_) write_zero();
   if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
   // A whole lap between two requests goes unnoticed when it is undone before the next.
@@ -282,16 +196,24 @@ void VirtualEncoder::update(Time now) {
   counter_lap_ = lap_now;
 
   const std::uint8_t threshold = memory_[threshold_at];
-  if ((threshold & 0x80) != 0 && environment_.temperature > (threshold & 0x7F)) latches_ |= alarms::over_heat;
+  if ((threshold & 0x80) != 0 && conditions_[temperature] > (threshold & 0x7F)) latches_ |= alarms::over_heat;
 }
 
-Reply VirtualEncoder::everything(Time now) {
-  const std::int64_t position = counts(now);
+// The turns stay.
+void VirtualEncoder::write_zero() {
+  zero_pending_ = false;
+  const std::uint64_t zeroed = static_cast<std::uint64_t>(zero_request_) & low_mask(format_.singleturn_bits);
+  store_little_endian(MutableBytes(memory_).subspan(zero_at, 4), zeroed);
+  changed_memory();
+  turn_offset_ = ((zero_request_ - zero()) >> format_.singleturn_bits) - zero_turns_;
+}
+
+Reply VirtualEncoder::everything(Time now) const {
+  const std::uint64_t mask = low_mask(format_.singleturn_bits);
   const std::uint8_t almc = alarms_now();
   Reply reply{.id = DataId::everything, .status = status_for(almc), .alarms = almc};
   reply.encoder_id = static_cast<std::uint8_t>(format_.encoder_id);
-  reply.singleturn =
-      static_cast<std::uint32_t>(static_cast<std::uint64_t>(position) & low_mask(format_.singleturn_bits));
+  reply.singleturn = static_cast<std::uint32_t>(static_cast<std::uint64_t>(counts(now)) & mask);
   reply.multiturn =
       static_cast<std::uint32_t>(static_cast<std::uint64_t>(turns(now)) & low_mask(format_.multiturn_bits));
   if ((almc & alarms::full_absolute_status) != 0 && format_.singleturn_bits > full_absolute_bits) {
@@ -303,34 +225,36 @@ Reply VirtualEncoder::everything(Time now) {
 // ---- Power
 
 void VirtualEncoder::power_on(Time now, PowerOn kind) {
-  if (power_ != Power::off) return;
-  if (was_on_) {
-    update_power_off(now);
+  if (!off_) return;
+  off_ = false;
+  if (off_since_) {
+    count_on_battery(*off_since_, now);
   } else {
     counter_lap_ = lap(now);
   }
-  const bool battery = environment_.battery_millivolts >= battery_error_below;
+  const bool battery = conditions_[battery_voltage] >= battery_error_below;
   // Without battery nothing counted the turns. Over_speed and counter_overflow are indefinite then: here, clear.
   if (!battery) {
     latches_ = alarms::battery_error;
     set_turns(0, now);
   }
-  power_ = Power::starting;
-  ready_at_ = now;
-  if (kind == PowerOn::real) ready_at_ += battery ? start_up_with_battery : start_up_without_battery;
   page_ = 0;
   busy_until_ = Time{};
-  update(now);
+  Responder::power_on(now, kind);
+  if (!battery && kind == PowerOn::real) restart(now + start_up_without_battery);
+}
+
+void VirtualEncoder::started(Time at) {
+  full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed;
 }
 
 // What happened to the turns while only the battery counted them (5.4.2): looked at every 10 ms, but at no more than
 // 10 000 points of a long pause.
-void VirtualEncoder::update_power_off(Time now) {
-  const Time step = std::max(Time(10ms), (now - off_since_) / 10'000);
-  for (Time at = off_since_; at < now; at += step) {
+void VirtualEncoder::count_on_battery(Time from, Time now) {
+  const Time step = std::max(Time(10ms), (now - from) / 10'000);
+  for (Time at = from; at < now; at += step) {
     const ShaftState state = shaft_->at(at);
-    const std::int32_t limit =
-        at - off_since_ < power_off_timer ? power_off_timer_acceleration : power_off_acceleration;
+    const std::int32_t limit = at - from < power_off_timer ? power_off_timer_acceleration : power_off_acceleration;
     if (magnitude(state.speed_millirpm) <= power_off_speed && magnitude(state.acceleration) <= limit) continue;
     latches_ |= alarms::over_speed;
     ++turn_offset_;  // a turn was missed: the flag means that the count is wrong
@@ -339,15 +263,13 @@ void VirtualEncoder::update_power_off(Time now) {
 }
 
 void VirtualEncoder::power_off(Time now) {
-  if (power_ == Power::off) return;
-  update(now);
-  power_ = Power::off;
-  was_on_ = true;
+  if (off_) return;
+  if (is_on(now)) update(now);
+  Responder::power_off(now);
+  off_ = true;
   off_since_ = now;
   zero_pending_ = false;
   latches_ &= static_cast<std::uint8_t>(~(alarms::counting_error | alarms::multiturn_error));
-  request_.clear();
-  reply_pending_ = transmitting_ = refusing_ = false;
   refused_status_ = 0;
   reset_count_ = 0;
 }

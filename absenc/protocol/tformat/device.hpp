@@ -4,86 +4,77 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "absenc/core/shaft.hpp"
-#include "absenc/protocol/conversation.hpp"
-#include "absenc/protocol/interruption.hpp"
-#include "absenc/protocol/tformat/frame.hpp"
-#include "absenc/protocol/tformat/timing.hpp"
+#include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/tformat/protocol.hpp"
+#include "absenc/protocol/unit.hpp"
 
 namespace absenc::tformat {
 
-/// Of the virtual encoder's environment; the defaults are those of a healthy installation.
-struct Environment {
-  std::int32_t battery_millivolts = 3600;  // 0: no battery
-  std::int32_t temperature = 35;           // degC, of the board
-};
+enum ConditionIndex : std::size_t { battery_voltage, temperature };
+inline constexpr std::array<Condition, 2> conditions{{
+    {"battery", "mV", "voltage of the external battery; 0: there is none", 0, 4750, 3600},
+    {"temperature", "degC", "of the board", -20, 127, 35},
+}};
 
-class VirtualEncoder final : public Device<std::uint8_t> {
+class VirtualEncoder final : public author::Responder {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   VirtualEncoder(const Format& format, const Shaft& shaft);
-
-  void feed(const Event<std::uint8_t>& event) override;
-  Step<std::uint8_t> next(Time now) override;
 
   void power_on(Time now, PowerOn kind) override;
   void power_off(Time now) override;
   void raise_alarms(std::uint32_t bits) override;
   void lower_alarms(std::uint32_t bits) override;
+  void set_condition(std::size_t index, std::int64_t value, Time now) override;
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  [[nodiscard]] std::uint32_t memory_version() const override { return memory_version_; }
-  [[nodiscard]] std::span<const Violation> violations() const override { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const override { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const override { return answered_; }
 
-  void set_environment(const Environment& environment) { environment_ = environment; }
-  /// Turns so that the counter shows `turns` now.
-  void set_turns(std::uint32_t turns, Time now);
   /// EEPROM writes since it was made: of 100 000 in total (6.1.1).
   [[nodiscard]] std::uint32_t writes() const { return writes_; }
   /// What an ID 3 reply would say now.
-  [[nodiscard]] Reply everything(Time now);
+  [[nodiscard]] Reply everything(Time now) const;
 
  private:
-  enum class Power : std::uint8_t { off, starting, on };
   // EEPROM: the user's pages, the over-heat threshold, the zero position (4 bytes, little endian).
   static constexpr std::size_t threshold_at = std::size_t{user_pages} * page_addresses;
   static constexpr std::size_t zero_at = threshold_at + 1;
   static constexpr std::size_t memory_size = zero_at + 4;
 
-  void byte_received(std::uint8_t byte, Time at);
-  void request_complete(Time at);
-  void answer(const Request& request, Time at);
-  void answer_data(const Request& request, Time at);
-  void answer_memory(const Request& request, Time at);
-  void interrupted(std::uint8_t byte, Time at);
-  void refuse(std::uint8_t status_bits);
-  void answer_refused(Time at);
-  void send(const Reply& reply, Time at);
+  [[nodiscard]] std::size_t request_size(Bytes begin) const override { return Protocol::request_size(begin); }
+  [[nodiscard]] std::size_t others_reply_size(Bytes) const override { return 0; }
+  Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) override;
+  bool is_refused(Flaw flaw, Bytes heard) override;
+  void refuse(Time at, ByteBuffer<64>& reply) override;
+  void started(Time at) override;
+
+  std::optional<Reply> answer(const Request& request, Time at);
+  std::optional<Reply> access_memory(const Request& request, Time at);
+  [[nodiscard]] std::uint8_t value_at(std::uint8_t address) const;
+  void write(std::uint8_t address, std::uint8_t value);
+  void changed_memory();
   void count_reset(DataId id, Time at);
   void execute_reset(DataId id, Time at);
 
   void update(Time now);
-  void update_power_off(Time now);
+  void write_zero();
+  void count_on_battery(Time from, Time now);
   [[nodiscard]] std::int64_t counts(Time now) const;
   [[nodiscard]] std::int64_t turns(Time now) const;
   [[nodiscard]] std::int64_t lap(Time now) const;
+  void set_turns(std::int64_t turns, Time now);
   [[nodiscard]] std::uint32_t zero() const;
   [[nodiscard]] std::uint8_t alarms_now() const;
-  void violate(std::string_view rule, Time at);
 
   Format format_;
   const Shaft* shaft_;
-  Environment environment_{};
+  std::array<std::int64_t, conditions.size()> conditions_{};
   std::array<std::uint8_t, memory_size> memory_{};
-  std::uint32_t memory_version_ = 0;
   std::uint32_t writes_ = 0;
 
-  Power power_ = Power::off;
-  Time ready_at_{};
-  Time off_since_{};
-  bool was_on_ = false;
+  std::optional<Time> off_since_{};  // none: it was never on before, or is
+  bool off_ = true;
 
   std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
   std::int64_t counter_lap_ = 0;  // which lap of the turn counter was seen last
@@ -101,19 +92,7 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   DataId reset_id_{};
   unsigned reset_count_ = 0;
   Time last_reset_{};
-
-  RequestBytes request_;
-  ReplyBytes reply_;
-  bool refusing_ = false;  // answered when the line is idle
   std::uint8_t refused_status_ = 0;
-  Time heard_at_{};  // the last character
-  bool reply_pending_ = false;
-  bool transmitting_ = false;
-  Interruption interruption_;
-  Time reply_at_{};
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
-  std::uint64_t answered_ = 0;
 };
 
 }  // namespace absenc::tformat

@@ -11,12 +11,9 @@ namespace absenc::tformat {
 namespace {
 
 using testing::Bench;
-using PowerOn = Device<std::uint8_t>::PowerOn;
-using Wire = std::vector<std::uint8_t>;
-
-Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
-Wire wire(const Reply& reply) { return wire(encode_reply(reply).view()); }
-Wire wire(const Request& request) { return wire(encode_request(request).view()); }
+using testing::PowerOn;
+using testing::wire;
+using testing::Wire;
 
 void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
   for (unsigned i = 0; i < times; ++i) {
@@ -164,8 +161,7 @@ TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
   bench.pass(memory_time);
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA2);
   // Page 0 after power on.
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA0);
 }
 
@@ -217,8 +213,7 @@ TEST(TformatDevice, AZeroThatWasNotWrittenBeforePowerOffIsLost) {
   Bench bench;
   bench.shaft.put(0, 1000);
   reset(bench, DataId::zero);
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   bench.pass(memory_time);
   EXPECT_EQ(bench.everything().singleturn, 1000u);
 }
@@ -232,8 +227,7 @@ TEST(TformatDevice, ZeroTakes18MillisecondsAndSurvivesPowerOff) {
   bench.pass(memory_time);
   EXPECT_EQ(bench.everything().singleturn, 0u);
   EXPECT_EQ(bench.everything().multiturn, 7u);
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   EXPECT_EQ(bench.everything().singleturn, 0u);
   bench.shaft.put(7, 999);
   EXPECT_EQ(bench.everything().singleturn, 0x1FFFFu);
@@ -245,10 +239,7 @@ TEST(TformatDevice, ResetsSentTooFastOrOnATurningShaftDoNothing) {
   bench.shaft.put(3, 0);
   for (unsigned i = 0; i < 20; ++i) {  // the next request right behind each reply: 31 us apart
     testing::RawHost host({0x62}, bench.line.now());
-    if (bench.host == Bench::none)
-      bench.host = bench.line.attach(sim::Role::host, host);
-    else
-      bench.line.replace(bench.host, host);
+    bench.put_on(host);
     while (host.reply.size() < 6) bench.line.step();
   }
   EXPECT_EQ(bench.encoder.everything(bench.line.now()).multiturn, 3u);
@@ -286,15 +277,15 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
 
 TEST(TformatDevice, OverHeatIsLatchedUntilCooledAndCleared) {
   Bench bench;
-  bench.encoder.set_environment({.temperature = 90});
+  bench.set(temperature, 90);
   EXPECT_EQ(bench.everything().alarms, 0);
-  bench.encoder.set_environment({.temperature = 91});
+  bench.set(temperature, 91);
   const Reply hot = bench.everything();
   EXPECT_EQ(hot.alarms, alarms::over_heat);
   EXPECT_EQ(hot.status, status::alarm);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
-  bench.encoder.set_environment({.temperature = 60});
+  bench.set(temperature, 60);
   EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.everything().alarms, 0);
@@ -308,8 +299,7 @@ TEST(TformatDevice, CounterOverflowGoesOnModulo65536) {
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
   EXPECT_EQ(bench.everything().multiturn, 0u);
   EXPECT_EQ(bench.everything().status, 0);  // SF does not show it
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
 }
 
@@ -331,18 +321,17 @@ TEST(TformatDevice, FullAbsoluteStatusClearsBelow100Rpm) {
 TEST(TformatDevice, BatteryFlags) {
   Bench bench;
   bench.shaft.put(9, 0);
-  bench.encoder.set_environment({.battery_millivolts = 3050});
+  bench.set(battery_voltage, 3050);
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
-  bench.encoder.set_environment({});
+  bench.set(battery_voltage, 3600);
   EXPECT_EQ(bench.everything().alarms, 0);  // not latched
-  bench.encoder.set_environment({.battery_millivolts = 2600});
+  bench.set(battery_voltage, 2600);
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises with the power off only
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   const Reply lost = bench.everything();
   EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
   EXPECT_FALSE(to_reading({}, lost).multiturn_valid);
-  bench.encoder.set_environment({});
+  bench.set(battery_voltage, 3600);
   reset(bench, DataId::reset_multiturn);
   EXPECT_EQ(bench.everything().alarms, 0);
 }
@@ -367,8 +356,7 @@ TEST(TformatDevice, CountingAndMultiturnErrorsEndWithThePower) {
   Bench bench;
   bench.encoder.raise_alarms(alarms::counting_error | alarms::multiturn_error | alarms::over_speed);
   EXPECT_EQ(bench.everything().status, status::counting_error | status::alarm);
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   EXPECT_EQ(bench.everything().alarms, alarms::over_speed);
 }
 
@@ -376,7 +364,7 @@ TEST(TformatDevice, IsSilentWhileItStarts) {
   for (const bool battery : {true, false}) {
     testing::TestShaft shaft;
     VirtualEncoder encoder({}, shaft);
-    encoder.set_environment({.battery_millivolts = battery ? 3600 : 0});
+    encoder.set_condition(battery_voltage, battery ? 3600 : 0, Time{});
     encoder.power_on(Time{}, PowerOn::real);
     sim::Line<std::uint8_t> line(LinkKind::half_duplex, line_settings);
     line.attach(sim::Role::device, encoder);

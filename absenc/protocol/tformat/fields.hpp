@@ -3,9 +3,9 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
+#include <optional>
 
-#include "absenc/protocol/field.hpp"
+#include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 
 namespace absenc::tformat {
@@ -39,119 +39,75 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"battery_alarm", "the battery is below 3.1 V", "replace the battery with the encoder switched on"},
 }};
 
-enum FieldIndex : std::size_t {
-  field_data_id,
-  field_control_field,
-  field_status,
-  field_singleturn,
-  field_encoder_id,
-  field_multiturn,
-  field_alarms,
-  field_page,
-  field_address,
-  field_busy,
-  field_value,
-  field_data,
-  field_written,
-  field_temperature,
-  field_overheat_enabled,
-  field_overheat_threshold,
-  field_page_left,
+/// What a frame or a procedure shows; in the order of the wire.
+struct Values {
+  std::optional<DataId> data_id{};
+  std::optional<std::uint8_t> control_field{};
+  std::optional<std::uint8_t> status{};
+  std::optional<std::uint32_t> singleturn{};
+  std::optional<std::uint8_t> encoder_id{};
+  std::optional<std::uint32_t> multiturn{};
+  std::optional<std::uint8_t> alarms{};
+  std::optional<std::uint8_t> page{};
+  std::optional<std::uint8_t> address{};
+  std::optional<bool> busy{};
+  std::optional<std::uint8_t> value{};
+  std::optional<Bytes> data{};
+  std::optional<std::int8_t> temperature{};
+  std::optional<bool> overheat_enabled{};
+  std::optional<std::uint8_t> overheat_threshold{};
+  std::optional<bool> written{};
+  std::optional<std::uint8_t> page_left{};
 };
 
-inline constexpr std::array<FieldInfo, 17> fields{{
-    {"data_id", FieldInfo::Kind::number, "", "which data was asked for (Table 1)"},
-    {"control_field", FieldInfo::Kind::number, "", "first byte of the request: sync code, data id, parity"},
-    {"status", FieldInfo::Kind::flags, "", "SF", status_flags},
-    {"singleturn",
-     FieldInfo::Kind::number,
-     "counts",
-     "ABS: position within the turn, rising counter-clockwise",
-     {},
-     Shows::position},
-    {"encoder_id", FieldInfo::Kind::number, "", "ENID"},
-    {"multiturn", FieldInfo::Kind::number, "revolutions", "ABM", {}, Shows::turns},
-    {"alarms", FieldInfo::Kind::flags, "", "ALMC", alarm_flags},
-    {"page", FieldInfo::Kind::number, "", "memory page"},
-    {"address", FieldInfo::Kind::number, "", "ADF: memory address; 127 selects the page"},
-    {"busy", FieldInfo::Kind::number, "", "1 while the encoder writes: the request was not executed"},
-    {"value", FieldInfo::Kind::number, "", "EDF: the byte in memory"},
-    {"data", FieldInfo::Kind::bytes, "", "the bytes in memory from `address` on"},
-    {"written", FieldInfo::Kind::boolean, "", "false when the value was there already"},
-    {"temperature_c", FieldInfo::Kind::number, "degC", "of the encoder's board, within 3 degC"},
-    {"overheat_enabled", FieldInfo::Kind::boolean, "", "whether over_heat is watched"},
-    {"overheat_threshold_c", FieldInfo::Kind::number, "degC", "over_heat above this"},
-    {"page_left", FieldInfo::Kind::number, "",
-     "memory page that is left selected, also for whoever reads next: which one was before is not known"},
-}};
+using Kind = FieldInfo::Kind;
+inline constexpr auto fields = author::fields_of<Values>(
+    author::field<&Values::data_id>({"data_id", Kind::number, "", "which data was asked for (Table 1)"}),
+    author::field<&Values::control_field>(
+        {"control_field", Kind::number, "", "first byte of the request: sync code, data id, parity"}),
+    author::field<&Values::status>({"status", Kind::flags, "", "SF", status_flags}),
+    author::field<&Values::singleturn>({"singleturn",
+                                        Kind::number,
+                                        "counts",
+                                        "ABS: position within the turn, rising counter-clockwise",
+                                        {},
+                                        Shows::position}),
+    author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID"}),
+    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Shows::turns}),
+    author::field<&Values::alarms>({"alarms", Kind::flags, "", "ALMC", alarm_flags}),
+    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
+    author::field<&Values::address>({"address", Kind::number, "", "ADF: memory address; 127 selects the page"}),
+    author::field<&Values::busy>(
+        {"busy", Kind::number, "", "1 while the encoder writes: the request was not executed"}),
+    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory"}),
+    author::field<&Values::data>({"data", Kind::bytes, "", "the bytes in memory from `address` on"}),
+    author::field<&Values::temperature>(
+        {"temperature_c", Kind::number, "degC", "of the encoder's board, within 3 degC"}),
+    author::field<&Values::overheat_enabled>({"overheat_enabled", Kind::boolean, "", "whether over_heat is watched"}),
+    author::field<&Values::overheat_threshold>({"overheat_threshold_c", Kind::number, "degC", "over_heat above this"}),
+    author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
+    author::field<&Values::page_left>(
+        {"page_left", Kind::number, "",
+         "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
 
-constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }
-
-/// Every field that the request carries.
-constexpr void put_fields(FieldSink& sink, const Request& request) {
-  put(sink, field_data_id, static_cast<std::int64_t>(request.id));
-  put(sink, field_control_field, control_field(request.id));
-  if (is_memory_access(request.id)) put(sink, field_address, request.address);
-  if (request.id == DataId::write_memory) put(sink, field_value, request.value);
+[[nodiscard]] constexpr Values values_of(const Request& request) {
+  Values all{.data_id = request.id, .control_field = control_field(request.id)};
+  if (is_memory_access(request.id)) all.address = request.address;
+  if (request.id == DataId::write_memory) all.value = request.value;
+  return all;
 }
 
-/// Every field that a reply of this id carries, in the order of the wire.
-constexpr void put_fields(FieldSink& sink, const Reply& reply) {
-  put(sink, field_data_id, static_cast<std::int64_t>(reply.id));
+[[nodiscard]] constexpr Values values_of(const Reply& reply) {
   if (is_memory_access(reply.id)) {
-    put(sink, field_address, reply.address);
-    put(sink, field_busy, reply.busy ? 1 : 0);
-    put(sink, field_value, reply.value);
-    return;
+    return {.data_id = reply.id, .address = reply.address, .busy = reply.busy, .value = reply.value};
   }
-  put(sink, field_status, reply.status);
-  if (reply.id == DataId::multiturn) {
-    put(sink, field_multiturn, reply.multiturn);
-  } else if (reply.id == DataId::encoder_id) {
-    put(sink, field_encoder_id, reply.encoder_id);
-  } else {
-    put(sink, field_singleturn, reply.singleturn);
-  }
-  if (reply.id == DataId::everything) {
-    put(sink, field_encoder_id, reply.encoder_id);
-    put(sink, field_multiturn, reply.multiturn);
-    put(sink, field_alarms, reply.alarms);
-  }
-}
-
-/// Decodes a reply to `request`, or `request` alone when there is no reply. Without a request, the reply's own control
-/// field says what was asked, and the address of a memory access is taken as it comes.
-constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
-  Request asked;
-  if (!request.empty()) {
-    const Result<Request> result = decode_request(request);
-    if (!result) {
-      // What the encoder cannot accept is answered like ID 3 (8.4, 9.4).
-      const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
-                           reply[0] == control_field(DataId::everything);
-      return refused ? Error::request_rejected : result.error();
-    }
-    asked = *result;
-  } else {
-    if (reply.empty()) return Error::wrong_length;
-    const auto id = data_id(reply[0]);
-    if (!id) return Error::unexpected_reply;
-    asked.id = *id;
-    if (is_memory_access(asked.id) && reply.size() == reply_length(asked.id)) {
-      asked.address = reply[1] & 0x7F;
-      asked.value = reply[2];
-    }
-  }
-  if (reply.empty()) {
-    put_fields(sink, asked);
-    return Error::none;
-  }
-  const Result<Reply> result = decode_reply(format, asked, reply);
-  if (!result) return result.error();
-  put_fields(sink, *result);
-  const Reading reading = to_reading(format, *result);
-  if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
-  return Error::none;
+  Values all{.data_id = reply.id, .status = reply.status};
+  const bool everything = reply.id == DataId::everything;
+  if (everything || reply.id == DataId::encoder_id) all.encoder_id = reply.encoder_id;
+  if (everything || reply.id == DataId::multiturn) all.multiturn = reply.multiturn;
+  if (everything) all.alarms = reply.alarms;
+  if (reply.id != DataId::multiturn && reply.id != DataId::encoder_id) all.singleturn = reply.singleturn;
+  return all;
 }
 
 }  // namespace absenc::tformat

@@ -6,9 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <optional>
-#include <type_traits>
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
@@ -61,7 +59,7 @@ inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_hea
 struct Format {
   unsigned singleturn_bits = 17;  // 1 to 24
   unsigned multiturn_bits = 16;   // 0 to 24
-  int encoder_id = 0x11;          // ENID; -1: any
+  int encoder_id = -1;            // ENID, 0 to 255; -1: any
   bool strict = true;             // also the checks that only a specification-true encoder passes
 };
 
@@ -77,19 +75,9 @@ using ReplyBytes = ByteBuffer<reply_capacity>;
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
-  std::uint64_t sum = 0;
-  if (!std::is_constant_evaluated()) {
-    for (; bytes.size() >= sizeof sum; bytes = bytes.subspan(sizeof sum)) {
-      std::uint64_t word = 0;
-      std::memcpy(&word, bytes.data(), sizeof word);
-      sum ^= word;
-    }
-    sum ^= sum >> 32;
-    sum ^= sum >> 16;
-    sum ^= sum >> 8;
-  }
+  std::uint8_t sum = 0;
   for (const std::uint8_t byte : bytes) sum ^= byte;
-  return static_cast<std::uint8_t>(sum);
+  return sum;
 }
 
 /// Sync code 010, the id, its even parity (6.3.1).
@@ -149,6 +137,10 @@ struct Request {
   std::uint8_t address = 0;  // memory access: 0 to 127
   std::uint8_t value = 0;    // write_memory
 };
+
+[[nodiscard]] constexpr bool selects_page(const Request& request) {
+  return request.id == DataId::write_memory && request.address == page_select_address;
+}
 
 /// Fields that the id does not carry are 0.
 struct Reply {

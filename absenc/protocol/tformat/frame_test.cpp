@@ -49,7 +49,7 @@ TEST(TformatFrame, EveryControlFieldIsJudged) {
 // How many of the two-bit errors of an 11-byte reply pass: all that X^8 + 1 lets through, then with the fixed bits
 // checked, then with SF and ALMC compared.
 TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
-  const Format format;
+  const Format format{.encoder_id = 0x11};
   const ReplyBytes good = encode_reply({.singleturn = 0x12345, .multiturn = 0x1234, .encoder_id = 0x11});
   unsigned crc_passes = 0;
   unsigned lax_passes = 0;

@@ -6,8 +6,8 @@
 #include <cstdlib>
 
 #include "absenc/protocol/tformat/device.hpp"
-#include "absenc/protocol/tformat/fields.hpp"
 #include "absenc/protocol/tformat/host.hpp"
+#include "absenc/protocol/tformat/unit.hpp"
 #include "tests/fuzz_toys.hpp"
 
 namespace {
@@ -18,9 +18,11 @@ using namespace absenc::fuzz;
 
 // Every split of the input into request and reply; an error puts no field, a good reply has its own length.
 void decode_all_splits(Bytes input) {
+  Options options;
+  require(resolve_options(unit, {}, {}, options).kind == OptionError::Kind::none);
   for (std::size_t split = 0; split <= input.size() && split <= request_capacity; ++split) {
     Counting sink;
-    const Error error = decode({}, input.first(split), input.subspan(split), sink);
+    const Error error = unit.decode(options, {.bytes = input.first(split)}, {.bytes = input.subspan(split)}, sink);
     require((error == Error::none) == (sink.count > 0));
   }
 }

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+// The engine and its coroutines, with a protocol of one byte: what is asked comes back with its high bit set.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/scan.hpp"
+#include "absenc/protocol/author/standstill.hpp"
+
+namespace absenc::author {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Toy {
+  struct Format {
+    bool ends_by_silence = false;
+    Time silence{};
+  };
+  using Request = std::uint8_t;
+  using Reply = std::uint8_t;
+  static constexpr std::size_t longest_reply = 1;
+  static Wire wire(const Format& format) {
+    return {.answer_limit = 1ms, .gap_limit = 100us, .silence = format.silence};
+  }
+  static Manner manner(const Format& format, const Request& request) {
+    return {.attempts = 3,
+            .pause = 2ms,
+            .answered = request != 0x7F,
+            .ends_by_silence = format.ends_by_silence,
+            .hold = 5ms};
+  }
+  static ByteBuffer<1> encode(const Format&, const Request& request) {
+    ByteBuffer<1> bytes;
+    bytes.push_back(request);
+    return bytes;
+  }
+  static std::size_t reply_size(const Format&, const Request& request) { return request == 0x7F ? 0 : 1; }
+  static Result<Reply> decode(const Format&, const Request& request, Bytes bytes) {
+    if (bytes.empty()) return Error::timeout;
+    if (bytes.size() != 1) return Error::wrong_length;
+    if (bytes[0] == 0xFF) return Error::busy;
+    if (bytes[0] != (request | 0x80)) return Error::bad_checksum;
+    return bytes[0];
+  }
+  static bool is_whole(Error error) { return error == Error::busy; }
+};
+
+using ToyLine = LineOf<Toy>;
+struct Found {
+  unsigned sum = 0;
+};
+using Wire = std::vector<std::uint8_t>;
+
+/// Runs a conversation in virtual time; `encoder` gives what comes back for the nth request, nothing at all: silence.
+struct Bench {
+  using Encoder = std::function<Wire(std::uint8_t, unsigned)>;
+  explicit Bench(Encoder answers) : encoder(std::move(answers)) {}
+
+  void run(Conversation<std::uint8_t>& host) {
+    using Kind = Event<std::uint8_t>::Kind;
+    for (int steps = 0; steps < 100'000; ++steps) {
+      const Step<std::uint8_t> step = host.next(now);
+      switch (step.kind) {
+        case Step<std::uint8_t>::Kind::done:
+          return;
+        case Step<std::uint8_t>::Kind::emit:
+          log += "emit ";
+          break;
+        case Step<std::uint8_t>::Kind::configure:
+          log += "rate=" + std::to_string(step.settings.rate) + " ";
+          break;
+        case Step<std::uint8_t>::Kind::transfer: {
+          now = std::max(now, step.at);
+          sent.push_back(now);
+          const std::uint8_t request = step.out[0];
+          host.feed({.kind = Kind::sent, .at = now});
+          for (const std::uint8_t byte : encoder(request, static_cast<unsigned>(sent.size()))) {
+            now += 10us;
+            host.feed({.kind = Kind::received, .at = now, .items = {&byte, 1}});
+          }
+          break;
+        }
+        default:
+          if (step.at != never && step.at > now) {
+            now = step.at;
+            host.feed({.kind = Kind::timer, .at = now});
+          } else {
+            now += step.answer;
+            host.feed({.kind = Kind::silence, .at = now});
+          }
+      }
+    }
+    FAIL() << "it never ends";
+  }
+
+  Encoder encoder;
+  Time now{};
+  std::vector<Time> sent;
+  std::string log;
+};
+
+Wire echo(std::uint8_t request, unsigned) { return {static_cast<std::uint8_t>(request | 0x80)}; }
+Wire nothing(std::uint8_t, unsigned) { return {}; }
+
+template <auto procedure>
+struct Case {
+  explicit Case(Bench::Encoder encoder, Toy::Format format = {}, Arguments arguments = {}, std::size_t size = 16384)
+      : host(format, arguments, std::span(arena).first(size)), bench(std::move(encoder)) {
+    bench.run(host);
+  }
+  alignas(std::max_align_t) std::array<std::byte, 16384> arena;
+  Run<Toy, Found, procedure> host;
+  Bench bench;
+};
+
+Procedure two_questions(ToyLine& line, Found& found) {
+  const std::uint8_t first = co_await line.ask(1);
+  found.sum += first;
+  const std::uint8_t second = co_await line.ask(2).after(10ms).or_say("the second");
+  found.sum += second;
+  co_return done;
+}
+
+TEST(Procedures, GoOnWithEachReply) {
+  Case<two_questions> good(echo);
+  EXPECT_EQ(good.host.error(), Error::none);
+  EXPECT_EQ(good.host.found().sum, 0x81u + 0x82u);
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 10ms + 10us);  // after what came last
+}
+
+TEST(Procedures, EndWhereNoGoodReplyComes) {
+  Case<two_questions> bad([](std::uint8_t request, unsigned n) { return request == 2 ? Wire{} : echo(request, n); });
+  EXPECT_EQ(bad.host.error(), Error::timeout);
+  EXPECT_EQ(bad.host.detail(), "the second");
+  ASSERT_EQ(bad.bench.sent.size(), 4u);                               // three attempts, each after its pause
+  EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);  // the silence is part of the pause
+  EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);                  // held
+}
+
+TEST(Procedures, RepeatWhatWasDamagedWhenTheLineIsSilent) {
+  Case<two_questions> bad([](std::uint8_t request, unsigned n) { return n == 1 ? Wire{3, 4} : echo(request, n); });
+  EXPECT_EQ(bad.host.error(), Error::none);
+  EXPECT_EQ(bad.bench.sent.size(), 3u);
+}
+
+TEST(Procedures, ARefusalIsWholeAtOnce) {
+  Case<two_questions> refused([](std::uint8_t, unsigned) { return Wire{0xFF}; });
+  EXPECT_EQ(refused.host.error(), Error::busy);
+  EXPECT_EQ(refused.bench.sent[1] - refused.bench.sent[0], 10us + 2ms);  // not after the silence
+}
+
+TEST(Engine, AWeakCheckIsTrustedOnlyBeforeSilence) {
+  const auto longer = [](std::uint8_t request, unsigned) { return Wire{static_cast<std::uint8_t>(request | 0x80), 0}; };
+  EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);  // what follows belongs to nobody
+  EXPECT_EQ(Case<two_questions>(longer, {.ends_by_silence = true}).host.error(), Error::wrong_length);
+  EXPECT_EQ(Case<two_questions>(echo, {.ends_by_silence = true}).host.error(), Error::none);
+}
+
+TEST(Engine, TheLineIsSilentBeforeEachRequest) {
+  Case<two_questions> good(echo, {.silence = 20ms});
+  EXPECT_EQ(good.bench.sent[0], 20ms);
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);  // the longer of the two
+}
+
+Procedure attempts(ToyLine& line, Found& found) {
+  const Result<std::uint8_t> first = co_await line.attempt(1).once();
+  if (first) co_return {Error::invalid_argument};
+  co_await line.ask(0x7F);  // is not answered
+  line.emit();
+  line.set_rate(9600);
+  const std::uint8_t last = co_await line.ask(3);
+  found.sum = last;
+  co_return done;
+}
+
+TEST(Procedures, AttemptsMayFail) {
+  Case<attempts> good([](std::uint8_t request, unsigned n) { return n < 3 ? Wire{} : echo(request, n); });
+  EXPECT_EQ(good.host.error(), Error::none);
+  EXPECT_EQ(good.host.found().sum, 0x83u);
+  EXPECT_EQ(good.bench.sent.size(), 3u);
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 1ms);
+  EXPECT_EQ(good.bench.sent[2] - good.bench.sent[1], 0ms);
+  EXPECT_EQ(good.bench.log, "rate=9600 emit ");
+}
+
+Part<unsigned> deeper(ToyLine& line, unsigned depth) {
+  if (depth == 0) {
+    const std::uint8_t reply = co_await line.ask(5);
+    co_return reply;
+  }
+  const unsigned below = co_await deeper(line, depth - 1);
+  if (below > 1000) co_await line.stop({Error::out_of_range, "too deep"});
+  co_return below + 100;
+}
+
+Procedure many_parts(ToyLine& line, Found& found, Arguments arguments) {
+  for (int i = 0; i < 500; ++i) {  // more than would fit together
+    const unsigned sum = co_await deeper(line, static_cast<unsigned>(arguments[0]));
+    found.sum = sum;
+  }
+  co_return done;
+}
+
+TEST(Procedures, PartsGiveTheirStorageBack) {
+  const std::array<std::int64_t, 1> depth{3};
+  Case<many_parts> good(echo, {}, depth);
+  EXPECT_EQ(good.host.error(), Error::none);
+  EXPECT_EQ(good.host.found().sum, 0x85u + 300);
+  EXPECT_EQ(good.bench.sent.size(), 500u);
+  EXPECT_GT(good.host.frames_size(), 0u);
+}
+
+TEST(Procedures, StopFromAnyDepth) {
+  const std::array<std::int64_t, 1> depth{12};
+  Case<many_parts> stopped(echo, {}, depth);
+  EXPECT_EQ(stopped.host.error(), Error::out_of_range);
+  EXPECT_EQ(stopped.host.detail(), "too deep");
+  EXPECT_EQ(stopped.bench.sent.size(), 1u);
+}
+
+TEST(Procedures, SayWhenTheStorageIsTooSmall) {
+  const std::array<std::int64_t, 1> depth{12};
+  const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);          // too deep
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);  // for a part
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);          // for the procedure
+}
+
+Procedure endless(ToyLine& line, Found& found) {
+  line.restores();
+  while (!line.is_aborted()) {
+    co_await line.ask(1);
+    if (++found.sum == 10) line.abort();
+  }
+  co_await line.rest(1s);
+  co_return done;
+}
+
+TEST(Procedures, LeaveTheEncoderAsItWasWhenAborted) {
+  Case<endless> aborted(echo);
+  EXPECT_EQ(aborted.host.found().sum, 10u);
+  EXPECT_GE(aborted.bench.now, 1s);
+}
+
+constexpr std::uint8_t request_to(std::size_t index) { return static_cast<std::uint8_t>(index); }
+
+TEST(Scan, AsksEachAddress) {
+  using Host = author::Run<Toy, Nodes<8>, scan<Toy, 8, request_to>>;
+  alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+  Host host({}, {}, arena);
+  Bench bench([](std::uint8_t request, unsigned n) {
+    return request == 3 ? Wire{1} : request == 6 ? echo(request, n) : Wire{};
+  });
+  bench.run(host);
+  EXPECT_EQ(host.error(), Error::none);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(host.found().there[i], i == 3 || i == 6);
+    EXPECT_EQ(host.found().clash[i], i == 3);
+  }
+  Host alone({}, {}, arena);
+  Bench silent(nothing);
+  silent.run(alone);
+  EXPECT_EQ(alone.error(), Error::timeout);
+}
+
+static_assert(is_near(0, 1, 14) && is_near(16383, 0, 14) && !is_near(0, 2, 14));
+static_assert(is_near(0, 466, 23) && !is_near(0, 467, 23));  // 0.02 degrees
+
+}  // namespace
+}  // namespace absenc::author

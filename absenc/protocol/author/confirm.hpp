@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// A position that one reply alone does not always prove.
+#pragma once
+
+#include <optional>
+
+#include "absenc/protocol/author/line.hpp"
+
+namespace absenc::author {
+
+/// As ReadPosition. Of the protocol it needs besides:
+///
+///   static bool needs_another(const Format&, const Reply&);
+///   static Error agree(const Format&, const Reply& first, const Reply& second, Time between);   // or what is wrong
+template <class P>
+class ReadConfirmed : public HostOf<P> {
+ public:
+  ReadConfirmed(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
+    this->ask(request);
+  }
+  [[nodiscard]] const Reading* reading() const final {
+    return this->error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
+  }
+
+ private:
+  void answered(Error error) final {
+    if (error == Error::none && first_) {
+      error = P::agree(this->format(), *first_, this->last(), this->received_at() - first_at_);
+    } else if (error == Error::none && P::needs_another(this->format(), this->last())) {
+      first_ = this->last();
+      first_at_ = this->sent_at();
+      return this->ask(this->request());
+    }
+    if (error == Error::none) {
+      reading_ = P::reading(this->format(), this->request(), this->last());
+      reading_.latched = this->sent_at();  // the latest it can have been taken
+      reading_.received = this->received_at();
+    }
+    this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
+  }
+
+  std::optional<typename P::Reply> first_;
+  Time first_at_{};
+  Reading reading_{};
+};
+
+}  // namespace absenc::author

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parts that procedures share: a look at the position, and whether the shaft stands still.
+#pragma once
+
+#include <cstdint>
+
+#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/standstill.hpp"
+
+namespace absenc::author {
+
+/// A good reply that carries the position, or the turns, all of it valid.
+[[nodiscard]] constexpr Reading position_reading(std::uint64_t counts, unsigned bits) {
+  Reading reading;
+  reading.singleturn = counts & low_mask(bits);
+  reading.singleturn_bits = reading.singleturn_valid_bits = bits;
+  return reading;
+}
+[[nodiscard]] constexpr Reading turns_reading(std::int64_t turns, unsigned bits) {
+  Reading reading;
+  reading.multiturn = static_cast<std::uint64_t>(turns) & low_mask(bits);
+  reading.multiturn_bits = bits;
+  reading.multiturn_valid = true;
+  return reading;
+}
+
+/// What a look found: `Found` of procedures that show a position derive from it, or are it.
+template <class P>
+struct Looked {
+  typename P::Request request{};
+  typename P::Reply reply{};
+  Reading reading{};
+};
+
+/// Asks once; `found` is what came, with its times. The result is the position in counts.
+template <class P>
+Part<std::uint64_t> look(LineOf<P>& line, Looked<P>& found, typename P::Request request) {
+  found.reply = co_await line.ask(request);
+  found.request = request;
+  found.reading = P::reading(line.format(), request, found.reply);
+  found.reading.latched = line.sent_at();
+  found.reading.received = line.received_at();
+  co_return found.reading.singleturn;
+}
+
+/// Looks twice.
+template <class P>
+Part<bool> stands_still(LineOf<P>& line, Looked<P>& found, typename P::Request request) {
+  const std::uint64_t first = co_await look(line, found, request);
+  co_await line.rest(between_looks);
+  const std::uint64_t second = co_await look(line, found, request);
+  co_return is_near(second, first, found.reading.singleturn_bits);
+}
+
+}  // namespace absenc::author

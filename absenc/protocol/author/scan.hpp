@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who answers on a line: every address is asked.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "absenc/protocol/author/line.hpp"
+
+namespace absenc::author {
+
+template <std::size_t addresses>
+struct Nodes {
+  std::array<bool, addresses> there{};
+  std::array<bool, addresses> clash{};  // what came was damaged every time: two of one address, or a bad line
+};
+
+/// `request_to(i)` asks the address of this index. Each that is not silent is asked twice: one answer may be noise.
+template <class P, std::size_t addresses, auto request_to>
+Procedure scan(LineOf<P>& line, Nodes<addresses>& nodes) {
+  bool any = false;
+  for (std::size_t i = 0; i < addresses; ++i) {
+    const Result<typename P::Reply> first = co_await line.attempt(request_to(i));
+    if (line.is_noisy()) co_return {first.error()};
+    if (!first && first.error() == Error::timeout) continue;
+    const Result<typename P::Reply> second = co_await line.attempt(request_to(i));
+    if (!first && !second && second.error() == Error::timeout) continue;
+    nodes.there[i] = any = true;
+    nodes.clash[i] = !first && !second;
+  }
+  if (!any) co_return {Error::timeout, "no address was answered at this rate"};
+  co_return done;
+}
+
+}  // namespace absenc::author

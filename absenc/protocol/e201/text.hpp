@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// Texts that no document describes: the numbers in them, wherever they stand.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/result.hpp"
+
+namespace absenc::e201 {
+
+/// What M1 to M8 make MA, kHz.
+inline constexpr std::array<std::uint16_t, 8> clocks_khz{35, 70, 140, 280, 560, 1100, 2200, 4400};
+
+inline constexpr char end_of_line = '\r';
+using Text = ByteBuffer<64>;
+
+/// Behind the first CR; 0: there is none.
+[[nodiscard]] constexpr std::size_t end_of_first_line(Bytes text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == end_of_line) return i + 1;
+  }
+  return 0;
+}
+
+/// Without the CR, spaces and LF around it.
+[[nodiscard]] constexpr Bytes trimmed(Bytes text) {
+  const auto blank = [](std::uint8_t c) { return c == ' ' || c == '\r' || c == '\n' || c == '\t'; };
+  while (!text.empty() && blank(text.front())) text = text.subspan(1);
+  while (!text.empty() && blank(text.back())) text = text.first(text.size() - 1);
+  return text;
+}
+
+[[nodiscard]] constexpr bool is_digit(std::uint8_t c) { return c >= '0' && c <= '9'; }
+
+namespace detail {
+
+// Digits from `at` on, at most 9 of them; `at` is moved behind.
+constexpr unsigned number_at(Bytes text, std::size_t& at) {
+  unsigned number = 0;
+  for (unsigned digits = 0; at < text.size() && is_digit(text[at]) && digits < 9; ++at, ++digits) {
+    number = number * 10 + static_cast<unsigned>(text[at] - '0');
+  }
+  return number;
+}
+
+constexpr bool skip_to_digit(Bytes text, std::size_t& at) {
+  while (at < text.size() && !is_digit(text[at])) ++at;
+  return at < text.size();
+}
+
+}  // namespace detail
+
+struct Version {
+  unsigned major;
+  unsigned minor;
+};
+
+/// `4` exists since then (E201-9S document).
+[[nodiscard]] constexpr bool has_samples(Version version) {
+  return version.major > 1 || (version.major == 1 && version.minor >= 16);
+}
+
+/// The first two numbers with a point between them.
+[[nodiscard]] constexpr std::optional<Version> find_version(Bytes text) {
+  for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
+    const unsigned major = detail::number_at(text, at);
+    if (at + 1 >= text.size() || text[at] != '.' || !is_digit(text[at + 1])) continue;
+    return Version{major, detail::number_at(text, ++at)};
+  }
+  return std::nullopt;
+}
+
+/// The first whole number. Error: bad_framing.
+[[nodiscard]] constexpr Result<std::int64_t> find_number(Bytes text) {
+  std::size_t at = 0;
+  if (!detail::skip_to_digit(text, at)) return Error::bad_framing;
+  return detail::number_at(text, at);
+}
+
+/// 1 to 8 of that, or of a clock in kHz; 0: there is no such clock.
+[[nodiscard]] constexpr unsigned clock_of(std::int64_t number) {
+  for (unsigned i = 0; i < clocks_khz.size(); ++i) {
+    if (number == i + 1 || number == clocks_khz[i]) return i + 1;
+  }
+  return 0;
+}
+
+/// The reply to `m`: the clock, 1 to 8. Error: bad_framing.
+[[nodiscard]] constexpr Result<std::int64_t> find_clock(Bytes text) {
+  const unsigned clock = clock_of(find_number(text).value_or(0));
+  return clock != 0 ? Result(std::int64_t{clock}) : Error::bad_framing;
+}
+
+/// The reply to `?`: the digits of the text, with a sign. Error: bad_framing.
+[[nodiscard]] constexpr Result<std::int64_t> decode_number(Bytes text) {
+  const bool negative = !text.empty() && text[0] == '-';
+  if (!text.empty() && (text[0] == '-' || text[0] == '+')) text = text.subspan(1);
+  if (text.empty() || text.size() > 20) return Error::bad_framing;
+  std::uint64_t number = 0;
+  for (const std::uint8_t c : text) {
+    if (!is_digit(c)) return Error::bad_framing;
+    const std::uint64_t digit = static_cast<std::uint64_t>(c - '0');
+    if (number > (std::numeric_limits<std::uint64_t>::max() - digit) / 10) return Error::bad_framing;
+    number = number * 10 + digit;
+  }
+  return static_cast<std::int64_t>(negative ? 0 - number : number);
+}
+
+/// Thousandths of the first number that is followed by `symbol` (V or A) or by m and `symbol`.
+[[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, std::uint8_t symbol) {
+  for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
+    std::uint64_t milli = std::uint64_t{detail::number_at(text, at)} * 1000;
+    if (at < text.size() && text[at] == '.') {
+      unsigned weight = 100;
+      for (++at; at < text.size() && is_digit(text[at]); ++at, weight /= 10) {
+        milli += weight * static_cast<unsigned>(text[at] - '0');
+      }
+    }
+    std::size_t after = at;
+    while (after < text.size() && text[after] == ' ') ++after;
+    const bool thousandths = after + 1 < text.size() && text[after] == 'm' && text[after + 1] == symbol;
+    if (thousandths) return static_cast<unsigned>(milli / 1000);
+    if (after < text.size() && text[after] == symbol) return static_cast<unsigned>(milli);
+  }
+  return std::nullopt;
+}
+
+}  // namespace absenc::e201

@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/amt21/unit.hpp"
+#include "absenc/protocol/author/line.hpp"
+#include "bench/firmware/reader.hpp"
+
+int main() {
+  using namespace absenc;
+  firmware::run<std::uint8_t, author::ReadPosition<amt21::Protocol>>(amt21::Format{}, amt21::Request{});
+}

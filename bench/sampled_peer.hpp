@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a motor controller does that samples SLO with its timer, one byte of a port for each clock of MA: our own
+// stand-in for the way mjbots' moteus takes a BiSS frame apart, to measure ours beside it. Nothing else uses it.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace absenc::bench {
+
+/// What the controller is configured with.
+struct SampledPeer {
+  unsigned pin;
+  unsigned bits;  // of the position, up to 58
+};
+
+struct SampledPosition {
+  enum class Error : std::uint8_t { none, no_start, truncated, checksum } error = Error::none;
+  std::uint64_t position = 0;
+  bool error_bit = false;
+  bool warning_bit = false;
+};
+
+namespace detail {
+
+// The remainder of six bits and six zeros behind them, by x^6 + x + 1.
+inline constexpr auto six_bits = [] {
+  std::array<std::uint8_t, 64> table{};
+  for (unsigned value = 0; value < 64; ++value) {
+    unsigned rest = value << 6;
+    for (unsigned bit = 12; bit-- > 6;) rest ^= (rest >> bit & 1) != 0 ? 0x43u << (bit - 6) : 0;
+    table[value] = static_cast<std::uint8_t>(rest);
+  }
+  return table;
+}();
+
+constexpr std::uint32_t every_byte = 0x0101'0101;
+
+inline std::uint32_t four_samples(const std::uint8_t* samples, unsigned pin) {
+  std::uint32_t four = 0;
+  __builtin_memcpy(&four, samples, sizeof four);  // a load, also in a freestanding program
+  return four >> pin & every_byte;
+}
+
+// One bit of each of four bytes, the first one the most significant, gathered by a multiplication.
+inline std::uint32_t gathered(std::uint32_t four) { return four * 0x0804'0201 >> 24; }
+
+// Six bits a step; as many steps as up to 30 bits need, or 60.
+inline unsigned checksum(std::uint64_t data, unsigned bits) {
+  unsigned rest = 0;
+  const auto step = [&](unsigned shift) { rest = six_bits[(data >> shift & 0x3F) ^ rest]; };
+  if (bits > 30) step(54), step(48), step(42), step(36), step(30);
+  step(24), step(18), step(12), step(6), step(0);
+  return rest;
+}
+
+template <class Register>
+Register gather(const std::uint8_t* samples, unsigned bits, unsigned pin) {
+  Register data = 0;
+  for (; bits >= 4; bits -= 4, samples += 4) data = data << 4 | gathered(four_samples(samples, pin));
+  for (; bits > 0; --bits, ++samples) data = data << 1 | (*samples >> pin & 1u);
+  return data;
+}
+
+}  // namespace detail
+
+/// The frame in `samples`, at least four more of which than it needs, whose start bit is looked for in the first 25.
+inline SampledPosition take(const SampledPeer& peer, std::span<const std::uint8_t> samples) {
+  using Error = SampledPosition::Error;
+  constexpr std::size_t searched = 25;
+  const auto level = [&](std::size_t at) { return samples[at] >> peer.pin & 1u; };
+  std::size_t at = 0;
+  while (at < searched && level(at) != 0) ++at;
+  while (at % 4 != 0 && at < searched && level(at) == 0) ++at;
+  if (at < searched && level(at) == 0) {
+    std::uint32_t four = 0;
+    while (at < searched && (four = detail::four_samples(&samples[at], peer.pin)) == 0) at += 4;
+    at += static_cast<std::size_t>(std::countr_zero(four)) / 8;
+  }
+  if (at >= searched) return {Error::no_start};
+  const std::size_t first = at + 2;
+  const std::size_t behind = first + peer.bits;
+  if (behind + 8 > samples.size()) return {Error::truncated};
+  const std::uint64_t position = peer.bits <= 32 ? detail::gather<std::uint32_t>(&samples[first], peer.bits, peer.pin)
+                                                 : detail::gather<std::uint64_t>(&samples[first], peer.bits, peer.pin);
+  const std::uint64_t data = position << 2 | level(behind) << 1 | level(behind + 1);
+  const std::uint32_t four = detail::gathered(detail::four_samples(&samples[behind + 2], peer.pin));
+  const unsigned sent = (four << 2 | level(behind + 6) << 1 | level(behind + 7)) ^ 0x3F;
+  if (sent != detail::checksum(data, peer.bits + 2)) return {Error::checksum};
+  return {Error::none, position, level(behind) == 0, level(behind + 1) == 0};
+}
+
+}  // namespace absenc::bench

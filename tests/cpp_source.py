@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tokens of a C++ source that clang-format has formatted, and where its operands and statements begin and end."""
+
+import bisect
+import re
+from typing import NamedTuple
+
+TOKEN = re.compile(
+    r"""(?P<space>\s+)
+      | (?P<comment>//[^\n]*|/\*.*?\*/)
+      | (?P<directive>\#(?:\\\n|[^\n])*)
+      | (?P<string>(?:u8|[uUL])?R"(?P<mark>[^()\\\s]{0,16})\(.*?\)(?P=mark)"\w* | (?:u8|[uUL])?"(?:\\.|[^"\\\n])*"\w*)
+      | (?P<char>(?:u8|[uUL])?'(?:\\.|[^'\\\n])+')
+      | (?P<number>\.?\d(?:[eEpP][+-]|'?[\w.])*)
+      | (?P<word>[A-Za-z_]\w*)
+      | (?P<operator><=>|<<=|>>=|->\*|\.\.\.|::|->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|.)""",
+    re.VERBOSE | re.DOTALL,
+)
+OPENING = {"(": ")", "[": "]", "{": "}"}
+CLOSING = set(OPENING.values())
+
+
+class Token(NamedTuple):
+    kind: str
+    text: str
+    start: int
+    end: int
+
+
+class Source:
+    """Tokens without comments and directives, and which brackets belong together."""
+
+    def __init__(self, text):
+        self.text = text
+        self.tokens = [
+            Token(found.lastgroup if found.lastgroup != "mark" else "string", found[0], found.start(), found.end())
+            for found in TOKEN.finditer(text)
+            if found.lastgroup not in ("space", "comment", "directive")
+        ]
+        self.lines = [0] + [found.end() for found in re.finditer("\n", text)]
+        self.line_of_token = [self.line_of(token.start) for token in self.tokens]
+        self.partner = {}
+        self._pair_brackets()
+
+    def __getitem__(self, index):
+        return self.tokens[index].text if 0 <= index < len(self.tokens) else ""
+
+    def _pair_brackets(self):
+        open_ones = []
+        for i, token in enumerate(self.tokens):
+            if token.text in OPENING or (token.text == "<" and not self.is_binary(i)):
+                open_ones.append(i)
+            elif token.text in CLOSING:
+                while open_ones and self[open_ones[-1]] == "<":
+                    open_ones.pop()
+                if open_ones:
+                    self._pair(open_ones.pop(), i)
+            elif token.text in (">", ">>") and not self.is_binary(i):
+                for _ in token.text:
+                    if open_ones and self[open_ones[-1]] == "<":
+                        self._pair(open_ones.pop(), i)
+
+    def _pair(self, first, last):
+        self.partner[first] = last
+        self.partner[last] = first
+
+    def is_binary(self, index):
+        token = self.tokens[index]
+        return self.text[token.start - 1 : token.start].isspace() and self.text[token.end : token.end + 1].isspace()
+
+    def line_of(self, position):
+        return bisect.bisect_right(self.lines, position)
+
+    def tokens_of_lines(self, first, last):
+        """Which tokens stand in them: from where up to, without, where."""
+        return bisect.bisect_left(self.line_of_token, first), bisect.bisect_right(self.line_of_token, last)
+
+    def span(self, first, last):
+        """The text of the tokens from `first` up to, without, `last`."""
+        return self.text[self.tokens[first].start : self.tokens[last - 1].end]
+
+    def left(self, index, stops):
+        """Where the operand begins that ends before `index`."""
+        while index > 0 and self[index - 1] not in stops:
+            index -= 1
+            if self[index] in OPENING:
+                return index + 1
+            if self[index] in CLOSING and self[index] == "}" and self._is_block(index):
+                return index + 1
+            if index in self.partner and self.partner[index] < index:
+                index = self.partner[index]
+        return index
+
+    def _is_block(self, closing):
+        before = self.partner.get(closing, closing) - 1
+        return before < 0 or self[before] in (")", ";", "{", "}", "else", "do")
+
+    def right(self, index, stops):
+        """Where the operand ends that begins at `index`."""
+        while index < len(self.tokens) and self[index] not in stops and self[index] not in CLOSING:
+            index = max(self.partner.get(index, index), index) + 1
+        return index
+
+    def statement(self, index):
+        """Where the statement ends that begins at `index`: behind its semicolon or brace."""
+        while index < len(self.tokens) and self[index] not in CLOSING:
+            if self[index] == ";":
+                return index + 1
+            if self[index] == "{" and self._is_block(self.partner.get(index, index)):
+                return self.partner.get(index, index) + 1
+            index = max(self.partner.get(index, index), index) + 1
+        return index

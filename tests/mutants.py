@@ -1,0 +1,371 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Breaks the units in one place at a time and looks whether tests notice.
+
+tests/mutant_rules.py finds the places. Each mutant is compiled in a copy of the sources (build/mutants), and the
+generic tests, as far as they concern its unit, the seeds of its fuzzer and its own tests run until one fails. A mutant
+that survives shows a test that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their
+reason.
+"""
+
+import argparse
+import fcntl
+import os
+import queue
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+import mutant_rules
+
+ROOT = Path(__file__).resolve().parent.parent
+COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
+NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
+# Of what the compiler says when a vector or another thing that is checked at compile time no longer holds.
+STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
+HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
+OUTCOMES = ("static_assert", "kit", "own", "time", "known", "new", "no C++")
+
+
+class Program(NamedTuple):
+    name: str
+    is_own: bool
+    tests: str = "*"  # of GoogleTest
+
+
+def unit_folders():
+    """By name: every unit, and the layers that all of them stand on."""
+    protocol = ROOT / "absenc" / "protocol"
+    folders = {folder.name: folder for folder in sorted(protocol.iterdir()) if folder.is_dir()}
+    return folders | {"host": ROOT / "absenc" / "host"}
+
+
+def generic_programs():
+    """Those that test every unit: a source of tests/ is one, or a folder in it (cmake/tests.cmake)."""
+    tests = ROOT / "tests"
+    names = []
+    for path in [*sorted(tests.glob("*_test.cpp")), *sorted(tests.glob("*/*_test.cpp"))]:
+        if "INSTANTIATE_TEST_SUITE_P" in path.read_text(encoding="utf-8"):
+            names.append(path.stem if path.parent == tests else f"{path.parent.name}_test")
+    return list(dict.fromkeys(names))
+
+
+def id_of(path):
+    """What the ids of the mutants of a source begin with."""
+    below = path.relative_to(ROOT / "absenc")
+    return str(below.relative_to("protocol") if below.parts[0] == "protocol" else below)
+
+
+def find_mutants(folder):
+    """With the path and the text of their source."""
+    for path in sorted([*folder.rglob("*.cpp"), *folder.rglob("*.hpp")]):
+        if not NO_SOURCE.search(path.name):
+            text = path.read_text(encoding="utf-8")
+            for mutant in mutant_rules.find(id_of(path), text):
+                yield mutant, path, text
+
+
+def shown(mutant, path, text):
+    """Where it is, and its lines before and after."""
+    last = text.count("\n", 0, mutant.end) + 1
+    changed = mutant.applied_to(text).splitlines()
+    end = last + len(changed) - len(text.splitlines())
+    lines = [f"{path.relative_to(ROOT)}:{mutant.line}  {mutant.id}"]
+    lines += [f"  - {line.strip()}" for line in text.splitlines()[mutant.line - 1 : last]]
+    lines += [f"  + {line.strip()}" for line in changed[mutant.line - 1 : end]]
+    return "\n".join(lines)
+
+
+def read_survivors(path):
+    """The reason why a mutant may survive, by its id."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    known = [line.split(maxsplit=1) for line in lines if line.strip() and not line.startswith("#")]
+    bare = [words[0] for words in known if len(words) < 2]
+    if bare:
+        sys.exit(f"mutants: {path.name} gives no reason for {', '.join(bare)}")
+    return dict(known)
+
+
+class Tree:
+    """A copy of the sources, and what is built from it."""
+
+    def __init__(self, folder):
+        self.source = folder / "source"
+        self.build = folder / "tree"
+        self.limits = {}
+        self.lock = None
+        self.environment = {**os.environ, "CCACHE_BASEDIR": str(folder), "GTEST_FAIL_FAST": "1", "GTEST_BRIEF": "1"}
+
+    def prepare(self):
+        self.source.mkdir(parents=True, exist_ok=True)
+        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")  # until this process ends
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise SystemExit(f"mutants: somebody else works in {self.source.parent}") from None
+        wanted = set()
+        for name in COPIED:
+            for path in sorted((ROOT / name).rglob("*")) if (ROOT / name).is_dir() else [ROOT / name]:
+                if path.is_file() and "__pycache__" not in path.parts:
+                    wanted.add(path.relative_to(ROOT))
+        for path in wanted:
+            self.write(self.source / path, (ROOT / path).read_bytes())
+        for path in self.source.rglob("*"):
+            if path.is_file() and path.relative_to(self.source) not in wanted:
+                path.unlink()
+        # What reads behind the end of its bytes is told; warnings are not looked at.
+        options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -D_GLIBCXX_ASSERTIONS"]
+        options += ["-DABSENC_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
+        if shutil.which("ccache"):
+            options.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
+        self.run_or_exit(["cmake", "-G", "Ninja", "-S", self.source, "-B", self.build, *options])
+
+    @staticmethod
+    def write(path, content):
+        """Only what differs, so that only that is compiled again."""
+        if not path.exists() or path.read_bytes() != content:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+    def run_or_exit(self, command):
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            told = " ".join(map(str, command))
+            raise SystemExit(f"mutants: without any mutant this fails: {told}\n{done.stdout}{done.stderr}")
+        return done.stdout
+
+    def build_command(self, *targets):
+        return ["cmake", "--build", self.build, "-j", "1", "--target", *targets]
+
+    def compile(self, target):
+        """What the compiler said; None when it took it."""
+        command = self.build_command(target)
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
+        return None if done.returncode == 0 else done.stdout + done.stderr
+
+    def run(self, program, cpu_limit):
+        """Its exit status and the seconds that it computed; the limit does not count what others compute meanwhile."""
+        limits = ["prlimit", f"--cpu={cpu_limit}:{cpu_limit + 1}", f"--as={4 << 30}", "--core=0"]
+        environment = {**self.environment, "GTEST_FILTER": program.tests}
+        running = subprocess.Popen(
+            [*limits, self.build / "tests" / program.name],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        too_long = threading.Timer(10 * cpu_limit, running.kill)  # it waits for what never comes
+        too_long.start()
+        _, status, usage = os.wait4(running.pid, 0)
+        too_long.cancel()
+        running.returncode = os.waitstatus_to_exitcode(status)
+        return running.returncode, usage.ru_utime + usage.ru_stime
+
+    def concerning(self, program, unit):
+        """The tests of a generic program that concern a unit: those that name it, and those that look at all units."""
+        listed = self.run_or_exit([self.build / "tests" / program.name, "--gtest_list_tests"])
+        suite, chosen, is_named = "", [], False
+        for line in listed.splitlines():
+            if line[:1] != " ":
+                suite = line.split(" ")[0]
+                continue
+            name = suite + line.split("#")[0].strip()
+            if re.search(rf"(?<![a-z0-9]){unit}", line.lower()):
+                is_named = True
+                chosen.append(name)
+            elif "/" not in name:
+                chosen.append(name)
+        return program._replace(tests=":".join(chosen)) if is_named else None
+
+    def programs(self, unit, folders):
+        """Those that may kill a unit's mutants, the fastest first. All of them pass without a mutant."""
+        kit = [Program(name, False) for name in generic_programs()]
+        owners = list(folders) if unit == "author" else [unit]
+        seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]
+        own = [f"{owner}_test" for owner in owners if any(folders[owner].rglob("*_test.cpp"))]
+        self.run_or_exit(self.build_command(*(program.name for program in kit), *seeds, *own))
+        if unit not in ("author", "host"):
+            kit = [chosen for program in kit if (chosen := self.concerning(program, unit))]
+        programs = kit + [Program(name, False) for name in seeds] + [Program(name, True) for name in own]
+        for program in programs:
+            status, seconds = self.run(program, 600)
+            if status != 0:
+                raise SystemExit(f"mutants: without any mutant {program.name} fails with {program.tests}")
+            self.limits[program] = int(5 * seconds) + 5
+        return sorted(programs, key=lambda program: (program.is_own, self.limits[program]))
+
+    def outcome(self, mutant, path, text, programs):
+        """What became of it, and the program that killed it. The source stays as the mutant has it."""
+        self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
+        # Vectors are checked where the unit is described: one file to compile tells most of what is wrong in a header.
+        unit = path.relative_to(ROOT).with_name("unit.cpp")
+        first = [f"CMakeFiles/absenc.dir/{unit}.o"] if (ROOT / unit).exists() else []
+        for program in programs:
+            for target in [*first, program.name]:
+                refused = self.compile(target)
+                if refused is not None:
+                    return ("static_assert" if STATIC_CHECK.search(refused) else "no C++"), target.rpartition("/")[2]
+            first = []
+            status, _ = self.run(program, self.limits[program])
+            if status != 0:
+                return ("time" if status in HANGS else "own" if program.is_own else "kit"), program.name
+        return "survived", ""
+
+
+class Campaign:
+    """Trees work through the mutants, a source at a time."""
+
+    def __init__(self, known, folders, verbose):
+        self.known = known
+        self.folders = folders
+        self.verbose = verbose
+        self.counts = {}
+        self.revived = []
+        self.work = queue.Queue()
+        self.lock = threading.Lock()
+        self.stopping = False
+        self.failure = None
+
+    def add(self, unit, mutants):
+        for path in dict.fromkeys(path for _, path, _ in mutants):
+            self.work.put((unit, [one for one in mutants if one[1] == path]))
+        self.counts[unit] = Counter()
+
+    def run(self, trees):
+        threads = [threading.Thread(target=self.serve, args=(tree,), daemon=True) for tree in trees]
+        for thread in threads:
+            thread.start()
+        try:
+            for thread in threads:
+                thread.join()
+        except KeyboardInterrupt:
+            self.stopping = True
+            print("interrupted: what is being built ends first", flush=True)
+            for thread in threads:
+                thread.join()
+        if self.failure:
+            raise self.failure
+
+    def serve(self, tree):
+        programs = {}
+        try:
+            tree.prepare()
+            while not self.stopping:
+                unit, mutants = self.work.get_nowait()
+                if unit not in programs:
+                    programs[unit] = tree.programs(unit, self.folders)
+                    names = ", ".join(program.name for program in programs[unit])
+                    print(f"{unit}, which passes without a mutant: {names}", flush=True)
+                for mutant, path, text in mutants:
+                    began = time.monotonic()
+                    result = tree.outcome(mutant, path, text, programs[unit])
+                    if self.stopping:
+                        break
+                    self.note(unit, mutant, path, text, result, time.monotonic() - began)
+                tree.write(tree.source / path.relative_to(ROOT), text.encode())
+        except queue.Empty:
+            pass
+        except (SystemExit, OSError) as failure:
+            self.failure = None if self.stopping else failure
+            self.stopping = True
+
+    def note(self, unit, mutant, path, text, result, seconds):
+        outcome, program = result
+        with self.lock:
+            if outcome == "survived":
+                outcome = "known" if mutant.id in self.known else "new"
+            elif mutant.id in self.known:
+                self.revived.append(mutant.id)
+            self.counts[unit][outcome] += 1
+            if self.verbose:
+                print(f"[{seconds:5.1f} s] {outcome:13} {program:20} {mutant.id}", flush=True)
+            if outcome in ("new", "no C++"):
+                print(f"{'survived' if outcome == 'new' else outcome}: {shown(mutant, path, text)}", flush=True)
+
+
+def print_table(counts):
+    print(f"{'':12}{'mutants':>9}" + "".join(f"{name:>15}" for name in OUTCOMES))
+    for unit, count in [*counts.items(), ("all", sum(counts.values(), Counter()))]:
+        print(f"{unit:12}{count.total():9}" + "".join(f"{count[name]:15}" for name in OUTCOMES))
+
+
+def choose(found, arguments):
+    chosen = {}
+    for unit, mutants in found.items():
+        wanted = [
+            one
+            for one in mutants
+            if (not arguments.unit or unit in arguments.unit)
+            and (not arguments.file or str(one[1]).endswith(arguments.file))
+            and (one[0].id in arguments.ids if arguments.ids else arguments.fine or one[0].rule in mutant_rules.COARSE)
+        ]
+        if wanted:
+            chosen[unit] = wanted
+    if arguments.sample:
+        everything = [(unit, one) for unit, mutants in chosen.items() for one in mutants]
+        picked = random.Random(arguments.seed).sample(everything, min(arguments.sample, len(everything)))
+        picked = {one[0].id for _, one in picked}
+        chosen = {unit: [one for one in mutants if one[0].id in picked] for unit, mutants in chosen.items()}
+        chosen = {unit: mutants for unit, mutants in chosen.items() if mutants}
+    return chosen
+
+
+def parse():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0], prog="./dev mutants")
+    parser.add_argument("ids", nargs="*", help="only these mutants")
+    parser.add_argument("--unit", action="append", help="a folder of absenc/protocol, or host; may be given again")
+    parser.add_argument("--file", help="only those of this source: the end of its path")
+    parser.add_argument("--fine", action="store_true", help="also terms, edges and constants (tests/mutant_rules.py)")
+    parser.add_argument("--sample", type=int, metavar="N", help="so many of them, at random")
+    parser.add_argument("--seed", type=int, default=1, help="of the sample (%(default)s)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time, each in a tree (%(default)s)")
+    parser.add_argument("--list", action="store_true", help="show them, run nothing")
+    parser.add_argument("--verbose", action="store_true", help="a line for each")
+    return parser.parse_args()
+
+
+def main():
+    arguments = parse()
+    folders = unit_folders()
+    for unit in arguments.unit or []:
+        if unit not in folders:
+            sys.exit(f"mutants: no unit {unit}: there are {', '.join(folders)}")
+    found = {unit: list(find_mutants(folder)) for unit, folder in folders.items()}
+    chosen = choose(found, arguments)
+    if not chosen:
+        sys.exit("mutants: there is no such mutant")
+    if arguments.list:
+        for mutants in chosen.values():
+            for mutant, path, text in mutants:
+                print(shown(mutant, path, text))
+        for unit, mutants in chosen.items():
+            print(f"{unit:12}{len(mutants):6}")
+        print(f"{'all':12}{sum(map(len, chosen.values())):6}")
+        return 0
+    known = read_survivors(ROOT / "tests" / "mutants_survivors.txt")
+    stale = sorted(set(known) - {mutant.id for mutants in found.values() for mutant, _, _ in mutants})
+    campaign = Campaign(known, folders, arguments.verbose)
+    for unit, mutants in chosen.items():
+        campaign.add(unit, mutants)
+    jobs = max(1, min(arguments.jobs, campaign.work.qsize()))
+    print(f"{sum(map(len, chosen.values()))} mutants; building in build/mutants, at first for minutes", flush=True)
+    campaign.run([Tree(ROOT / "build" / "mutants" / str(number)) for number in range(jobs)])
+    print_table(campaign.counts)
+    for name in campaign.revived:
+        print(f"mutants_survivors.txt lists what is killed now: {name}")
+    for name in stale:
+        print(f"mutants_survivors.txt lists what is not found any more: {name}")
+    survived = sum(count["new"] for count in campaign.counts.values())
+    return 130 if campaign.stopping else int(survived > 0 or bool(stale))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
