@@ -17,8 +17,8 @@ constexpr unsigned cycle_attempts = 3;
 constexpr unsigned write_attempts = 3;
 constexpr std::string_view size_needed = "this address is not in the table of registers: say how many bytes it has";
 
-bool is_near(const Line& line, std::uint32_t singleturn) {
-  return author::is_near(line.position().singleturn, singleturn, line.format().resolution);
+bool is_near(const Line& line, std::uint32_t singleturn, std::uint32_t millidegrees = author::standstill_millidegrees) {
+  return author::is_near(line.position().singleturn, singleturn, line.format().resolution, millidegrees);
 }
 
 // ---- Parts
@@ -163,7 +163,7 @@ Procedure zero(Line& line, FoundZero& found, Arguments arguments) {
   if (!still) co_return {Error::invalid_argument, "the shaft turns: hold it still"};
   const std::uint32_t offset = line.format().moved_offset(old, line.position().singleturn);
   co_await write(line, position_offset, offset);
-  if (!is_near(line, 0)) {
+  if (!is_near(line, 0, author::zero_millidegrees)) {
     co_await write(line, position_offset, old);
     co_return {Error::cross_check_failed,
                "the position did not become zero, the old offset is back: hold the shaft still, or change the option "

@@ -21,7 +21,7 @@ using author::CommandOf;
 
 // ---- What goes out
 
-/// Two bytes, or the access whose bytes ride in the second one; of no length: it cannot be told.
+/// Two bytes, or the access whose bytes ride in the second one.
 struct Request {
   Config config = Config::position;
   std::optional<RegisterRequest> access{};
@@ -31,9 +31,10 @@ struct Protocol {
   using Format = encolink::Format;
   using Request = encolink::Request;
   using Line = encolink::Line;
+  static constexpr std::size_t longest_reply = padded_identity_bytes;
 
   static AccessBytes encode(const Format&, const Request& request) {
-    if (request.access) return request.access->length == 0 ? AccessBytes{} : encode_access(*request.access);
+    if (request.access) return encode_access(*request.access);
     AccessBytes bytes;
     bytes.push_back(static_cast<std::uint8_t>(request.config));
     bytes.push_back(0);
@@ -70,13 +71,15 @@ Result<Request> order(const Format&, Arguments) {
 
 Result<Request> memory_reading(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  return Request{Config::position, read_request(address, size_of(address, arguments[1]))};
+  const std::uint16_t size = size_of(address, arguments[1]);
+  if (size == 0) return Error::invalid_argument;
+  return Request{Config::position, read_request(address, size)};
 }
 
 Result<Request> memory_writing(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
   const std::uint16_t size = size_of(address, arguments[2]);
-  if (size > 8) return Request{Config::position, RegisterRequest{}};
+  if (size == 0 || size > 8) return Error::invalid_argument;
   return Request{Config::position, write_request(address, size, static_cast<std::uint64_t>(arguments[1]))};
 }
 
@@ -271,8 +274,12 @@ struct Definition {
   static constexpr std::size_t frames_size = 1280;
   static constexpr auto& conditions = encolink::conditions;
   static constexpr const FieldInfo* status = &general_status_field;
-  static constexpr const FieldInfo* alarms = std::find_if(frame_fields.infos.begin(), frame_fields.infos.end(),
-                                                          [](const FieldInfo& one) { return one.name == "alarms"; });
+  static constexpr const FieldInfo* alarms = frame_fields.of<&Values::alarms>();
+  static constexpr auto& registers = register_infos;
+  static constexpr const Unit* over_spi = spi ? nullptr : &spi_unit;
+  static constexpr auto probe = encolink::probe;
+  static constexpr auto covered = encolink::covered;
+  static bool streams(const Options& values) { return format(values).stream_rate > 0; }
 
   static constexpr Format format(const Options& values) {
     Format made = options.format(values);
@@ -296,19 +303,9 @@ struct Definition {
   }
 };
 
-// What is told of both alike.
-constexpr Unit with_the_rest(Unit made, const Unit* over_spi) {
-  made.registers = register_infos;
-  made.over_spi = over_spi;
-  made.covered = covered;
-  made.probe = probe;
-  made.streams = [](const Options& values) { return options.format(values).stream_rate > 0; };
-  return made;
-}
-
 }  // namespace
 
-constinit const Unit unit = with_the_rest(author::UnitOf<Definition<Wire::uart>>::make(), &spi_unit);
-constinit const Unit spi_unit = with_the_rest(author::UnitOf<Definition<Wire::spi>>::make(), nullptr);
+constinit const Unit unit = author::UnitOf<Definition<Wire::uart>>::make();
+constinit const Unit spi_unit = author::UnitOf<Definition<Wire::spi>>::make();
 
 }  // namespace absenc::encolink
