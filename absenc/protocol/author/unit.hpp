@@ -133,17 +133,21 @@ struct UnitOf {
     }
   }
 
+  static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
+    if constexpr (requires { Definition::reply_size(Format{}, begin); }) {
+      return Definition::reply_size(format(values), begin);
+    } else {
+      return P::longest_reply;
+    }
+  }
+
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
     if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
       return Definition::delimit(values, direction, bytes);
     } else {
       if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
-      std::size_t size = P::longest_reply;
-      if (direction == Direction::request) {
-        size = request_size(values, bytes);
-      } else if constexpr (requires { Definition::reply_size(Format{}, bytes); }) {
-        size = Definition::reply_size(format(values), bytes);
-      }
+      const std::size_t size =
+          direction == Direction::request ? request_size(values, bytes) : reply_size(values, bytes);
       if (size == 0) return {Delimit::Kind::no_frame};
       return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
     }
