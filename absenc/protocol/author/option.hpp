@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
 
 #include "absenc/protocol/options.hpp"
@@ -28,7 +27,7 @@ struct OptionOf {
   using Member = decltype(detail::member_of(member));
   Option info;
 
-  constexpr void put(Format& format, std::int64_t value) const { format.*member = static_cast<Member>(value); }
+  static constexpr void put(Format& format, std::int64_t value) { format.*member = static_cast<Member>(value); }
 };
 
 /// A number from `minimum` to `maximum` in steps; its default is that of the member.
@@ -83,13 +82,13 @@ template <auto... members>
 struct OptionsOf {
   using Format = std::common_type_t<typename OptionOf<members>::Format...>;
 
-  constexpr explicit OptionsOf(const OptionOf<members>&... all) : each(all...), infos{all.info...} {}
+  constexpr explicit OptionsOf(const OptionOf<members>&... all) : infos{all.info...} {}
 
   /// What these values make of the format's own.
   [[nodiscard]] constexpr Format format(const Options& values) const {
     Format made{};
     std::size_t index = 0;
-    std::apply([&](const auto&... one) { (one.put(made, values[index++]), ...); }, each);
+    (OptionOf<members>::put(made, values[index++]), ...);
     return made;
   }
   /// Index of the option with this name; the number of options when there is none.
@@ -99,7 +98,6 @@ struct OptionsOf {
     return i;
   }
 
-  std::tuple<OptionOf<members>...> each;
   std::array<Option, sizeof...(members)> infos;
 };
 
