@@ -166,23 +166,51 @@ struct UnitOf {
     return made;
   }();
 
-  static constexpr auto vector_parts = [] {
-    std::array<VectorParts, Definition::vectors.size()> made{};
-    for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i]);
+  // What the vectors point to, in no more room than it takes.
+  struct VectorRoom {
+    std::size_t bytes = 0;
+    std::size_t fields = 0;
+  };
+  static constexpr VectorRoom room = [] {
+    VectorRoom sum;
+    for (const VectorText& text : Definition::vectors) {
+      const VectorParts parts(text);
+      sum.bytes += parts.request.size() + parts.reply.size();
+      sum.fields += parts.fields.size();
+    }
+    return sum;
+  }();
+  struct VectorPool {
+    std::array<std::uint8_t, room.bytes> bytes{};
+    std::array<Expected, room.fields> fields{};
+  };
+  static constexpr VectorPool pool = [] {
+    VectorPool made;
+    auto bytes = made.bytes.begin();
+    auto fields = made.fields.begin();
+    for (const VectorText& text : Definition::vectors) {
+      const VectorParts parts(text);
+      bytes = std::copy(parts.request.view().begin(), parts.request.view().end(), bytes);
+      bytes = std::copy(parts.reply.view().begin(), parts.reply.view().end(), bytes);
+      fields = std::copy(parts.fields.view().begin(), parts.fields.view().end(), fields);
+    }
     return made;
   }();
   static constexpr auto vectors = [] {
     std::array<Vector, Definition::vectors.size()> made{};
+    Bytes bytes = pool.bytes;
+    std::span<const Expected> fields = pool.fields;
+    const auto take = [](auto& from, std::size_t size) {
+      const auto taken = from.first(size);
+      from = from.subspan(size);
+      return taken;
+    };
     for (std::size_t i = 0; i < made.size(); ++i) {
       const VectorText& text = Definition::vectors[i];
-      const VectorParts& parts = vector_parts[i];
-      made[i] = {text.id,
-                 text.meaning,
-                 text.source,
-                 text.options,
-                 parts.request.view(),
-                 parts.reply.view(),
-                 parts.fields.view(),
+      const VectorParts parts(text);
+      const Bytes request = take(bytes, parts.request.size());
+      const Bytes reply = take(bytes, parts.reply.size());
+      made[i] = {text.id,    text.meaning, text.source, text.options, request, reply, take(fields, parts.fields.size()),
                  parts.error};
     }
     return made;
