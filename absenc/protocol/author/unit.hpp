@@ -329,14 +329,12 @@ struct UnitOf {
     }
   }
 
-  // Whether the text is understood. Without model: the defaults.
-  static constexpr bool resolve(std::string_view text, const Model* model, Options& values) {
+  // Whether the text is understood, which comes over a model, which comes over the defaults.
+  static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
     for (std::size_t i = 0; i < Definition::options.infos.size(); ++i) {
       values.values[i] = Definition::options.infos[i].default_value;
     }
-    if (model != nullptr) {
-      for (const OptionValue& one : model->values) values.values[one.option] = one.value;
-    }
+    for (const OptionValue& one : model) values.values[one.option] = one.value;
     return for_each_value(text, [&](std::string_view name, std::string_view value) {
       const std::size_t option = Definition::options.find(name);
       return option < Definition::options.infos.size() &&
@@ -350,11 +348,11 @@ struct UnitOf {
 
   static constexpr bool holds(const Vector& vector) {
     Options values;
-    bool known = resolve(vector.options, nullptr, values);
+    bool known = resolve(vector.options, {}, values);
     // The first model that agrees with what is said, as resolve_options has it.
     for (const Model& model : models) {
       Options of_model;
-      known = known && resolve(vector.options, &model, of_model);
+      known = known && resolve(vector.options, model.values, of_model);
       if (!agrees(model, of_model)) continue;
       values = of_model;
       break;
