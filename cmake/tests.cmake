@@ -59,6 +59,10 @@ if(TARGET absenc-manual-objects)
   absenc_folder_test(manual tools/manual GLOB_RECURSE)
 endif()
 
+# What every unit is tested with, and toys with mistakes that it must find.
+file(GLOB kit_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/kit/*.cpp")
+absenc_test(kit ${kit_sources})
+
 file(GLOB cross_tests CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/*_test.cpp")
 foreach(source IN LISTS cross_tests)
   cmake_path(GET source STEM stem)
