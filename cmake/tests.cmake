@@ -62,6 +62,8 @@ endif()
 # What every unit is tested with, and toys with mistakes that it must find.
 file(GLOB kit_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/kit/*.cpp")
 absenc_test(kit ${kit_sources})
+list(FILTER kit_sources EXCLUDE REGEX "_test\\.cpp$")
+set_source_files_properties(${kit_sources} PROPERTIES COMPILE_OPTIONS -O2)  # a million exchanges of each unit
 
 file(GLOB cross_tests CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/*_test.cpp")
 foreach(source IN LISTS cross_tests)

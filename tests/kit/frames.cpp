@@ -99,28 +99,28 @@ std::optional<Options> options_of(const Unit& unit, std::string_view text) {
 
 std::vector<Configuration> configurations(const Unit& unit) {
   std::vector<Configuration> found;
-  const auto add = [&](std::string text, const Options& options) {
+  const auto add = [&](std::string text, const Options& options, bool is_model) {
     const bool known = std::any_of(found.begin(), found.end(),
                                    [&](const Configuration& one) { return one.options.values == options.values; });
-    if (!known) found.push_back({std::move(text), options});
+    if (!known) found.push_back({std::move(text), options, is_model});
   };
   Options first;
   for (const Model& model : unit.models) {
     Options options;
     if (resolve_options(unit, model.name, {}, options).kind != OptionError::Kind::none) continue;
     if (found.empty()) first = options;
-    add(std::string(model.name), options);
+    add(std::string(model.name), options, true);
   }
   if (found.empty()) {
     (void)resolve_options(unit, {}, {}, first);
-    add("defaults", first);
+    add("defaults", first, true);
   }
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
     const Option& option = unit.options[i];
     Options changed = first;
     const auto set = [&](std::int64_t value, std::string_view shown) {
       changed.values[i] = value;
-      add(std::string(option.name) + "=" + std::string(shown), changed);
+      add(std::string(option.name) + "=" + std::string(shown), changed, false);
     };
     for (std::size_t k = 0; k < option.choices.size(); ++k) set(static_cast<std::int64_t>(k), option.choices[k]);
     if (!option.choices.empty()) continue;

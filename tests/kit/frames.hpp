@@ -73,6 +73,7 @@ struct Seen final : FieldSink {
 struct Configuration {
   std::string text;
   Options options;
+  bool is_model = false;
 };
 /// Each model, and each choice of each option and each end of its range beside the first model. None is there twice.
 [[nodiscard]] std::vector<Configuration> configurations(const Unit& unit);

@@ -41,6 +41,35 @@ TEST_P(Kit, HostsTakeWhatVectorsSay) {
   expect_none(findings);
 }
 
+TEST_P(Kit, CommandsEndWell) {
+  const Findings findings = check_commands(unit);
+  EXPECT_GT(findings.looks(), 10u);
+  expect_none(findings);
+}
+
+/// The series of faults, of which sanitizers see the first (CMakePresets.json), and the unit.
+using Series = std::tuple<unsigned, const Unit*>;
+
+class KitExchanges : public ::testing::TestWithParam<Series> {};
+
+TEST_P(KitExchanges, NothingWrongIsTaken) {
+  const auto [series, unit] = GetParam();
+  expect_none(check_exchanges(*unit, {.count = 100'000, .seed = series}));
+}
+
+TEST_P(KitExchanges, NorWhenRequestsAreDamaged) {
+  const auto [series, unit] = GetParam();
+  if (unit->link == LinkKind::can) GTEST_SKIP() << "the checksum of CAN sees that";
+  expect_none(check_exchanges(*unit, {.count = 20'000, .seed = series, .requests_too = true}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, KitExchanges,
+                         ::testing::Combine(::testing::Range(0u, 2u),
+                                            ::testing::ValuesIn(all_units().begin(), all_units().end())),
+                         [](const auto& test) {
+                           return std::to_string(std::get<0>(test.param)) + "_" + name_of(*std::get<1>(test.param));
+                         });
+
 INSTANTIATE_TEST_SUITE_P(Units, Kit, ::testing::ValuesIn(all_units().begin(), all_units().end()),
                          [](const auto& test) { return name_of(*test.param); });
 
