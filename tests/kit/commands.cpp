@@ -29,13 +29,9 @@ void run_commands(const Unit& unit, const Configuration& way, Findings& findings
     World<Item> world(unit, way.options, 1);
     if (!world.made()) return;
     const auto what = [&] { return way.text + ", " + std::string(command.name) + ": "; };
-    for (unsigned i = 0; i < (command.verb == Verb::read ? 10 : is_plain(command) ? 2 : 1); ++i) {
+    for (unsigned i = 0; i < (command.verb == Verb::read ? 10 : 1); ++i) {
       world.move(static_cast<std::int64_t>(random.next()));
-      Ended result = world.run(command, least_arguments(command));
-      // As a session does: what an encoder sends unasked may come in between.
-      for (unsigned more = 0; more < 2 && result.made && !result.good() && command.repeatable; ++more) {
-        result = world.run(command, least_arguments(command));
-      }
+      const Ended result = world.run(command, least_arguments(command));
       if (!result.made) break;
       findings.require(result.ended, [&] { return what() + "hangs"; });
       const bool may_fail = !way.is_model || !is_plain(command) || is_refused(command, result.error);

@@ -44,7 +44,7 @@ class Campaign {
   Campaign(const Unit& unit, const Configuration& way, const Exchanges& wanted, std::uint64_t seed, Tally& tally,
            Findings& findings)
       : unit_(unit), way_(way), random_(seed), world_(unit, way.options, seed), tally_(tally), findings_(findings) {
-    rates_ = rates_for(unit, wanted);
+    rates_ = rates_for(unit, way.options, wanted);
   }
 
   [[nodiscard]] bool is_possible() { return world_.made(); }
@@ -71,14 +71,15 @@ class Campaign {
     std::vector<std::string> varying{};  // fields that are not the same each time
   };
 
-  static sim::FaultRates rates_for(const Unit& unit, const Exchanges& wanted) {
+  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const Exchanges& wanted) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
     if (unit.link == LinkKind::exchange) rates = {};                   // there a reply is as long as what is clocked
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum sees that
     if (wanted.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // Late enough to be given up every other time.
-    if (wanted.seed % 2 == 1 && !wanted.requests_too) rates.delay = unit.timing.turnaround_limit * 3 / 2;
+    // Late enough to be given up, every other time. Nobody can tell how old it is what comes unasked.
+    const bool unasked = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
+    if (wanted.seed % 2 == 1 && !wanted.requests_too && !unasked) rates.delay = unit.timing.turnaround_limit * 3 / 2;
     return rates;
   }
 
@@ -165,13 +166,26 @@ class Campaign {
     const bool may_miss = asked.command->verb == Verb::info && result.faults != 0;  // one of several questions
     const std::string wrong = difference(asked, result.seen, may_miss);
     if (wrong.empty()) return;
+    if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_so_now(asked, result.seen)) return;
     // What no check covers is taken whatever comes in its place: also what was said before.
     const bool unchecked = is_unchecked(asked);
-    findings_.require(result.damaged != 0 || (unchecked && result.faults != 0),
+    findings_.require(result.damaged != 0 || (unchecked && !quiet_),
                       [&] { return where(asked) + wrong + ", though no byte was damaged"; });
     if (unchecked) return;
     ++tally_.wrong;
     ++tally_.mistakes[std::string(asked.command->name)];
+  }
+
+  // A request that was misheard may have changed the encoder: then the truth is another one from now on.
+  bool is_so_now(const Asked& asked, const Seen& seen) {
+    world_.set_rates({});
+    const Ended now = world_.run(*asked.command, asked.arguments);
+    if (!now.good()) return false;
+    for (const auto& [name, value] : seen.fields) {
+      if (!now.seen.fields.contains(name) || !(now.seen.fields.at(name) == value)) return false;
+    }
+    for (Asked& one : asked_) one.truth = {};
+    return true;
   }
 
   /// Empty when all of it is so.
@@ -227,13 +241,12 @@ class Campaign {
   // it deaf) is rare.
   void judge_rules(const Asked& asked, bool struck, std::uint32_t before) {
     const std::uint32_t broken = world_.device().violation_count() - before;
-    const bool quiet = was_quiet_ && !struck;
-    was_quiet_ = !struck;
+    quiet_ = quiet_ && !struck;
     if (broken == 0) return;
     tally_.broken += broken;
     const std::span<const Violation> rules = world_.device().violations();
     if (tally_.rule.empty() && !rules.empty()) tally_.rule = where(asked) + std::string(rules.back().rule);
-    findings_.require(!quiet, [&] { return "the host broke a rule: " + tally_.rule; });
+    findings_.require(!quiet_, [&] { return "the host broke a rule: " + tally_.rule; });
   }
 
   const Unit& unit_;
@@ -245,7 +258,7 @@ class Campaign {
   sim::FaultRates rates_;
   std::array<std::int64_t, places> places_{};
   unsigned place_ = 0;
-  bool was_quiet_ = true;  // no fault struck in the conversation before
+  bool quiet_ = true;  // no fault has struck yet: later the guard may ask again for what is late
   std::vector<Asked> asked_;
   std::vector<std::size_t> reads_;  // of them those that read the position
 };
@@ -333,7 +346,7 @@ Findings check_exchanges(const Unit& unit, const Exchanges& wanted) {
     exchange<std::uint8_t>(unit, wanted, tally, findings);
   }
   judge_weights(tally, findings);
-  const std::uint64_t few = tally.conversations / 1000 + tally.misheard / 100 + 1;
+  const std::uint64_t few = tally.conversations / 1000 + tally.misheard + 1;
   findings.require(tally.broken <= few, [&] { return std::to_string(tally.broken) + " rules broken: " + tally.rule; });
   findings.require(tally.accepted > tally.conversations / 10, [&] {
     return "only " + std::to_string(tally.accepted) + " of " + std::to_string(tally.conversations) + " ended well";
