@@ -173,8 +173,10 @@ void ask_device(const Unit& unit, const Options& options, Bytes input) {
 
 template <class Item>
 void run(const Unit& unit, const Options& options, const Command& command, Bytes input) {
-  converse<Item>(unit, options, command, input, 1);
-  converse<Item>(unit, options, command, input, input.size() + 1);
+  // A scan asks hundreds of times.
+  const Bytes reply = input.first(std::min<std::size_t>(input.size(), command.verb == Verb::scan ? 8 : input.size()));
+  converse<Item>(unit, options, command, reply, 1);
+  converse<Item>(unit, options, command, reply, reply.size() + 1);
   if (unit.link != LinkKind::exchange && unit.link != LinkKind::clocked) ask_device<Item>(unit, options, input);
 }
 

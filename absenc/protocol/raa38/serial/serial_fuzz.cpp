@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "absenc/protocol/raa38/serial/stream.hpp"
+#include "absenc/protocol/raa38/serial/listen.hpp"
 #include "tests/fuzz_toys.hpp"
 
 namespace {
