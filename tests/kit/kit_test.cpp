@@ -47,6 +47,12 @@ TEST_P(Kit, CommandsEndWell) {
   expect_none(findings);
 }
 
+TEST_P(Kit, DeclaresWhatIsThere) { expect_none(check_declarations(unit)); }
+TEST_P(Kit, RequestsHaveTheirArguments) { expect_none(check_requests(unit, 1)); }
+TEST_P(Kit, StorageIsEnough) { expect_none(check_storage(unit)); }
+TEST_P(Kit, ChangesAreMade) { expect_none(check_settings(unit)); }
+TEST_P(Kit, MemoryKeepsItsBytes) { expect_none(check_memory(unit)); }
+
 /// The series of faults, of which sanitizers see the first (CMakePresets.json), and the unit.
 using Series = std::tuple<unsigned, const Unit*>;
 
