@@ -107,7 +107,7 @@ constexpr std::byte untouched{0xA5};
 
 /// The storage that a command is given, and what lies behind it.
 struct Fenced {
-  explicit Fenced(std::size_t size_given) : bytes(size_given + 64, untouched), size(size_given) {}
+  Fenced(std::size_t size_given, std::size_t behind) : bytes(size_given + behind + 64, untouched), size(size_given) {}
   [[nodiscard]] std::span<std::byte> given() { return std::span(bytes).first(size); }
   [[nodiscard]] bool is_whole() const {
     return std::all_of(bytes.begin() + static_cast<std::ptrdiff_t>(size), bytes.end(),
@@ -121,7 +121,7 @@ template <class Item>
 void store(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
   const Values values = least_arguments(command);
   const auto made = [&](std::size_t size) {
-    Fenced storage(size);
+    Fenced storage(size, unit.host_storage + unit.device_storage);
     const bool is = machine_of<Item>(unit.host(way.options, command, values, storage.given())) != nullptr;
     findings.require(storage.is_whole(), [&] { return std::string(command.name) + ": made beyond its storage"; });
     return is;
@@ -140,7 +140,7 @@ void store(const Unit& unit, const Configuration& way, const Command& command, F
   }
   const auto end = [&](std::size_t size) {
     World<Item> world(unit, way.options, 1);
-    Fenced storage(size);
+    Fenced storage(size, unit.host_storage + unit.device_storage);
     const Ended result = world.run_in(storage.given(), command, values);
     findings.require(storage.is_whole(), [&] { return std::string(command.name) + ": writes beyond its storage"; });
     return std::pair(result.error, result.seen.fields);
@@ -158,7 +158,7 @@ template <class Item>
 void store_device(const Unit& unit, const Configuration& way, Findings& findings) {
   const Hand shaft;
   const auto made = [&](std::size_t size) {
-    Fenced storage(size);
+    Fenced storage(size, unit.host_storage + unit.device_storage);
     const bool is = machine_of<Item>(unit.device(way.options, shaft, storage.given())) != nullptr;
     findings.require(storage.is_whole(), [] { return "the virtual encoder is made beyond its storage"; });
     return is;
