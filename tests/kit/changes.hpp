@@ -128,7 +128,8 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
       const Seen now = read_setting(world, unit, command);
       if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
       for (const auto& [name, value] : now.fields) {
-        if (name.find('#') != std::string::npos) continue;  // of one frame of many
+        // Not one frame of many, nor where the shaft was.
+        if (name.find('#') != std::string::npos || value.shows != Shows::other) continue;
         const auto found = written.fields.find(name);
         if (found != written.fields.end() && !(found->second == value)) return name + " reads as another";
       }
