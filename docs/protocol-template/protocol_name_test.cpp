@@ -8,7 +8,7 @@
 namespace absenc::protocol_name {
 namespace {
 
-// The generic battery (tests/battery_test.cpp) runs every vector; here stands what only this encoder does.
+// The kit (tests/kit) tests what every unit has; here stands what only this encoder does.
 TEST(ProtocolNameUnit, HasBothRoles) {
   EXPECT_GT(unit.host_storage, 0u) << "write host.hpp: one class a conversation";
   EXPECT_GT(unit.device_storage, 0u) << "write device.hpp: the virtual encoder";

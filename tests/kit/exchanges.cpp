@@ -368,6 +368,10 @@ template <class Item>
 void exchange(const Unit& unit, const Exchanges& wanted, Tally& tally, Findings& findings) {
   const std::vector<Configuration> ways = configurations(unit);
   for (std::uint64_t round = 0; tally.exchanges < wanted.count && findings.count() == 0; ++round) {
+    if (round > 100 + wanted.count / 100) {
+      findings.add("exchanges do not come together");
+      break;
+    }
     // The models every other time, in between everything that options can be.
     const Configuration& way =
         round % 2 == 0 ? ways[round / 2 % std::max<std::size_t>(1, unit.models.size())] : ways[round / 2 % ways.size()];
@@ -377,10 +381,6 @@ void exchange(const Unit& unit, const Exchanges& wanted, Tally& tally, Findings&
       campaign.run(std::min(exchanges_each, wanted.count - tally.exchanges));
     } catch (const std::logic_error& error) {
       findings.add(way.text + ": " + error.what());
-    }
-    if (round > 100 + wanted.count / 100) {
-      findings.add("exchanges do not come together");
-      break;
     }
   }
 }

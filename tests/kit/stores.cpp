@@ -161,6 +161,8 @@ void store_device(const Unit& unit, const Configuration& way, Findings& findings
     findings.require(storage.is_whole(), [] { return "the virtual encoder is made beyond its storage"; });
     return is;
   };
+  findings.require(unit.device_storage > 0, [] { return "there is no virtual encoder"; });
+  if (unit.device_storage == 0) return;
   findings.require(made(unit.device_storage), [] { return "the virtual encoder needs more than device_storage"; });
   findings.require(!made(unit.device_storage - 1), [] { return "the virtual encoder needs less than device_storage"; });
 }

@@ -171,7 +171,6 @@ TEST(EslFrame, RepliesComeBackInEveryProfile) {
   }
 }
 
-// What the generic battery does with the vectors, for every id in every profile.
 TEST(EslFrame, EveryRequestBitFlipIsSeen) {
   for (const DataId id : all_ids) {
     const RequestBytes good = encode_request({}, {id, 5, 0x2A, 0x91});
