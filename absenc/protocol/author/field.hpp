@@ -76,6 +76,8 @@ struct FieldsOf {
       ByteBuffer<96> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
       sink.put({.info = &info, .bytes = text});
+    } else if constexpr (std::is_same_v<T, Bytes>) {
+      sink.put({.info = &info, .bytes = value});
     } else {
       sink.put({.info = &info, .number = static_cast<std::int64_t>(value)});
     }

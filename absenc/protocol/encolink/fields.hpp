@@ -2,11 +2,14 @@
 // Names, units and meanings of everything in EncoLink frames and registers, in words for the person at the machine.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
+#include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
 #include "absenc/protocol/encolink/registers.hpp"
 #include "absenc/protocol/field.hpp"
@@ -58,38 +61,70 @@ inline constexpr std::array<FlagInfo, 4> calibration_flags{{
     {"out_of_range", "the ring is too eccentric to be calibrated", "mount the ring again, then calibrate again"},
 }};
 
-enum FieldIndex : std::size_t {
-  field_general_status,
-  field_alarms,
-  field_singleturn,
-  field_multiturn,
-  field_error,
-  field_warning,
-  field_channel2,
-  field_status,
-  field_channel3,
-  field_protocol_version,
-  field_frame_bytes,
-  field_resolution,
-  field_part_number,
-  field_config,
-  field_ra,
-  field_op,
-  field_register,
-  field_address,
-  field_length,
-  field_data,
-  field_value,
-  field_registers,  // one for each of the table, in its order
-  field_calibrations = field_registers + registers.size(),
-  field_running,
-  field_not_described,
-  field_count,
+/// What frames and accesses say. What is not there is not put.
+struct Values {
+  template <class T>
+  using Maybe = std::optional<T>;
+  Maybe<std::uint32_t> singleturn{};
+  Maybe<std::uint16_t> multiturn{};
+  Maybe<bool> error{};
+  Maybe<bool> warning{};
+  Maybe<std::uint8_t> channel2{};
+  Maybe<std::uint16_t> status{};
+  Maybe<std::uint16_t> alarms{};
+  Maybe<std::uint8_t> channel3{};
+  Maybe<std::uint8_t> protocol_version{};
+  Maybe<std::uint8_t> frame_bytes{};
+  Maybe<unsigned> resolution{};
+  Maybe<Bytes> part_number{};
+  Maybe<std::uint8_t> config{};
+  Maybe<std::uint8_t> ra{};
+  Maybe<std::string_view> op{};
+  Maybe<std::string_view> name{};
+  Maybe<std::uint32_t> address{};
+  Maybe<std::size_t> length{};
+  Maybe<Bytes> data{};
+  Maybe<std::uint64_t> value{};
 };
 
-namespace detail {
+inline constexpr FieldInfo general_status_field{"general_status", FieldInfo::Kind::flags, "",
+                                                "the two low bits of a position frame, active low", general_flags};
 
-constexpr FieldInfo register_field(const Register& one) {
+inline constexpr auto frame_fields = [] {
+  using enum FieldInfo::Kind;
+  using author::field;
+  return author::fields_of<Values>(
+      field<&Values::singleturn>({"singleturn", number, "counts", "position within the turn", {}, Shows::position}),
+      field<&Values::multiturn>({"multiturn", number, "revolutions", "turn counter", {}, Shows::turns}),
+      field<&Values::error>({"error", boolean, "", "the position is not valid"}),
+      field<&Values::warning>({"warning", boolean, "", "the position is valid, but something is near its limit"}),
+      field<&Values::channel2>({"channel2", number, "", "one byte of channel 2; the checksum does not cover it"}),
+      field<&Values::status>({"status", number, "", "detailed status of a channel 2 cycle"}),
+      field<&Values::alarms>({"alarms", flags, "", "detailed status", alarm_flags}),
+      field<&Values::channel3>(
+          {"channel3", number, "", "one byte of channel 3: 33 idle, 66 busy, 88 and 99 ready, or data"}),
+      field<&Values::protocol_version>({"protocol_version", number, "", "of EncoLink: 2 or 4"}),
+      field<&Values::frame_bytes>({"frame_bytes", number, "", "5 without turns, 7 with"}),
+      field<&Values::resolution>({"resolution", number, "bits", "of a turn"}),
+      field<&Values::part_number>({"part_number", text, "", "from the identity"}),
+      field<&Values::config>(
+          {"config", number, "", "first byte of a request: 00 position, AA reset of the channels, BB identify"}),
+      field<&Values::ra>({"ra", number, "", "second byte of a request: one byte of a register access"}),
+      field<&Values::op>({"op", text, "", "read or write"}),
+      field<&Values::name>({"register", text, "", "its name in the table of registers"}),
+      field<&Values::address>({"address", number, "", "of the register"}),
+      field<&Values::length>({"length", number, "bytes", "of the register"}),
+      field<&Values::data>({"data", bytes, "", "the register's bytes, most significant first"}),
+      field<&Values::value>({"value", number, "", "the same as a number"}));
+}();
+
+inline constexpr FieldInfo calibrations_field{"calibrations", FieldInfo::Kind::number, "",
+                                              "self-calibrations that ended, modulo 4"};
+inline constexpr FieldInfo running_field{"running", FieldInfo::Kind::boolean, "",
+                                         "whether the self-calibration still goes on"};
+inline constexpr FieldInfo not_described_field{"registers", FieldInfo::Kind::text, "", "why none of them is shown"};
+
+[[nodiscard]] constexpr FieldInfo register_field(const Register& one) {
   switch (one.content) {
     case Content::tenths:
       return {one.name, FieldInfo::Kind::real, one.name == "speed_rpm" ? "rpm" : "degC", "register, in tenths"};
@@ -103,84 +138,66 @@ constexpr FieldInfo register_field(const Register& one) {
   return {one.name, FieldInfo::Kind::number, "", "register"};
 }
 
-constexpr std::array<FieldInfo, field_count> make_fields() {
-  using Kind = FieldInfo::Kind;
-  std::array<FieldInfo, field_count> fields{{
-      {"general_status", Kind::flags, "", "the two low bits of a position frame, active low", general_flags},
-      {"alarms", Kind::flags, "", "detailed status", alarm_flags},
-      {"singleturn", Kind::number, "counts", "position within the turn", {}, Shows::position},
-      {"multiturn", Kind::number, "revolutions", "turn counter", {}, Shows::turns},
-      {"error", Kind::boolean, "", "the position is not valid"},
-      {"warning", Kind::boolean, "", "the position is valid, but something is near its limit"},
-      {"channel2", Kind::number, "", "one byte of channel 2; the checksum does not cover it"},
-      {"status", Kind::number, "", "detailed status of a channel 2 cycle"},
-      {"channel3", Kind::number, "", "one byte of channel 3: 33 idle, 66 busy, 88 and 99 ready, or data"},
-      {"protocol_version", Kind::number, "", "of EncoLink: 2 or 4"},
-      {"frame_bytes", Kind::number, "", "5 without turns, 7 with"},
-      {"resolution", Kind::number, "bits", "of a turn"},
-      {"part_number", Kind::text, "", "from the identity"},
-      {"config", Kind::number, "", "first byte of a request: 00 position, AA reset of the channels, BB identify"},
-      {"ra", Kind::number, "", "second byte of a request: one byte of a register access"},
-      {"op", Kind::text, "", "read or write"},
-      {"register", Kind::text, "", "its name in the table of registers"},
-      {"address", Kind::number, "", "of the register"},
-      {"length", Kind::number, "bytes", "of the register"},
-      {"data", Kind::bytes, "", "the register's bytes, most significant first"},
-      {"value", Kind::number, "", "the same as a number"},
-  }};
-  for (std::size_t i = 0; i < registers.size(); ++i) fields[field_registers + i] = register_field(registers[i]);
-  fields[field_calibrations] = {"calibrations", Kind::number, "", "self-calibrations that ended, modulo 4"};
-  fields[field_not_described] = {"registers", Kind::text, "", "why none of them is shown"};
-  fields[field_running] = {"running", Kind::boolean, "", "whether the self-calibration still goes on"};
-  return fields;
+/// One for each of the table, in its order.
+inline constexpr std::array<FieldInfo, registers.size()> register_fields = [] {
+  std::array<FieldInfo, registers.size()> made{};
+  for (std::size_t i = 0; i < made.size(); ++i) made[i] = register_field(registers[i]);
+  return made;
+}();
+
+/// All of them.
+inline constexpr auto fields = [] {
+  std::array<FieldInfo, 1 + frame_fields.infos.size() + register_fields.size() + 3> made{};
+  made[0] = general_status_field;
+  FieldInfo* next = std::copy(frame_fields.infos.begin(), frame_fields.infos.end(), made.data() + 1);
+  next = std::copy(register_fields.begin(), register_fields.end(), next);
+  *next++ = calibrations_field;
+  *next++ = running_field;
+  *next = not_described_field;
+  return made;
+}();
+
+[[nodiscard]] constexpr Values values_of(const Format& format, const Position& position) {
+  Values values{.singleturn = position.singleturn, .error = position.error, .warning = position.warning};
+  if (format.multiturn_bits > 0) values.multiturn = position.multiturn;
+  return values;
 }
 
-}  // namespace detail
-
-inline constexpr std::array<FieldInfo, field_count> fields = detail::make_fields();
-
-constexpr void put(FieldSink& sink, std::size_t field, std::int64_t number) { sink.put({&fields[field], number}); }
-constexpr void put(FieldSink& sink, std::size_t field, Bytes bytes) {
-  sink.put({.info = &fields[field], .bytes = bytes});
+/// A position, with the detailed status where it is known.
+constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
+                            std::optional<std::uint16_t> detailed = {}) {
+  Values values = values_of(format, position);
+  if (format.has_ch2) values.channel2 = position.channel2;
+  values.status = values.alarms = detailed;
+  frame_fields.put(sink, values);
+  Reading reading = to_reading(format, position);
+  if (detailed) add_status(reading, *detailed);
+  sink.put_reading(reading);
 }
 
-constexpr void put_fields(FieldSink& sink, const Format& format, const Position& position) {
-  put(sink, field_singleturn, position.singleturn);
-  if (format.multiturn_bits > 0) put(sink, field_multiturn, position.multiturn);
-  put(sink, field_error, position.error ? 1 : 0);
-  put(sink, field_warning, position.warning ? 1 : 0);
-  if (format.has_ch2) put(sink, field_channel2, position.channel2);
-  sink.put_reading(to_reading(format, position));
-}
-
-constexpr void put_fields(FieldSink& sink, const Format& format, const Cycle& cycle) {
-  put(sink, field_singleturn, cycle.position.singleturn);
-  if (format.multiturn_bits > 0) put(sink, field_multiturn, cycle.position.multiturn);
-  put(sink, field_error, cycle.position.error ? 1 : 0);
-  put(sink, field_warning, cycle.position.warning ? 1 : 0);
-  put(sink, field_status, cycle.status);
-  put(sink, field_alarms, cycle.status);
-  put(sink, field_channel3, cycle.channel3);
+constexpr void put_cycle(FieldSink& sink, const Format& format, const Cycle& cycle) {
+  Values values = values_of(format, cycle.position);
+  values.status = values.alarms = cycle.status;
+  values.channel3 = cycle.channel3;
+  frame_fields.put(sink, values);
   Reading reading = to_reading(format, cycle.position);
   add_status(reading, cycle.status);
   sink.put_reading(reading);
 }
 
-constexpr void put_fields(FieldSink& sink, const Identity& identity) {
-  put(sink, field_protocol_version, identity.protocol_version);
-  put(sink, field_frame_bytes, identity.frame_bytes);
-  put(sink, field_resolution, identity.resolution);
-  put(sink, field_part_number, identity.part_number());
+constexpr void put_identity(FieldSink& sink, const Identity& identity) {
+  frame_fields.put(sink, {.protocol_version = identity.protocol_version,
+                          .frame_bytes = identity.frame_bytes,
+                          .resolution = identity.resolution,
+                          .part_number = identity.part_number()});
 }
 
-constexpr void put_fields(FieldSink& sink, const RegisterRequest& request) {
-  constexpr std::array<std::uint8_t, 4> read{'r', 'e', 'a', 'd'};
-  constexpr std::array<std::uint8_t, 5> write{'w', 'r', 'i', 't', 'e'};
+constexpr void put_access(FieldSink& sink, const RegisterRequest& request) {
   const bool reads = request.operation == RegisterRequest::Operation::read;
-  put(sink, field_op, reads ? Bytes(read) : Bytes(write));
-  put(sink, field_address, request.address);
-  put(sink, field_length, request.length);
-  if (!reads) put(sink, field_data, request.data);
+  Values values{.op = reads ? "read" : "write", .address = request.address, .length = request.length};
+  if (!reads) values.data = request.data;
+  if (!reads && request.length < 8) values.value = load_big_endian(request.data);
+  frame_fields.put(sink, values);
 }
 
 /// Two's complement of 1 to 8 bytes.
@@ -192,14 +209,14 @@ constexpr void put_fields(FieldSink& sink, const RegisterRequest& request) {
 
 /// What the bytes of a register of the table mean.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
-  const FieldInfo* info = &fields[field_registers + index];
+  const FieldInfo* info = &register_fields[index];
   switch (registers[index].content) {
     case Content::number:
       sink.put({info, static_cast<std::int64_t>(load_big_endian(bytes))});
       break;
     case Content::flags:
       sink.put({info, bytes[0]});
-      put(sink, field_calibrations, bytes[0] & calibration::count);
+      sink.put({&calibrations_field, bytes[0] & calibration::count});
       break;
     case Content::tenths:
       sink.put({.info = info, .real = static_cast<double>(signed_value(bytes)) / 10});
@@ -226,15 +243,14 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
 constexpr Error decode_request(Bytes request, FieldSink& sink) {
   if (request.size() != request_bytes) {
     const Result<RegisterRequest> access = decode_access(request);
-    if (access) put_fields(sink, *access);
+    if (access) put_access(sink, *access);
     return access.error();
   }
   const auto config = static_cast<Config>(request[0]);
   if (config != Config::position && config != Config::reset_channels && config != Config::identify) {
     return Error::unsupported;
   }
-  put(sink, field_config, request[0]);
-  put(sink, field_ra, request[1]);
+  frame_fields.put(sink, {.config = request[0], .ra = request[1]});
   return Error::none;
 }
 
@@ -243,17 +259,17 @@ constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSi
   if (reply.empty()) return decode_request(request, sink);
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) {
     const Result<Identity> identity = decode_identity(reply);
-    if (identity) put_fields(sink, *identity);
+    if (identity) put_identity(sink, *identity);
     return identity.error();
   }
   const Format known = assumed(format, reply);
   if (known.has_ch2 && reply.size() == known.cycle_bytes()) {
     const Result<Cycle> cycle = decode_cycle(known, reply);
-    if (cycle) put_fields(sink, known, *cycle);
+    if (cycle) put_cycle(sink, known, *cycle);
     return cycle.error();
   }
   const Result<Position> position = decode_position(known, reply);
-  if (position) put_fields(sink, known, *position);
+  if (position) put_position(sink, known, *position);
   return position.error();
 }
 

@@ -149,7 +149,7 @@ TEST(EncolinkRegisters, BadAccessesAreNamed) {
 
 TEST(EncolinkRegisters, TheTableAgreesWithTheFields) {
   for (std::size_t i = 0; i < registers.size(); ++i) {
-    EXPECT_EQ(fields[field_registers + i].name, registers[i].name);
+    EXPECT_EQ(register_fields[i].name, registers[i].name);
     EXPECT_EQ(find_register(registers[i].address), &registers[i]);
     EXPECT_LE(registers[i].size, access_capacity);
   }

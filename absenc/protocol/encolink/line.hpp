@@ -38,7 +38,7 @@ class Line : public Stream, public author::Routine {
     auto await_resume() const { return (line.*result)(); }
   };
 
-  /// The next position. This and all that follows but `attempt` ends the procedure when no good frame comes.
+  /// The next position. This and all that follows but the attempts ends the procedure when no good frame comes.
   [[nodiscard]] auto frame() { return until<&Line::latest>(Until::frame); }
   /// A whole cycle of channel 2, whose channels begin anew: Result<Cycle>.
   [[nodiscard]] auto cycle() { return until<&Line::latest_cycle>(Until::cycle); }
@@ -54,9 +54,13 @@ class Line : public Stream, public author::Routine {
     return until<&Line::data>(Until::data);
   }
   [[nodiscard]] auto read(const Register& one) { return read(one.address, one.size); }
-  /// An access of which the procedure decides what its failure means: Answer.
-  [[nodiscard]] auto attempt(const RegisterRequest& request) {
-    access_.start(request);
+  /// Accesses of which the procedure decides what their failure means: Answer. `size` of a write: 1 to 8 bytes.
+  [[nodiscard]] auto attempt_read(std::uint32_t address, std::uint16_t length) {
+    access_.start(read_request(address, length));
+    return until<&Line::answer>(Until::answer);
+  }
+  [[nodiscard]] auto attempt_write(std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+    access_.start(write_request(address, size, value));
     return until<&Line::answer>(Until::answer);
   }
   /// Whether the encoder may have executed the last access.

@@ -96,7 +96,7 @@ void Listen::give_up() {
 const Reading* Listen::reading() const { return error_ == Error::none && found_ > 0 ? &reading_ : nullptr; }
 
 void Listen::report(FieldSink& sink) const {
-  if (error_ == Error::none && found_ > 0) put_fields(sink, format_, position_);
+  if (error_ == Error::none && found_ > 0) put_position(sink, format_, position_);
 }
 
 Exchange<std::uint8_t> Listen::exchange() const {

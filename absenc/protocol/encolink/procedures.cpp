@@ -28,11 +28,11 @@ Part<bool> write(Line& line, std::uint32_t address, std::uint16_t size, std::uin
   constexpr std::string_view in_the_middle =
       "the encoder stopped answering in the middle of a register write: read it to see whether it was written";
   for (unsigned left = write_attempts; left > 0; --left) {
-    const Line::Answer written = co_await line.attempt(write_request(address, size, value));
+    const Line::Answer written = co_await line.attempt_write(address, size, value);
     if (written.fate == Fate::refused) co_await line.stop(written.why);
     if (written.fate == Fate::gone && !line.was_asked()) co_await line.stop(written.why);
     if (written.fate == Fate::gone) co_await line.stop({written.why.error, in_the_middle});
-    const Line::Answer back = co_await line.attempt(read_request(address, size));
+    const Line::Answer back = co_await line.attempt_read(address, size);
     if (back.fate == Fate::gone) co_await line.stop({back.why.error, in_the_middle});
     if (back.fate != Fate::good) {
       co_await line.stop({back.why.error, "the register may be written: it could not be read back"});
@@ -48,7 +48,7 @@ Part<bool> write(Line& line, RegisterIndex index, std::uint64_t value) {
 }
 
 Part<bool> send(Line& line, std::uint8_t command) {
-  const Line::Answer answer = co_await line.attempt(write_request(registers[command_register].address, 1, command));
+  const Line::Answer answer = co_await line.attempt_write(registers[command_register].address, 1, command);
   const bool untouched = answer.fate == Fate::gone && !line.was_asked();
   if (answer.fate == Fate::refused || untouched) co_await line.stop(answer.why);
   if (answer.fate == Fate::gone) {
@@ -94,7 +94,7 @@ Procedure read_info(Line& line, FoundIdentity& found) {
   }
   for (std::size_t i = 0; i < registers.size(); ++i) {
     if (!registers[i].in_info) continue;
-    const Line::Answer answer = co_await line.attempt(read_request(registers[i].address, registers[i].size));
+    const Line::Answer answer = co_await line.attempt_read(registers[i].address, registers[i].size);
     if (answer.why.error == Error::request_rejected) continue;
     if (answer.fate != Fate::good) co_return answer.why;
     found.has[i] = true;
@@ -222,56 +222,50 @@ Procedure self_calibrate(Line& line, FoundCalibration& found) {
 
 namespace {
 
-void put_text(FieldSink& sink, std::size_t field, std::string_view text) {
-  put(sink, field, Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
-}
-
 void put_register(FieldSink& sink, std::uint32_t address, Bytes data) {
   const Register* known = find_register(address);
-  if (known != nullptr) put_text(sink, field_register, known->name);
-  put(sink, field_address, address);
-  put(sink, field_length, static_cast<std::int64_t>(data.size()));
-  put(sink, field_data, data);
-  if (known != nullptr && known->size == data.size()) {
-    put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
-  } else if (data.size() < 8) {
-    put(sink, field_value, static_cast<std::int64_t>(load_big_endian(data)));
-  }
+  const bool in_table = known != nullptr && known->size == data.size();
+  Values values{.address = address, .length = data.size(), .data = data};
+  if (known != nullptr) values.name = known->name;
+  if (!in_table && data.size() < 8) values.value = load_big_endian(data);
+  frame_fields.put(sink, values);
+  if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
 }
+
+void put_position(FieldSink& sink, const Line& line) { put_position(sink, line.format(), line.position()); }
 
 }  // namespace
 
 void put(FieldSink& sink, const Stream& stream) {
-  put_fields(sink, stream.format(), stream.position());
-  if (!stream.detailed_status()) return;
-  put(sink, field_status, *stream.detailed_status());
-  put(sink, field_alarms, *stream.detailed_status());
+  put_position(sink, stream.format(), stream.position(), stream.detailed_status());
 }
 
-void put(FieldSink& sink, const Line& line, const Nothing&) { put_fields(sink, line.format(), line.position()); }
+void put(FieldSink& sink, const Line& line, const Nothing&) { put_position(sink, line); }
 
 void put(FieldSink& sink, const Line& line, const FoundAlarms&) { put(sink, line); }
 
 void put(FieldSink& sink, const Line& line, const FoundRegister& found) {
-  if (!found.address) return put_fields(sink, line.format(), line.position());
+  if (!found.address) return put_position(sink, line);
   put_register(sink, *found.address, line.data());
 }
 
 void put(FieldSink& sink, const Line& line, const FoundZero& found) {
-  put_fields(sink, line.format(), line.position());
-  if (found.offset) put(sink, field_registers + std::size_t{position_offset}, *found.offset);
+  put_position(sink, line);
+  if (found.offset) sink.put({&register_fields[position_offset], *found.offset});
 }
 
 void put(FieldSink& sink, const Line& line, const FoundCalibration& found) {
-  put_fields(sink, line.format(), line.position());
-  const std::array<std::uint8_t, 1> data{found.status};
-  put_value(sink, calibration_status, data);
-  put(sink, field_running, found.running ? 1 : 0);
+  put_position(sink, line);
+  put_value(sink, calibration_status, Bytes(&found.status, 1));
+  sink.put({&running_field, found.running ? 1 : 0});
 }
 
 void put(FieldSink& sink, const Line&, const FoundIdentity& found) {
-  put_fields(sink, found.identity);
-  if (found.identity.protocol_version == version::aksim4) put_text(sink, field_not_described, not_described);
+  put_identity(sink, found.identity);
+  if (found.identity.protocol_version == version::aksim4) {
+    const Bytes why(reinterpret_cast<const std::uint8_t*>(not_described.data()), not_described.size());
+    sink.put({.info = &not_described_field, .bytes = why});
+  }
   std::size_t at = 0;
   for (std::size_t i = 0; i < registers.size(); ++i) {
     if (!found.has[i]) continue;

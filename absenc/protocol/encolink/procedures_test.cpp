@@ -196,7 +196,7 @@ TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
 
 // After a refusal bytes of data may follow: the next access must not begin among them.
 author::Procedure read_twice(Line& line, FoundRegister& found) {
-  const Line::Answer refused = co_await line.attempt(read_request(0x1234, 20));
+  const Line::Answer refused = co_await line.attempt_read(0x1234, 20);
   if (refused.why.error != Error::request_rejected) co_return refused.why;
   co_await line.read(registers[temperature]);
   found.address = registers[temperature].address;
@@ -232,28 +232,6 @@ TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
   EXPECT_EQ(bench.encoder.memory_version(), 1u);
 }
 
-// The frames of coroutines lie behind the conversation: what the unit asks for is enough, without optimisation too.
-TEST_P(EncolinkRegister, FitsIntoItsStorage) {
-  Bench bench(testing::multi, wire);
-  bench.shaft.put(7, 0x12345);
-  std::array<std::byte, 8192> frames{};
-  const auto most = [&](auto& run, auto... parameters) {
-    static_cast<void>(run), (static_cast<void>(parameters), ...);
-    bench.drive(run);
-    EXPECT_EQ(run.error(), Error::none) << run.detail();
-    return run.frames_size();
-  };
-  constexpr std::array<std::int64_t, 3> arguments{0, 1, 0};
-  author::Told<Twice, author::Run<Twice, FoundZero, zero>> zeroes(bench.format, arguments, frames);
-  std::printf("zero %zu\n", most(zeroes));
-  author::Told<Twice, author::Run<Twice, Nothing, preset_multiturn>> presets(bench.format, arguments, frames);
-  std::printf("preset %zu\n", most(presets));
-  author::Told<Twice, author::Run<Twice, FoundRegister, write_memory>> writes(bench.format, arguments, frames);
-  std::printf("write %zu\n", most(writes));
-  author::Told<Twice, author::Run<Twice, FoundIdentity, read_info>> info(bench.format, arguments, frames);
-  std::printf("info %zu\n", most(info));
-}
-
 // ---- Procedures
 
 TEST_P(EncolinkRegister, ZeroIsHereAndSurvivesPowerOff) {
@@ -268,6 +246,20 @@ TEST_P(EncolinkRegister, ZeroIsHereAndSurvivesPowerOff) {
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);
   EXPECT_EQ(bench.run("zero").error, Error::none);  // an offset on top of an offset
   EXPECT_EQ(bench.run("position").reading->singleturn, 0u);
+}
+
+TEST_P(EncolinkRegister, ZeroIsHereWhereverTheShaftStandsAndWhateverTheOffsetWas) {
+  for (const OffsetSign sign : {OffsetSign::add, OffsetSign::subtract}) {
+    for (const std::int64_t place : {0, 1, 0x7FFFF, 0x80000, 0xFFFFF}) {
+      Format format = testing::multi;
+      format.offset_sign = sign;
+      Bench bench(format, wire);
+      bench.shaft.put(-3, place);
+      ASSERT_EQ(bench.run("memory-write", {0, 0xFEDCB}).error, Error::none);
+      ASSERT_EQ(bench.run("zero").error, Error::none);
+      EXPECT_EQ(bench.run("position").reading->singleturn, 0u);
+    }
+  }
 }
 
 TEST_P(EncolinkRegister, ZeroUntilPowerOff) {
@@ -295,8 +287,10 @@ TEST_P(EncolinkRegister, ZeroWithTheWrongSignPutsTheOldOffsetBack) {
 
 TEST_P(EncolinkRegister, ZeroNeedsAShaftAtRestAndAPosition) {
   Bench bench(testing::single, wire);
-  bench.shaft.spin(600, bench.line.now());
-  EXPECT_EQ(bench.run("zero").error, Error::invalid_argument);
+  for (const std::int32_t rpm : {600, 1, -1}) {
+    bench.shaft.spin(rpm, bench.line.now());
+    EXPECT_EQ(bench.run("zero").error, Error::invalid_argument) << rpm;
+  }
   bench.shaft.spin(0, bench.line.now());
   bench.encoder.raise_alarms(status::signal_lost);
   EXPECT_EQ(bench.run("zero").error, Error::invalid_argument);

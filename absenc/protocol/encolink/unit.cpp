@@ -263,15 +263,16 @@ struct Definition {
   static constexpr auto& commands = commands_of_unit;
   static constexpr auto vectors = [] {
     if constexpr (spi) {
-      return spi_vectors;
+      return vector_texts::spi;
     } else {
-      return encolink::vectors;
+      return vector_texts::uart;
     }
   }();
-  static constexpr std::size_t frames_size = 4096;
+  static constexpr std::size_t frames_size = 1280;
   static constexpr auto& conditions = encolink::conditions;
-  static constexpr const FieldInfo* status = &encolink::fields[field_general_status];
-  static constexpr const FieldInfo* alarms = &encolink::fields[field_alarms];
+  static constexpr const FieldInfo* status = &general_status_field;
+  static constexpr const FieldInfo* alarms = std::find_if(frame_fields.infos.begin(), frame_fields.infos.end(),
+                                                          [](const FieldInfo& one) { return one.name == "alarms"; });
 
   static constexpr Format format(const Options& values) {
     Format made = options.format(values);
