@@ -81,7 +81,7 @@ struct UnitOf {
     return Error::none;
   }
 
-  static constexpr const CommandOf<P>& find(const Command& command) { return Definition::commands[command.id]; }
+  static constexpr const CommandOf<P>& find(const Command& command) { return command_table[command.id]; }
 
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
@@ -132,6 +132,10 @@ struct UnitOf {
   }
 
   // ---- Its tables
+
+  // Copies, because g++ lets those of a class that is no template be written to: on firmware that is RAM.
+  static constexpr auto command_table = Definition::commands;
+  static constexpr auto options = Definition::options.infos;
 
   static constexpr auto commands = [] {
     std::array<Command, Definition::commands.size()> made{};
@@ -248,7 +252,7 @@ struct UnitOf {
               .document = Definition::document,
               .link = Definition::link,
               .line = Definition::line(Format{}),
-              .options = Definition::options.infos,
+              .options = options,
               .models = models,
               .fields = Definition::fields.infos,
               .commands = commands,
