@@ -108,7 +108,7 @@ struct UnitOf {
     return request;
   }
 
-  static constexpr const CommandOf<P>& find(const Command& command) { return Definition::commands[command.id]; }
+  static constexpr const CommandOf<P>& find(const Command& command) { return command_table[command.id]; }
 
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
@@ -208,6 +208,10 @@ struct UnitOf {
   }
 
   // ---- Its tables
+
+  // Copies, because g++ lets those of a class that is no template be written to: on firmware that is RAM.
+  static constexpr auto command_table = Definition::commands;
+  static constexpr auto options = Definition::options.infos;
 
   static constexpr auto commands = [] {
     std::array<Command, Definition::commands.size()> made{};
@@ -368,7 +372,7 @@ struct UnitOf {
               .document = Definition::document,
               .link = Definition::link,
               .line = line_of(Format{}),
-              .options = Definition::options.infos,
+              .options = options,
               .models = models,
               .fields = Definition::fields.infos,
               .commands = commands,
