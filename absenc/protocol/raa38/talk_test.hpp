@@ -28,8 +28,7 @@ class Talk : public Conversation<Item> {
       made_ = made.bytes;
     }
   }
-  Talk(const Talk&) = delete;
-  Talk& operator=(const Talk&) = delete;
+  Talk(Talk&&) noexcept = default;  // the storage stays where it is
 
   void feed(const Event<Item>& event) override { made_->feed(event); }
   Step<Item> next(Time now) override { return made_->next(now); }
