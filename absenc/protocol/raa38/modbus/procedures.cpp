@@ -23,11 +23,6 @@ constexpr Explanation lost_encoder{
     "switch the encoder off and on, then find it: `absenc config get ... baud`, `absenc scan`; do not send it again "
     "blindly, its memory wears out"};
 
-// These words in place of what the document says of the last reply.
-constexpr Outcome only(Error error, const Explanation& words) {
-  return {.error = error, .detail = words.found, .advice = words.advice, .alone = true};
-}
-
 constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
 }
@@ -37,7 +32,7 @@ Part<Result<Reply>> look(Line& line, std::uint8_t address, unsigned attempts) {
   Request request = read_request(line.format());
   request.address = address;
   if (request.registers == 1 && line.format().bits > 16) {
-    co_await line.stop(only(Error::invalid_argument, too_few_registers));
+    co_await line.stop(only(Error::invalid_argument, too_few_registers.found, too_few_registers.advice));
   }
   Result<Reply> reply = Error::timeout;
   for (unsigned i = 0; i < attempts && !line.is_noisy(); ++i) {
@@ -110,9 +105,9 @@ Procedure find_baud(Line& line, Baud& found) {
     co_return {there ? Error::none : reply.error()};
   }
   line.set_rate(bauds[own]);
-  if (first.error() != Error::timeout) co_return only(first.error(), reason);
-  co_return only(Error::timeout, {"nobody answers at this address at any of the five baud rates",
-                                  "`absenc scan` asks every address; then check supply and A/B"});
+  if (first.error() != Error::timeout) co_return only(first.error(), reason.found, reason.advice);
+  co_return only(Error::timeout, "nobody answers at this address at any of the five baud rates",
+                 "`absenc scan` asks every address; then check supply and A/B");
 }
 
 Procedure scan(Line& line, Slaves& found, Arguments arguments) {
@@ -145,7 +140,7 @@ Procedure scan(Line& line, Slaves& found, Arguments arguments) {
     if (reply.error() == Error::request_rejected) found.at[address] = Kind::refuses;
     any = any || found.at[address] != Kind::none;
   }
-  if (!any) co_return only(Error::timeout, {"no address was answered at this baud rate", {}});
+  if (!any) co_return only(Error::timeout, "no address was answered at this baud rate");
   co_return done;
 }
 
@@ -177,7 +172,7 @@ Procedure set_address(Line& line, Set& found, Arguments arguments) {
   const Result<Reply> there = co_await look(line, address, 3);
   if (there) co_return done;
   const Result<Reply> back = co_await look(line, before, 3);
-  if (!back) co_return only(back.error(), lost_encoder);
+  if (!back) co_return only(back.error(), lost_encoder.found, lost_encoder.advice);
   co_return {Error::cross_check_failed, "the encoder answers at its old address still: it did not take the new one",
              "try once more, not often: each time may wear its memory"};
 }
@@ -202,7 +197,7 @@ Procedure set_baud(Line& line, Set& found, Arguments arguments) {
   if (there) co_return done;
   line.set_rate(before);
   const Result<Reply> back = co_await look(line, line.format().address, 3);
-  if (!back) co_return only(back.error(), lost_encoder);
+  if (!back) co_return only(back.error(), lost_encoder.found, lost_encoder.advice);
   co_return {Error::cross_check_failed, "the encoder answers at its old baud rate still: it did not take the new one",
              "try once more, not often: each time may wear its memory"};
 }
@@ -215,8 +210,8 @@ Procedure set_direction(Line& line, Set& found, Arguments arguments) {
   const Result<Reply> echo = co_await line.attempt(setting(line.format(), static_cast<std::uint8_t>(arguments[0])));
   if (!echo) {
     co_return only(echo.error(),
-                   {"the direction was sent, but its echo did not come, and nothing else tells whether it was taken",
-                    "turn the shaft and see how the position moves before you send it again: its memory wears out"});
+                   "the direction was sent, but its echo did not come, and nothing else tells whether it was taken",
+                   "turn the shaft and see how the position moves before you send it again: its memory wears out");
   }
   co_await line.rest(memory_time);
   const Result<Reply> now = co_await look(line, line.format().address, 3);

@@ -85,17 +85,12 @@ Procedure set_zero(HostLine& line, Zeroed& found) {
     if (now && is_near(now->singleturn, 0, format.bits, zero_millidegrees)) co_return done;
   } while (line.received_at() < give_up_at);
   if (!now) {
-    co_return {.error = now.error(),
-               .detail = "the zero was set, but the position could not be read back",
-               .advice = "read the encoder to see what it is now",
-               .alone = true};
+    co_return only(now.error(), "the zero was set, but the position could not be read back",
+                   "read the encoder to see what it is now");
   }
-  co_return {.error = Error::cross_check_failed,
-             .detail = "the position is not zero after the zero was set",
-             .advice =
-                 "let the shaft stand still; check the wire to CLR (below 0.5 V), or zero_unit, and that the "
-                 "encoder has it",
-             .alone = true};
+  co_return only(Error::cross_check_failed, "the position is not zero after the zero was set",
+                 "let the shaft stand still; check the wire to CLR (below 0.5 V), or zero_unit, and that the encoder "
+                 "has it");
 }
 
 Procedure scan(HostLine& line, Units& found) {
@@ -103,10 +98,8 @@ Procedure scan(HostLine& line, Units& found) {
   for (HostLine::Heard heard{}; !heard.over;) {
     heard = co_await line.heard();
     if (heard.bytes.empty()) continue;
-    co_return {.error = Error::unexpected_reply,
-               .detail = "something comes although nobody asks",
-               .advice = "an encoder that transmits by itself has no number: mode=timing, and nothing to scan for",
-               .alone = true};
+    co_return only(Error::unexpected_reply, "something comes although nobody asks",
+                   "an encoder that transmits by itself has no number: mode=timing, and nothing to scan for");
   }
   bool any = false;
   for (unsigned i = 0; i < unit_count; ++i) {
@@ -121,10 +114,8 @@ Procedure scan(HostLine& line, Units& found) {
     any = any || unit.answers || unit.clash;
   }
   if (any) co_return done;
-  co_return {.error = Error::timeout,
-             .detail = "no number from 0 to F is answered",
-             .advice = "check supply, A/B polarity and baud, and that the encoder is one with bus commands",
-             .alone = true};
+  co_return only(Error::timeout, "no number from 0 to F is answered",
+                 "check supply, A/B polarity and baud, and that the encoder is one with bus commands");
 }
 
 }  // namespace absenc::raa38::serial
