@@ -42,8 +42,6 @@ class Engine : public Conversation<std::uint8_t> {
   void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return outcome_.error; }
-  /// Fields and their texts are a matter of those who print: Told.
-  void report(FieldSink&) const override {}
   [[nodiscard]] std::string_view detail() const override {
     return outcome_.detail.empty() ? noise_.explanation().found : outcome_.detail;
   }

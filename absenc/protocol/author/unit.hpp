@@ -119,7 +119,7 @@ struct UnitOf {
     const Result<Request> request = one.request(f, arguments);
     if (!request) return request.error();
     const auto bytes = P::encode(f, *request);
-    if (bytes.empty()) return Error::invalid_argument;
+    if (bytes.empty()) return asks_by_pulse<P>(f, *request) ? Error::unsupported : Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
     return bytes.size();
