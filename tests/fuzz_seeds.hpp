@@ -12,17 +12,23 @@ namespace absenc {
 
 using Seed = std::vector<std::uint8_t>;
 
-/// Request, reply and both in a row, of every vector.
+/// Request, reply and both in a row, of every vector; both also behind the three bytes by which units_fuzz.cpp chooses
+/// unit, options and command.
 inline std::vector<Seed> fuzz_seeds() {
   std::vector<Seed> seeds;
+  std::uint8_t number = 0;
   for (const Unit* unit : all_units()) {
+    std::uint8_t command = 0;
     for (const Vector& vector : unit->vectors) {
       Seed both(vector.request.begin(), vector.request.end());
       both.insert(both.end(), vector.reply.begin(), vector.reply.end());
       seeds.emplace_back(vector.request.begin(), vector.request.end());
       seeds.emplace_back(vector.reply.begin(), vector.reply.end());
       seeds.push_back(both);
+      both.insert(both.begin(), {number, 0, command++});
+      seeds.push_back(both);
     }
+    ++number;
   }
   return seeds;
 }

@@ -19,6 +19,8 @@ class FaultyNode final : public Machine<CanFrame> {
   void feed(const Event<CanFrame>& event) override;
   Step<CanFrame> next(Time now) override;
 
+  /// From the next frame on.
+  void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// How many faults of each kind were injected.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
   /// Frames with at least one fault.

@@ -208,6 +208,11 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
     }
     return true;
   };
+  Wire noise;
+  for (unsigned byte = 0; byte < 256; ++byte) {
+    if (begins_nothing(static_cast<std::uint8_t>(byte))) noise.push_back(static_cast<std::uint8_t>(byte));
+  }
+  if (noise.empty()) GTEST_SKIP() << "any byte may begin a frame";
   Talker talker(unit, options, {}, 4);
   std::vector<Character> quiet;
   std::vector<Character> noisy;
@@ -219,10 +224,7 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
       quiet.push_back(character);
       noisy.push_back(character);
     }
-    std::uint8_t byte = 0;
-    do {
-      byte = static_cast<std::uint8_t>(talker.random().below(256));
-    } while (!begins_nothing(byte));
+    const std::uint8_t byte = noise[talker.random().below(noise.size())];
     ++noises;
     const std::uint64_t count = 1 + talker.random().below(3);
     for (std::uint64_t k = 0; k < count; ++k) {

@@ -134,6 +134,16 @@ struct ItemOf<P> {
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
+/// Whether a pulse on a wire of its own is the request.
+template <class P>
+constexpr bool asks_by_pulse(const typename P::Format& format, const typename P::Request& request) {
+  if constexpr (requires { P::manner(format, request).pulse; }) {
+    return P::manner(format, request).pulse != Time{};
+  } else {
+    return false;
+  }
+}
+
 template <class P>
 struct CommandOf {
   using Format = typename P::Format;
@@ -176,7 +186,7 @@ struct CommandOf {
     if (request == nullptr) return true;
     const Result<Request> asked = request(format, arguments);
     if constexpr (requires { P::encode(format, *asked).empty(); }) {
-      return asked && !P::encode(format, *asked).empty();
+      return asked && (!P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked));
     } else {
       return asked.has_value();
     }

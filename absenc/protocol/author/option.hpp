@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
 
 #include "absenc/protocol/options.hpp"
@@ -37,8 +36,8 @@ struct OptionOf {
   using Member = decltype(detail::member_of(member));
   Option info;
 
-  constexpr void put(Format& format, std::int64_t value) const { format.*member = static_cast<Member>(value); }
-  [[nodiscard]] constexpr std::int64_t get(const Format& format) const {
+  static constexpr void put(Format& format, std::int64_t value) { format.*member = static_cast<Member>(value); }
+  [[nodiscard]] static constexpr std::int64_t get(const Format& format) {
     return static_cast<std::int64_t>(format.*member);
   }
 };
@@ -100,30 +99,24 @@ template <auto... members>
 struct OptionsOf {
   using Format = std::common_type_t<typename OptionOf<members>::Format...>;
 
-  constexpr explicit OptionsOf(const OptionOf<members>&... all) : each(all...), infos{all.info...} {}
+  constexpr explicit OptionsOf(const OptionOf<members>&... all) : infos{all.info...} {}
 
   /// What these values make of the format's own.
   [[nodiscard]] constexpr Format format(const Options& values) const {
     Format made{};
     std::size_t index = 0;
-    std::apply([&](const auto&... one) { (one.put(made, values[index++]), ...); }, each);
+    (OptionOf<members>::put(made, values[index++]), ...);
     return made;
   }
   /// The option of this index alone.
-  constexpr void put(Format& format, std::size_t option, std::int64_t value) const {
+  static constexpr void put(Format& format, std::size_t option, std::int64_t value) {
     std::size_t index = 0;
-    const auto put_one = [&](const auto& one) {
-      if (index++ == option) one.put(format, value);
-    };
-    std::apply([&](const auto&... one) { (put_one(one), ...); }, each);
+    ((index++ == option ? OptionOf<members>::put(format, value) : void()), ...);
   }
-  [[nodiscard]] constexpr std::int64_t get(const Format& format, std::size_t option) const {
+  [[nodiscard]] static constexpr std::int64_t get(const Format& format, std::size_t option) {
     std::size_t index = 0;
     std::int64_t value = 0;
-    const auto get_one = [&](const auto& one) {
-      if (index++ == option) value = one.get(format);
-    };
-    std::apply([&](const auto&... one) { (get_one(one), ...); }, each);
+    ((index++ == option ? void(value = OptionOf<members>::get(format)) : void()), ...);
     return value;
   }
   /// Index of the option with this name; the number of options when there is none.
@@ -133,7 +126,6 @@ struct OptionsOf {
     return i;
   }
 
-  std::tuple<OptionOf<members>...> each;
   std::array<Option, sizeof...(members)> infos;
 };
 

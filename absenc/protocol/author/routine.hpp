@@ -32,6 +32,11 @@ struct Outcome {
 /// `co_return done;`
 inline constexpr Outcome done{};
 
+/// `co_return only(Error::timeout, "...")`: these words and no others.
+[[nodiscard]] constexpr Outcome only(Error error, std::string_view detail, std::string_view advice = {}) {
+  return {.error = error, .detail = detail, .advice = advice, .alone = true};
+}
+
 /// Runs one procedure and its parts; whoever carries it says what is awaited. Not to be copied: frames point to it.
 class Routine {
  public:

@@ -152,4 +152,11 @@ struct VectorParts {
   }
 };
 
+/// The parts of all vectors of a unit, one behind the other.
+template <std::size_t byte_count, std::size_t field_count>
+struct AllParts {
+  ByteBuffer<byte_count> bytes{};
+  Buffer<Expected, field_count> fields{};
+};
+
 }  // namespace absenc::author

@@ -108,7 +108,7 @@ struct UnitOf {
     return request;
   }
 
-  static constexpr const CommandOf<P>& find(const Command& command) { return Definition::commands[command.id]; }
+  static constexpr const CommandOf<P>& find(const Command& command) { return command_table[command.id]; }
 
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
@@ -119,7 +119,7 @@ struct UnitOf {
     const Result<Request> request = one.request(f, arguments);
     if (!request) return request.error();
     const auto bytes = P::encode(f, *request);
-    if (bytes.empty()) return Error::invalid_argument;
+    if (bytes.empty()) return asks_by_pulse<P>(f, *request) ? Error::unsupported : Error::invalid_argument;
     if (bytes.size() > out.size()) return Error::buffer_too_small;
     std::copy_n(bytes.view().begin(), bytes.size(), out.begin());
     return bytes.size();
@@ -133,17 +133,21 @@ struct UnitOf {
     }
   }
 
+  static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
+    if constexpr (requires { Definition::reply_size(Format{}, begin); }) {
+      return Definition::reply_size(format(values), begin);
+    } else {
+      return P::longest_reply;
+    }
+  }
+
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
     if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
       return Definition::delimit(values, direction, bytes);
     } else {
       if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
-      std::size_t size = P::longest_reply;
-      if (direction == Direction::request) {
-        size = request_size(values, bytes);
-      } else if constexpr (requires { Definition::reply_size(Format{}, bytes); }) {
-        size = Definition::reply_size(format(values), bytes);
-      }
+      const std::size_t size =
+          direction == Direction::request ? request_size(values, bytes) : reply_size(values, bytes);
       if (size == 0) return {Delimit::Kind::no_frame};
       return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
     }
@@ -205,6 +209,10 @@ struct UnitOf {
 
   // ---- Its tables
 
+  // Copies, because g++ lets those of a class that is no template be written to: on firmware that is RAM.
+  static constexpr auto command_table = Definition::commands;
+  static constexpr auto options = Definition::options.infos;
+
   static constexpr auto commands = [] {
     std::array<Command, Definition::commands.size()> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
@@ -220,55 +228,95 @@ struct UnitOf {
     return most + Definition::frames_size;
   }();
 
-  static constexpr auto model_values = [] {
-    // Without {}: g++ 12 refuses it where no model has a value.
-    std::array<Buffer<OptionValue, maximum_options>, Definition::models.size()> made;
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      const bool good = for_each_value(Definition::models[i].values, [&](std::string_view name, std::string_view text) {
-        const std::size_t option = Definition::options.find(name);
-        std::int64_t value = 0;
-        return option < Definition::options.infos.size() && to_value(Definition::options.infos[option], text, value) &&
-               made[i].push_back({option, value});
-      });
-      if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
-    }
+  // What texts say lies one behind the other, and no larger than if it were written by hand.
+  static constexpr Buffer<OptionValue, maximum_options> values_of(const ModelText& model) {
+    Buffer<OptionValue, maximum_options> made;
+    const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {
+      const std::size_t option = Definition::options.find(name);
+      std::int64_t value = 0;
+      return option < Definition::options.infos.size() && to_value(Definition::options.infos[option], text, value) &&
+             made.push_back({option, value});
+    });
+    if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
     return made;
+  }
+  static constexpr auto model_values = [] {
+    constexpr std::size_t size = [] {
+      std::size_t sum = 0;
+      for (const ModelText& text : Definition::models) sum += values_of(text).size();
+      return sum;
+    }();
+    Buffer<OptionValue, size> all;
+    for (const ModelText& text : Definition::models) all.append(values_of(text));
+    return all;
   }();
   static constexpr auto models = [] {
     std::array<Model, Definition::models.size()> made{};
+    std::size_t first = 0;
     for (std::size_t i = 0; i < made.size(); ++i) {
       const ModelText& text = Definition::models[i];
+      const std::size_t size = values_of(text).size();
       made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
-      if (!text.values.empty()) made[i].values = model_values[i].view();  // g++ 12 cannot view an empty one
+      if (size != 0) made[i].values = model_values.view().subspan(first, size);  // g++ 12 cannot view an empty one
+      first += size;
     }
     return made;
   }();
 
+  static constexpr VectorParts parts_of(const VectorText& text) {
+    return VectorParts(
+        text, requires { Definition::frames_are_texts; });
+  }
   static constexpr bool has_texts = std::is_same_v<std::remove_cvref_t<decltype(Definition::vectors[0])>, VectorText>;
-  static constexpr auto vector_parts = [] {
-    std::array<VectorParts, has_texts ? Definition::vectors.size() : 0> made{};
+  static constexpr auto texts = [] {
     if constexpr (has_texts) {
-      const bool are_texts = requires { Definition::frames_are_texts; };
-      for (std::size_t i = 0; i < made.size(); ++i) made[i] = VectorParts(Definition::vectors[i], are_texts);
+      return Definition::vectors;
+    } else {
+      return std::array<VectorText, 0>{};
+    }
+  }();
+  static constexpr auto vector_parts = [] {
+    constexpr auto sizes = [] {
+      std::array<std::size_t, 2> sums{};
+      for (const VectorText& text : texts) {
+        const VectorParts parts = parts_of(text);
+        sums[0] += parts.request.size() + parts.reply.size();
+        sums[1] += parts.fields.size();
+      }
+      return sums;
+    }();
+    AllParts<sizes[0], sizes[1]> all;
+    for (const VectorText& text : texts) {
+      const VectorParts parts = parts_of(text);
+      all.bytes.append(parts.request);
+      all.bytes.append(parts.reply);
+      all.fields.append(parts.fields);
+    }
+    return all;
+  }();
+  static constexpr auto vectors_of_texts = [] {
+    std::array<Vector, texts.size()> made{};
+    Bytes bytes = vector_parts.bytes;
+    std::span<const Expected> fields = vector_parts.fields;
+    const auto taken = [](auto& all, std::size_t size) {
+      const auto first = all.first(size);
+      all = all.subspan(size);
+      return first;
+    };
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      const VectorText& text = texts[i];
+      const VectorParts parts = parts_of(text);
+      const Bytes request = taken(bytes, parts.request.size());
+      const Bytes reply = taken(bytes, parts.reply.size());
+      made[i] = {
+          text.id,    text.meaning, text.source, text.options, request, reply, taken(fields, parts.fields.size()),
+          parts.error};
     }
     return made;
   }();
   static constexpr auto vectors = [] {
     if constexpr (has_texts) {
-      std::array<Vector, Definition::vectors.size()> made{};
-      for (std::size_t i = 0; i < made.size(); ++i) {
-        const VectorText& text = Definition::vectors[i];
-        const VectorParts& parts = vector_parts[i];
-        made[i] = {text.id,
-                   text.meaning,
-                   text.source,
-                   text.options,
-                   parts.request.view(),
-                   parts.reply.view(),
-                   parts.fields.view(),
-                   parts.error};
-      }
-      return made;
+      return vectors_of_texts;
     } else {
       return Definition::vectors;
     }
@@ -285,14 +333,12 @@ struct UnitOf {
     }
   }
 
-  // Whether the text is understood. Without model: the defaults.
-  static constexpr bool resolve(std::string_view text, const Model* model, Options& values) {
+  // Whether the text is understood, which comes over a model, which comes over the defaults.
+  static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
     for (std::size_t i = 0; i < Definition::options.infos.size(); ++i) {
       values.values[i] = Definition::options.infos[i].default_value;
     }
-    if (model != nullptr) {
-      for (const OptionValue& one : model->values) values.values[one.option] = one.value;
-    }
+    for (const OptionValue& one : model) values.values[one.option] = one.value;
     return for_each_value(text, [&](std::string_view name, std::string_view value) {
       const std::size_t option = Definition::options.find(name);
       return option < Definition::options.infos.size() &&
@@ -306,11 +352,11 @@ struct UnitOf {
 
   static constexpr bool holds(const Vector& vector) {
     Options values;
-    bool known = resolve(vector.options, nullptr, values);
+    bool known = resolve(vector.options, {}, values);
     // The first model that agrees with what is said, as resolve_options has it.
     for (const Model& model : models) {
       Options of_model;
-      known = known && resolve(vector.options, &model, of_model);
+      known = known && resolve(vector.options, model.values, of_model);
       if (!agrees(model, of_model)) continue;
       values = of_model;
       break;
@@ -326,7 +372,7 @@ struct UnitOf {
               .document = Definition::document,
               .link = Definition::link,
               .line = line_of(Format{}),
-              .options = Definition::options.infos,
+              .options = options,
               .models = models,
               .fields = Definition::fields.infos,
               .commands = commands,

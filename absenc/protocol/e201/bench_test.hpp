@@ -43,6 +43,8 @@ inline Options options_of(std::string_view text) {
   return options;
 }
 
+inline bool says(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
+
 /// What comes in place of the interface's answer: each so long after what was before it.
 struct Said {
   std::string text;

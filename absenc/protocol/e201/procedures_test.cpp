@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"
-#include "absenc/protocol/e201/procedures.hpp"
 
 namespace absenc::e201 {
 namespace {
@@ -13,12 +12,11 @@ using testing::Bench;
 using testing::Ended;
 using testing::Fields;
 using testing::Said;
+using testing::says;
 using testing::Tamper;
 
 constexpr std::int64_t turn = std::int64_t{1} << 32;
 constexpr std::int64_t count = std::int64_t{1} << 13;  // of 19 bits
-
-bool says(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
 TEST(E201Read, APosition) {
   Bench bench;
@@ -264,151 +262,6 @@ TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
     EXPECT_GE(pause, 10ms);
     EXPECT_LT(pause, 14ms);
   }
-}
-
-// ---- clock-sweep
-
-/// 10 us of latency, 32 + 8 bits: up to 20 bits of ACK fit, so M8 (45 bits) and M7 (22) are too fast.
-TEST(E201Sweep, CountsRecommendsAndRestores) {
-  Bench bench("singleturn_bits=32");
-  bench.raw("M7");
-  std::vector<Fields> progress;
-  const Ended sweep = bench.run("clock-sweep", {5}, [&progress](const Conversation<std::uint8_t>& conversation) {
-    testing::Collector collector;
-    conversation.report(collector);
-    progress.push_back(collector.fields);
-  });
-  EXPECT_EQ(sweep.error, "none") << sweep.detail;
-  EXPECT_EQ(sweep.fields, (Fields{{"frames", 5},
-                                  {"valid_35_khz", 5},
-                                  {"valid_70_khz", 5},
-                                  {"valid_140_khz", 5},
-                                  {"valid_280_khz", 5},
-                                  {"valid_560_khz", 5},
-                                  {"valid_1100_khz", 5},
-                                  {"valid_2200_khz", 0},
-                                  {"valid_4400_khz", 0},
-                                  {"recommended_clock", 4},
-                                  {"recommended_khz", 280},
-                                  {"restored_clock", 7},
-                                  {"aborted", 0}}));
-  EXPECT_EQ(bench.raw("m"), "7\r");
-  ASSERT_EQ(progress.size(), 8u);
-  EXPECT_EQ(progress[0], (Fields{{"frames", 5}, {"valid_35_khz", 5}}));
-}
-
-TEST(E201Sweep, LineDelayMovesTheRecommendation) {
-  // Two bits late at 4400 kHz, one at 2200, and 900 ns are the period at 1100: nothing fast is stable.
-  Bench bench("singleturn_bits=19 latency_us=0 line_delay_ns=905");
-  const Fields fields = bench.run("clock-sweep", {20}).fields;
-  EXPECT_LT(fields.at("valid_1100_khz"), 20);
-  EXPECT_EQ(fields.at("valid_560_khz"), 20);
-  EXPECT_EQ(fields.at("valid_2200_khz"), 0);
-  EXPECT_EQ(fields.at("recommended_clock"), 3);
-}
-
-TEST(E201Sweep, TheLongestRunIsRecommended) {
-  for (const auto& [good, recommended] : std::to_array<std::pair<std::string_view, unsigned>>(
-           {{"11111111", 5}, {"10111011", 4}, {"11000110", 2}, {"00000001", 8}, {"01000011", 8}, {"00000000", 0}})) {
-    Sweep sweep{.frames = 3};
-    for (unsigned i = 0; i < good.size(); ++i) sweep.valid[i] = good[i] == '1' ? 3 : 2;
-    EXPECT_EQ(sweep.recommended(), recommended) << good;
-  }
-}
-
-TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
-  for (unsigned steps = 0; steps < 400; steps += 3) {
-    Bench bench;
-    bench.raw("M6");
-    Conversation<std::uint8_t>& sweep = bench.make("clock-sweep", {100});
-    const std::size_t host = bench.line.attach(sim::Role::host, sweep);
-    for (unsigned i = 0; i < steps && !bench.line.done(host); ++i) bench.line.step();
-    const Time asked = bench.line.now();
-    EXPECT_TRUE(sweep.abort());
-    ASSERT_TRUE(bench.line.run(host, asked + 1s));
-    EXPECT_LT(bench.line.now() - asked, 30ms) << steps;
-    EXPECT_EQ(sweep.error(), Error::none);
-    EXPECT_EQ(bench.raw("m"), "6\r") << steps;
-    testing::Collector collector;
-    sweep.report(collector);
-    EXPECT_EQ(collector.fields["aborted"], 1);
-    EXPECT_EQ(collector.fields["restored_clock"], 6);
-    EXPECT_FALSE(collector.fields.contains("recommended_clock"));
-  }
-}
-
-TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
-  Bench bench;
-  bench.raw("M6");
-  Conversation<std::uint8_t>& sweep = bench.make("clock-sweep", {3});
-  const std::size_t host = bench.line.attach(sim::Role::host, sweep);
-  std::string left;
-  while (!bench.line.done(host)) {
-    bench.line.step();
-    testing::Collector collector;
-    sweep.report_left(collector);
-    if (collector.fields.empty()) {
-      EXPECT_FALSE(says(bench.tampered.asked(), "M6M")) << "another clock is set";
-      continue;
-    }
-    EXPECT_EQ(collector.fields["previous_clock"], 6);
-    const auto clock = static_cast<char>('0' + collector.fields["left_clock"]);
-    EXPECT_EQ(collector.fields["left_khz"], clocks_khz[static_cast<std::size_t>(clock - '1')]);
-    if (left.empty() || left.back() != clock) left += clock;
-  }
-  EXPECT_EQ(left, "123456786");
-}
-
-TEST(E201Sweep, WhatFails) {
-  struct Case {
-    char letter;  // this command is answered so, the `nth` time and, when `always`, ever after
-    int nth;
-    bool always;
-    std::vector<Said> answer;
-    std::string error;
-    std::string detail;
-    std::string advice;
-    bool restored;
-  };
-  const std::vector<Said> short_stream(11, {"1", 10ms});
-  for (const Case& one : std::vector<Case>{
-           {'v', 1, false, {{"V1.15\r"}}, "unsupported", "1.16", "`info`", true},
-           {'m', 1, false, {{"?\r"}}, "bad_framing", "does not say which clock", "E201-9S", true},
-           {'m', 4, false, {{"8\r"}}, "cross_check_failed", "another clock than", "", true},
-           {'m', 4, false, {}, "timeout", "is silent", "it is an E201-9S", true},
-           {'m', 4, false, {{"8"}}, "wrong_length", "ends with CR", "stream-off", true},
-           {'4', 5, false, short_stream, "wrong_length", "without a pause", "stream-off", true},
-           {'4', 1, true, {{"0000000000000000\r"}}, "line_stuck", "no MA clock", "supply-on", true},
-           {'4', 1, true, {}, "timeout", "no MA clock", "", true},
-           {'M', 9, false, {}, "cross_check_failed", "could not be restored", "with clock and set-clock", false},
-           {'m', 10, false, {}, "timeout", "not known whether", "with clock and set-clock", true}}) {
-    Bench bench;
-    int asked = 0;
-    const Tamper tamper = [&](char letter) {
-      if (letter == one.letter) ++asked;
-      const bool answers = letter == one.letter && (asked == one.nth || (one.always && asked > one.nth));
-      return answers ? std::optional(one.answer) : std::nullopt;
-    };
-    const Ended sweep = bench.run_tampered(tamper, "clock-sweep", {2});
-    EXPECT_EQ(sweep.error, one.error) << one.detail;
-    EXPECT_TRUE(says(sweep.detail, one.detail)) << sweep.detail;
-    EXPECT_TRUE(says(sweep.advice, one.advice)) << sweep.advice;
-    EXPECT_TRUE(sweep.fields.empty());
-    EXPECT_EQ(bench.raw("m") == "4\r", one.restored) << one.detail;
-  }
-}
-
-// Some bad frames are what a sweep is for.
-TEST(E201Sweep, GoesOnAfterABadFrame) {
-  Bench bench;
-  int asked = 0;
-  const Tamper tamper = [&](char letter) {
-    return letter == '4' && ++asked == 1 ? std::optional(std::vector<Said>{{"1\r"}}) : std::nullopt;
-  };
-  const Ended sweep = bench.run_tampered(tamper, "clock-sweep", {2});
-  EXPECT_EQ(sweep.error, "none");
-  EXPECT_EQ(sweep.fields.at("valid_35_khz"), 1);
-  EXPECT_EQ(sweep.fields.at("valid_70_khz"), 2);
 }
 
 }  // namespace

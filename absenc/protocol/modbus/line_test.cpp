@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client and a server of this folder on one line in virtual time: silence, damage, changes of the baud rate.
+// A client with this folder's times and its server on one line in virtual time: silence, damage, changes of the rate.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <vector>
 
 #include "absenc/core/hex.hpp"
-#include "absenc/protocol/modbus/client.hpp"
 #include "absenc/protocol/modbus/server.hpp"
 #include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/line.hpp"
@@ -40,38 +40,33 @@ class ToyServer final : public Server {
   }
 };
 
-/// Sends one frame, as often as told, and keeps the reply.
-class ToyClient final : public Client {
+/// Sends one frame, as often as told.
+class ToyClient final : public author::Engine {
  public:
   explicit ToyClient(Bytes body, unsigned count = 1, std::uint32_t rate = line_settings.rate)
-      : Client(line_settings, 50ms), left_(count) {
+      : Engine(client_wire({.rate = rate}, 50ms), storage_), left_(count) {
     frame_.append(body);
     append_crc(frame_);
     if (rate != line_settings.rate) set_rate(rate);
-    ask(frame_);
+    send(frame_, {}, {});
   }
   void report(FieldSink&) const override {}
-
-  Wire reply;
-  Error failure = Error::none;
+  [[nodiscard]] Wire taken() const { return {reply().begin(), reply().end()}; }
 
  private:
   std::size_t expected(Bytes) const override { return 7; }
-  Error check(Bytes bytes) const override {
+  Error check(Bytes bytes) override {
+    if (bytes.empty()) return Error::timeout;
     if (bytes.size() != 7) return Error::wrong_length;
     return crc_order(bytes) == CrcOrder::low_first ? Error::none : Error::bad_checksum;
   }
-  void answered(Bytes bytes) override {
-    reply.assign(bytes.begin(), bytes.end());
-    if (--left_ == 0) return finish();
-    ask(frame_);
-  }
-  void failed(Error error, Bytes bytes) override {
-    reply.assign(bytes.begin(), bytes.end());
-    failure = error;
-    finish(error);
+  bool is_whole(Error) const override { return false; }
+  void answered(Error error) override {
+    if (error != Error::none || --left_ == 0) return finish({.error = error});
+    send(frame_, {}, {});
   }
 
+  std::array<std::uint8_t, 20> storage_{};
   FrameBytes frame_;
   unsigned left_;
 };
@@ -133,11 +128,11 @@ TEST(ModbusLine, TheClientWaitsAlsoBeforeItsFirstFrame) {
 TEST(ModbusLine, ARefusalAndAnUnfinishedReplyEndBySilence) {
   Bench bench;
   ToyClient refused(hex<"070400000001">);
-  EXPECT_EQ(bench.run(refused).failure, Error::wrong_length);
-  EXPECT_EQ(refused.reply.size(), 5u);
-  EXPECT_EQ(refused.reply[1], 0x84);
+  EXPECT_EQ(bench.run(refused).error(), Error::wrong_length);
+  EXPECT_EQ(refused.taken().size(), 5u);
+  EXPECT_EQ(refused.taken()[1], 0x84);
   ToyClient silent(hex<"080300000001">);
-  EXPECT_EQ(bench.run(silent).failure, Error::timeout);
+  EXPECT_EQ(bench.run(silent).error(), Error::timeout);
 }
 
 TEST(ModbusLine, TheServerAnswersWhatStandsAloneOnly) {
@@ -271,8 +266,8 @@ TEST(ModbusLine, WhatIsHeardBeforeTheRequestPutsItOff) {
   EXPECT_EQ(client.next(2ms + request_silence(line_settings)).kind, Step<std::uint8_t>::Kind::transfer);
   client.feed({.kind = Kind::sent, .at = 9ms});
   client.feed({.kind = Kind::received, .at = 13ms, .items = good_reply});
-  EXPECT_EQ(client.reply, good_reply);
-  EXPECT_EQ(client.failure, Error::none);
+  EXPECT_EQ(client.taken(), good_reply);
+  EXPECT_EQ(client.error(), Error::none);
 }
 
 TEST(ModbusLine, ADamagedCharacterOrOneOutOfTurnIsNoReply) {
@@ -283,7 +278,7 @@ TEST(ModbusLine, ADamagedCharacterOrOneOutOfTurnIsNoReply) {
   damaged.feed({.kind = Kind::sent, .at = 9ms});
   damaged.feed({.kind = Kind::line_error, .at = 12ms});
   damaged.feed({.kind = Kind::silence, .at = 19ms});
-  EXPECT_EQ(damaged.failure, Error::bad_framing);
+  EXPECT_EQ(damaged.error(), Error::bad_framing);
 
   ToyClient early(request_body);
   static_cast<void>(early.next(Time{}));
@@ -291,7 +286,7 @@ TEST(ModbusLine, ADamagedCharacterOrOneOutOfTurnIsNoReply) {
   early.feed({.kind = Kind::received, .at = 8ms, .items = good_reply});
   early.feed({.kind = Kind::sent, .at = 9ms});
   early.feed({.kind = Kind::silence, .at = 19ms});
-  EXPECT_EQ(early.failure, Error::wrong_length);
+  EXPECT_EQ(early.error(), Error::wrong_length);
 }
 
 }  // namespace

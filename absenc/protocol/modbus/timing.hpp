@@ -6,6 +6,7 @@
 
 #include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
+#include "absenc/protocol/author/engine.hpp"
 
 namespace absenc::modbus {
 
@@ -27,6 +28,14 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
 /// 1.5 characters: at most so much lies between two characters of a frame.
 [[nodiscard]] constexpr Time character_gap(const LineSettings& line) {
   return line.rate > fixed_times_above ? 750us : line.character() * 3 / 2;
+}
+
+/// How a client speaks on a line as it is set: `answer_limit` after a request the reply has begun.
+[[nodiscard]] constexpr author::Wire client_wire(const LineSettings& line, Time answer_limit) {
+  return {.answer_limit = answer_limit + line.character(),
+          .gap_limit = frame_silence(line),
+          .silence = request_silence(line),
+          .patience = 1s};  // longer than any reply, and than carriers are late to tell silence
 }
 
 }  // namespace absenc::modbus

@@ -158,7 +158,7 @@ struct Definition {
   static constexpr std::string_view id = "tformat", name = "Tamagawa T-format (Smart-Abs)",
                                     document = "Specification of Smart-Abs TS5700N8500";
   static constexpr LinkKind link = LinkKind::half_duplex;
-  static constexpr std::size_t frames_size = 4000;
+  static constexpr std::size_t frames_size = 900;
   // Any pause ends a frame; some encoders may forgive one that is shorter than their own answer time.
   static constexpr LineTiming timing{.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit};
 

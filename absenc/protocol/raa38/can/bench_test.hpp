@@ -9,14 +9,28 @@
 #include <vector>
 
 #include "absenc/protocol/raa38/can/device.hpp"
-#include "absenc/protocol/raa38/can/host.hpp"
-#include "absenc/protocol/raa38/can/survey.hpp"
+#include "absenc/protocol/raa38/can/protocol.hpp"
+#include "absenc/protocol/raa38/talk_test.hpp"
+#include "absenc/protocol/raa38/unit.hpp"
 #include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/line.hpp"
 
 namespace absenc::raa38::can::testing {
 
 using TestShaft = sim::testing::TestShaft<14>;
+
+[[nodiscard]] inline Options options_of(const Format& format) {
+  Options options;
+  options.values = {format.bits,     format.node,     format.rate,   format.listens ? 1 : 0,
+                    format.positive, format.negative, format.cyclic, format.answers_on_7e4 ? 1 : 0};
+  return options;
+}
+
+/// A command to an encoder of this format.
+struct Talk final : raa38::testing::Talk<CanFrame> {
+  Talk(const Format& format, std::string_view name, std::vector<std::int64_t> arguments = {})
+      : raa38::testing::Talk<CanFrame>(can_unit, options_of(format), name, std::move(arguments)) {}
+};
 
 struct Fields final : FieldSink {
   void put(const FieldValue& value) override { all.emplace_back(value.info->name, value.number); }
@@ -69,12 +83,10 @@ class RawHost final : public Machine<CanFrame> {
 };
 
 struct Bench {
-  explicit Bench(const Format& bench_format = {}, const NodeSettings& settings = {}) : format(bench_format) {
-    add(bench_format, settings);
-  }
+  explicit Bench(const Format& bench_format = {}) : format(bench_format) { add(bench_format); }
 
-  VirtualNode& add(const Format& node_format, const NodeSettings& settings = {}) {
-    nodes.push_back(std::make_unique<VirtualNode>(node_format, shaft, settings));
+  VirtualNode& add(const Format& node_format) {
+    nodes.push_back(std::make_unique<VirtualNode>(node_format, shaft));
     nodes.back()->power_on(line.now(), Device<CanFrame>::PowerOn::skip);
     line.attach(sim::Role::device, *nodes.back());
     return *nodes.back();
@@ -94,7 +106,7 @@ struct Bench {
     return run(host).heard;
   }
   [[nodiscard]] std::uint64_t read() {
-    Read reading(format, Read::Way::ask);
+    Talk reading(format, "position");
     run(reading);
     return reading.reading() != nullptr ? reading.reading()->singleturn : ~std::uint64_t{0};
   }
@@ -102,10 +114,10 @@ struct Bench {
   Format format;
   TestShaft shaft;
   std::vector<std::unique_ptr<VirtualNode>> nodes;
-  sim::Line<CanFrame> line{LinkKind::can, {.rate = format.rate}};
+  sim::Line<CanFrame> line{LinkKind::can, {.rate = format.bit_rate()}};
   bool finished = true;
 };
 
-inline constexpr NodeSettings silent{.readings_per_s = 0};
+inline constexpr Format silent{.cyclic = 0};
 
 }  // namespace absenc::raa38::can::testing

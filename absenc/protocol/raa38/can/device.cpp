@@ -24,10 +24,9 @@ constexpr std::uint8_t refused = 1;  // CiA 305: value not supported
 
 }  // namespace
 
-VirtualNode::VirtualNode(const Format& format, const Shaft& shaft, const NodeSettings& settings)
-    : format_(format), shaft_(&shaft), settings_(settings) {
+VirtualNode::VirtualNode(const Format& format, const Shaft& shaft) : format_(format), shaft_(&shaft) {
   memory_[memory_node] = format.node;
-  memory_[memory_rate] = rate_of_bits(format.rate)->index;
+  memory_[memory_rate] = rates[format.rate].index;
 }
 
 std::uint32_t VirtualNode::wear() const {
@@ -54,12 +53,12 @@ Time VirtualNode::period() const { return Time(1s) / readings_per_s_; }
 void VirtualNode::power_on(Time now, PowerOn kind) {
   // What a file of another encoder may have brought.
   if (memory_[memory_node] == 0) memory_[memory_node] = format_.node;
-  if (rate_of_index(memory_[memory_rate]) == nullptr) memory_[memory_rate] = rate_of_bits(format_.rate)->index;
+  if (rate_of_index(memory_[memory_rate]) == nullptr) memory_[memory_rate] = rates[format_.rate].index;
   powered_ = true;
   configuring_ = false;
-  readings_per_s_ = settings_.readings_per_s;
+  readings_per_s_ = format_.cyclic;
   next_cyclic_ = readings_per_s_ == 0 ? never : now + (kind == PowerOn::real ? start_up_time : period());
-  tell_rate_ = rate() != format_.rate;
+  tell_rate_ = rate() != format_.bit_rate();
 }
 
 void VirtualNode::power_off(Time) {
@@ -139,8 +138,8 @@ void VirtualNode::hear_command(const CanFrame& frame, Time at) {
   if (frame.data[1] != node()) return violate("the second byte is not the node's number", at);
   switch (frame.data[0]) {
     case command::start:
-      if (readings_per_s_ == 0 && settings_.readings_per_s != 0) {
-        readings_per_s_ = settings_.readings_per_s;
+      if (readings_per_s_ == 0 && format_.cyclic != 0) {
+        readings_per_s_ = format_.cyclic;
         next_cyclic_ = at + period();
       }
       return answer(encode_position(node(), position(at)), at);
@@ -202,7 +201,7 @@ void VirtualNode::hear_configuration(const CanFrame& frame, Time at) {
 }
 
 void VirtualNode::set_node(std::uint8_t node, Time at) {
-  const std::uint32_t id = settings_.configuration_answer;
+  const std::uint32_t id = format_.answer_id();
   if (node == 0) {
     violate("a node number of 0", at);
     return answer(encode_configuration_answer(id, configuration::node, refused), at);
@@ -213,7 +212,7 @@ void VirtualNode::set_node(std::uint8_t node, Time at) {
 
 // It changes when the answer is out.
 void VirtualNode::set_rate(const CanFrame& frame, Time at) {
-  const std::uint32_t id = settings_.configuration_answer;
+  const std::uint32_t id = format_.answer_id();
   const std::uint8_t index = frame.data[2];
   if (frame.data[1] != 0 || rate_of_index(index) == nullptr) {
     violate("an unknown bit rate", at);

@@ -10,14 +10,9 @@
 
 namespace absenc::raa38::can {
 
-struct NodeSettings {
-  std::uint8_t readings_per_s = 10;            // after power on, unasked; 0: none
-  std::uint32_t configuration_answer = 0x7E5;  // the identifier of its answers there: 7E5 or 7E4
-};
-
 class VirtualNode final : public Device<CanFrame> {
  public:
-  VirtualNode(const Format& format, const Shaft& shaft, const NodeSettings& settings = {});
+  VirtualNode(const Format& format, const Shaft& shaft);
 
   void feed(const Event<CanFrame>& event) override;
   Step<CanFrame> next(Time now) override;
@@ -63,7 +58,6 @@ class VirtualNode final : public Device<CanFrame> {
 
   Format format_;
   const Shaft* shaft_;
-  NodeSettings settings_;
   std::array<std::uint8_t, 11> memory_{};
   std::uint32_t memory_version_ = 0;
 

@@ -11,6 +11,7 @@ namespace {
 using testing::Bench;
 using testing::RawHost;
 using testing::silent;
+using testing::Talk;
 using Frames = std::vector<CanFrame>;
 using PowerOn = Device<CanFrame>::PowerOn;
 
@@ -22,7 +23,7 @@ TEST(CanDevice, SendsUnaskedAfterPowerOn) {
 }
 
 TEST(CanDevice, AnswersAsTheDocumentShows) {
-  Bench bench({}, silent);
+  Bench bench({.cyclic = 0});
   bench.shaft.put(0, 0x2647);
   const auto frame = [](std::uint32_t id, std::initializer_list<std::uint8_t> bytes) {
     CanFrame made{.id = id, .size = 8};
@@ -43,7 +44,7 @@ TEST(CanDevice, AnswersAsTheDocumentShows) {
 }
 
 TEST(CanDevice, SettingsSurvivePowerOff) {
-  Bench bench({}, silent);
+  Bench bench({.cyclic = 0});
   bench.shaft.put(0, 500);
   bench.raw(encode_configuration(configuration::enter, 1));
   bench.raw(encode_configuration(configuration::node, 0x42));
@@ -53,7 +54,7 @@ TEST(CanDevice, SettingsSurvivePowerOff) {
   const Bytes memory = bench.node().memory();
   testing::TestShaft shaft;
   shaft.put(0, 510);
-  VirtualNode again({}, shaft, silent);
+  VirtualNode again(silent, shaft);
   std::copy(memory.begin(), memory.end(), again.memory().begin());
   again.power_on(Time{}, PowerOn::skip);
   EXPECT_EQ(again.node(), 0x42);
@@ -67,7 +68,7 @@ TEST(CanDevice, SettingsSurvivePowerOff) {
 
 TEST(CanDevice, MemoryOfAnother) {
   testing::TestShaft shaft;
-  VirtualNode node({}, shaft, silent);
+  VirtualNode node(silent, shaft);
   std::fill(node.memory().begin(), node.memory().end(), std::uint8_t{0});
   node.memory()[1] = 9;
   node.power_on(Time{}, PowerOn::skip);
@@ -92,7 +93,7 @@ TEST(CanDevice, NamesTheRulesThatAreBroken) {
       {encode_configuration(configuration::node, 0x33), "configuration mode"},
   };
   for (const auto& [frame, words] : cases) {
-    Bench bench({}, silent);
+    Bench bench({.cyclic = 0});
     bench.raw(frame);
     ASSERT_EQ(bench.node().violation_count(), 1u) << words;
     EXPECT_NE(bench.node().violations()[0].rule.find(words), std::string_view::npos) << words;
@@ -104,7 +105,7 @@ TEST(CanDevice, NamesTheRulesThatAreBroken) {
       {encode_configuration(configuration::node, 0x20), "set already"},
   };
   for (const auto& [frame, words] : configured) {
-    Bench bench({}, silent);
+    Bench bench({.cyclic = 0});
     bench.raw(encode_configuration(configuration::enter, 1));
     bench.raw(frame);
     ASSERT_EQ(bench.node().violation_count(), 1u) << words;
@@ -129,7 +130,7 @@ TEST(CanDevice, IsDeadWithoutPower) {
 // A shaft at any place, any resolution: the position is what the frames say.
 TEST(CanDevice, EveryResolution) {
   for (unsigned bits = 10; bits <= 21; ++bits) {
-    Bench bench({.bits = bits}, silent);
+    Bench bench({.bits = bits, .cyclic = 0});
     bench.shaft.start.position = 0x5A5A5A5A;
     EXPECT_EQ(bench.read(), 0x5A5A5A5Au >> (32 - bits));
   }

@@ -14,14 +14,6 @@ namespace absenc::raa38::can {
 
 inline constexpr std::uint8_t frame_size = 8;
 
-struct Format {
-  unsigned bits = 14;        // 10 to 21
-  std::uint8_t node = 0x20;  // 1 to 255
-  std::uint32_t rate = 250'000;
-  std::uint8_t positive = 0;  // what 22 carries to count up, and to count down: the document does not say
-  std::uint8_t negative = 1;
-};
-
 /// What a node is told, in byte 0.
 namespace command {
 inline constexpr std::uint8_t start = 0x01;
@@ -102,6 +94,20 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
   return nullptr;
 }
 
+struct Format {
+  unsigned bits = 14;         // 10 to 21
+  std::uint8_t node = 0x20;   // 1 to 255
+  std::uint8_t rate = 2;      // index into `rates`
+  bool listens = false;       // reads what the node sends by itself
+  std::uint8_t positive = 0;  // what 22 carries to count up, and to count down: the document does not say
+  std::uint8_t negative = 1;
+  std::uint8_t cyclic = 10;     // virtual: readings a second after power on, unasked; 0: none
+  bool answers_on_7e4 = false;  // virtual: its answers to configurations, else on 7E5
+
+  [[nodiscard]] constexpr std::uint32_t bit_rate() const { return rates[rate].bits_per_second; }
+  [[nodiscard]] constexpr std::uint32_t answer_id() const { return answers_on_7e4 ? 0x7E4 : 0x7E5; }
+};
+
 // ---- Frames
 
 [[nodiscard]] constexpr CanFrame encode_command(std::uint8_t node, std::uint8_t code, std::uint8_t value = 0) {
@@ -158,6 +164,11 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
     if (frame.data[i] != 0) return Error::out_of_range;
   }
   return frame.data[1];
+}
+
+/// Whether the frame has the identifier of this node's replies.
+[[nodiscard]] constexpr bool is_from(const CanFrame& frame, std::uint8_t node) {
+  return function_of(frame) == Function::reply && node_of(frame) == node;
 }
 
 }  // namespace absenc::raa38::can

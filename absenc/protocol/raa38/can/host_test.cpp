@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/can/host.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +10,7 @@ namespace {
 using testing::Bench;
 using testing::report;
 using testing::silent;
+using testing::Talk;
 
 /// Drives a conversation without a bus: the test says what happens.
 struct ByHand {
@@ -29,37 +29,37 @@ TEST(CanRead, AsksAndListens) {
   Bench bench;
   bench.shaft.put(0, 9799);
   EXPECT_EQ(bench.read(), 9799u);
-  Read listening({}, Read::Way::listen);
+  Talk listening({}, "listen");
   const Time before = bench.line.now();
   bench.run(listening);
   ASSERT_NE(listening.reading(), nullptr);
   EXPECT_EQ(listening.reading()->singleturn, 9799u);
   EXPECT_LE(bench.line.now() - before, 101ms);
-  Read start({}, Read::Way::start);
+  Talk start({}, "start");
   EXPECT_EQ(report(bench.run(start))["singleturn"], 9799);
   EXPECT_EQ(bench.node().violation_count(), 0u);
 }
 
 TEST(CanRead, NobodyThere) {
-  Bench bench({.node = 0x21}, silent);
-  Read read({}, Read::Way::ask);
+  Bench bench({.node = 0x21, .cyclic = 0});
+  Talk read({}, "position");
   EXPECT_EQ(bench.run(read).error(), Error::timeout);
   EXPECT_NE(read.advice().find("scan"), std::string_view::npos);
-  Read listening({}, Read::Way::listen);
+  Talk listening({}, "listen");
   EXPECT_EQ(bench.run(listening).error(), Error::timeout);
   EXPECT_NE(listening.detail().find("by itself"), std::string_view::npos);
 }
 
 // Frames of others never end, so the line is never silent.
 TEST(CanRead, NobodyThereOnABusyBus) {
-  Bench bench({.node = 0x21}, {.readings_per_s = 255});
-  Read read({}, Read::Way::ask);
+  Bench bench({.node = 0x21, .cyclic = 255});
+  Talk read({}, "position");
   EXPECT_EQ(bench.run(read).error(), Error::timeout);
   EXPECT_LE(bench.line.now(), 300ms);
 }
 
 TEST(CanRead, WhatWasUnderWayBeforeIsNoAnswer) {
-  Read read({}, Read::Way::ask);
+  Talk read({}, "position");
   ByHand by_hand(read);
   EXPECT_EQ(by_hand.next().kind, Step<CanFrame>::Kind::transfer);
   by_hand.receive(encode_position(0x20, 1));  // before the request is out
@@ -72,7 +72,7 @@ TEST(CanRead, WhatWasUnderWayBeforeIsNoAnswer) {
 }
 
 TEST(CanRead, WhatListeningHeardBeforeItBeganIsOld) {
-  Read read({}, Read::Way::listen);
+  Talk read({}, "listen");
   ByHand by_hand(read);
   EXPECT_EQ(by_hand.next().kind, Step<CanFrame>::Kind::wait);
   by_hand.receive(encode_position(0x20, 2), by_hand.now - 1ms);
@@ -87,7 +87,7 @@ TEST(CanRead, FramesOfOthersAreLeftAside) {
   extended.extended = true;
   CanFrame asked = encode_command(0x20, command::read);
   for (const CanFrame& other : {encode_position(0x21, 5), extended, asked, CanFrame{.id = 0x80}}) {
-    Read read({}, Read::Way::ask);
+    Talk read({}, "position");
     ByHand by_hand(read);
     by_hand.next();
     by_hand.sent();
@@ -105,7 +105,7 @@ TEST(CanRead, BadFramesOfTheNodeAreErrors) {
                                               {remote, Error::bad_framing},
                                               {encode_position(0x20, 1 << 14), Error::out_of_range}};
   for (const auto& [frame, error] : cases) {
-    Read read({}, Read::Way::ask);
+    Talk read({}, "position");
     ByHand by_hand(read);
     by_hand.next();
     by_hand.sent();
@@ -119,13 +119,13 @@ TEST(CanRead, BadFramesOfTheNodeAreErrors) {
 }
 
 TEST(CanRead, DestroyedFramesAreNamed) {
-  Bench bench({}, silent);
+  Bench bench({.cyclic = 0});
   bench.shaft.put(0, 100);
-  bench.add({.positive = 1, .negative = 0}, silent);
+  bench.add({.positive = 1, .negative = 0, .cyclic = 0});
   // Both answer at once, with other data: the second counts the other way.
   bench.raw(encode_command(0x20, command::direction, 0));
   ASSERT_NE(bench.nodes[0]->position(bench.line.now()), bench.nodes[1]->position(bench.line.now()));
-  Read read({}, Read::Way::ask);
+  Talk read({}, "position");
   EXPECT_EQ(bench.run(read).error(), Error::bad_framing);
   EXPECT_NE(read.advice().find("one number"), std::string_view::npos);
 }
@@ -133,7 +133,7 @@ TEST(CanRead, DestroyedFramesAreNamed) {
 TEST(CanCyclic, StartsAndStops) {
   Bench bench;
   for (const std::uint8_t rate : std::to_array<std::uint8_t>({0, 1, 2, 3, 100, 255, 7, 0})) {
-    SetCyclic cyclic({}, rate);
+    Talk cyclic({}, "cyclic", {rate});
     EXPECT_EQ(bench.run(cyclic).error(), Error::none) << int{rate} << cyclic.detail();
     EXPECT_EQ(report(cyclic)["readings_per_s"], rate);
     EXPECT_EQ(report(cyclic)["answered"], 1);
@@ -157,20 +157,20 @@ TEST(CanCyclic, ANodeThatDoesNotObey) {
   } deaf;
   sim::Line<CanFrame> line(LinkKind::can, {.rate = 250'000});
   line.attach(sim::Role::device, deaf);
-  SetCyclic stop({}, 0);
+  Talk stop({}, "stop");
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, stop), 10s));
   EXPECT_EQ(stop.error(), Error::cross_check_failed);
   EXPECT_NE(stop.detail().find("goes on"), std::string_view::npos);
-  SetCyclic other({}, 10);
+  Talk other({}, "cyclic", {10});
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, other), 20s));
   EXPECT_EQ(other.error(), Error::cross_check_failed);
 }
 
 TEST(CanZero, IsZeroAndSendsAgainAsBefore) {
   for (const std::uint8_t rate : std::to_array<std::uint8_t>({0, 1, 10, 200})) {
-    Bench bench({}, {.readings_per_s = rate});
+    Bench bench({.cyclic = rate});
     bench.shaft.put(0, 9799);
-    Zero zero({});
+    Talk zero({}, "zero");
     EXPECT_EQ(bench.run(zero).error(), Error::none) << zero.detail();
     EXPECT_EQ(report(zero)["before"], 9799);
     EXPECT_EQ(report(zero)["after"], 0);
@@ -186,7 +186,7 @@ TEST(CanZero, IsZeroAndSendsAgainAsBefore) {
 
 TEST(CanZero, WritesNothingWhenItIsZero) {
   Bench bench;
-  Zero zero({});
+  Talk zero({}, "zero");
   EXPECT_EQ(bench.run(zero).error(), Error::none);
   EXPECT_EQ(report(zero)["written"], 0);
   EXPECT_EQ(bench.node().wear(), 0u);
@@ -196,7 +196,7 @@ TEST(CanZero, AShaftThatTurns) {
   Bench bench;
   bench.shaft.put(0, 5000);
   bench.shaft.spin(600, bench.line.now());
-  Zero zero({});
+  Talk zero({}, "zero");
   EXPECT_EQ(bench.run(zero).error(), Error::invalid_argument);
   EXPECT_EQ(bench.node().wear(), 0u);
 }
@@ -232,13 +232,13 @@ TEST(CanZero, AnAnswerAloneIsNoZero) {
   // 32 is the answer read as a position: at 21 bits that would be near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
     Stubborn node(counts);
-    Zero zero({.bits = 21});
+    Talk zero({.bits = 21}, "zero");
     EXPECT_EQ(with(node, zero).error(), Error::cross_check_failed);
     EXPECT_NE(zero.detail().find("answered, but"), std::string_view::npos);
     EXPECT_NE(zero.advice().find("command 20"), std::string_view::npos);
   }
   Stubborn silent_node(5000, false);
-  Zero zero({});
+  Talk zero({}, "zero");
   EXPECT_EQ(with(silent_node, zero).error(), Error::cross_check_failed);
   EXPECT_NE(zero.detail().find("did not answer"), std::string_view::npos);
 }
@@ -260,7 +260,7 @@ TEST(CanZero, ALateAnswerIsNoZero) {
     bool late = false;
     CanFrame frame{};
   } node;
-  Zero zero({.bits = 21});
+  Talk zero({.bits = 21}, "zero");
   sim::Line<CanFrame> line(LinkKind::can, {.rate = 250'000});
   line.attach(sim::Role::device, node);
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, zero), 20s));
@@ -270,11 +270,11 @@ TEST(CanZero, ALateAnswerIsNoZero) {
 TEST(CanDirection, IsMirrored) {
   Bench bench;
   bench.shaft.put(0, 1000);
-  SetDirection negative({}, true);
+  Talk negative({}, "direction", {1});
   EXPECT_EQ(bench.run(negative).error(), Error::none) << negative.detail();
   EXPECT_EQ(report(negative)["mirrored"], 1);
   EXPECT_EQ(bench.read(), (1u << 14) - 1000);
-  SetDirection positive({}, false);
+  Talk positive({}, "direction", {0});
   EXPECT_EQ(bench.run(positive).error(), Error::none);
   EXPECT_EQ(bench.read(), 1000u);
   EXPECT_EQ(bench.node().wear(), 2u);
@@ -284,7 +284,7 @@ TEST(CanDirection, IsMirrored) {
 TEST(CanDirection, TheSameOnceMoreWearsTheMemory) {
   Bench bench;
   bench.shaft.put(0, 1000);
-  SetDirection positive({}, false);
+  Talk positive({}, "direction", {0});
   EXPECT_EQ(bench.run(positive).error(), Error::none);
   EXPECT_EQ(report(positive)["mirrored"], 0);
   EXPECT_EQ(bench.node().violation_count(), 1u);  // nobody can know before
@@ -292,7 +292,7 @@ TEST(CanDirection, TheSameOnceMoreWearsTheMemory) {
 
 TEST(CanDirection, NeitherAnswerNorEffect) {
   Stubborn node(1000, false);
-  SetDirection direction({}, true);
+  Talk direction({}, "direction", {1});
   EXPECT_EQ(with(node, direction).error(), Error::timeout);
 }
 
@@ -300,7 +300,7 @@ TEST(CanDirection, OtherValues) {
   const Format format{.positive = 0x10, .negative = 0x11};
   Bench bench(format);
   bench.shaft.put(0, 1000);
-  SetDirection negative(format, true);
+  Talk negative(format, "direction", {1});
   EXPECT_EQ(bench.run(negative).error(), Error::none);
   EXPECT_EQ(report(negative)["value"], 0x11);
   EXPECT_TRUE(bench.node().is_negative());

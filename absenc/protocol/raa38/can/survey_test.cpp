@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/can/survey.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,15 +11,16 @@ using testing::Bench;
 using testing::Fields;
 using testing::report;
 using testing::silent;
+using testing::Talk;
 using Numbers = std::vector<std::int64_t>;
 
 TEST(CanScan, FindsWhoSendsAndWhoOnlyAnswers) {
   Bench bench;
   bench.shaft.put(0, 77);
-  bench.add({.node = 0x01}, silent);
-  bench.add({.node = 0xFF}, {.readings_per_s = 50});
-  bench.add({.bits = 21, .node = 0x30}, silent);
-  Scan scan({});
+  bench.add({.node = 0x01, .cyclic = 0});
+  bench.add({.node = 0xFF, .cyclic = 50});
+  bench.add({.bits = 21, .node = 0x30, .cyclic = 0});
+  Talk scan({}, "scan");
   EXPECT_EQ(bench.run(scan).error(), Error::none);
   const Fields fields = report(scan);
   EXPECT_EQ(fields.every("node"), (Numbers{0x01, 0x20, 0x30, 0xFF}));
@@ -32,25 +32,25 @@ TEST(CanScan, FindsWhoSendsAndWhoOnlyAnswers) {
 
 TEST(CanScan, NobodyThere) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = 250'000});
-  Scan scan({});
+  Talk scan({}, "scan");
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, scan), 10s));
   EXPECT_EQ(scan.error(), Error::timeout);
 }
 
 TEST(CanScan, TwoNodesWithOneNumber) {
-  Bench bench({}, silent);
+  Bench bench({.cyclic = 0});
   bench.shaft.put(0, 100);
-  bench.add({.positive = 1, .negative = 0}, silent);
+  bench.add({.positive = 1, .negative = 0, .cyclic = 0});
   bench.raw(encode_command(0x20, command::direction, 0));  // now they differ
-  bench.add({.node = 0x21}, silent);
-  Scan scan({});
+  bench.add({.node = 0x21, .cyclic = 0});
+  Talk scan({}, "scan");
   EXPECT_EQ(bench.run(scan).error(), Error::none);
   EXPECT_EQ(report(scan).every("node"), (Numbers{0x20, 0x21}));
   EXPECT_EQ(report(scan).every("clash"), (Numbers{1, 0}));
 }
 
 TEST(CanScan, AWrongBitRateIsNotManyClashes) {
-  Bench bench({}, {.readings_per_s = 255});
+  Bench bench({.cyclic = 255});
   sim::Line<CanFrame> line(LinkKind::can, {.rate = 500'000});
   struct Noise final : Machine<CanFrame> {
     void feed(const Event<CanFrame>&) override {}
@@ -67,7 +67,7 @@ TEST(CanScan, AWrongBitRateIsNotManyClashes) {
     Time at = 1ms;
   } noise;
   line.attach(sim::Role::device, noise);
-  Scan scan({});
+  Talk scan({}, "scan");
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, scan), 10s));
   EXPECT_EQ(scan.error(), Error::bad_framing);
   EXPECT_NE(scan.advice().find("bit rate"), std::string_view::npos);
@@ -75,27 +75,27 @@ TEST(CanScan, AWrongBitRateIsNotManyClashes) {
 
 TEST(CanFindNode, TheOnlyOneOrTheOneThatIsMeant) {
   Bench bench({.node = 0x55});
-  FindNode only({});
+  Talk only({}, "node");
   EXPECT_EQ(report(bench.run(only))["node"], 0x55);
-  bench.add({.node = 0x56}, silent);
-  FindNode meant({.node = 0x56});
+  bench.add({.node = 0x56, .cyclic = 0});
+  Talk meant({.node = 0x56}, "node");
   EXPECT_EQ(report(bench.run(meant))["node"], 0x56);
-  FindNode neither({});
+  Talk neither({}, "node");
   EXPECT_EQ(bench.run(neither).error(), Error::unexpected_reply);
 }
 
 TEST(CanFindNode, WhatItSendsByItselfIsNoSecondAnswer) {
-  const Format format{.node = 1};
-  Bench bench(format, {.readings_per_s = 50});
-  FindNode find(format);
+  const Format format{.node = 1, .cyclic = 50};
+  Bench bench(format);
+  Talk find(format, "node");
   EXPECT_EQ(bench.run(find).error(), Error::none) << find.detail();
   EXPECT_EQ(report(find)["node"], 1);
 }
 
 TEST(CanSetNode, AnswersUnderTheNewNumber) {
   for (const std::uint32_t id : {0x7E5u, 0x7E4u}) {
-    Bench bench({}, {.configuration_answer = id});
-    SetNode set({}, 0x42, false);
+    Bench bench({.answers_on_7e4 = id == 0x7E4});
+    Talk set({}, "set-node", {0x42});
     EXPECT_EQ(bench.run(set).error(), Error::none) << set.detail();
     EXPECT_EQ(report(set)["node"], 0x42);
     EXPECT_EQ(report(set)["answered"], 1);
@@ -107,11 +107,11 @@ TEST(CanSetNode, AnswersUnderTheNewNumber) {
 
 TEST(CanSetNode, WritesNothingTwice) {
   Bench bench;
-  SetNode again({}, 0x20, false);
+  Talk again({}, "set-node", {0x20});
   EXPECT_EQ(bench.run(again).error(), Error::none);
   EXPECT_EQ(report(again)["written"], 0);
   EXPECT_EQ(bench.node().wear(), 0u);
-  SetNode forced({}, 0x20, true);
+  Talk forced({}, "set-node", {0x20, 1});
   EXPECT_EQ(bench.run(forced).error(), Error::none) << forced.detail();
   EXPECT_EQ(report(forced)["written"], 1);
   EXPECT_EQ(bench.node().wear(), 1u);
@@ -120,11 +120,11 @@ TEST(CanSetNode, WritesNothingTwice) {
 
 TEST(CanSetNode, NotWithOthersOnTheBus) {
   Bench bench;
-  VirtualNode& other = bench.add({.node = 0x21}, silent);
-  SetNode set({}, 0x42, false);
+  VirtualNode& other = bench.add({.node = 0x21, .cyclic = 0});
+  Talk set({}, "set-node", {0x42});
   EXPECT_EQ(bench.run(set).error(), Error::invalid_argument);
   EXPECT_NE(set.advice().find("7E5"), std::string_view::npos);
-  SetNode absent({.node = 0x77}, 0x42, false);
+  Talk absent({.node = 0x77}, "set-node", {0x42});
   EXPECT_EQ(bench.run(absent).error(), Error::unexpected_reply);
   EXPECT_EQ(bench.node().wear() + other.wear(), 0u);
 }
@@ -166,13 +166,13 @@ Conversation& with(Scripted& node, Conversation& conversation) {
 
 TEST(CanSetNode, Refused) {
   Scripted node(encode_configuration_answer(0x7E4, configuration::node, 1));
-  SetNode set({}, 0x42, false);
+  Talk set({}, "set-node", {0x42});
   EXPECT_EQ(with(node, set).error(), Error::request_rejected);
 }
 
 TEST(CanSetNode, AnAnswerAloneIsNoNumber) {
   Scripted node(encode_configuration_answer(0x7E5, configuration::node, 0));
-  SetNode set({}, 0x42, false);
+  Talk set({}, "set-node", {0x42});
   EXPECT_EQ(with(node, set).error(), Error::cross_check_failed);
   EXPECT_NE(set.detail().find("keeps its old number"), std::string_view::npos);
   Fields left;
@@ -184,7 +184,7 @@ TEST(CanSetNode, GoneAfterwards) {
   Scripted node({});
   node.has_answer = false;
   node.dies = true;
-  SetNode set({}, 0x42, false);
+  Talk set({}, "set-node", {0x42});
   EXPECT_EQ(with(node, set).error(), Error::timeout);
   EXPECT_NE(set.detail().find("neither"), std::string_view::npos);
 }
@@ -192,18 +192,18 @@ TEST(CanSetNode, GoneAfterwards) {
 TEST(CanSetRate, IsFollowed) {
   Bench bench;
   bench.shaft.put(0, 321);
-  SetRate set({}, 1'000'000, false);
+  Talk set({}, "bitrate", {1'000'000});
   EXPECT_EQ(bench.run(set).error(), Error::none) << set.detail();
   EXPECT_EQ(report(set)["bit_rate"], 1'000'000);
   EXPECT_EQ(bench.node().rate(), 1'000'000u);
   EXPECT_EQ(bench.node().violation_count(), 0u);
-  Read before({}, Read::Way::ask);  // still at 250 kbit/s
+  Talk before({}, "position");  // still at 250 kbit/s
   EXPECT_NE(bench.run(before).error(), Error::none);
 }
 
 TEST(CanSetRate, WritesNothingTwice) {
   Bench bench;
-  SetRate set({}, 250'000, false);
+  Talk set({}, "bitrate", {250'000});
   EXPECT_EQ(bench.run(set).error(), Error::none);
   EXPECT_EQ(report(set)["written"], 0);
   EXPECT_EQ(bench.node().wear(), 0u);
@@ -211,7 +211,7 @@ TEST(CanSetRate, WritesNothingTwice) {
 
 TEST(CanSetRate, OnlyThoseOfTheDocument) {
   Bench bench;
-  SetRate set({}, 125'000, false);
+  Talk set({}, "bitrate", {125'000});
   EXPECT_EQ(bench.run(set).error(), Error::invalid_argument);
   EXPECT_NE(set.advice().find("500000"), std::string_view::npos);
   EXPECT_EQ(bench.node().answered(), 0u);
@@ -219,12 +219,12 @@ TEST(CanSetRate, OnlyThoseOfTheDocument) {
 
 TEST(CanSetRate, GoesBackWhenTheNodeDoesNot) {
   Scripted node(encode_configuration_answer(0x7E5, configuration::rate, 0));
-  SetRate set({}, 500'000, false);
+  Talk set({}, "bitrate", {500'000});
   EXPECT_EQ(with(node, set).error(), Error::cross_check_failed);
   EXPECT_NE(set.detail().find("keeps its old bit rate"), std::string_view::npos);
   Scripted gone(encode_configuration_answer(0x7E5, configuration::rate, 0));
   gone.dies = true;
-  SetRate lost({}, 500'000, false);
+  Talk lost({}, "bitrate", {500'000});
   EXPECT_EQ(with(gone, lost).error(), Error::timeout);
 }
 

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "absenc/protocol/raa38/modbus/device.hpp"
-#include "absenc/protocol/raa38/modbus/settings.hpp"
+#include "absenc/protocol/raa38/modbus/options.hpp"
+#include "absenc/protocol/raa38/talk_test.hpp"
+#include "absenc/protocol/raa38/unit.hpp"
 #include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/line.hpp"
 
@@ -17,9 +19,21 @@ using PowerOn = Device<std::uint8_t>::PowerOn;
 /// The top 21 bits of a turn: what the finest of these encoders sees.
 using TestShaft = sim::testing::TestShaft<21>;
 
+[[nodiscard]] inline Options options_of(const Format& format) {
+  Options options;
+  options.values = {format.address, format.bits, format.registers, static_cast<std::int64_t>(format.baud),
+                    static_cast<std::int64_t>(format.data)};
+  return options;
+}
+
+/// A command of an encoder of this format.
+struct Talk final : raa38::testing::Talk<std::uint8_t> {
+  Talk(const Format& format, std::string_view name, std::vector<std::int64_t> arguments = {})
+      : raa38::testing::Talk<std::uint8_t>(modbus_unit, options_of(format), name, std::move(arguments)) {}
+};
+
 struct Bench {
-  explicit Bench(const Format& bench_format = {}, Data data = Data::four_bytes)
-      : format(bench_format), encoder(bench_format, shaft, data) {
+  explicit Bench(const Format& bench_format = {}) : format(bench_format), encoder(bench_format, shaft) {
     put_on_line(encoder);
   }
 

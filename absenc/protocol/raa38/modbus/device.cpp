@@ -23,8 +23,8 @@ constexpr bool is_address(std::uint8_t address) {
 
 }  // namespace
 
-VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft, Data data)
-    : Server(format.line()), format_(format), shaft_(&shaft), data_(data) {
+VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
+    : Server(format.line()), format_(format), shaft_(&shaft) {
   memory_[address_at] = format.address;
   memory_[baud_at] = static_cast<std::uint8_t>(format.baud);
 }
@@ -88,8 +88,8 @@ void VirtualEncoder::read(Bytes body, Time at, FrameBytes& reply) {
 
 void VirtualEncoder::append_position(std::uint16_t registers, Time at, FrameBytes& reply) const {
   unsigned size = 2u * registers;
-  if (registers == 2 && data_ != Data::four_bytes) size = 3;
-  const bool counted_as_four = registers == 2 && data_ != Data::three_bytes;
+  if (registers == 2 && format_.data != Data::four_bytes) size = 3;
+  const bool counted_as_four = registers == 2 && format_.data != Data::three_bytes;
   reply.push_back(address());
   reply.push_back(function::read);
   reply.push_back(static_cast<std::uint8_t>(counted_as_four ? 4 : size));

@@ -12,17 +12,10 @@
 
 namespace absenc::raa38::rtu {
 
-/// How a reply to a request of two registers looks; the document has all three.
-enum class Data : std::uint8_t {
-  four_bytes,     // byte count 04
-  three_bytes,    // byte count 03
-  three_as_four,  // byte count 04, three bytes
-};
-
 class VirtualEncoder final : public modbus::Server {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
-  VirtualEncoder(const Format& format, const Shaft& shaft, Data data = Data::four_bytes);
+  VirtualEncoder(const Format& format, const Shaft& shaft);
 
   void raise_alarms(std::uint32_t) override {}
   void lower_alarms(std::uint32_t) override {}
@@ -55,7 +48,6 @@ class VirtualEncoder final : public modbus::Server {
 
   Format format_;
   const Shaft* shaft_;
-  Data data_;
   std::array<std::uint8_t, writes_at + 4> memory_{};
   std::uint32_t memory_version_ = 0;
   std::uint32_t recent_settings_ = 0;  // within a minute

@@ -8,6 +8,7 @@ namespace {
 
 using testing::Bench;
 using testing::PowerOn;
+using testing::Talk;
 using Wire = std::vector<std::uint8_t>;
 
 // The frame without its CRC, which must be good.
@@ -49,10 +50,10 @@ TEST(Raa38ModbusDevice, APartOfThePositionIsNotGiven) {
 }
 
 TEST(Raa38ModbusDevice, AllFormsOfTheManual) {
-  Bench three({.bits = 21}, Data::three_bytes);
+  Bench three({.bits = 21, .data = Data::three_bytes});
   three.put_shaft(0x1FABCD);
   EXPECT_EQ(body(three.raw_body({1, 3, 0, 0, 0, 2})), (Wire{1, 3, 3, 0x1F, 0xAB, 0xCD}));
-  Bench short_of_one({.bits = 21}, Data::three_as_four);
+  Bench short_of_one({.bits = 21, .data = Data::three_as_four});
   short_of_one.put_shaft(0x1FABCD);
   EXPECT_EQ(body(short_of_one.raw_body({1, 3, 0, 0, 0, 2})), (Wire{1, 3, 4, 0x1F, 0xAB, 0xCD}));
 }
@@ -96,7 +97,7 @@ TEST(Raa38ModbusDevice, ABaudRateHoldsFromTheReplyOn) {
     EXPECT_EQ(body(bench.raw_body({1, 0xCC, baud_parameters[i]})), (Wire{1, 0xCC, baud_parameters[i]}));
     EXPECT_EQ(bench.encoder.baud(), bauds[i]);
     EXPECT_TRUE(bench.raw_body({1, 3, 0, 0, 0, 1}).empty()) << "it listens at " << bauds[i];
-    ReadPosition read({.baud = i});
+    Talk read({.baud = i}, "position");
     struct At final : Machine<std::uint8_t> {
       At(Machine<std::uint8_t>& inner, LineSettings line) : inner_(inner), line_(line) {}
       void feed(const Event<std::uint8_t>& event) override { inner_.feed(event); }

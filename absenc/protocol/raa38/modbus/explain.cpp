@@ -30,6 +30,7 @@ Explanation explain_length(const Request& request) {
 }
 
 Explanation explain_other(const Request& request, Bytes reply) {
+  if (reply.size() < modbus::shortest_frame) return {};
   if (reply[1] != request.function) {
     return {"it answers another function than was asked for", "check that no other program uses the line"};
   }
@@ -56,7 +57,7 @@ Explanation explain(const Request& request, Error error, Bytes reply) {
     case Error::unexpected_reply:
       return explain_other(request, reply);
     case Error::request_rejected:
-      return modbus::explain_refusal(reply[2]);
+      return reply.size() < modbus::shortest_frame ? Explanation{} : modbus::explain_refusal(reply[2]);
     case Error::unsupported:
       return {"the position is read from register 0 on, one register or two", {}};
     case Error::out_of_range:

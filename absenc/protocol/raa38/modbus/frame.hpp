@@ -48,11 +48,19 @@ inline constexpr std::size_t baud_at_shipping = 3;
 
 inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
 
+/// How a virtual encoder's reply to a request of two registers looks; the document has all three.
+enum class Data : std::uint8_t {
+  four_bytes,     // byte count 04
+  three_bytes,    // byte count 03
+  three_as_four,  // byte count 04, three bytes
+};
+
 struct Format {
   std::uint8_t address = 1;
   unsigned bits = 14;      // 10 to 21
   unsigned registers = 0;  // to ask for: 1, 2; 0: as many as the bits need
   std::size_t baud = baud_at_shipping;
+  Data data = Data::four_bytes;
 
   [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
@@ -119,7 +127,19 @@ struct Reply {
   std::uint32_t singleturn = 0;  // read
   std::uint8_t value = 0;        // set_parameter
   CrcOrder order = CrcOrder::low_first;
+  std::size_t doubtful_size = 0;  // of a reading whose length the CRC cannot vouch for
 };
+
+/// Whether a good reply to a reading would also be good with its last byte lost, or with a 00 behind it: then the CRC
+/// does not tell whether it has three bytes of data or four.
+[[nodiscard]] constexpr bool length_is_doubtful(Bytes reply) {
+  return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
+}
+
+/// Whether a second reply leaves the first one's length in doubt.
+[[nodiscard]] constexpr bool differ_doubtfully(const Reply& first, const Reply& second) {
+  return second.doubtful_size != 0 && second.doubtful_size != first.doubtful_size;
+}
 
 namespace detail {
 
@@ -180,6 +200,7 @@ constexpr Error check_header(const Request& request, Bytes reply) {
     const Bytes data = bytes.subspan(3, bytes.size() - 3 - modbus::crc_size);
     for (const std::uint8_t byte : data) reply.singleturn = reply.singleturn << 8 | byte;
     if (reply.singleturn >> format.bits != 0) return Error::out_of_range;
+    if (length_is_doubtful(bytes)) reply.doubtful_size = bytes.size();
   } else if (request.function == function::ask_address) {
     reply.address = bytes[2];
     if (reply.address < modbus::first_address || reply.address > modbus::last_address) return Error::out_of_range;
@@ -207,12 +228,6 @@ constexpr Error check_header(const Request& request, Bytes reply) {
   if (begun.size() > 1 && begun[1] == (function::read | modbus::refusal_bit)) return 5;
   if (request.registers != 2) return 5u + 2u * request.registers;
   return begun.size() > 2 && begun[2] == 3 ? 8 : 9;
-}
-
-/// Whether a good reply to a reading would also be good with its last byte lost, or with a 00 behind it: then the CRC
-/// does not tell whether it has three bytes of data or four.
-[[nodiscard]] constexpr bool length_is_doubtful(Bytes reply) {
-  return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
 }
 
 }  // namespace absenc::raa38::rtu

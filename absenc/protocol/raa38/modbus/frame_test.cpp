@@ -172,8 +172,8 @@ TEST(Raa38ModbusProbe, FramesTellRegistersAndHowManyBitsAtLeast) {
   Evidence evidence;
   const std::vector<Capture> captures{{{}, hex<"010304001fabcd7550">}};
   ASSERT_TRUE(modbus_unit.probe(options, captures, evidence));
-  EXPECT_EQ(options[option_bits], 21);
-  EXPECT_EQ(to_format(options).asked(), 2u);
+  EXPECT_EQ(rtu::options.format(options).bits, 21u);
+  EXPECT_EQ(rtu::options.format(options).asked(), 2u);
   EXPECT_EQ(evidence.possible.size(), 3u);  // 21 bits; auto and 2 registers
 }
 

@@ -6,13 +6,13 @@
 
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/raa38/modbus/bench_test.hpp"
-#include "absenc/protocol/raa38/modbus/fields.hpp"
 
 namespace absenc::raa38::rtu {
 namespace {
 
 using testing::Bench;
 using testing::PowerOn;
+using testing::Talk;
 using Wire = std::vector<std::uint8_t>;
 
 constexpr Format fine{.bits = 21};
@@ -71,7 +71,7 @@ TEST(Raa38ModbusHost, ReadsEveryResolutionAtEveryBaudRate) {
       Bench bench({.bits = bits, .baud = baud});
       const auto position = static_cast<std::uint32_t>(0x155555 & low_mask(bits));
       bench.put_shaft(position);
-      ReadPosition read(bench.format);
+      Talk read(bench.format, "position");
       ASSERT_EQ(bench.run(read).error(), Error::none) << bits << " bits, " << bauds[baud] << " baud";
       EXPECT_EQ(read.reading()->singleturn, position);
       EXPECT_EQ(read.reading()->singleturn_bits, bits);
@@ -84,10 +84,10 @@ TEST(Raa38ModbusHost, ReadsEveryResolutionAtEveryBaudRate) {
 TEST(Raa38ModbusHost, ReadsEveryForm) {
   for (const Data data : {Data::four_bytes, Data::three_bytes, Data::three_as_four}) {
     for (const unsigned bits : {14u, 21u}) {
-      Bench bench({.bits = bits, .registers = 2}, data);
+      Bench bench({.bits = bits, .registers = 2, .data = data});
       for (const std::int64_t position : {0, 1, 383, 0x3FFF}) {
         bench.put_shaft(position);
-        ReadPosition read(bench.format);
+        Talk read(bench.format, "position");
         ASSERT_EQ(bench.run(read).error(), Error::none) << static_cast<int>(data) << " " << position;
         EXPECT_EQ(read.reading()->singleturn, static_cast<std::uint64_t>(position));
       }
@@ -97,7 +97,7 @@ TEST(Raa38ModbusHost, ReadsEveryForm) {
 }
 
 TEST(Raa38ModbusHost, OneRegisterDoesNotHold17Bits) {
-  ReadPosition read({.bits = 17, .registers = 1});
+  Talk read({.bits = 17, .registers = 1}, "position");
   EXPECT_EQ(read.next(Time{}).kind, Step<std::uint8_t>::Kind::done);
   EXPECT_EQ(read.error(), Error::invalid_argument);
   EXPECT_TRUE(says(read.detail(), "16 bits"));
@@ -116,15 +116,15 @@ TEST(Raa38ModbusHost, AReplyThatLostItsLastByteIsNotAPosition) {
   const Wire cut(whole.begin(), whole.end() - 1);
   EXPECT_TRUE(decode_reply(fine, read_request(fine), cut)) << "the trap is there";
 
-  ReadPosition read(fine);
+  Talk read(fine, "position");
   EXPECT_EQ(converse(read, [&](Bytes, unsigned before) { return before == 0 ? cut : whole; }), 2u);
   EXPECT_EQ(read.error(), Error::wrong_length);
-  ReadPosition moved(fine);
+  Talk moved(fine, "position");
   const Wire unambiguous = framed({1, 3, 4, 0, 0x1F, 0xAB, 0xCD});
   EXPECT_EQ(converse(moved, [&](Bytes, unsigned before) { return before == 0 ? cut : unambiguous; }), 2u);
   EXPECT_EQ(moved.error(), Error::none);
   EXPECT_EQ(moved.reading()->singleturn, 0x1FABCDu);
-  ReadPosition twice(fine);
+  Talk twice(fine, "position");
   EXPECT_EQ(converse(twice, [&](Bytes, unsigned) { return whole; }), 2u);
   EXPECT_EQ(twice.error(), Error::none);
   EXPECT_EQ(twice.reading()->singleturn, right);
@@ -147,7 +147,7 @@ TEST(Raa38ModbusHost, EachBadReplyHasItsWords) {
       {{0x01}, Error::wrong_length, "one register"},
   };
   for (const Case& one : cases) {
-    ReadPosition read({});
+    Talk read({}, "position");
     converse(read, [&](Bytes, unsigned) { return one.reply; });
     EXPECT_EQ(text_of(read.error()).name, text_of(one.error).name);
     EXPECT_TRUE(says(read.detail(), one.found)) << read.detail();
@@ -172,17 +172,19 @@ std::string report(const Conversation<std::uint8_t>& conversation) {
   return collector.text;
 }
 
+bool written(const Talk& talk) { return says(report(talk), "written=1"); }
+
 TEST(Raa38ModbusHost, TheAddressIsAskedOfWhoeverIsThere) {
   Bench bench({.address = 42});
-  ReadAddress read({});
+  Talk read({}, "address");
   EXPECT_EQ(bench.run(read).error(), Error::none);
   EXPECT_EQ(report(read), "address=42 ");
   VirtualEncoder other({.address = 200}, bench.shaft);
   bench.put_on_line(other);
-  ReadAddress named({.address = 200});
+  Talk named({.address = 200}, "address");
   EXPECT_EQ(bench.run(named).error(), Error::none);
   EXPECT_EQ(report(named), "address=200 ");
-  ReadAddress nobody({.address = 7});
+  Talk nobody({.address = 7}, "address");
   EXPECT_EQ(bench.run(nobody).error(), Error::timeout);
   EXPECT_EQ(report(nobody), "");
 }
@@ -195,22 +197,22 @@ TEST(Raa38ModbusHost, TheBaudRateIsFound) {
       bench.encoder.power_on(bench.line.now(), PowerOn::skip);
       bench.line.wake(0);
       ASSERT_EQ(bench.encoder.baud(), bauds[set]);
-      FindBaud find({.baud = told});
+      Talk find({.baud = told}, "baud");
       EXPECT_EQ(bench.run(find).error(), Error::none) << bauds[set] << " told " << bauds[told];
       EXPECT_EQ(report(find), "baud=" + std::to_string(bauds[set]) + " ");
     }
   }
   Bench bench;
-  FindBaud nobody({.address = 2});
+  Talk nobody({.address = 2}, "baud");
   EXPECT_EQ(bench.run(nobody).error(), Error::timeout);
   EXPECT_TRUE(says(nobody.detail(), "any of the five"));
-  ReadPosition as_before({});
+  Talk as_before({}, "position");
   EXPECT_EQ(bench.run(as_before).error(), Error::none) << "the line is as it was";
 }
 
 TEST(Raa38ModbusHost, ScanFindsASingleOneByAskingAll) {
   Bench bench({.address = 99});
-  Scan scan({}, 1, 247);
+  Talk scan({}, "scan", {1, 247});
   const Time start = bench.line.now();
   EXPECT_EQ(bench.run(scan).error(), Error::none);
   EXPECT_EQ(report(scan), "encoder_address=99 clash=0 ");
@@ -225,17 +227,17 @@ TEST(Raa38ModbusHost, ScanAsksEveryAddressOfALine) {
   VirtualEncoder other_kind({.address = 100, .bits = 18}, bench.shaft);
   for (VirtualEncoder* another : {&same, &as_same, &last, &other_kind}) bench.put_on_line(*another);
   bench.put_shaft(0x1234);
-  Scan scan({}, 1, 247);
+  Talk scan({}, "scan", {1, 247});
   EXPECT_EQ(bench.run(scan).error(), Error::none);
   EXPECT_EQ(report(scan),
             "encoder_address=3 clash=0 encoder_address=20 clash=1 encoder_address=100 clash=0 refuses=1 "
             "encoder_address=247 clash=0 ");
-  Scan part({}, 3, 19);
+  Talk part({}, "scan", {3, 19});
   bench.run(part);
   EXPECT_EQ(report(part), "encoder_address=3 clash=0 ");
-  Scan empty({}, 4, 19);
+  Talk empty({}, "scan", {4, 19});
   EXPECT_EQ(bench.run(empty).error(), Error::timeout);
-  Scan turned({}, 5, 4);
+  Talk turned({}, "scan", {5, 4});
   EXPECT_EQ(turned.error(), Error::invalid_argument);
 }
 
@@ -243,16 +245,16 @@ TEST(Raa38ModbusHost, ScanAsksEveryAddressOfALine) {
 
 TEST(Raa38ModbusSettings, AnAddressIsSetAndAsked) {
   Bench bench;
-  SetAddress set({}, 5);
+  Talk set({}, "set-address", {5});
   EXPECT_EQ(bench.run(set).error(), Error::none);
   EXPECT_EQ(report(set), "address=5 written=1 ");
   EXPECT_EQ(bench.encoder.address(), 5);
-  SetAddress again({.address = 5}, 5);
+  Talk again({.address = 5}, "set-address", {5});
   EXPECT_EQ(bench.run(again).error(), Error::none);
   EXPECT_EQ(report(again), "address=5 written=0 ");
   EXPECT_EQ(bench.encoder.writes(), 1u);
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
-  SetAddress forced({.address = 5}, 5, Wear::accept);
+  Talk forced({.address = 5}, "set-address", {5, 1});
   EXPECT_EQ(bench.run(forced).error(), Error::none);
   EXPECT_EQ(bench.encoder.writes(), 2u);
   EXPECT_EQ(bench.encoder.violation_count(), 1u);
@@ -262,7 +264,7 @@ TEST(Raa38ModbusSettings, AnAddressThatIsTakenIsRefused) {
   Bench bench;
   VirtualEncoder other({.address = 2}, bench.shaft);
   bench.put_on_line(other);
-  SetAddress set({}, 2);
+  Talk set({}, "set-address", {2});
   EXPECT_EQ(bench.run(set).error(), Error::invalid_argument);
   EXPECT_TRUE(says(set.detail(), "already"));
   EXPECT_EQ(bench.encoder.writes() + other.writes(), 0u);
@@ -276,15 +278,15 @@ TEST(Raa38ModbusSettings, AnEncoderThatDoesNotTakeASettingIsFoundOut) {
     if (request[1] == function::set_address) return framed({request[2], request[1]});
     return Wire(request.begin(), request.end());
   };
-  SetAddress address({}, 2);
+  Talk address({}, "set-address", {2});
   converse(address, deaf_to_settings);
   EXPECT_EQ(address.error(), Error::cross_check_failed);
   EXPECT_TRUE(says(address.detail(), "old address"));
-  SetBaud baud({}, 9600);
+  Talk baud({}, "set-baud", {9600});
   converse(baud, deaf_to_settings);
   EXPECT_EQ(baud.error(), Error::cross_check_failed);
   EXPECT_TRUE(says(baud.detail(), "old baud rate"));
-  Zero zero({}, Wear::accept);
+  Talk zero({}, "zero", {1});
   converse(zero, [&](Bytes request, unsigned before) {
     return request[1] == function::read ? framed({1, 3, 2, 0x10, 0}) : deaf_to_settings(request, before);
   });
@@ -299,8 +301,8 @@ TEST(Raa38ModbusSettings, ASettingIsSentOnceWhateverComes) {
       if (request[1] == code) ++sent;
       return sent == 0 && request[0] == 1 && request[1] == function::read ? position_of_1 : Wire{};
     };
-    SetAddress address({}, 2);
-    SetBaud baud({}, 57'600);
+    Talk address({}, "set-address", {2});
+    Talk baud({}, "set-baud", {57'600});
     if (code == function::set_address) {
       converse(address, dies);
       EXPECT_EQ(address.error(), Error::timeout);
@@ -315,7 +317,7 @@ TEST(Raa38ModbusSettings, ASettingIsSentOnceWhateverComes) {
 }
 
 TEST(Raa38ModbusSettings, ARefusedAddressIsToldInWords) {
-  SetAddress set({}, 2);
+  Talk set({}, "set-address", {2});
   converse(set, [](Bytes request, unsigned) {
     if (request[1] == function::set_address) return framed({1, 0xA1, 1});
     return request[0] == 1 ? position_of_1 : Wire{};
@@ -326,7 +328,7 @@ TEST(Raa38ModbusSettings, ARefusedAddressIsToldInWords) {
 
 TEST(Raa38ModbusSettings, ALostReplyIsNoLostSetting) {
   Bench bench;
-  SetAddress set({}, 2);
+  Talk set({}, "set-address", {2});
   bool lost = false;
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   std::uint8_t address = 1;
@@ -346,46 +348,46 @@ TEST(Raa38ModbusSettings, ABaudRateIsFollowed) {
   for (std::size_t from = 0; from < bauds.size(); ++from) {
     for (std::size_t to = 0; to < bauds.size(); ++to) {
       Bench bench({.baud = from});
-      SetBaud set({.baud = from}, bauds[to]);
+      Talk set({.baud = from}, "set-baud", {bauds[to]});
       EXPECT_EQ(bench.run(set).error(), Error::none) << bauds[from] << " to " << bauds[to];
-      EXPECT_EQ(set.written(), from != to);
+      EXPECT_EQ(written(set), from != to);
       EXPECT_EQ(bench.encoder.baud(), bauds[to]);
-      ReadPosition read({.baud = to});
+      Talk read({.baud = to}, "position");
       EXPECT_EQ(bench.run(read).error(), Error::none) << "the line goes on at the new rate";
       EXPECT_EQ(bench.encoder.violation_count(), 0u);
     }
   }
-  SetBaud unknown({}, 38'400);
+  Talk unknown({}, "set-baud", {38'400});
   EXPECT_EQ(unknown.error(), Error::invalid_argument);
   EXPECT_TRUE(says(unknown.advice(), "57600"));
 }
 
 TEST(Raa38ModbusSettings, APortThatCannotChangeItsRateSaysSoBeforeTheEncoderDoes) {
-  SetBaud set({}, 9600);
+  Talk set({}, "set-baud", {9600});
   EXPECT_EQ(set.next(Time{}).kind, Step<std::uint8_t>::Kind::configure);
 }
 
 TEST(Raa38ModbusSettings, ADirectionShowsInThePosition) {
   Bench bench;
   bench.put_shaft(383);
-  SetDirection backwards({}, parameter::negative);
+  Talk backwards({}, "set-direction", {parameter::negative});
   EXPECT_EQ(bench.run(backwards).error(), Error::none);
   EXPECT_TRUE(says(report(backwards), "direction has changed")) << report(backwards);
   EXPECT_TRUE(bench.encoder.counts_backwards());
-  SetDirection once_more({}, parameter::negative);
+  Talk once_more({}, "set-direction", {parameter::negative});
   EXPECT_EQ(bench.run(once_more).error(), Error::none);
   EXPECT_TRUE(says(report(once_more), "counted so already"));
   bench.shaft.spin(60, bench.line.now());
-  SetDirection turning({}, parameter::positive);
+  Talk turning({}, "set-direction", {parameter::positive});
   EXPECT_EQ(bench.run(turning).error(), Error::none);
   EXPECT_TRUE(says(report(turning), "neither")) << report(turning);
-  ReadDirection read({});
+  Talk read({}, "direction");
   EXPECT_EQ(bench.run(read).error(), Error::none);
   EXPECT_TRUE(says(report(read), "does not tell"));
 }
 
 TEST(Raa38ModbusSettings, ADirectionWithoutItsEchoIsNotKnown) {
-  SetDirection set({}, parameter::positive);
+  Talk set({}, "set-direction", {parameter::positive});
   converse(set, [](Bytes request, unsigned) { return request[1] == function::read ? position_of_1 : Wire{}; });
   EXPECT_EQ(set.error(), Error::timeout);
   EXPECT_TRUE(says(set.detail(), "nothing else tells"));
@@ -394,16 +396,16 @@ TEST(Raa38ModbusSettings, ADirectionWithoutItsEchoIsNotKnown) {
 TEST(Raa38ModbusSettings, ZeroIsHere) {
   Bench bench;
   bench.put_shaft(5000);
-  Zero zero({});
+  Talk zero({}, "zero");
   EXPECT_EQ(bench.run(zero).error(), Error::none);
   EXPECT_EQ(zero.reading()->singleturn, 0u);
-  EXPECT_TRUE(zero.written());
-  Zero again({});
+  EXPECT_TRUE(written(zero));
+  Talk again({}, "zero");
   EXPECT_EQ(bench.run(again).error(), Error::none);
-  EXPECT_FALSE(again.written());
+  EXPECT_FALSE(written(again));
   EXPECT_EQ(bench.encoder.writes(), 1u);
   bench.shaft.spin(60, bench.line.now());
-  Zero turning({});
+  Talk turning({}, "zero");
   EXPECT_EQ(bench.run(turning).error(), Error::invalid_argument);
   EXPECT_TRUE(says(turning.detail(), "turning"));
   EXPECT_EQ(bench.encoder.writes(), 1u);
@@ -412,10 +414,10 @@ TEST(Raa38ModbusSettings, ZeroIsHere) {
 
 TEST(Raa38ModbusSettings, NothingIsSentToAnEncoderThatIsNotThere) {
   Bench bench({.address = 9});
-  SetAddress address({}, 2);
-  SetBaud baud({}, 9600);
-  SetDirection direction({}, parameter::positive);
-  Zero zero({});
+  Talk address({}, "set-address", {2});
+  Talk baud({}, "set-baud", {9600});
+  Talk direction({}, "set-direction", {parameter::positive});
+  Talk zero({}, "zero");
   EXPECT_EQ(bench.run(address).error(), Error::timeout);
   EXPECT_EQ(bench.run(baud).error(), Error::timeout);
   EXPECT_EQ(bench.run(direction).error(), Error::timeout);

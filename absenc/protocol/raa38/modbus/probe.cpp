@@ -87,16 +87,18 @@ bool judge(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int6
 }  // namespace
 
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
-  const Option& bits = options[option_bits];
-  const bool bits_found =
-      judge(sink, option_bits, bits.minimum, bits.maximum, values.values[option_bits],
-            [&](std::int64_t value) { return against_bits(captures, static_cast<unsigned>(value)); });
-  const bool registers_found = judge(sink, option_registers, 0, 2, values.values[option_registers],
-                                     [&](std::int64_t value) -> std::optional<Contradiction> {
-                                       Format format = to_format(values);
-                                       format.registers = static_cast<unsigned>(value);
-                                       return against_registers(captures, format);
-                                     });
+  constexpr std::size_t bits = options.find("bits");
+  constexpr std::size_t registers = options.find("registers");
+  const Option& range = options.infos[bits];
+  const bool bits_found = judge(sink, bits, range.minimum, range.maximum, values.values[bits], [&](std::int64_t value) {
+    return against_bits(captures, static_cast<unsigned>(value));
+  });
+  const bool registers_found =
+      judge(sink, registers, 0, 2, values.values[registers], [&](std::int64_t value) -> std::optional<Contradiction> {
+        Format format = options.format(values);
+        format.registers = static_cast<unsigned>(value);
+        return against_registers(captures, format);
+      });
   return bits_found && registers_found;
 }
 

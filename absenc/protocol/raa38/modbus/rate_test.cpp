@@ -16,7 +16,7 @@ TEST(Raa38ModbusRate, AsFastAsTheSilencesAllow) {
     const Time start = bench.line.now();
     constexpr int readings = 200;
     for (int i = 0; i < readings; ++i) {
-      ReadPosition read(format);
+      testing::Talk read(format, "position");
       ASSERT_EQ(bench.run(read).error(), Error::none);
     }
     // Silence, 8 characters, silence, the encoder's time, 7 characters.

@@ -1,24 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
+#include "absenc/protocol/raa38/unit.hpp"
+
 #include <array>
 
-#include "absenc/protocol/make.hpp"
+#include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/raa38/modbus/device.hpp"
 #include "absenc/protocol/raa38/modbus/explain.hpp"
+#include "absenc/protocol/raa38/modbus/fields.hpp"
 #include "absenc/protocol/raa38/modbus/options.hpp"
 #include "absenc/protocol/raa38/modbus/probe.hpp"
-#include "absenc/protocol/raa38/modbus/settings.hpp"
+#include "absenc/protocol/raa38/modbus/procedures.hpp"
 #include "absenc/protocol/raa38/modbus/vectors.hpp"
-#include "absenc/protocol/raa38/unit.hpp"
 
 namespace absenc::raa38 {
 
+namespace rtu {
 namespace {
 
-using namespace rtu;
-
-constexpr std::array<Model, 1> models{{
-    {"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, {}},
-}};
+using author::command;
 
 constexpr Argument force{"force", "1: also what is so already (each time wears the memory)", 0, 1, 0, false};
 constexpr std::array<Argument, 2> address_arguments{
@@ -32,52 +31,34 @@ constexpr std::array<Argument, 2> scan_arguments{
     {{"first", "address to ask", modbus::first_address, modbus::last_address, modbus::first_address, false},
      {"last", "address to ask", modbus::first_address, modbus::last_address, modbus::last_address, false}}};
 
-constexpr std::string_view address = "address";
-constexpr std::string_view baud = "baud";
-constexpr std::string_view direction = "direction";
+// ---- The one request that does the command's work; procedures send more.
 
-constexpr std::array<Command, 9> commands{{
-    {"position", Verb::read, function::read, "position within the turn"},
-    {address, Verb::config_get, function::ask_address, "address of the encoder"},
-    {baud, Verb::config_get, function::read, "the baud rate at which it answers", {}, false, false},
-    {direction, Verb::config_get, function::read, "in which direction it counts: only the position shows it"},
-    {"set-address", Verb::config_set, function::set_address, "give it another address", address_arguments, true, false,
-     address, address},
-    {"set-baud", Verb::config_set, function::set_parameter, "give it another baud rate", baud_arguments, true, false,
-     baud, baud},
-    {"set-direction", Verb::config_set, function::set_parameter, "set in which direction it counts",
-     direction_arguments, true, false, direction},
-    {"zero", Verb::zero, function::set_parameter, "make this the zero of the turn", zero_arguments, true, false},
-    {"scan", Verb::scan, function::ask_address, "who answers on the line", scan_arguments, false, false},
-}};
-
-Error decode_frame(const Options& values, Frame request, Frame reply, FieldSink& sink) {
-  return decode(to_format(values), request.bytes, reply.bytes, sink);
+constexpr Request to_look(const Format& format) { return read_request(format); }
+constexpr Request to_read(const Format& format, Arguments) { return read_request(format); }
+constexpr Request to_ask_address(const Format&, Arguments) {
+  return {.function = function::ask_address, .address = any_address};
 }
-
-// The one frame that does the command's work; procedures send more.
-Result<Request> request_of(const Format& format, const Command& command, Arguments arguments) {
-  Request request = read_request(format);
-  request.function = command.id;
-  if (command.id == function::ask_address) request.address = any_address;
-  if (command.verb == Verb::zero) request.value = parameter::zero;
-  if (command.verb != Verb::config_set) return request;
-  request.value = static_cast<std::uint8_t>(arguments[0]);
-  if (command.reads_back != baud) return request;
+constexpr Request to_set(const Format& format, std::uint8_t code, std::int64_t value) {
+  return {.function = code, .address = format.address, .value = static_cast<std::uint8_t>(value)};
+}
+constexpr Request to_set_address(const Format& format, Arguments arguments) {
+  return to_set(format, function::set_address, arguments[0]);
+}
+constexpr Request to_set_direction(const Format& format, Arguments arguments) {
+  return to_set(format, function::set_parameter, arguments[0]);
+}
+constexpr Request to_set_zero(const Format& format, Arguments) {
+  return to_set(format, function::set_parameter, parameter::zero);
+}
+constexpr Result<Request> to_set_baud(const Format& format, Arguments arguments) {
   const std::optional<std::size_t> index = baud_index(static_cast<std::uint64_t>(arguments[0]));
   if (!index) return Error::invalid_argument;
-  request.value = baud_parameters[*index];
-  return request;
+  return to_set(format, function::set_parameter, baud_parameters[*index]);
 }
 
-Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments, MutableBytes request) {
-  const Result<Request> wanted = request_of(to_format(values), command, arguments);
-  if (!wanted) return wanted.error();
-  const RequestBytes bytes = encode_request(*wanted);
-  if (bytes.size() > request.size()) return Error::buffer_too_small;
-  std::copy_n(bytes.view().begin(), bytes.size(), request.begin());
-  return bytes.size();
-}
+constexpr bool has_too_few_registers(const Format& format) { return format.asked() == 1 && format.bits > 16; }
+
+// ---- Where a frame ends
 
 constexpr bool is_good(Bytes bytes, std::size_t size) {
   return bytes.size() >= size && modbus::crc_order(bytes.first(size)) == CrcOrder::low_first;
@@ -99,7 +80,7 @@ Delimit delimit(const Options& values, Direction way, Bytes bytes) {
   if (!function::is_known(code) && (way == Direction::request || !refusal)) return {Delimit::Kind::no_frame};
   std::size_t length = request_length(code);
   if (way == Direction::reply) {
-    Format format = to_format(values);
+    Format format = options.format(values);
     format.address = bytes[0];
     Request request = read_request(format);
     request.function = refusal ? function::read : code;
@@ -109,72 +90,117 @@ Delimit delimit(const Options& values, Direction way, Bytes bytes) {
   return {bytes.size() < length ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
 }
 
-Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
-                       std::span<std::byte> storage) {
-  const Format format = to_format(values);
-  const auto argument = [arguments](std::size_t i) { return static_cast<std::uint8_t>(arguments[i]); };
-  const auto wear = [&](std::size_t i) { return arguments[i] != 0 ? Wear::accept : Wear::avoid; };
-  switch (command.verb) {
-    case Verb::config_get:
-      if (command.name == address) return make_host<ReadAddress>(storage, format);
-      if (command.name == baud) return make_host<FindBaud>(storage, format);
-      return make_host<ReadDirection>(storage, format);
-    case Verb::config_set:
-      if (command.reads_back == address) return make_host<SetAddress>(storage, format, argument(0), wear(1));
-      if (command.reads_back == direction) return make_host<SetDirection>(storage, format, argument(0));
-      return make_host<SetBaud>(storage, format, static_cast<std::uint32_t>(arguments[0]), wear(1));
-    case Verb::zero:
-      return make_host<Zero>(storage, format, wear(0));
-    case Verb::scan:
-      return make_host<Scan>(storage, format, argument(0), argument(1));
-    default:
-      return make_host<ReadPosition>(storage, format);
+// ---- What is declared
+
+// A position beside other things, as several conversations report it.
+constexpr void put_position(FieldSink& sink, const Format& format, const Reading& reading) {
+  const auto singleturn = static_cast<std::uint32_t>(reading.singleturn);
+  fields.put(sink, {.singleturn = singleturn, .angle = degrees(singleturn, format.bits)});
+  sink.put_reading(reading);
+}
+
+// How each setting is told.
+struct SetAddress : Set {};
+struct SetBaud : Set {};
+struct SetDirection : Set {};
+struct SetZero : Set {};
+
+struct Definition {
+  using Protocol = rtu::Protocol;
+  using Encoder = VirtualEncoder;
+  static constexpr std::string_view id = "raa38-modbus", name = "RAA38S6 over Modbus RTU",
+                                    document = "RAA38S6 Operation Manual, 3.1.7";
+  static constexpr LinkKind link = LinkKind::half_duplex;
+  static constexpr std::size_t frames_size = 1300;
+  static constexpr auto options = rtu::options;
+  static constexpr auto fields = rtu::fields;
+  static constexpr auto vectors = rtu::vectors;
+  static constexpr auto probe = rtu::probe;
+  static constexpr auto delimit = rtu::delimit;
+  static constexpr std::array models{author::ModelText{"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, ""}};
+  // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.
+  static constexpr LineTiming timing{.pause_bits = 25, .turnaround_limit = answer_limit};
+
+  static constexpr Command position{"position", Verb::read, 0, "position within the turn"};
+  static constexpr std::array commands{
+      author::reading<Definition, Protocol, to_look, ReadPosition>(position).or_when(
+          has_too_few_registers, command<Definition, Protocol, Looked, look_once, to_read>(position)),
+      command<Definition, Protocol, Address, ask_address, to_ask_address>(
+          {"address", Verb::config_get, 0, "address of the encoder"}),
+      command<Definition, Protocol, Baud, find_baud, to_read>(
+          {"baud", Verb::config_get, 0, "the baud rate at which it answers", {}, false, false}),
+      command<Definition, Protocol, Seen, look_at_direction, to_read>(
+          {"direction", Verb::config_get, 0, "in which direction it counts: only the position shows it"}),
+      command<Definition, Protocol, SetAddress, set_address, to_set_address>(
+          {"set-address", Verb::config_set, 0, "give it another address", address_arguments, true, false, "address",
+           "address"}),
+      command<Definition, Protocol, SetBaud, set_baud, to_set_baud>(
+          {"set-baud", Verb::config_set, 0, "give it another baud rate", baud_arguments, true, false, "baud", "baud"}),
+      command<Definition, Protocol, SetDirection, set_direction, to_set_direction>(
+          {"set-direction", Verb::config_set, 0, "set in which direction it counts", direction_arguments, true, false,
+           "direction"}),
+      command<Definition, Protocol, SetZero, set_zero, to_set_zero>(
+          {"zero", Verb::zero, 0, "make this the zero of the turn", zero_arguments, true, false}),
+      command<Definition, Protocol, Slaves, scan, to_ask_address>(
+          {"scan", Verb::scan, 0, "who answers on the line", scan_arguments, false, false}),
+  };
+
+  static constexpr LineSettings line(const Format& format) { return format.line(); }
+  static constexpr Resolution resolution(const Format& format) { return {.singleturn_bits = format.bits}; }
+  static constexpr Request guess_request(const Format& format, Bytes reply) { return assumed_request(format, reply); }
+  static Explanation explain(const Format& format, Error error, Bytes asked, Bytes reply) {
+    const Result<Request> request = asked.empty() ? assumed_request(format, reply) : decode_request(asked);
+    return request ? rtu::explain(*request, error, reply) : explain_request(error, asked);
   }
-}
 
-Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-  return make_device<VirtualEncoder>(storage, to_format(values), shaft, static_cast<Data>(values[option_reply_data]));
-}
-
-Resolution resolution(const Options& values) { return {.singleturn_bits = to_format(values).bits}; }
-
-Explanation explain_frame(const Options& values, Error error, Frame request, Frame reply) {
-  const Result<Request> asked =
-      request.bytes.empty() ? assumed_request(to_format(values), reply.bytes) : decode_request(request.bytes);
-  return asked ? explain(*asked, error, reply.bytes) : explain_request(error, request.bytes);
-}
-
-LineSettings settings(const Options& values) { return to_format(values).line(); }
+  static constexpr void put(FieldSink& sink, const Format&, const Request& request) {
+    fields.put(sink, values_of(request));
+  }
+  static constexpr void put(FieldSink& sink, const Format& format, const Request&, const Reply& reply) {
+    fields.put(sink, values_of(format, reply));
+  }
+  static void put(FieldSink& sink, const Format& format, const Looked& found) {
+    put_position(sink, format, found.reading);
+  }
+  static void put(FieldSink& sink, const Format&, const Seen& found) {
+    fields.put(sink,
+               {.singleturn = found.singleturn, .direction = "the encoder does not tell: turn the shaft and see"});
+  }
+  static void put(FieldSink& sink, const Format&, const Address& found) {
+    fields.put(sink, {.address = found.address});
+  }
+  static void put(FieldSink& sink, const Format&, const Baud& found) { fields.put(sink, {.baud = bauds[found.index]}); }
+  static void put(FieldSink& sink, const Format&, const SetAddress& found) {
+    fields.put(sink, {.address = static_cast<std::uint16_t>(found.value), .written = found.written});
+  }
+  static void put(FieldSink& sink, const Format&, const SetBaud& found) {
+    fields.put(sink, {.baud = static_cast<std::uint32_t>(found.value), .written = found.written});
+  }
+  static void put(FieldSink& sink, const Format&, const SetDirection& found) {
+    const auto value = static_cast<std::uint8_t>(found.value);
+    fields.put(
+        sink,
+        {.parameter = value, .setting = name_of_setting(value), .effect = found.effect, .written = found.written});
+  }
+  static void put(FieldSink& sink, const Format& format, const SetZero& found) {
+    put_position(sink, format, found.reading);
+    fields.put(sink, {.written = found.written});
+  }
+  static void put(FieldSink& sink, const Format&, const Slaves& found) {
+    using Kind = Slaves::Kind;
+    for (std::size_t i = 0; i < found.at.size(); ++i) {
+      const Kind kind = found.at[i];
+      if (kind == Kind::none) continue;
+      fields.put(sink, {.encoder_address = static_cast<std::uint16_t>(i),
+                        .clash = kind == Kind::clash,
+                        .refuses = kind == Kind::refuses ? std::optional<bool>(true) : std::nullopt});
+    }
+  }
+};
 
 }  // namespace
+}  // namespace rtu
 
-constinit const Unit modbus_unit{
-    .id = "raa38-modbus",
-    .name = "RAA38S6 over Modbus RTU",
-    .document = "RAA38S6 Operation Manual, 3.1.7",
-    .link = LinkKind::half_duplex,
-    .line = line_settings,
-    .options = options,
-    .models = models,
-    .fields = fields,
-    .commands = commands,
-    .vectors = vectors,
-    .status = nullptr,
-    .alarms = nullptr,
-    .host_storage = std::max({sizeof(ReadPosition), sizeof(ReadAddress), sizeof(FindBaud), sizeof(ReadDirection),
-                              sizeof(Scan), sizeof(SetAddress), sizeof(SetBaud), sizeof(SetDirection), sizeof(Zero)}),
-    .device_storage = sizeof(VirtualEncoder),
-    .decode = decode_frame,
-    .encode = encode,
-    .delimit = delimit,
-    .host = host,
-    .device = device,
-    .resolution = resolution,
-    .explain = explain_frame,
-    .settings = settings,
-    .probe = probe,
-    // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.
-    .timing = {.pause_bits = 25, .turnaround_limit = answer_limit},
-};
+constinit const Unit modbus_unit = author::UnitOf<rtu::Definition>::make();
 
 }  // namespace absenc::raa38

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Modbus RTU frames of the RAA38S6 with their source. Each is decoded at compile time: a broken frame does not build.
+// Modbus RTU frames of the RAA38S6 with their source. Each is decoded when unit.cpp is compiled.
 #pragma once
 
 #include <array>
 
 #include "absenc/core/hex.hpp"
-#include "absenc/protocol/raa38/modbus/fields.hpp"
 #include "absenc/protocol/unit.hpp"
-#include "absenc/protocol/vector_check.hpp"
 
 namespace absenc::raa38::rtu {
 
@@ -82,26 +80,5 @@ inline constexpr std::array<Vector, 31> vectors{{
     {"raa38-modbus-120", "another parameter comes back", "derived", "", hex<"01cc01b4c0">, hex<"01cc02f4c1">, {}, Error::unexpected_reply},
 }};
 // clang-format on
-
-namespace detail {
-
-constexpr bool holds(const Vector& vector) {
-  Format format;
-  if (vector.options == "bits=21") format.bits = 21;
-  if (vector.options == "bits=14 registers=2") format.registers = 2;
-  VectorCheck check(vector.fields);
-  const Error error = decode(format, vector.request, vector.reply, check);
-  return error == vector.error && check.all();
-}
-
-constexpr bool all_hold() {
-  for (const Vector& vector : vectors) {
-    if (!holds(vector)) return false;
-  }
-  return true;
-}
-static_assert(all_hold());
-
-}  // namespace detail
 
 }  // namespace absenc::raa38::rtu

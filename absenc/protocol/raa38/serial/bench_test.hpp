@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "absenc/protocol/raa38/serial/device.hpp"
-#include "absenc/protocol/raa38/serial/host.hpp"
 #include "absenc/protocol/raa38/serial/listen.hpp"
+#include "absenc/protocol/raa38/serial/timing.hpp"
+#include "absenc/protocol/raa38/talk_test.hpp"
+#include "absenc/protocol/raa38/unit.hpp"
 #include "absenc/sim/bench_test.hpp"
 #include "absenc/sim/line.hpp"
 
@@ -19,6 +21,27 @@ namespace absenc::raa38::serial::testing {
 inline constexpr LineSettings line_of_tests{.rate = 115'200};
 
 using Shaft14 = sim::testing::TestShaft<14>;
+
+[[nodiscard]] inline Options options_of(const Format& format) {
+  Options options;
+  options.values = {static_cast<std::int64_t>(format.mode),
+                    format.bits,
+                    format.unit,
+                    static_cast<std::int64_t>(format.second_byte),
+                    static_cast<std::int64_t>(format.zeroing),
+                    format.zero_unit,
+                    format.refresh_millihertz,
+                    format.maximum_rpm,
+                    format.acquisition.count(),
+                    format.transmission.count()};
+  return options;
+}
+
+/// A command of an encoder of this format.
+struct Talk final : raa38::testing::Talk<std::uint8_t> {
+  Talk(const Format& format, std::string_view name)
+      : raa38::testing::Talk<std::uint8_t>(serial_unit, options_of(format), name, {}) {}
+};
 
 struct Fields final : FieldSink {
   void put(const FieldValue& value) override {
@@ -65,14 +88,14 @@ class Tampered final : public Machine<std::uint8_t> {
 };
 
 struct Bench {
-  explicit Bench(const Settings& bench_settings, LinkKind kind = LinkKind::half_duplex)
+  explicit Bench(const Format& bench_settings, LinkKind kind = LinkKind::half_duplex)
       : settings(bench_settings), line(kind, line_of_tests) {
     shaft.put(0, 383);
     add(settings);
   }
 
   /// One more encoder on the line, on the same shaft.
-  VirtualEncoder& add(const Settings& of_it) {
+  VirtualEncoder& add(const Format& of_it) {
     encoders.emplace_back(of_it, shaft);
     encoders.back().power_on(line.now(), Device<std::uint8_t>::PowerOn::skip);
     devices.emplace_back(encoders.back());
@@ -99,7 +122,7 @@ struct Bench {
     Step<std::uint8_t> next(Time) override { return {}; }
   };
 
-  Settings settings;
+  Format settings;
   Shaft14 shaft;
   sim::Line<std::uint8_t> line;
   std::list<VirtualEncoder> encoders;

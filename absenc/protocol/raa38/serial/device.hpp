@@ -7,15 +7,15 @@
 
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/conversation.hpp"
-#include "absenc/protocol/raa38/serial/settings.hpp"
+#include "absenc/protocol/raa38/serial/frame.hpp"
 
 namespace absenc::raa38::serial {
 
 class VirtualEncoder final : public Device<std::uint8_t> {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder. What the settings do not know is as in
+  /// Switched off until `power_on`. `shaft` must outlive the encoder. What the format does not know is as in
   /// timing.hpp.
-  VirtualEncoder(const Settings& settings, const Shaft& shaft);
+  VirtualEncoder(const Format& format, const Shaft& shaft);
 
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
@@ -45,7 +45,8 @@ class VirtualEncoder final : public Device<std::uint8_t> {
   void violate(std::string_view rule, Time at);
   [[nodiscard]] std::uint32_t shaft_counts(Time at) const;
 
-  Settings settings_;
+  Format format_;
+  Time period_;
   const Shaft* shaft_;
   std::array<std::uint8_t, 4> memory_{};  // the zero position, little endian
   std::uint32_t memory_version_ = 0;

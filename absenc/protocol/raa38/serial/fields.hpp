@@ -1,73 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and meanings of what the RAA38S6 says on asynchronous lines, and what decoding puts.
+// Names and meanings of what the RAA38S6 says on asynchronous lines.
 #pragma once
 
-#include <array>
+#include <optional>
+#include <string_view>
 
-#include "absenc/protocol/field.hpp"
+#include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/raa38/serial/frame.hpp"
 
 namespace absenc::raa38::serial {
 
-enum FieldIndex : std::size_t {
-  field_singleturn,
-  field_second_byte,
-  field_angle_deg,
-  field_command,
-  field_unit,
-  field_encoder_address,
-  field_clash,
-  field_before,
-  field_skipped,
+/// In the order in which they are shown.
+struct Values {
+  std::optional<std::uint8_t> encoder_address{};
+  std::optional<bool> clash{};
+  std::optional<std::uint32_t> before{};
+  std::optional<std::uint32_t> singleturn{};
+  std::optional<std::uint8_t> second_byte{};
+  std::optional<double> angle{};
+  std::optional<std::string_view> command{};
+  std::optional<std::uint8_t> unit{};
+  std::optional<std::uint64_t> skipped{};
 };
 
-inline constexpr std::array<FieldInfo, 9> fields{{
-    {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Shows::position},
-    {"second_byte", FieldInfo::Kind::number, "", "81, or on a bus Bx: the encoder's number"},
-    {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle", {}, Shows::position},
-    {"command", FieldInfo::Kind::text, "", "read or zero_clear"},
-    {"unit", FieldInfo::Kind::number, "", "the number behind B or C"},
-    {"encoder_address", FieldInfo::Kind::number, "", "the number behind B"},
-    {"clash", FieldInfo::Kind::boolean, "", "every answer is damaged: two encoders, or a bad line"},
-    {"before", FieldInfo::Kind::number, "counts", "position before the zero was set"},
-    {"skipped", FieldInfo::Kind::number, "bytes", "so far, that belonged to no good frame"},
-}};
+using enum FieldInfo::Kind;
+inline constexpr auto fields = author::fields_of<Values>(
+    author::field<&Values::encoder_address>({"encoder_address", number, "", "the number behind B"}),
+    author::field<&Values::clash>({"clash", boolean, "", "every answer is damaged: two encoders, or a bad line"}),
+    author::field<&Values::before>({"before", number, "counts", "position before the zero was set"}),
+    author::field<&Values::singleturn>(
+        {"singleturn", number, "counts", "position within the turn", {}, Shows::position}),
+    author::field<&Values::second_byte>({"second_byte", number, "", "81, or on a bus Bx: the encoder's number"}),
+    author::field<&Values::angle>({"angle_deg", real, "deg", "the same as an angle", {}, Shows::position}),
+    author::field<&Values::command>({"command", text, "", "read or zero_clear"}),
+    author::field<&Values::unit>({"unit", number, "", "the number behind B or C"}),
+    author::field<&Values::skipped>({"skipped", number, "bytes", "so far, that belonged to no good frame"}));
 
-constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) {
-  sink.put({.info = &fields[field], .number = number});
+constexpr Values values_of(const Format& format, const Position& position) {
+  return {.singleturn = position.singleturn,
+          .second_byte = position.second_byte,
+          .angle = degrees(position.singleturn, format.bits)};
 }
 
-constexpr void put_position(FieldSink& sink, const Format& format, const Position& position) {
-  put(sink, field_singleturn, position.singleturn);
-  put(sink, field_second_byte, position.second_byte);
-  sink.put({.info = &fields[field_angle_deg], .real = degrees(position.singleturn, format.bits)});
-  sink.put_reading(to_reading(format, position, {}, {}));
-}
-
-namespace detail {
-inline constexpr std::array<std::uint8_t, 4> read_text{'r', 'e', 'a', 'd'};
-inline constexpr std::array<std::uint8_t, 10> zero_text{'z', 'e', 'r', 'o', '_', 'c', 'l', 'e', 'a', 'r'};
-}  // namespace detail
-
-/// A reply with its request, if there was one; without a reply the request itself.
-[[nodiscard]] constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
-  int unit = anybody;
-  if (!request.empty()) {
-    const Result<Request> asked = decode_request(request);
-    if (!asked) return asked.error();
-    if (reply.empty()) {
-      const bool reads = asked->kind == Request::Kind::read;
-      sink.put({.info = &fields[field_command], .bytes = reads ? Bytes(detail::read_text) : Bytes(detail::zero_text)});
-      put(sink, field_unit, asked->unit);
-      return Error::none;
-    }
-    if (asked->kind == Request::Kind::zero_clear) return Error::unexpected_reply;  // nothing answers it
-    unit = asked->unit;
-  }
-  const Result<Position> position = decode_position(format, reply, unit);
-  if (!position) return position.error();
-  put_position(sink, format, *position);
-  return Error::none;
+constexpr Values values_of(const Request& request) {
+  return {.command = request.kind == Request::Kind::read ? "read" : "zero_clear", .unit = request.unit};
 }
 
 }  // namespace absenc::raa38::serial

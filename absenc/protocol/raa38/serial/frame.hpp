@@ -10,6 +10,7 @@
 #include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
 #include "absenc/core/result.hpp"
+#include "absenc/core/time.hpp"
 
 namespace absenc::raa38::serial {
 
@@ -36,16 +37,36 @@ inline constexpr std::uint8_t number_mark = 0xB0;  // Bx: unit x
 inline constexpr std::uint8_t clear_mark = 0xC0;   // Cx: its zero
 inline constexpr unsigned unit_count = 16;         // x is one hexadecimal digit
 inline constexpr unsigned least_bits = 10;
-inline constexpr unsigned most_bits = 32;  // the encoders have up to 21; the tables draw a fourth data byte
+inline constexpr unsigned most_bits = 21;
 inline constexpr std::size_t request_bytes = 3;
-inline constexpr std::size_t frame_capacity = 7;
+inline constexpr std::size_t frame_capacity = 6;
 
+/// How an encoder was ordered.
 struct Format {
   unsigned bits = 14;  // of a turn
   SecondByte second_byte = SecondByte::automatic;
+  Mode mode = Mode::timing;
+  std::uint8_t unit = 1;
+  Zeroing zeroing = Zeroing::none;
+  std::int32_t zero_unit = -1;          // the x of Cx; -1: that of Bx
+  std::int64_t refresh_millihertz = 0;  // 0: not known
+  std::uint32_t maximum_rpm = 0;        // 0: positions may jump
+  Time acquisition{};                   // T3, or from a request to its answer; 0: not known
+  Time transmission{};                  // T1 - T3, of a frame; 0: as long as its characters take
 
-  [[nodiscard]] constexpr std::size_t data_bytes() const { return bits <= 16 ? 2 : bits <= 24 ? 3 : 4; }
+  [[nodiscard]] constexpr std::size_t data_bytes() const { return bits <= 16 ? 2 : 3; }
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return data_bytes() + 3; }
+  /// Between two frames that nobody asks for; 0: not known.
+  [[nodiscard]] constexpr Time period() const {
+    return refresh_millihertz > 0 ? Time(1'000'000'000'000 / refresh_millihertz) : Time{};
+  }
+  [[nodiscard]] constexpr std::uint8_t zeroed_unit() const {
+    return zero_unit < 0 ? unit : static_cast<std::uint8_t>(zero_unit);
+  }
+  /// Of frames that nobody asked for.
+  [[nodiscard]] constexpr std::uint8_t own_second_byte() const {
+    return second_byte == SecondByte::echo ? static_cast<std::uint8_t>(number_mark | unit) : fixed_second_byte;
+  }
 };
 
 struct Position {
@@ -96,12 +117,19 @@ inline constexpr int anybody = -1;
 }
 
 struct Request {
-  enum class Kind : std::uint8_t { read, zero_clear } kind = Kind::read;
+  enum class Kind : std::uint8_t {
+    read,        // BC AA Bx
+    zero_clear,  // BC AA Cx
+    trigger,     // a pulse on CLK, which has no bytes
+    clear,       // a pulse on CLR
+  } kind = Kind::read;
   std::uint8_t unit = 0;  // 0 to 15
 };
 
+/// Nothing for a pulse.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
+  if (request.kind == Request::Kind::trigger || request.kind == Request::Kind::clear) return bytes;
   bytes.push_back(0xBC);
   bytes.push_back(0xAA);
   const unsigned mark = request.kind == Request::Kind::read ? number_mark : clear_mark;
@@ -118,6 +146,14 @@ struct Request {
   }
   return Request{mark == number_mark ? Request::Kind::read : Request::Kind::zero_clear,
                  static_cast<std::uint8_t>(bytes[2] & 0x0Fu)};
+}
+
+/// Whether a shaft can have turned so far in that time, with a little for noise.
+[[nodiscard]] constexpr bool is_possible(const Format& format, std::uint32_t from, std::uint32_t to, Time between) {
+  const std::int64_t moved = wrapped_difference(to, from, format.bits);
+  const double revolutions = format.maximum_rpm * static_cast<double>(between.count()) / 60e9;
+  const double allowed = 4 + revolutions * static_cast<double>(std::uint64_t{1} << format.bits);
+  return static_cast<double>(moved < 0 ? -moved : moved) <= allowed;
 }
 
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position, Time latched,

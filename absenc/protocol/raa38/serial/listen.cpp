@@ -3,17 +3,18 @@
 
 #include <algorithm>
 
+#include "absenc/protocol/raa38/serial/explain.hpp"
 #include "absenc/protocol/raa38/serial/fields.hpp"
+#include "absenc/protocol/raa38/serial/timing.hpp"
 
 namespace absenc::raa38::serial {
 
 using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
-Listen::Listen(const Settings& settings)
-    : settings_(settings), decoder_(settings.format, settings.second_byte(), settings.period) {
-  if (settings.maximum_rpm == 0 || settings.period > Time{}) return;
-  fail(Error::invalid_argument, "max_rpm needs to know how often the encoder transmits", "set refresh_hz as well");
+Listen::Listen(const Format& format) : format_(format), decoder_(format) {
+  if (format.maximum_rpm == 0 || format.period() > Time{}) return;
+  fail(Error::invalid_argument, {"max_rpm needs to know how often the encoder transmits", "set refresh_hz as well"});
   done_ = true;
 }
 
@@ -24,7 +25,7 @@ ByteStep Listen::next(Time now) {
     return {.kind = ByteStep::Kind::emit};
   }
   // Whoever stops at a result and comes back later has not waited in vain meanwhile.
-  if (arm_) deadline_ = now + std::max(listen_limit, 4 * settings_.period);
+  if (arm_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
   arm_ = false;
   if (!done_ && now >= deadline_) give_up();  // bytes that are no frames may come before every timer
   if (done_) return {.kind = ByteStep::Kind::done};
@@ -51,22 +52,23 @@ void Listen::feed(const ByteEvent& event) {
 
 void Listen::take(const Found& found) {
   error_ = Error::none;
-  detail_ = advice_ = {};
+  words_ = {};
   frame_.clear();
   if (found.error != Error::none) {
     frame_.append(decoder_.bad());
-    return fail(found.error, "a frame of the stream is damaged");
+    return fail(found.error, {"a frame of the stream is damaged", {}});
   }
   ++frame_number_;
-  frame_ = encode_position(settings_.format, {found.singleturn, settings_.second_byte()});
+  frame_ = encode_position(format_, {found.singleturn, format_.own_second_byte()});
   const Time latched = std::max(latched_time(found), reading_.latched);
   if (is_plausible(found.singleturn, latched)) return accept(found, latched);
-  fail(Error::cross_check_failed, "the position jumped farther than max_rpm allows",
-       "the checksum does not see swapped bytes: read again, and check shielding, bits and max_rpm");
+  fail(Error::cross_check_failed,
+       {"the position jumped farther than max_rpm allows",
+        "the checksum does not see swapped bytes: read again, and check shielding, bits and max_rpm"});
 }
 
 void Listen::accept(const Found& found, Time latched) {
-  reading_ = to_reading(settings_.format, {found.singleturn, settings_.second_byte()}, latched, found.at);
+  reading_ = to_reading(format_, {found.singleturn, format_.own_second_byte()}, latched, found.at);
   last_good_at_ = latched;
   last_good_ = found.singleturn;
   last_number_ = frame_number_;
@@ -78,12 +80,12 @@ void Listen::accept(const Found& found, Time latched) {
 // A position is compared with the last good one, or with the last that was refused: when two of these agree, the
 // first one was wrong, or the shaft was turned while nobody could see it.
 bool Listen::is_plausible(std::uint32_t singleturn, Time latched) {
-  if (settings_.maximum_rpm == 0 || good_ == 0) return true;
+  if (format_.maximum_rpm == 0 || good_ == 0) return true;
   // Frames that were lost in between are not counted: the clock knows better, but not by less than a frame.
-  const Time by_frames = settings_.period * static_cast<std::int64_t>(frame_number_ - last_number_);
+  const Time by_frames = format_.period() * static_cast<std::int64_t>(frame_number_ - last_number_);
   const Time between = std::max(by_frames, latched - last_good_at_);
-  if (is_possible(settings_, last_good_, singleturn, between)) return true;
-  if (has_suspect_ && is_possible(settings_, suspect_, singleturn, settings_.period)) return true;
+  if (is_possible(format_, last_good_, singleturn, between)) return true;
+  if (has_suspect_ && is_possible(format_, suspect_, singleturn, format_.period())) return true;
   has_suspect_ = true;
   suspect_ = singleturn;
   return false;
@@ -94,37 +96,32 @@ Time Listen::latched_time(const Found& found) const {
   if (found.at != heard_at_) return found.at;
   const auto behind = static_cast<std::int64_t>(waiting_.size() - taken_);
   const auto together = static_cast<std::int64_t>(std::max<std::size_t>(waiting_.size(), 1));
-  const Time each = settings_.period > Time{} ? settings_.period : (heard_at_ - heard_before_) / together;
+  const Time each = format_.period() > Time{} ? format_.period() : (heard_at_ - heard_before_) / together;
   return heard_at_ - behind * each;
 }
 
 void Listen::give_up() {
   done_ = true;
   frame_.clear();
-  if (!heard_) {
-    return fail(
-        Error::timeout, "nothing comes: the encoder does not transmit by itself, or it was unplugged",
-        "check supply, A/B polarity and baud rate; mode=handshake or mode=bus for an encoder that must be asked");
-  }
-  if (decoder_.saw_larger_positions()) {
-    return fail(Error::out_of_range, "the frames carry more bits than the option bits says", "set bits");
-  }
-  fail(Error::bad_framing, "something comes, but no two frames in a row",
-       "check baud, parity, bits (their number of data bytes) and second_byte");
+  const Error error = !heard_                           ? Error::timeout
+                      : decoder_.saw_larger_positions() ? Error::out_of_range
+                                                        : Error::bad_framing;
+  fail(error, explain_stream(error));
 }
 
-void Listen::fail(Error error, std::string_view detail, std::string_view advice) {
+void Listen::fail(Error error, const Explanation& words) {
   error_ = error;
-  detail_ = detail;
-  advice_ = advice;
+  words_ = words;
 }
 
 const Reading* Listen::reading() const { return error_ == Error::none && good_ > 0 ? &reading_ : nullptr; }
 
 void Listen::report(FieldSink& sink) const {
   if (reading() == nullptr) return;
-  put_position(sink, settings_.format, {static_cast<std::uint32_t>(reading_.singleturn), settings_.second_byte()});
-  put(sink, field_skipped, static_cast<std::int64_t>(decoder_.skipped()));
+  Values values = values_of(format_, {static_cast<std::uint32_t>(reading_.singleturn), format_.own_second_byte()});
+  values.skipped = decoder_.skipped();
+  fields.put(sink, values);
+  sink.put_reading(reading_);
 }
 
 Exchange<std::uint8_t> Listen::exchange() const { return {{}, frame_.view(), heard_at_, heard_at_}; }

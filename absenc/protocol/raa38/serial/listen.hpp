@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "absenc/protocol/conversation.hpp"
-#include "absenc/protocol/raa38/serial/settings.hpp"
 #include "absenc/protocol/raa38/serial/stream.hpp"
 
 namespace absenc::raa38::serial {
@@ -15,16 +14,15 @@ namespace absenc::raa38::serial {
 /// bad_framing, out_of_range. With a maximum speed a position that the shaft cannot have reached is cross_check_failed.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// `settings.maximum_rpm` needs `settings.period`: otherwise invalid_argument, because times of arrival are too
-  /// rough.
-  explicit Listen(const Settings& settings);
+  /// `format.maximum_rpm` needs the refresh rate: otherwise invalid_argument, because times of arrival are too rough.
+  explicit Listen(const Format& format);
 
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] bool streams() const override { return true; }
   [[nodiscard]] Error error() const override { return error_; }
-  [[nodiscard]] std::string_view detail() const override { return detail_; }
-  [[nodiscard]] std::string_view advice() const override { return advice_; }
+  [[nodiscard]] std::string_view detail() const override { return words_.found; }
+  [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
@@ -40,9 +38,9 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] bool is_plausible(std::uint32_t singleturn, Time latched);
   [[nodiscard]] Time latched_time(const Found& found) const;
   void give_up();
-  void fail(Error error, std::string_view detail, std::string_view advice = {});
+  void fail(Error error, const Explanation& words);
 
-  Settings settings_;
+  Format format_;
   StreamDecoder decoder_;
   Buffer<Found, most_waiting> waiting_;
   std::size_t taken_ = 0;  // of `waiting_`
@@ -62,8 +60,7 @@ class Listen final : public Conversation<std::uint8_t> {
   std::uint32_t suspect_ = 0;  // the last position that was not plausible
   FrameBytes frame_;
   Error error_ = Error::none;
-  std::string_view detail_{};
-  std::string_view advice_{};
+  Explanation words_{};
 };
 
 }  // namespace absenc::raa38::serial

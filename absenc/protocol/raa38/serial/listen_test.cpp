@@ -6,7 +6,6 @@
 
 #include "absenc/host/session.hpp"
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
-#include "absenc/protocol/raa38/serial/unit.hpp"
 #include "absenc/protocol/raa38/unit.hpp"
 #include "absenc/sim/sim_port.hpp"
 
@@ -16,7 +15,7 @@ namespace {
 using namespace testing;
 using Wire = std::vector<std::uint8_t>;
 
-constexpr Settings fast{.mode = Mode::timing, .period = 1ms};
+constexpr Format fast{.mode = Mode::timing, .refresh_millihertz = 1'000'000};
 
 /// The results of so many emits.
 struct Results {
@@ -66,7 +65,7 @@ TEST(RaaListen, ADamagedFrameIsOneErrorAndTheStreamGoesOn) {
 }
 
 TEST(RaaListen, SpeedRefusesAJumpUnlessItStays) {
-  Settings settings = fast;
+  Format settings = fast;
   settings.maximum_rpm = 6000;
   Bench bench(settings);
   bench.device().set([&](unsigned frame, Wire& reply) {
@@ -101,7 +100,7 @@ TEST(RaaListen, SaysWhyNothingGoodComes) {
        Error::out_of_range, "more bits"},
   };
   for (const Row& row : rows) {
-    Bench bench(row.error == Error::timeout ? Settings{.mode = Mode::bus} : fast);
+    Bench bench(row.error == Error::timeout ? Format{.mode = Mode::bus} : fast);
     bench.device().set([&](unsigned, Wire& reply) { row.change(reply); });
     Listen machine(fast);
     bench.run(machine);
@@ -113,7 +112,7 @@ TEST(RaaListen, SaysWhyNothingGoodComes) {
 }
 
 TEST(RaaListen, WithoutTheRefreshRateTimesAreSpreadOverWhatCameAtOnce) {
-  Listen machine(Settings{});
+  Listen machine(Format{});
   Wire wire;
   const auto feed = [&](std::uint32_t from, std::uint32_t frames, Time at) {
     wire.clear();

@@ -9,7 +9,6 @@
 
 #include "absenc/host/session.hpp"
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
-#include "absenc/protocol/raa38/serial/unit.hpp"
 #include "absenc/protocol/raa38/unit.hpp"
 #include "absenc/sim/sim_port.hpp"
 

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a procedure on a CAN bus speaks through: it sends a frame, or listens, and then awaits one frame after the
+// other.
+//
+//   struct Protocol {
+//     using Item = CanFrame;
+//     using Format, Request = CanFrame;
+//     static CanWire wire(const Format&);
+//     static ByteBuffer<N> encode(const Format&, const CanFrame&);   // the text of a frame, as in vectors
+//   };
+#pragma once
+
+#include <concepts>
+#include <coroutine>
+#include <optional>
+#include <span>
+
+#include "absenc/protocol/author/can_engine.hpp"
+#include "absenc/protocol/author/line.hpp"
+
+namespace absenc::author {
+
+template <class P>
+requires std::same_as<typename P::Item, CanFrame>
+class LineOf<P> : public CanEngine, public Routine {
+ public:
+  using Format = typename P::Format;
+
+  [[nodiscard]] const Format& format() const { return format_; }
+
+  // What is heard begins with one of these.
+  using CanEngine::ask;
+  using CanEngine::ask_for;
+  using CanEngine::configure;
+  using CanEngine::listen;
+
+  /// The next frame, anybody's; none when the time is over: `const std::optional<CanFrame> frame = co_await
+  /// line.heard()`.
+  [[nodiscard]] auto heard() {
+    struct Hear {
+      LineOf& line;
+      [[nodiscard]] bool await_ready() const { return false; }
+      void await_suspend(std::coroutine_handle<>) {}
+      std::optional<CanFrame> await_resume() const { return line.frame_; }
+    };
+    return Hear{*this};
+  }
+  /// When that frame was complete.
+  [[nodiscard]] Time heard_at() const { return heard_at_; }
+  /// That frame is the answer.
+  void keep() { CanEngine::keep(*frame_, heard_at_); }
+
+ protected:
+  LineOf(const Format& format, std::span<std::byte> arena)
+      : CanEngine(P::wire(format)), Routine(arena), format_(format) {}
+  ~LineOf() = default;
+
+ private:
+  void heard(const CanFrame& frame, Time at) final {
+    frame_ = frame;
+    heard_at_ = at;
+    resume();
+  }
+  void over() final {
+    frame_.reset();
+    resume();
+  }
+  void ended(const Outcome& outcome) final { finish(outcome); }
+
+  Format format_;
+  std::optional<CanFrame> frame_;
+  Time heard_at_{};
+};
+
+}  // namespace absenc::author

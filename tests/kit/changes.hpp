@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a command that changes an encoder promises, by its verb, and whether it is so: asked on a good line.
+#pragma once
+
+#include <algorithm>
+#include <charconv>
+#include <string>
+
+#include "tests/kit/world.hpp"
+
+namespace absenc::kit {
+
+/// The argument of that name; none when the command has no such.
+[[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, std::string_view name) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (command.arguments[i].name == name) return &values[i];
+  }
+  return nullptr;
+}
+
+[[nodiscard]] inline Values memory_arguments(const Command& command, const MemoryArea& area, std::uint32_t address,
+                                             std::uint8_t byte) {
+  Values values = least_arguments(command);
+  const auto set = [&](std::string_view name, std::int64_t value) {
+    if (std::int64_t* one = argument(command, values, name)) *one = value;
+  };
+  set("address", address);
+  set("page", area.page);
+  set("count", 1);
+  set("value", byte);
+  set("force", area.protection.empty() ? 0 : 1);
+  return values;
+}
+
+/// Arguments with which this command may work; none when the unit describes none.
+[[nodiscard]] inline std::optional<Values> change_arguments(const Unit& unit, const Command& command,
+                                                            sim::Random& random) {
+  if (command.verb != Verb::memory_write) return random_arguments(command, random);
+  std::vector<const MemoryArea*> open;
+  for (const MemoryArea& area : unit.memory) {
+    if (area.writable) open.push_back(&area);
+  }
+  if (open.empty()) return std::nullopt;
+  const MemoryArea& area = *open[random.below(open.size())];
+  const auto address = static_cast<std::uint32_t>(area.first + random.below(area.count));
+  return memory_arguments(command, area, address, static_cast<std::uint8_t>(random.below(256)));
+}
+
+/// What the encoder was set to may be what it is reached with.
+template <class Item>
+void follow(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
+  if (setter.changes_option.empty()) return;
+  Options options = world.options();
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const Option& option = unit.options[i];
+    if (option.name != setter.changes_option) continue;
+    std::int64_t value = arguments[0];
+    const std::string text = std::to_string(value);
+    if (!option.choices.empty()) {
+      value = std::find(option.choices.begin(), option.choices.end(), text) - option.choices.begin();
+    }
+    options.values[i] = value;
+  }
+  world.set_options(options);
+}
+
+/// Again after an error, as a session does: what an encoder sends unasked may come in between.
+template <class Item>
+Ended run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
+  Ended result = world.run(command, arguments);
+  for (unsigned more = 0; more < 3 && result.made && !result.good(); ++more) {
+    world.pass(std::chrono::microseconds(700));
+    result = world.run(command, arguments);
+  }
+  return result;
+}
+
+/// What the getter of a setting reports; empty when it cannot be read.
+template <class Item>
+Seen read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
+  const Command* getter = find_command(unit, setter.reads_back);
+  return getter == nullptr ? Seen{} : run_repeated(world, *getter, least_arguments(*getter)).seen;
+}
+
+/// Empty when the encoder is as the command that ended well promised. There must be no faults.
+template <class Item>
+std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
+                           const Seen& written) {
+  const Command* read = find_command(unit, Verb::read);
+  const auto position = [&] { return world.run(*read, least_arguments(*read)).seen.reading; };
+  switch (command.verb) {
+    case Verb::zero: {
+      const std::optional<Reading> now = position();
+      if (!now) return "nothing is read after it";
+      const std::int64_t off = wrapped_difference(now->singleturn, 0, now->singleturn_bits);
+      const std::int64_t near = std::int64_t{1} << (now->singleturn_bits - std::min(now->singleturn_bits, 10u));
+      return std::abs(off) <= near ? "" : "the position is " + std::to_string(off) + " counts off";
+    }
+    case Verb::reset_multiturn: {
+      const std::optional<Reading> now = position();
+      if (!now) return "nothing is read after it";
+      const auto wanted = static_cast<std::uint64_t>(values.empty() ? 0 : values[0]) & low_mask(now->multiturn_bits);
+      return now->multiturn == wanted ? "" : "the turns are " + std::to_string(now->multiturn);
+    }
+    case Verb::clear_alarms: {
+      const std::optional<Reading> now = position();
+      return now && now->alarms == 0 ? "" : "there are alarms";
+    }
+    case Verb::memory_write: {
+      const Command* reader = find_command(unit, Verb::memory_read);
+      if (reader == nullptr) return {};
+      Values asked = least_arguments(*reader);
+      for (const std::string_view name : {"address", "page"}) {
+        if (std::int64_t* one = argument(*reader, asked, name)) *one = *argument(command, values, name);
+      }
+      const Ended now = world.run(*reader, asked);
+      if (!now.good()) return "it cannot be read: " + std::string(text_of(now.error).name);
+      const std::int64_t byte = *argument(command, values, "value");
+      const auto is = [&](const char* name) {
+        const auto found = now.seen.fields.find(name);
+        if (found == now.seen.fields.end()) return false;
+        const std::string& bytes = found->second.bytes;
+        return bytes.empty() ? found->second.number == byte : bytes == std::string(1, static_cast<char>(byte));
+      };
+      return is("data") || is("value") ? "" : "the byte is " + to_text(now.seen.fields);
+    }
+    case Verb::config_set: {
+      const Seen now = read_setting(world, unit, command);
+      if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
+      for (const auto& [name, value] : now.fields) {
+        // Not one frame of many, nor where the shaft was.
+        if (name.find('#') != std::string::npos || value.shows != Shows::other) continue;
+        const auto found = written.fields.find(name);
+        if (found != written.fields.end() && !(found->second == value)) return name + " reads as another";
+      }
+      return {};
+    }
+    default:
+      return {};
+  }
+}
+
+}  // namespace absenc::kit

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// What needs no faults: commands, settings, memory and storage over the virtual encoder.
+#include <algorithm>
+
+#include "tests/kit/kit.hpp"
+#include "tests/kit/place.hpp"
+#include "tests/kit/world.hpp"
+
+namespace absenc::kit {
+namespace {
+
+/// What a unit's own model must be able to say.
+bool is_plain(const Command& command) {
+  return command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
+         command.verb == Verb::temperature || command.verb == Verb::config_get;
+}
+
+// Whether the caller has to do something first: the command exists, but not so.
+bool is_refused(const Command& command, Error error) {
+  return command.verb != Verb::read && (error == Error::unsupported || error == Error::invalid_argument);
+}
+
+// A virtual encoder can be given what no host is made for (a second for each answer), but never makes it wrong.
+template <class Item>
+void run_commands(const Unit& unit, const Configuration& way, Findings& findings) {
+  sim::Random random(7);
+  for (const Command& command : unit.commands) {
+    if (command.changes_encoder) continue;
+    World<Item> world(unit, way.options, 1);
+    if (!world.made()) return;
+    const auto what = [&] { return way.text + ", " + std::string(command.name) + ": "; };
+    for (unsigned i = 0; i < (command.verb == Verb::read ? 10 : 1); ++i) {
+      world.move(static_cast<std::int64_t>(random.next()));
+      const Ended result = world.run(command, least_arguments(command));
+      if (!result.made) break;
+      findings.require(result.ended, [&] { return what() + "hangs"; });
+      const bool may_fail = !way.is_model || !is_plain(command) || is_refused(command, result.error);
+      findings.require(result.good() || may_fail,
+                       [&] { return what() + std::string(text_of(result.error).name) + " " + result.detail; });
+      if (!result.good()) break;
+      if (result.seen.reading) {
+        findings.require(is_at(*result.seen.reading, world.place()),
+                         [&] { return what() + "another position than the shaft's"; });
+      } else {
+        findings.require(command.verb != Verb::read, [&] { return what() + "has no reading"; });
+      }
+    }
+    findings.require(world.device().violation_count() == 0 || !way.is_model, [&] {
+      return what() + "the host broke a rule: " + std::string(world.device().violations()[0].rule);
+    });
+  }
+}
+
+}  // namespace
+
+Findings check_commands(const Unit& unit) {
+  Findings findings;
+  for (const Configuration& way : configurations(unit)) {
+    if (unit.link == LinkKind::can) {
+      run_commands<CanFrame>(unit, way, findings);
+    } else {
+      run_commands<std::uint8_t>(unit, way, findings);
+    }
+  }
+  return findings;
+}
+
+}  // namespace absenc::kit

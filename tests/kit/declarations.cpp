@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the descriptor says of itself, and the requests that commands make.
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "tests/kit/frames.hpp"
+#include "tests/kit/kit.hpp"
+
+namespace absenc::kit {
+namespace {
+
+bool takes(const Command* command, std::string_view name, std::uint32_t least, std::uint32_t most) {
+  if (command == nullptr) return false;
+  return std::any_of(command->arguments.begin(), command->arguments.end(), [&](const Argument& one) {
+    return one.name == name && one.minimum <= least && one.maximum >= most;
+  });
+}
+
+void declared_memory(const Unit& unit, Findings& findings) {
+  const Command* reads = find_command(unit, Verb::memory_read);
+  const Command* writes = find_command(unit, Verb::memory_write);
+  std::uint64_t after = 0;  // of the area before
+  for (const MemoryArea& area : unit.memory) {
+    const auto require = [&](bool holds, const char* text) {
+      findings.require(
+          holds, [&] { return "memory " + std::to_string(area.page) + "/" + std::to_string(area.first) + " " + text; });
+    };
+    const std::uint32_t last = area.first + area.count - 1;
+    const std::uint64_t begin = std::uint64_t{area.page} << 32 | area.first;
+    require(begin >= after, "overlaps, or is out of order");
+    after = begin + area.count;
+    require(area.count > 0, "is empty");
+    require(area.writable || area.write_life == 0, "has a life though it cannot be written");
+    for (const Command* command : {reads, writes}) {
+      if (command == writes && !area.writable) continue;
+      require(takes(command, "address", area.first, last), "is not reached by `address`");
+      require(area.page == 0 || takes(command, "page", area.page, area.page), "is not reached by `page`");
+      require(command == reads || takes(command, "value", 0, 255), "is not written by `value`");
+      require(command == reads || area.protection.empty() || takes(command, "force", 1, 1),
+              "is not written by `force`");
+    }
+  }
+}
+
+void declared_registers(const Unit& unit, Findings& findings) {
+  std::set<std::string_view> names;
+  for (const RegisterInfo& one : unit.registers) {
+    const auto require = [&](bool holds, const char* text) {
+      findings.require(holds, [&] { return "register " + std::string(one.name) + " " + text; });
+    };
+    require(names.insert(one.name).second, "is there twice");
+    require(one.size > 0 && (one.readable || one.writable), "is of no use");
+    for (const Verb verb : {Verb::memory_read, Verb::memory_write}) {
+      const Command* command = find_command(unit, verb);
+      require(takes(command, "address", one.address, one.address), "is not reached by `address`");
+      require(verb == Verb::memory_read || takes(command, "value", 0, 255), "is not written by `value`");
+    }
+  }
+  findings.require(unit.registers.empty() || unit.memory.empty(), [] { return "has bytes or registers, not both"; });
+}
+
+void declared_settings(const Unit& unit, Findings& findings) {
+  for (const Command& command : unit.commands) {
+    const auto require = [&](bool holds, const char* text) {
+      findings.require(holds, [&] { return std::string(command.name) + " " + text; });
+    };
+    require(find_command(unit, command.name) == &command, "is there twice");
+    if (command.verb != Verb::config_set) {
+      require(command.reads_back.empty(), "sets nothing that could be read back");
+      continue;
+    }
+    require(command.changes_encoder, "sets something, but does not change the encoder");
+    require(!command.arguments.empty(), "sets nothing");
+    if (command.reads_back.empty()) continue;
+    const Command* getter = find_command(unit, command.reads_back);
+    require(getter != nullptr && getter->verb == Verb::config_get, "is read back by nothing");
+    const bool is_option = std::any_of(unit.options.begin(), unit.options.end(),
+                                       [&](const Option& one) { return one.name == command.changes_option; });
+    require(command.changes_option.empty() || is_option, "changes an option that does not exist");
+  }
+}
+
+void request_of(const Unit& unit, const Configuration& way, const Command& command, const Values& values,
+                Findings& findings) {
+  const auto what = [&] { return way.text + ", " + std::string(command.name) + to_text(Arguments(values)) + ": "; };
+  const Result<Wire> request = encoded(unit, way.options, command, values);
+  if (!request) {
+    const bool told = request.error() == Error::unsupported || request.error() == Error::invalid_argument;
+    return findings.require(told, [&] { return what() + std::string(text_of(request.error()).name); });
+  }
+  if (request->empty()) return;  // clocks only
+  Wire small(request->size() - 1);
+  findings.require(unit.encode(way.options, command, values, small).error() == Error::buffer_too_small,
+                   [&] { return what() + "fits into less than it has"; });
+  Seen seen;
+  const Error error = unit.decode(way.options, held(unit, *request).frame(), {}, seen);
+  if (error == Error::invalid_argument) return;  // of options that no encoder has
+  findings.require(error == Error::none && !seen.fields.empty(),
+                   [&] { return what() + "is " + std::string(text_of(error).name); });
+  // A field of the argument's name may be one of every request: then it stands in another.
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Argument& one = command.arguments[i];
+    if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;
+    const bool has = std::any_of(seen.fields.begin(), seen.fields.end(),
+                                 [&](const auto& field) { return field.second.number == values[i]; });
+    findings.require(has, [&] { return what() + "has no such " + std::string(one.name); });
+  }
+}
+
+}  // namespace
+
+Findings check_declarations(const Unit& unit) {
+  Findings findings;
+  findings.require(find_command(unit, Verb::read) != nullptr, [] { return "reads no position"; });
+  declared_memory(unit, findings);
+  declared_registers(unit, findings);
+  declared_settings(unit, findings);
+  return findings;
+}
+
+Findings check_requests(const Unit& unit, std::uint64_t seed) {
+  Findings findings;
+  sim::Random random(seed);
+  for (const Configuration& way : configurations(unit)) {
+    for (const Command& command : unit.commands) {
+      for (unsigned i = 0; i < (command.arguments.empty() ? 1 : 100); ++i) {
+        request_of(unit, way, command, random_arguments(command, random), findings);
+      }
+    }
+  }
+  return findings;
+}
+
+}  // namespace absenc::kit

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "tests/kit/frames.hpp"
+#include "tests/kit/kit.hpp"
+
+namespace absenc::kit {
+namespace {
+
+class Decoding {
+ public:
+  Decoding(const Unit& unit, const Vector& vector, const Options& options, Findings& findings)
+      : unit_(unit), vector_(vector), options_(options), findings_(findings) {}
+
+  void whole() {
+    Seen seen;
+    const Error error = decode(reply_, seen);
+    require(error == vector_.error, [&] { return "is " + std::string(text_of(error).name); });
+    require(seen.fields == expected_fields(vector_), [&] { return "decodes to " + to_text(seen.fields); });
+    require((seen.readings == 1) == seen.has_position() && seen.readings <= 1,
+            [&] { return "has " + std::to_string(seen.readings) + " readings"; });
+    if (seen.reading) reading_shows(seen);
+  }
+
+  void good_reply() {
+    std::size_t flipped = 0;
+    for (std::size_t bit = 0; bit < reply_.bit_count(); ++bit) {
+      if (unit_.covered != nullptr && !unit_.covered(options_, request_.frame(), reply_.frame(), bit)) continue;
+      ++flipped;
+      refused(reply_.flipped(bit), [&] { return "with bit " + std::to_string(bit) + " flipped"; });
+    }
+    // Of some frames on CAN only the identifier means anything.
+    const bool means_nothing = reply_.can && flipped == 0;
+    for (std::size_t size = reply_.can ? 0 : 1; size < reply_.elements() && !means_nothing; ++size) {
+      refused(reply_.cut(size), [&] { return "cut after " + std::to_string(size); });
+    }
+    if (reply_.can) {
+      if (!means_nothing) other_frames();
+    } else if (unit_.link != LinkKind::clocked) {
+      refused(reply_.between({}, vector_.reply), [] { return std::string("twice"); });
+      ends();
+    }
+  }
+
+ private:
+  template <class Text>
+  void require(bool holds, Text&& text) {
+    findings_.require(holds, [&] { return std::string(vector_.id) + " " + text(); });
+  }
+
+  Error decode(const Held& reply, FieldSink& sink) const {
+    return unit_.decode(options_, request_.frame(), reply.frame(), sink);
+  }
+
+  // With an error no field may be put.
+  template <class Text>
+  void refused(const Held& reply, Text&& text) {
+    Seen seen;
+    const Error error = decode(reply, seen);
+    require(error != Error::none && seen.fields.empty() && !seen.reading, [&] { return text() + " is accepted"; });
+  }
+
+  void reading_shows(const Seen& seen) {
+    const auto is = [&](const char* name, std::uint64_t counts) {
+      const auto field = seen.fields.find(name);
+      return field != seen.fields.end() && static_cast<std::uint64_t>(field->second.number) == counts;
+    };
+    const Reading& reading = *seen.reading;
+    require(reading.singleturn_bits == 0 || is("singleturn", reading.singleturn) || is("position", reading.singleturn),
+            [] { return "has a reading of another position"; });
+    require(reading.multiturn_bits == 0 || is("multiturn", reading.multiturn),
+            [] { return "has a reading of other turns"; });
+  }
+
+  void ends() {
+    const Held with_more = reply_.between({}, std::array<std::uint8_t, 1>{0});
+    const Delimit whole = unit_.delimit(options_, Direction::reply, with_more.bytes);
+    require(whole.kind == Delimit::Kind::complete && whole.size == reply_.bytes.size(),
+            [] { return "does not end where it ends, with another byte behind it"; });
+    for (std::size_t size = 0; size < reply_.bytes.size(); ++size) {
+      require(unit_.delimit(options_, Direction::reply, reply_.cut(size).bytes).kind == Delimit::Kind::incomplete,
+              [&] { return "seems not to go on after " + std::to_string(size); });
+    }
+  }
+
+  // Of another identifier, where a request tells whose it is, and of other kinds.
+  void other_frames() {
+    for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
+      Held other = reply_;
+      other.can->id ^= 1u << bit;
+      if (is_of_a_vector(other.can->id)) continue;
+      refused(other, [&] { return "with bit " + std::to_string(bit) + " of its identifier flipped"; });
+    }
+    Held extended = reply_;
+    extended.can->extended = true;
+    refused(extended, [] { return std::string("with an identifier of 29 bits"); });
+    Held remote = reply_;
+    remote.can->remote = true;
+    refused(remote, [] { return std::string("as a remote frame"); });
+  }
+
+  // Some questions are answered on one of several identifiers.
+  [[nodiscard]] bool is_of_a_vector(std::uint32_t id) const {
+    return std::any_of(unit_.vectors.begin(), unit_.vectors.end(), [&](const Vector& one) {
+      const Held reply = held(unit_, one.reply);
+      return reply.can && reply.can->id == id && one.error == Error::none;
+    });
+  }
+
+  const Unit& unit_;
+  const Vector& vector_;
+  Options options_;
+  Findings& findings_;
+  Held request_ = held(unit_, vector_.request);
+  Held reply_ = held(unit_, vector_.reply);
+};
+
+}  // namespace
+
+Findings check_decoding(const Unit& unit) {
+  Findings findings;
+  for (const Vector& vector : unit.vectors) {
+    const std::optional<Options> options = options_of(unit, vector.options);
+    findings.require(options.has_value(), [&] { return std::string(vector.id) + " has options that do not exist"; });
+    if (!options) continue;
+    Decoding decoding(unit, vector, *options, findings);
+    decoding.whole();
+    if (!vector.reply.empty() && vector.error == Error::none) decoding.good_reply();
+  }
+  return findings;
+}
+
+}  // namespace absenc::kit

@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <map>
+#include <stdexcept>
+
+#include "absenc/sim/bench_test.hpp"
+#include "tests/kit/changes.hpp"
+#include "tests/kit/kit.hpp"
+#include "tests/kit/place.hpp"
+#include "tests/kit/weight.hpp"
+#include "tests/kit/world.hpp"
+
+namespace absenc::kit {
+namespace {
+
+constexpr unsigned places = 8;
+constexpr std::uint64_t exchanges_each = 4000;  // of one virtual encoder
+constexpr unsigned changes_each = 2;            // of each command, at its end
+
+bool may_be_asked_often(const Command& command) {
+  return !command.changes_encoder &&
+         (command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
+          command.verb == Verb::temperature || command.verb == Verb::config_get || command.verb == Verb::memory_read);
+}
+
+/// What a campaign has seen, over all its virtual encoders.
+struct Tally {
+  std::uint64_t exchanges = 0;
+  std::uint64_t conversations = 0;
+  std::uint64_t accepted = 0;
+  std::uint64_t damaged = 0;      // faults that changed bytes
+  std::uint64_t wrong = 0;        // in conversations with at least one of them
+  std::uint64_t broken = 0;       // rules, after faults
+  std::uint64_t misheard = 0;     // bytes of requests
+  std::uint64_t changes = 0;      // conversations that change the encoder
+  std::uint64_t changed = 0;      // that ended well
+  std::uint64_t not_changed = 0;  // though it was not so
+  std::string promise{};
+  std::string rule{};
+  std::map<std::string, Weight> weights{};          // by command
+  std::map<std::string, std::uint64_t> trials{};    // damaged replies, by command
+  std::map<std::string, std::uint64_t> mistakes{};  // wrong results, by command
+  std::map<std::string, std::uint64_t> costs{};     // exchanges of each command
+  std::map<std::string, bool> unchecked{};          // commands whose reply has no check
+};
+
+template <class Item>
+class Campaign {
+ public:
+  Campaign(const Unit& unit, const Configuration& way, const Exchanges& wanted, std::uint64_t seed, Tally& tally,
+           Findings& findings)
+      : unit_(unit), way_(way), random_(seed), world_(unit, way.options, seed), tally_(tally), findings_(findings) {
+    rates_ = rates_for(unit, way.options, wanted);
+  }
+
+  [[nodiscard]] bool is_possible() { return world_.made(); }
+
+  void run(std::uint64_t exchanges) {
+    raise_an_alarm();
+    learn();
+    if (asked_.empty()) return;
+    const std::uint64_t end = world_.device().answered() + exchanges;
+    const std::uint64_t begin = world_.device().answered();
+    for (unsigned idle = 0; world_.device().answered() < end && findings_.count() == 0 && idle < 10'000; ++idle) one();
+    if (way_.is_model) change();
+    tally_.exchanges += world_.device().answered() - begin;
+    tally_.misheard += world_.faulty().counts()[static_cast<std::size_t>(sim::FaultKind::request_corrupt)];
+  }
+
+ private:
+  /// What one command says on an undamaged line, at each place.
+  struct Asked {
+    const Command* command;
+    Values arguments;
+    std::array<std::optional<Seen>, places> truth{};
+    std::uint64_t cost = 0;              // exchanges
+    std::vector<std::string> varying{};  // fields that are not the same each time
+  };
+
+  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const Exchanges& wanted) {
+    using sim::FaultKind;
+    sim::FaultRates rates = sim::testing::damaged_replies(0.1);
+    if (unit.link == LinkKind::exchange) rates = {};                   // there a reply is as long as what is clocked
+    rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum sees that
+    if (wanted.requests_too) rates[FaultKind::request_corrupt] = 0.02;
+    // Late enough to be given up, every other time. Nobody can tell how old it is what comes unasked.
+    const bool unasked = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
+    if (wanted.seed % 2 == 1 && !wanted.requests_too && !unasked) rates.delay = unit.timing.turnaround_limit * 3 / 2;
+    return rates;
+  }
+
+  [[nodiscard]] std::string where(const Asked& asked) const {
+    return way_.text + ", " + std::string(asked.command->name) + to_text(Arguments(asked.arguments)) + ": ";
+  }
+
+  void raise_an_alarm() {
+    if (unit_.alarms == nullptr || random_.chance(0.5)) return;
+    const std::uint64_t bit = random_.below(unit_.alarms->flags.size());
+    if (!unit_.alarms->flags[bit].name.empty()) world_.device().raise_alarms(1u << bit);
+  }
+
+  // The truth. A position is where the shaft stands, whatever the encoder says.
+  void learn() {
+    for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
+    for (const Command& command : unit_.commands) {
+      if (!may_be_asked_often(command)) continue;
+      std::uint64_t& cost = tally_.costs[std::string(command.name)];
+      if (cost > 20 && !random_.chance(0.1)) continue;
+      Asked asked{&command,
+                  command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
+      // Others are asked for the first time where they are needed: some take a hundred exchanges.
+      if (!learn_at(asked, 0)) continue;
+      cost = asked.cost;
+      if (command.verb == Verb::read) {
+        for (unsigned place = 1; place < places; ++place) learn_at(asked, place);
+      }
+      if (command.verb == Verb::read) reads_.push_back(asked_.size());
+      asked_.push_back(std::move(asked));
+    }
+    findings_.require(!way_.is_model || !reads_.empty(), [&] { return way_.text + ": no position can be read"; });
+  }
+
+  bool learn_at(Asked& asked, unsigned place) {
+    world_.move(places_[place]);
+    for (unsigned twice = 0; twice < 2; ++twice) {
+      const Ended result = world_.run(*asked.command, asked.arguments);
+      if (!result.good()) return false;
+      if (result.seen.reading) {
+        findings_.require(is_at(*result.seen.reading, places_[place]),
+                          [&] { return where(asked) + "another position than the shaft's, on a good line"; });
+      }
+      asked.cost = std::max(asked.cost, result.asked);
+      if (twice == 0) {
+        asked.truth[place] = result.seen;
+        continue;
+      }
+      for (const auto& [name, value] : result.seen.fields) {
+        const auto first = asked.truth[place]->fields.find(name);
+        if (first != asked.truth[place]->fields.end() && first->second == value) continue;
+        findings_.require(value.shows == Shows::other,
+                          [&, &changed = name] { return where(asked) + changed + " changes though the shaft stands"; });
+        asked.varying.push_back(name);
+      }
+    }
+    return true;
+  }
+
+  void one() {
+    const bool reads = !reads_.empty() && random_.chance(0.95);
+    Asked* chosen = &asked_[reads ? reads_[random_.below(reads_.size())] : random_.below(asked_.size())];
+    // What takes many exchanges comes so much less often.
+    if (chosen->cost > 4 && !reads_.empty() && !random_.chance(4.0 / static_cast<double>(chosen->cost))) {
+      chosen = &asked_[reads_[random_.below(reads_.size())]];
+    }
+    Asked& asked = *chosen;
+    place_ = asked.cost > 20 ? 1 - std::min(place_, 1u)
+                             : (place_ + 1 + static_cast<unsigned>(random_.below(places - 1))) % places;
+    if (!asked.truth[place_]) {
+      world_.set_rates({});
+      world_.pass(std::chrono::seconds(1));
+      (void)world_.run(*asked.command, asked.arguments);  // what came too late before has come
+      if (!learn_at(asked, place_)) return;
+    }
+    world_.move(places_[place_]);
+    world_.set_rates(rates_);
+    const std::uint32_t rules = world_.device().violation_count();
+    const Ended result = world_.run(*asked.command, asked.arguments);
+    judge_rules(asked, result.faults != 0, rules);
+    ++tally_.conversations;
+    tally_.damaged += result.damaged;
+    findings_.require(result.ended, [&] { return where(asked) + "hangs"; });
+    if (result.damaged != 0) weigh(asked, result.damaged);
+    if (!result.good()) return;
+    ++tally_.accepted;
+    const bool may_miss = asked.command->verb == Verb::info && result.faults != 0;  // one of several questions
+    const std::string wrong = difference(asked, result.seen, may_miss);
+    if (wrong.empty()) return;
+    if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_so_now(asked, result.seen)) return;
+    // What no check covers is taken whatever comes in its place: also what was said before.
+    const bool unchecked = is_unchecked(asked);
+    findings_.require(result.damaged != 0 || (unchecked && !quiet_),
+                      [&] { return where(asked) + wrong + ", though no byte was damaged"; });
+    if (unchecked) return;
+    ++tally_.wrong;
+    ++tally_.mistakes[std::string(asked.command->name)];
+  }
+
+  // A request that was misheard may have changed the encoder: then the truth is another one from now on.
+  bool is_so_now(const Asked& asked, const Seen& seen) {
+    world_.set_rates({});
+    const Ended now = world_.run(*asked.command, asked.arguments);
+    if (!now.good()) return false;
+    for (const auto& [name, value] : seen.fields) {
+      if (!now.seen.fields.contains(name) || !(now.seen.fields.at(name) == value)) return false;
+    }
+    for (Asked& one : asked_) one.truth = {};
+    return true;
+  }
+
+  // Changes over the same line, some of each command. Whatever ends well is so, seen over a good line; the encoder is
+  // not used for anything else after them.
+  void change() {
+    for (const Command& command : unit_.commands) {
+      if (!command.changes_encoder || command.verb == Verb::run) continue;
+      for (unsigned i = 0; i < changes_each && findings_.count() == 0; ++i) {
+        // Some take a hundred good exchanges in a row: a better line as well.
+        sim::FaultRates rates = rates_;
+        for (double& rate : rates.rates) rate *= i % 2 == 0 ? 1 : 0.03;
+        change(command, rates);
+      }
+    }
+    world_.set_rates({});
+  }
+  void change(const Command& command, const sim::FaultRates& rates) {
+    std::optional<Values> values = change_arguments(unit_, command, random_);
+    if (!values) return;
+    world_.set_rates({});
+    world_.device().lower_alarms(0xFFFF'FFFF);
+    world_.pass(std::chrono::seconds(2));  // nothing is late any more
+    world_.move(static_cast<std::int64_t>(random_.next()));
+    world_.set_rates(rates);
+    const Ended result = world_.run(command, *values);
+    world_.set_rates({});
+    world_.pass(std::chrono::seconds(2));
+    const auto what = [&] { return way_.text + ", " + std::string(command.name) + to_text(Arguments(*values)) + ": "; };
+    findings_.require(result.ended || !result.made, [&] { return what() + "hangs"; });
+    if (!result.made || result.error == Error::invalid_argument || result.error == Error::unsupported) return;
+    ++tally_.changes;
+    if (!result.good()) return;
+    ++tally_.changed;
+    follow(world_, unit_, command, *values);
+    const std::string broken = broken_promise(world_, unit_, command, *values, result.seen);
+    if (broken.empty()) return;
+    findings_.require(result.damaged != 0, [&] { return what() + broken + ", though no byte was damaged"; });
+    ++tally_.not_changed;
+    if (tally_.promise.empty()) tally_.promise = what() + broken;
+  }
+
+  /// Empty when all of it is so.
+  [[nodiscard]] std::string difference(const Asked& asked, const Seen& seen, bool may_miss) const {
+    const Seen& truth = *asked.truth[place_];
+    if (seen.reading.has_value() != truth.reading.has_value()) return "has another reading";
+    if (seen.reading && !is_at(*seen.reading, places_[place_])) return "another position than the shaft's";
+    for (const auto& [name, value] : truth.fields) {
+      if (std::find(asked.varying.begin(), asked.varying.end(), name) != asked.varying.end()) continue;
+      const auto found = seen.fields.find(name);
+      if (found == seen.fields.end() && may_miss) continue;
+      if (found == seen.fields.end()) return "no " + name;
+      if (!(found->second == value)) return "another " + name + " than on a good line";
+    }
+    return {};
+  }
+
+  // What a check is worth depends on the frames of the conversation.
+  void weigh(const Asked& asked, std::uint64_t damaged) {
+    const std::string name(asked.command->name);
+    tally_.trials[name] += damaged;
+    if (tally_.weights.contains(name)) return;
+    Weight worst{.damaged = 1};
+    for (const auto& [request, reply] : frames_of(asked)) {
+      const Weight weight = weight_of(unit_, world_.options(), request, reply, rates_,
+                                      asked.command->verb == Verb::read ? 20'000 : 4'000);
+      if (weight.damaged == 0) continue;
+      const auto chance = [](const Weight& one) {
+        return static_cast<double>(one.wrong) / static_cast<double>(one.damaged);
+      };
+      if (worst.damaged <= 1 || chance(weight) > chance(worst)) worst = weight;
+    }
+    tally_.weights[name] = worst;
+  }
+
+  // Whether no bit of one of its replies is covered by a check.
+  bool is_unchecked(const Asked& asked) {
+    const std::string name(asked.command->name);
+    if (const auto known = tally_.unchecked.find(name); known != tally_.unchecked.end()) return known->second;
+    const auto frames = frames_of(asked);
+    const auto open = [&](const std::pair<Held, Held>& one) {
+      if (unit_.covered == nullptr) return false;
+      for (std::size_t bit = 0; bit < one.second.bit_count(); ++bit) {
+        if (unit_.covered(world_.options(), one.first.frame(), one.second.frame(), bit)) return false;
+      }
+      return true;
+    };
+    return tally_.unchecked[name] = std::any_of(frames.begin(), frames.end(), open);
+  }
+
+  [[nodiscard]] std::vector<std::pair<Held, Held>> frames_of(const Asked& asked);
+
+  // A host breaks no rule. What an encoder takes for one after faults (half a request, heard when a long reply had made
+  // it deaf) is rare.
+  void judge_rules(const Asked& asked, bool struck, std::uint32_t before) {
+    const std::uint32_t broken = world_.device().violation_count() - before;
+    quiet_ = quiet_ && !struck;
+    if (broken == 0 || !way_.is_model) return;  // a virtual encoder can be given what no host keeps to
+    tally_.broken += broken;
+    const std::span<const Violation> rules = world_.device().violations();
+    if (tally_.rule.empty() && !rules.empty()) tally_.rule = where(asked) + std::string(rules.back().rule);
+    findings_.require(!quiet_, [&] { return "the host broke a rule: " + tally_.rule; });
+  }
+
+  const Unit& unit_;
+  const Configuration& way_;
+  sim::Random random_;
+  World<Item> world_;
+  Tally& tally_;
+  Findings& findings_;
+  sim::FaultRates rates_;
+  std::array<std::int64_t, places> places_{};
+  unsigned place_ = 0;
+  bool quiet_ = true;  // no fault has struck yet: later the guard may ask again for what is late
+  std::vector<Asked> asked_;
+  std::vector<std::size_t> reads_;  // of them those that read the position
+};
+
+/// What was on the line in a conversation without faults: requests, each with what came back.
+template <class Item>
+std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked) {
+  World<Item> world(unit_, way_.options, 1);
+  world.move(places_[place_]);
+  std::vector<std::pair<Held, Held>> frames;
+  bool answering = true;
+  const auto next = [&](bool by_host) {
+    if (by_host && std::exchange(answering, false)) frames.push_back({{.link = unit_.link}, {.link = unit_.link}});
+    if (!by_host && frames.empty()) frames.push_back({{.link = unit_.link}, {.link = unit_.link}});
+    if (!by_host) answering = true;
+  };
+  world.line().observe([&](std::size_t sender, Time, Time, const Item& item) {
+    const bool by_host = world.line().role(sender) == sim::Role::host;
+    next(by_host);
+    Held& frame = by_host ? frames.back().first : frames.back().second;
+    if constexpr (World<Item>::is_can) {
+      frame.can = item;
+    } else {
+      frame.bytes.push_back(item);
+    }
+  });
+  world.line().observe_exchanges([&](const typename World<Item>::Line::Exchange& exchange) {
+    if constexpr (!World<Item>::is_can) {
+      const bool clocked = unit_.link == LinkKind::clocked;
+      Held reply{.link = unit_.link, .bytes = Wire(exchange.in.begin(), exchange.in.end())};
+      if (clocked) reply.bits = exchange.bits;
+      Held request{.link = unit_.link};
+      if (!clocked) request.bytes.assign(exchange.out.begin(), exchange.out.end());
+      frames.push_back({request, reply});
+    }
+  });
+  (void)world.run(*asked.command, asked.arguments);
+  std::erase_if(frames, [](const auto& one) { return one.second.empty(); });
+  if (frames.size() > 4) frames.resize(4);
+  return frames;
+}
+
+void judge_weights(const Tally& tally, Findings& findings) {
+  for (const auto& [name, trials] : tally.trials) {
+    const auto mistakes = tally.mistakes.contains(name) ? tally.mistakes.at(name) : 0;
+    const std::uint64_t allowed = tally.weights.at(name).allowed(trials);
+    const auto text = [&, &command = name, &damaged = trials] {
+      return command + ": of " + std::to_string(damaged) + " damaged replies " + std::to_string(mistakes) +
+             " were taken for good and wrong; the check lets " + std::to_string(allowed) + " pass";
+    };
+    findings.require(mistakes <= allowed, text);
+    if (mistakes > 0) findings.note(text());
+  }
+}
+
+template <class Item>
+void exchange(const Unit& unit, const Exchanges& wanted, Tally& tally, Findings& findings) {
+  const std::vector<Configuration> ways = configurations(unit);
+  for (std::uint64_t round = 0; tally.exchanges < wanted.count && findings.count() == 0; ++round) {
+    if (round > 100 + wanted.count / 100) {
+      findings.add("exchanges do not come together");
+      break;
+    }
+    // The models every other time, in between everything that options can be.
+    const Configuration& way =
+        round % 2 == 0 ? ways[round / 2 % std::max<std::size_t>(1, unit.models.size())] : ways[round / 2 % ways.size()];
+    Campaign<Item> campaign(unit, way, wanted, 1000 * wanted.seed + round, tally, findings);
+    if (!campaign.is_possible()) continue;
+    try {
+      campaign.run(std::min(exchanges_each, wanted.count - tally.exchanges));
+    } catch (const std::logic_error& error) {
+      findings.add(way.text + ": " + error.what());
+    }
+  }
+}
+
+}  // namespace
+
+Findings check_exchanges(const Unit& unit, const Exchanges& wanted) {
+  Findings findings;
+  Tally tally;
+  if (unit.link == LinkKind::can) {
+    exchange<CanFrame>(unit, wanted, tally, findings);
+  } else {
+    exchange<std::uint8_t>(unit, wanted, tally, findings);
+  }
+  judge_weights(tally, findings);
+  const std::uint64_t few = tally.conversations / 1000 + tally.misheard + 1;
+  findings.require(tally.broken <= few, [&] { return std::to_string(tally.broken) + " rules broken: " + tally.rule; });
+  // What was written is read back, so that two damaged replies must look good.
+  findings.require(tally.not_changed <= 2 + tally.changed / 100,
+                   [&] { return std::to_string(tally.not_changed) + " changes were not made: " + tally.promise; });
+  findings.note(std::to_string(tally.changed) + " of " + std::to_string(tally.changes) + " changes were made");
+  findings.require(tally.accepted > tally.conversations / 50, [&] {
+    return "only " + std::to_string(tally.accepted) + " of " + std::to_string(tally.conversations) + " ended well";
+  });
+  findings.require(tally.damaged > tally.exchanges / 100, [] { return "hardly anything was damaged"; });
+  findings.note(std::to_string(tally.exchanges) + " exchanges in " + std::to_string(tally.conversations) +
+                " conversations, " + std::to_string(tally.damaged) + " damaged, " + std::to_string(tally.accepted) +
+                " ended well, " + std::to_string(tally.wrong) + " of them wrong");
+  return findings;
+}
+
+}  // namespace absenc::kit

@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+
+#include "tests/kit/frames.hpp"
+#include "tests/kit/kit.hpp"
+#include "tests/kit/player.hpp"
+
+namespace absenc::kit {
+namespace {
+
+/// How a conversation with this reply ended.
+struct Outcome {
+  bool ended = false;
+  unsigned asked = 0;
+  Error error = Error::none;
+  Seen seen;
+};
+
+/// One command and one vector whose request it sends.
+struct Feeding {
+  const Unit& unit;
+  const Vector& vector;
+  const Options& options;
+  const Command& command;
+  const Values arguments;
+  Findings& findings;
+
+  const Held request = held(unit, vector.request);
+  const Held reply = held(unit, vector.reply);
+  const bool streams = unit.streams != nullptr && unit.streams(options);
+
+  template <class Text>
+  void require(bool holds, Text&& text) const {
+    findings.require(holds, [&] {
+      return std::string(vector.id) + ", " + std::string(command.name) + to_text(Arguments(arguments)) + ": " + text();
+    });
+  }
+
+  template <class Item>
+  Outcome converse(const std::vector<Item>& asks, const typename Player<Item>::Reply& comes,
+                   const std::function<void(const Conversation<Item>&)>& on_emit = {}) const {
+    std::vector<std::byte> storage(unit.host_storage);
+    Conversation<Item>* conversation = machine_of<Item>(unit.host(options, command, arguments, storage));
+    if (conversation == nullptr) return {};
+    Player<Item> player(unit, options);
+    Outcome outcome;
+    outcome.ended = player.run(*conversation, asks, comes, [&] {
+      if (on_emit) on_emit(*conversation);
+    });
+    outcome.asked = player.asked();
+    outcome.error = conversation->error();
+    conversation->report(outcome.seen);
+    if (conversation->reading() != nullptr) outcome.seen.reading = *conversation->reading();
+    require(outcome.ended, [] { return "does not end"; });
+    require(outcome.error == Error::none || (outcome.seen.fields.empty() && !outcome.seen.reading),
+            [&] { return "reports " + to_text(outcome.seen.fields) + " with an error"; });
+    return outcome;
+  }
+  Outcome converse(const std::vector<Wire>& pieces) const {
+    return converse<std::uint8_t>(request.bytes, [&](std::size_t) { return pieces; });
+  }
+
+  Error decoded(const Held& frame, Seen& seen) const {
+    return unit.decode(options, request.frame(), frame.frame(), seen);
+  }
+
+  // What a unit makes of its raw fields (a temperature of a memory byte) has other names, but a position is what it is.
+  void require_report(const Outcome& outcome) const {
+    const bool reads = command.verb == Verb::read || command.verb == Verb::read_part;
+    unsigned shared = 0;
+    for (const auto& [name, value] : expected_fields(vector)) {
+      const auto found = outcome.seen.fields.find(name);
+      if (found == outcome.seen.fields.end()) {
+        require(!reads || !shows_place(name), [&, &missing = name] { return missing + " is not reported"; });
+        continue;
+      }
+      ++shared;
+      require(found->second == value, [&, &wrong = name] { return wrong + " is not what the frame has"; });
+    }
+    require(shared > 0 || (!reads && !outcome.seen.fields.empty()),
+            [&] { return "reports " + to_text(outcome.seen.fields); });
+    Seen frame;
+    const bool has_reading = decoded(reply, frame) == Error::none && frame.reading.has_value();
+    require(!reads || outcome.seen.reading.has_value() == has_reading, [] { return "has another reading"; });
+    if (!reads || !has_reading || !outcome.seen.reading) return;
+    // What of it holds may be known from an earlier reply.
+    require(outcome.seen.reading->singleturn == frame.reading->singleturn &&
+                outcome.seen.reading->multiturn == frame.reading->multiturn,
+            [] { return "reads another position"; });
+  }
+  [[nodiscard]] bool shows_place(const std::string& name) const {
+    return std::any_of(unit.fields.begin(), unit.fields.end(),
+                       [&](const FieldInfo& one) { return one.name == name && one.shows != Shows::other; });
+  }
+
+  // ---- Links of characters
+
+  static std::vector<Wire> bytewise(Bytes bytes) {
+    std::vector<Wire> pieces;
+    for (const std::uint8_t byte : bytes) pieces.push_back({byte});
+    return pieces;
+  }
+
+  void characters() const {
+    const Outcome whole = converse({reply.bytes});
+    require(request.empty() || whole.asked > 0, [] { return "is not asked"; });
+    // Other procedures may go on after a good reply, and may ask again after one that is none.
+    if (is_one_question()) {
+      require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
+    }
+    if (whole.error == Error::none && vector.error == Error::none) require_report(whole);
+    // A byte after a complete good reply belongs to whatever comes next: it is found there.
+    const Delimit end = unit.delimit(options, Direction::reply, vector.reply);
+    if (end.kind != Delimit::Kind::complete || end.size >= reply.bytes.size()) {
+      const Outcome pieces = converse(bytewise(reply.bytes));
+      require(pieces.error == whole.error && pieces.seen.fields == whole.seen.fields,
+              [] { return "another result when it comes byte by byte"; });
+    }
+    if (vector.error != Error::none || whole.error != Error::none) return;
+    damaged();
+  }
+  [[nodiscard]] bool is_one_question() const {
+    return command.arguments.empty() && (command.verb == Verb::read || command.verb == Verb::read_part ||
+                                         command.verb == Verb::info || command.verb == Verb::temperature);
+  }
+  void damaged() const {
+    for (std::size_t size = 1; size < reply.bytes.size(); ++size) {
+      refused(reply.cut(size), [&] { return "takes a reply cut after " + std::to_string(size); });
+    }
+    for (std::size_t bit = 0; bit < reply.bit_count(); ++bit) {
+      if (unit.covered != nullptr && !unit.covered(options, request.frame(), reply.frame(), bit)) continue;
+      refused(reply.flipped(bit), [&] { return "takes a reply with bit " + std::to_string(bit) + " flipped"; });
+    }
+    for (const std::uint8_t byte : std::to_array<std::uint8_t>({0x00, 0x1A, 0x55, 0xFF})) {
+      const std::array garbage{byte};
+      const auto text = [&] { return "takes a reply with garbage " + to_text(Bytes(garbage)) + " around it"; };
+      refused(reply.between(garbage, {}), text);
+      refused(reply.between({}, garbage), text, false);
+    }
+    refused(
+        reply.between({}, reply.bytes), [] { return std::string("takes a reply that comes twice"); }, false);
+  }
+
+  // In one piece, and byte by byte where that is not another thing.
+  template <class Text>
+  void refused(const Held& frame, Text&& text, bool in_pieces = true) const {
+    Seen ignored;
+    if (decoded(frame, ignored) == Error::none) return;  // it stands for a byte that no check covers
+    require(converse({frame.bytes}).error != Error::none, text);
+    if (!in_pieces) return;
+    require(converse(bytewise(frame.bytes)).error != Error::none, [&] { return text() + ", byte by byte"; });
+  }
+
+  // ---- What comes by itself: frames without a pause, among which one is damaged. Whatever is taken for a position is
+  // that of the good ones.
+
+  void stream() const {
+    if (vector.error != Error::none) return;
+    const unsigned undamaged = stream_with(reply, [] { return std::string("of good frames only"); });
+    require(undamaged >= 2, [&] { return "finds " + std::to_string(undamaged) + " of eight good frames"; });
+    for (std::size_t size = 1; size < reply.bytes.size(); ++size) {
+      stream_with(reply.cut(size), [&] { return "with one cut after " + std::to_string(size); });
+    }
+    for (std::size_t bit = 0; bit < reply.bit_count(); ++bit) {
+      if (unit.covered != nullptr && !unit.covered(options, request.frame(), reply.frame(), bit)) continue;
+      stream_with(reply.flipped(bit), [&] { return "with one whose bit " + std::to_string(bit) + " is flipped"; });
+    }
+    for (const std::uint8_t byte : std::to_array<std::uint8_t>({0x00, 0x1A, 0x55, 0xFF})) {
+      stream_with(reply.between(std::array{byte}, {}), [] { return std::string("with garbage between"); });
+    }
+  }
+  // How many positions were found.
+  template <class Text>
+  unsigned stream_with(const Held& odd, Text&& text) const {
+    unsigned good = 0;
+    for (const bool in_bytes : {false, true}) {
+      Wire all;
+      std::vector<Wire> pieces;
+      for (unsigned i = 0; i < 8; ++i) {
+        const Wire& one = i == 4 ? odd.bytes : reply.bytes;
+        all.insert(all.end(), one.begin(), one.end());
+        pieces.push_back(one);
+      }
+      if (in_bytes) pieces = bytewise(all);
+      converse<std::uint8_t>(
+          {}, [&](std::size_t) { return pieces; },
+          [&](const Conversation<std::uint8_t>& now) {
+            if (now.error() != Error::none) return;
+            ++good;
+            Seen seen;
+            now.report(seen);
+            for (const auto& [name, value] : expected_fields(vector)) {
+              require(seen.fields.contains(name) && seen.fields[name] == value,
+                      [&, &wrong = name] { return "a stream " + text() + " shows another " + wrong; });
+            }
+          });
+    }
+    return good;
+  }
+
+  // ---- Clocked links: the host takes as many bits as it wants, and behind the frame there is nothing.
+
+  [[nodiscard]] bool bits() const {
+    const bool taken = same_as_decoded(reply);
+    for (std::size_t size = 0; size < reply.bits; ++size) same_as_decoded(reply.cut(size));
+    for (std::size_t bit = 0; bit < reply.bits; ++bit) same_as_decoded(reply.flipped(bit));
+    return taken;
+  }
+  bool same_as_decoded(const Held& frame) const {
+    bool taken = false;
+    for (const std::uint8_t idle : std::to_array<std::uint8_t>({0x00, 0xFF})) {
+      Held clocked{.link = unit.link};
+      const Outcome outcome = converse<std::uint8_t>(request.bytes, [&](std::size_t clocks) {
+        clocked.bytes.assign((clocks + 7) / 8, idle);
+        clocked.bits = clocks;
+        for (std::size_t i = 0; i < std::min(clocks, frame.bits); ++i) {
+          const auto mask = static_cast<std::uint8_t>(0x80u >> i % 8);
+          clocked.bytes[i / 8] =
+              static_cast<std::uint8_t>((clocked.bytes[i / 8] & ~mask) | (frame.bytes[i / 8] & mask));
+        }
+        return std::vector<Wire>{clocked.bytes};
+      });
+      Seen seen;
+      const Error error = decoded(clocked, seen);
+      // A conversation may demand more than a frame: a life counter that counts.
+      const bool as_decoded = error == Error::none && outcome.seen.fields == seen.fields;
+      require(outcome.error != Error::none || as_decoded, [&] {
+        return "makes " + to_text(outcome.seen.fields) + " of " + to_text(clocked) + ", which is " +
+               std::string(text_of(error).name) + " " + to_text(seen.fields);
+      });
+      taken = taken || outcome.seen.reading.has_value();
+    }
+    return taken;
+  }
+
+  // ---- CAN
+
+  void frames() const {
+    std::vector<CanFrame> asks;
+    if (request.can) asks.push_back(*request.can);
+    const auto converse_with = [&](const std::vector<CanFrame>& frames) {
+      return converse<CanFrame>(asks, [&](std::size_t) {
+        Player<CanFrame>::Pieces pieces;
+        for (const CanFrame& frame : frames) pieces.push_back({frame});
+        return pieces;
+      });
+    };
+    if (vector.error != Error::none) return;  // others send such frames: they are none of this conversation
+    const CanFrame other{.id = 0x7A5, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
+    std::vector<CanFrame> echo = asks;
+    echo.push_back(*reply.can);
+    for (const std::vector<CanFrame>& frames :
+         {std::vector{*reply.can}, std::vector{other, *reply.can}, std::vector{*reply.can, other}, echo}) {
+      const Outcome outcome = converse_with(frames);
+      require(outcome.error == Error::none, [&] { return "ends with " + std::string(text_of(outcome.error).name); });
+      if (outcome.error == Error::none) require_report(outcome);
+    }
+    for (const std::vector<CanFrame>& frames : {std::vector<CanFrame>{}, std::vector{other}, asks}) {
+      require(converse_with(frames).error == Error::timeout, [] { return "does not wait for its reply"; });
+    }
+    for (std::uint8_t size = 0; size < reply.can->size; ++size) {
+      require(converse_with({*reply.cut(size).can}).error != Error::none,
+              [&] { return "takes a frame of " + std::to_string(size) + " bytes"; });
+    }
+  }
+};
+
+/// The arguments with which the command sends this request; none when it does not.
+std::optional<Values> arguments_for(const Unit& unit, const Options& options, const Command& command,
+                                    const Vector& vector) {
+  Seen asked;
+  Values values = least_arguments(command);
+  if (!vector.request.empty() && !values.empty()) {
+    (void)unit.decode(options, held(unit, vector.request).frame(), {}, asked);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      for (const auto& [name, value] : asked.fields) {
+        if (name == command.arguments[i].name) values[i] = value.number;
+      }
+    }
+  }
+  const Result<Wire> request = encoded(unit, options, command, values);
+  if (request && std::ranges::equal(*request, vector.request)) return values;
+  // Nothing is sent for what comes by itself.
+  const bool unasked = !request && request.error() == Error::unsupported && vector.request.empty() &&
+                       command.verb == Verb::read && unit.streams != nullptr && unit.streams(options);
+  if (unasked) return values;
+  return std::nullopt;
+}
+
+// Whether what came first may be a reading at all: of what is only named in a capture no conversation is made.
+bool has_reading(const Unit& unit, const Options& options, const Vector& vector) {
+  Seen seen;
+  return unit.decode(options, held(unit, vector.request).frame(), held(unit, vector.reply).frame(), seen) ==
+             Error::none &&
+         seen.reading.has_value();
+}
+
+void feed_vector(const Unit& unit, const Vector& vector, const Options& options, unsigned& readings,
+                 Findings& findings) {
+  for (const Command& command : unit.commands) {
+    if (command.changes_encoder || command.verb == Verb::scan) continue;
+    const std::optional<Values> arguments = arguments_for(unit, options, command, vector);
+    if (!arguments) continue;
+    if (unit.link == LinkKind::can && command.verb != Verb::read) continue;
+    const Feeding feeding{unit, vector, options, command, *arguments, findings};
+    bool taken = command.verb == Verb::read && has_reading(unit, options, vector);
+    if (unit.link == LinkKind::can) {
+      feeding.frames();
+    } else if (unit.link == LinkKind::clocked) {
+      taken = feeding.bits() && taken;
+    } else if (feeding.streams) {
+      feeding.stream();
+    } else {
+      feeding.characters();
+    }
+    if (taken) ++readings;
+  }
+}
+
+// Every command has a request in some configuration, or says that it has none of its own.
+void find_requests(const Unit& unit, Findings& findings) {
+  const std::vector<Configuration> ways = configurations(unit);
+  for (const Command& command : unit.commands) {
+    Error error = Error::none;
+    const bool any = std::any_of(ways.begin(), ways.end(), [&](const Configuration& way) {
+      for (const Values& values : {least_arguments(command), most_arguments(command)}) {
+        const Result<Wire> request = encoded(unit, way.options, command, values);
+        if (request) return true;
+        error = request.error();
+      }
+      return false;
+    });
+    findings.require(any || error == Error::unsupported, [&] {
+      return std::string(command.name) + " has no request: " + std::string(text_of(error).name);
+    });
+  }
+}
+
+}  // namespace
+
+Findings check_hosts(const Unit& unit) {
+  Findings findings;
+  unsigned readings = 0;
+  for (const Vector& vector : unit.vectors) {
+    if (vector.reply.empty()) continue;
+    const std::optional<Options> options = options_of(unit, vector.options);
+    if (options) feed_vector(unit, vector, *options, readings, findings);
+  }
+  findings.require(readings > 0, [] { return "no vector's position is read by a command"; });
+  find_requests(unit, findings);
+  return findings;
+}
+
+}  // namespace absenc::kit

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every unit is tested with, from its descriptor alone: no line of it is written by the unit's author.
+#pragma once
+
+#include <cstdint>
+
+#include "absenc/protocol/unit.hpp"
+#include "tests/kit/findings.hpp"
+
+namespace absenc::kit {
+
+/// Every vector through `decode` and `delimit`: whole, cut at each element, with each bit flipped that is covered, one
+/// reply too many.
+[[nodiscard]] Findings check_decoding(const Unit& unit);
+
+/// Every vector's reply fed to the conversations of the commands whose request it has: whole, byte by byte, cut at each
+/// byte, with each bit flipped, garbage before and behind, one frame too many. A vector's reading that no command
+/// reads, and a command without a request, are findings.
+[[nodiscard]] Findings check_hosts(const Unit& unit);
+
+/// Requests of every command with random arguments: what `encode` makes is a good request with these arguments in its
+/// fields.
+[[nodiscard]] Findings check_requests(const Unit& unit, std::uint64_t seed);
+
+/// Each command in exactly the storage that it needs, which is at most what is declared, and no byte behind it is
+/// touched; with one byte less there is no conversation. The same of devices.
+[[nodiscard]] Findings check_storage(const Unit& unit);
+
+/// What the descriptor says of memory, registers and settings names commands and arguments that are there.
+[[nodiscard]] Findings check_declarations(const Unit& unit);
+
+/// Every setting is written and read back over the virtual encoder.
+[[nodiscard]] Findings check_settings(const Unit& unit);
+
+/// The first and the last byte of each memory area are written and read back; what cannot be written is refused.
+[[nodiscard]] Findings check_memory(const Unit& unit);
+
+/// On an undamaged line each command ends well, in each configuration of the unit, and positions are where the shaft
+/// stands.
+[[nodiscard]] Findings check_commands(const Unit& unit);
+
+/// Host against virtual encoder in virtual time, over a line with every kind of fault. The shaft's place is known, and
+/// so is what each command says of it on an undamaged line: anything else is an error where no byte of the conversation
+/// was damaged, and elsewhere so rare as the check of the frames allows.
+struct Exchanges {
+  std::uint64_t count = 100'000;
+  std::uint64_t seed = 0;
+  bool requests_too = false;  // also what the encoder hears is damaged
+};
+[[nodiscard]] Findings check_exchanges(const Unit& unit, const Exchanges& exchanges);
+
+}  // namespace absenc::kit

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every unit with everything of the kit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include "absenc/protocol/all.hpp"
+#include "tests/kit/kit.hpp"
+
+namespace absenc::kit {
+namespace {
+
+std::string name_of(const Unit& unit) {
+  std::string name(unit.id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+void expect_none(const Findings& findings) {
+  for (const std::string& text : findings.texts()) ADD_FAILURE() << text;
+  EXPECT_EQ(findings.count(), 0u);
+  for (const std::string& note : findings.notes()) std::printf("%s\n", note.c_str());
+}
+
+class Kit : public ::testing::TestWithParam<const Unit*> {
+ protected:
+  const Unit& unit = *GetParam();
+};
+
+TEST_P(Kit, DecodesItsVectors) {
+  const Findings findings = check_decoding(unit);
+  EXPECT_GT(findings.looks(), unit.vectors.size());
+  expect_none(findings);
+}
+
+TEST_P(Kit, HostsTakeWhatVectorsSay) {
+  const Findings findings = check_hosts(unit);
+  EXPECT_GT(findings.looks(), 100u);
+  expect_none(findings);
+}
+
+TEST_P(Kit, CommandsEndWell) {
+  const Findings findings = check_commands(unit);
+  EXPECT_GT(findings.looks(), 10u);
+  expect_none(findings);
+}
+
+TEST_P(Kit, DeclaresWhatIsThere) { expect_none(check_declarations(unit)); }
+TEST_P(Kit, RequestsHaveTheirArguments) { expect_none(check_requests(unit, 1)); }
+TEST_P(Kit, StorageIsEnough) { expect_none(check_storage(unit)); }
+TEST_P(Kit, ChangesAreMade) { expect_none(check_settings(unit)); }
+TEST_P(Kit, MemoryKeepsItsBytes) { expect_none(check_memory(unit)); }
+
+/// The series of faults, of which sanitizers see the first (CMakePresets.json), and the unit.
+using Series = std::tuple<unsigned, const Unit*>;
+
+class KitExchanges : public ::testing::TestWithParam<Series> {};
+
+TEST_P(KitExchanges, NothingWrongIsTaken) {
+  const auto [series, unit] = GetParam();
+  expect_none(check_exchanges(*unit, {.count = 125'000, .seed = series}));
+}
+
+TEST_P(KitExchanges, NorWhenRequestsAreDamaged) {
+  const auto [series, unit] = GetParam();
+  if (unit->link == LinkKind::can || series > 1) GTEST_SKIP() << "the checksum of CAN sees that; two series are enough";
+  expect_none(check_exchanges(*unit, {.count = 10'000, .seed = series, .requests_too = true}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, KitExchanges,
+                         ::testing::Combine(::testing::Range(0u, 6u),
+                                            ::testing::ValuesIn(all_units().begin(), all_units().end())),
+                         [](const auto& test) {
+                           return std::to_string(std::get<0>(test.param)) + "_" + name_of(*std::get<1>(test.param));
+                         });
+
+INSTANTIATE_TEST_SUITE_P(Units, Kit, ::testing::ValuesIn(all_units().begin(), all_units().end()),
+                         [](const auto& test) { return name_of(*test.param); });
+
+}  // namespace
+}  // namespace absenc::kit

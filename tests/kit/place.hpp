@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a shaft stands, as a reading of so many bits has it.
+#pragma once
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/bits.hpp"
+
+namespace absenc::kit {
+
+/// Counts of a turn; a linear encoder goes along its whole scale in one revolution.
+[[nodiscard]] constexpr std::uint64_t counts_at(std::int64_t position, unsigned bits) {
+  const auto fraction = static_cast<std::uint64_t>(position) & 0xFFFF'FFFF;
+  if (bits == 0) return 0;
+  // Beyond 32 bits the turns are part of it.
+  return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
+}
+
+[[nodiscard]] constexpr std::uint64_t turns_at(std::int64_t position, unsigned bits) {
+  return bits == 0 ? 0 : static_cast<std::uint64_t>(position >> 32) & low_mask(bits);
+}
+
+/// What of the reading holds is the place.
+[[nodiscard]] constexpr bool is_at(const Reading& reading, std::int64_t position) {
+  if (reading.singleturn_bits != 0 && reading.singleturn_valid_bits != 0) {
+    const unsigned open = reading.singleturn_bits - reading.singleturn_valid_bits;
+    if (reading.singleturn >> open != counts_at(position, reading.singleturn_bits) >> open) return false;
+  }
+  return !reading.multiturn_valid || reading.multiturn == turns_at(position, reading.multiturn_bits);
+}
+
+}  // namespace absenc::kit

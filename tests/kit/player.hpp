@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plays the encoder for one conversation: one request gets what the test gives, in pieces; every other one gets what a
+// virtual encoder says.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <type_traits>
+#include <vector>
+
+#include "tests/kit/frames.hpp"
+
+namespace absenc::kit {
+
+struct Still final : Shaft {
+  [[nodiscard]] ShaftState at(Time) const override { return {}; }
+};
+
+/// The machine of an Any that carries this item.
+template <class Item, template <class> class Role>
+Role<Item>* machine_of(const Any<Role>& any) {
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    return any.frames;
+  } else {
+    return any.bytes;
+  }
+}
+
+template <class Item>
+class Player {
+ public:
+  using Pieces = std::vector<std::vector<Item>>;
+  /// What comes back for the request under test: `clocks` bits or items are what is asked for, 0: unknown.
+  using Reply = std::function<Pieces(std::size_t clocks)>;
+
+  Player(const Unit& unit, const Options& options) : device_storage_(unit.device_storage) {
+    device_ = machine_of<Item>(unit.device(options, still_, device_storage_));
+    if (device_ != nullptr) device_->power_on(now_, Device<Item>::PowerOn::skip);
+  }
+
+  /// False when the conversation does not end. An empty request is one that sends nothing: a pulse, or a wait.
+  /// `on_emit` is called for each result of one that streams.
+  template <class OnEmit>
+  bool run(Conversation<Item>& conversation, const std::vector<Item>& request, const Reply& reply, OnEmit&& on_emit) {
+    using Kind = typename Event<Item>::Kind;
+    using Wanted = typename Step<Item>::Kind;
+    bool unasked = request.empty();
+    for (unsigned steps = 0; steps < 2000; ++steps) {
+      const Step<Item> step = conversation.next(now_);
+      if (step.kind == Wanted::done) return true;
+      if (step.kind == Wanted::emit && conversation.streams()) on_emit();
+      if (step.kind == Wanted::emit || step.kind == Wanted::configure) continue;
+      now_ += std::chrono::milliseconds(1);
+      if (step.kind == Wanted::wait) {
+        if (std::exchange(unasked, false)) {
+          play(conversation, reply(step.expect));
+        } else {
+          conversation.feed({.kind = Kind::silence, .at = now_});
+        }
+        continue;
+      }
+      const std::vector<Item> sent(step.out.begin(), step.out.end());
+      const std::size_t clocks = step.bits != 0 ? step.bits : step.expect;
+      now_ = std::max(now_, step.at);
+      conversation.feed({.kind = Kind::sent, .at = now_});
+      const bool tested = sent == request;
+      if (tested) ++asked_;
+      unasked = false;
+      play(conversation, tested ? reply(clocks) : Pieces{ask_device(sent)});
+    }
+    return false;
+  }
+  /// How often the request under test came.
+  [[nodiscard]] unsigned asked() const { return asked_; }
+
+ private:
+  void play(Conversation<Item>& conversation, const Pieces& pieces) {
+    for (const std::vector<Item>& piece : pieces) {
+      if (piece.empty()) continue;
+      now_ += std::chrono::microseconds(1);
+      if (conversation.next(now_).kind != Step<Item>::Kind::wait) return;
+      conversation.feed({.kind = Event<Item>::Kind::received, .at = now_, .items = piece});
+    }
+  }
+
+  std::vector<Item> ask_device(const std::vector<Item>& request) {
+    if (device_ == nullptr || request.empty()) return {};
+    device_->feed({.kind = Event<Item>::Kind::received, .at = now_, .items = request});
+    const Step<Item> step = device_->next(now_);
+    if (step.kind != Step<Item>::Kind::transfer) return {};
+    std::vector<Item> reply(step.out.begin(), step.out.end());
+    device_->feed({.kind = Event<Item>::Kind::sent, .at = now_});
+    return reply;
+  }
+
+  Time now_{};
+  Still still_;
+  std::vector<std::byte> device_storage_;
+  Device<Item>* device_ = nullptr;
+  unsigned asked_ = 0;
+};
+
+}  // namespace absenc::kit

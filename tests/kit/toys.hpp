@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole unit in a hundred lines, right or with one mistake: what the kit must find is shown by it. One byte asks, the
+// position comes with a CRC of 16 bits, or as one word of 14 bits with two parities, which any byte may begin.
+#pragma once
+
+#include <array>
+
+#include "absenc/core/hex.hpp"
+#include "absenc/protocol/make.hpp"
+#include "tests/kit/place.hpp"
+
+namespace absenc::kit::toy {
+
+enum class Mistake : std::uint8_t {
+  none,
+  parity,          // no mistake: a check that lets every fourth wrong word pass
+  takes_two,       // the host takes the first two bytes for the reply
+  takes_anything,  // the host looks at no check
+  takes_more,      // the host takes what begins with a good reply, and leaves the rest to the next
+  says_nothing,    // the host reports nothing
+  has_no_request,  // encode fails
+  no_vector,       // vectors whose request no command sends
+  is_stale,        // the virtual encoder says where it was when it was asked last
+  is_wrong,        // the virtual encoder is a count beside its shaft
+  wants_more,      // host_storage is less than the host needs
+  overflows,       // the host is made whatever storage there is
+  flips_pass,      // decode does not look at the last byte
+  never_ends,      // the host waits for ever when nothing comes
+};
+
+inline constexpr std::uint8_t ask = 0x5A;
+inline constexpr Time answer_limit = std::chrono::microseconds(200);
+inline constexpr Time gap = std::chrono::microseconds(30);
+
+constexpr std::uint16_t crc16(Bytes bytes) {
+  std::uint16_t crc = 0xFFFF;
+  for (const std::uint8_t byte : bytes) {
+    crc = static_cast<std::uint16_t>(crc ^ byte << 8);
+    for (unsigned i = 0; i < 8; ++i)
+      crc = static_cast<std::uint16_t>((crc & 0x8000) != 0 ? crc << 1 ^ 0x1021 : crc << 1);
+  }
+  return crc;
+}
+
+constexpr std::uint16_t parities(unsigned position) {
+  unsigned odd = 3;
+  for (unsigned bit = 0; bit < 14; ++bit) odd ^= (position >> bit & 1) << bit % 2;
+  return static_cast<std::uint16_t>(position | odd << 14);
+}
+
+inline constexpr std::array<FieldInfo, 1> fields{
+    {{"singleturn", FieldInfo::Kind::number, "counts", "position", {}, Shows::position}}};
+
+template <Mistake mistake>
+struct Toy {
+  static constexpr bool weak = mistake == Mistake::parity;
+  static constexpr std::size_t length = weak ? 2 : 4;
+  static constexpr unsigned bits = weak ? 14 : 16;
+
+  static constexpr std::array<std::uint8_t, length> encoded(unsigned position) {
+    const unsigned word = weak ? parities(position) : position;
+    std::array<std::uint8_t, length> bytes{static_cast<std::uint8_t>(word), static_cast<std::uint8_t>(word >> 8)};
+    if constexpr (!weak) {
+      const std::uint16_t crc = crc16(Bytes(bytes).first(2));
+      bytes[2] = static_cast<std::uint8_t>(crc >> 8);
+      bytes[3] = static_cast<std::uint8_t>(crc);
+    }
+    return bytes;
+  }
+  static Result<unsigned> position_of(Bytes reply) {
+    if (reply.size() != length) return Error::wrong_length;
+    const unsigned position = (reply[0] | reply[1] << 8) & low_mask(bits);
+    const auto wanted = encoded(position);
+    const std::size_t checked = mistake == Mistake::flips_pass ? length - 1 : length;
+    for (std::size_t i = 0; i < checked; ++i) {
+      if (reply[i] != wanted[i]) return Error::bad_checksum;
+    }
+    return position;
+  }
+  static Reading reading_of(unsigned position) {
+    return {.singleturn = position, .singleturn_bits = bits, .singleturn_valid_bits = bits};
+  }
+
+  class Host final : public Conversation<std::uint8_t> {
+   public:
+    void feed(const Event<std::uint8_t>& event) override {
+      using Kind = Event<std::uint8_t>::Kind;
+      if (event.kind == Kind::sent) state_ = State::hearing;
+      if (state_ != State::hearing) return;
+      if (event.kind == Kind::received) {
+        for (const std::uint8_t byte : event.items) {
+          if (size_ < heard_.size()) heard_[size_++] = byte;
+        }
+        if (mistake == Mistake::takes_two && size_ >= 2) take(heard_[0] | heard_[1] << 8);
+        if (mistake == Mistake::takes_more && size_ >= length) conclude(length);
+      }
+      if (event.kind == Kind::silence && !(mistake == Mistake::never_ends && size_ == 0)) conclude(size_);
+    }
+    Step<std::uint8_t> next(Time) override {
+      using Kind = Step<std::uint8_t>::Kind;
+      static constexpr std::array request{ask};
+      if (state_ == State::done) return {.kind = Kind::done};
+      const bool ready = state_ == State::ready;
+      if (ready) state_ = State::sending;
+      return {.kind = ready ? Kind::transfer : Kind::wait, .out = request, .answer = answer_limit, .gap = gap};
+    }
+    [[nodiscard]] Error error() const override { return error_; }
+    [[nodiscard]] const Reading* reading() const override {
+      return error_ == Error::none && mistake != Mistake::says_nothing ? &reading_ : nullptr;
+    }
+    void report(FieldSink& sink) const override {
+      if (reading() == nullptr) return;
+      sink.put({&fields[0], static_cast<std::int64_t>(reading_.singleturn)});
+    }
+    [[nodiscard]] Exchange<std::uint8_t> exchange() const override { return {}; }
+
+   private:
+    enum class State : std::uint8_t { ready, sending, hearing, done };
+
+    void take(unsigned position) {
+      reading_ = reading_of(position);
+      error_ = Error::none;
+      state_ = State::done;
+    }
+    void conclude(std::size_t size) {
+      state_ = State::done;
+      error_ = Error::timeout;
+      if (size == 0) return;
+      if (mistake == Mistake::takes_anything && size >= 2) return take(heard_[0] | heard_[1] << 8);
+      const Result<unsigned> position = position_of(Bytes(heard_).first(size));
+      if (position) return take(*position);
+      error_ = position.error();
+    }
+
+    State state_ = State::ready;
+    Error error_ = Error::none;
+    Reading reading_{};
+    std::array<std::uint8_t, 16> heard_{};
+    std::size_t size_ = 0;
+  };
+
+  class Encoder final : public Device<std::uint8_t> {
+   public:
+    explicit Encoder(const Shaft& shaft) : shaft_(shaft) {}
+    void feed(const Event<std::uint8_t>& event) override {
+      using Kind = Event<std::uint8_t>::Kind;
+      if (event.kind == Kind::received && event.items[0] == ask) {
+        const auto now = static_cast<unsigned>(counts_at(shaft_.at(event.at).position, bits));
+        said_ = mistake == Mistake::is_stale ? before_ : now + (mistake == Mistake::is_wrong ? 1 : 0);
+        before_ = now;
+        at_ = event.at + std::chrono::microseconds(3);
+        speaks_ = true;
+        ++answered_;
+      }
+    }
+    Step<std::uint8_t> next(Time) override {
+      if (!speaks_) return {};
+      speaks_ = false;
+      reply_ = encoded(static_cast<unsigned>(said_ & low_mask(bits)));
+      return {.kind = Step<std::uint8_t>::Kind::transfer, .out = reply_, .at = at_};
+    }
+    void power_on(Time, PowerOn) override {}
+    void power_off(Time) override {}
+    void raise_alarms(std::uint32_t) override {}
+    void lower_alarms(std::uint32_t) override {}
+    [[nodiscard]] MutableBytes memory() override { return {}; }
+    [[nodiscard]] std::uint32_t memory_version() const override { return 0; }
+    [[nodiscard]] std::span<const Violation> violations() const override { return {}; }
+    [[nodiscard]] std::uint32_t violation_count() const override { return 0; }
+    [[nodiscard]] std::uint64_t answered() const override { return answered_; }
+
+   private:
+    const Shaft& shaft_;
+    unsigned said_ = 0;
+    unsigned before_ = 0;
+    Time at_{};
+    bool speaks_ = false;
+    std::uint64_t answered_ = 0;
+    std::array<std::uint8_t, length> reply_{};
+  };
+
+  static Error decode(const Options&, Frame request, Frame reply, FieldSink& sink) {
+    if (reply.empty()) {
+      if (request.bytes.size() != 1 || request.bytes[0] != ask) return Error::unexpected_reply;
+      static constexpr FieldInfo command{"command", FieldInfo::Kind::number, "", "what is asked"};
+      sink.put({&command, ask});
+      return Error::none;
+    }
+    const Result<unsigned> position = position_of(reply.bytes);
+    if (!position) return position.error();
+    sink.put({&fields[0], static_cast<std::int64_t>(*position)});
+    sink.put_reading(reading_of(*position));
+    return Error::none;
+  }
+  static Result<std::size_t> encode(const Options&, const Command&, Arguments, MutableBytes request) {
+    if (mistake == Mistake::has_no_request) return Error::invalid_argument;
+    if (request.empty()) return Error::buffer_too_small;
+    request[0] = ask;
+    return std::size_t{1};
+  }
+  static Delimit delimit(const Options&, Direction direction, Bytes bytes) {
+    const std::size_t size = direction == Direction::request ? 1 : length;
+    return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
+  }
+  static Any<Conversation> host(const Options&, const Command&, Arguments, std::span<std::byte> storage) {
+    if (mistake == Mistake::overflows) return {.bytes = new (storage.data()) Host};
+    return make_host<Host>(storage);
+  }
+  static Any<Device> device(const Options&, const Shaft& shaft, std::span<std::byte> storage) {
+    if (storage.size() < sizeof(Encoder)) return {};
+    return {.bytes = new (storage.data()) Encoder(shaft)};
+  }
+  static Resolution resolution(const Options&) { return {bits, 0}; }
+
+  static constexpr std::array<Model, 1> models{{{"toy", "", 0, {}}}};
+  static constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position"}}};
+  static constexpr std::array<Expected, 1> expected{{{"singleturn", weak ? 8619 : 0x1234}}};
+  static constexpr std::array<std::uint8_t, 1> asks{mistake == Mistake::no_vector ? std::uint8_t{0x5B} : ask};
+  static constexpr std::array<std::uint8_t, length> says = encoded(weak ? 8619 : 0x1234);
+  static_assert(!weak || (says[0] == 0xAB && says[1] == 0x61));
+  static constexpr std::array<Vector, 1> vectors{{{"toy-1", "", "", "", asks, says, expected}}};
+};
+
+template <Mistake mistake>
+inline constexpr Unit unit = [] {
+  using Made = Toy<mistake>;
+  Unit made{};
+  made.id = "toy";
+  made.link = LinkKind::half_duplex;
+  made.line = {.rate = 1'000'000};
+  made.models = Made::models;
+  made.fields = fields;
+  made.commands = Made::commands;
+  made.vectors = Made::vectors;
+  made.host_storage = sizeof(typename Made::Host) - (mistake == Mistake::wants_more ? 8 : 0);
+  made.device_storage = sizeof(typename Made::Encoder);
+  made.decode = Made::decode;
+  made.encode = Made::encode;
+  made.delimit = Made::delimit;
+  made.host = Made::host;
+  made.device = Made::device;
+  made.resolution = Made::resolution;
+  return made;
+}();
+
+}  // namespace absenc::kit::toy

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kit can fail: each toy has one mistake, and the kit finds it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/kit/kit.hpp"
+#include "tests/kit/toys.hpp"
+
+namespace absenc::kit {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using toy::Mistake;
+
+constexpr Exchanges few{.count = 20'000};
+
+template <Mistake mistake>
+void expect_no_finding() {
+  const Unit& unit = toy::unit<mistake>;
+  for (const Findings& findings :
+       {check_decoding(unit), check_hosts(unit), check_requests(unit, 1), check_storage(unit), check_declarations(unit),
+        check_settings(unit), check_memory(unit), check_commands(unit), check_exchanges(unit, few)}) {
+    EXPECT_THAT(findings.texts(), IsEmpty());
+  }
+}
+
+TEST(KitToys, WithoutAMistakeNothingIsFound) { expect_no_finding<Mistake::none>(); }
+
+// Any byte may begin its reply, and its check lets wrong ones pass: so many, and no more.
+TEST(KitToys, AWeakCheckIsNoMistake) {
+  expect_no_finding<Mistake::parity>();
+  EXPECT_THAT(check_exchanges(toy::unit<Mistake::parity>, few).notes(),
+              Contains(HasSubstr("taken for good and wrong")));
+}
+
+TEST(KitToys, AHostThatTakesTwoBytes) {
+  const Unit& unit = toy::unit<Mistake::takes_two>;
+  EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("takes a reply cut after 2")));
+  EXPECT_THAT(check_exchanges(unit, few).texts(), Not(IsEmpty()));
+}
+
+TEST(KitToys, AHostThatLooksAtNoCheck) {
+  const Unit& unit = toy::unit<Mistake::takes_anything>;
+  EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("bit 0 flipped")));
+  EXPECT_THAT(check_exchanges(unit, few).texts(), Contains(HasSubstr("taken for good and wrong")));
+}
+
+TEST(KitToys, AHostThatLeavesAFrameToTheNext) {
+  EXPECT_THAT(check_hosts(toy::unit<Mistake::takes_more>).texts(), Contains(HasSubstr("comes twice")));
+}
+
+TEST(KitToys, AHostThatReportsNothing) {
+  const Unit& unit = toy::unit<Mistake::says_nothing>;
+  EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("singleturn is not reported")));
+  EXPECT_THAT(check_commands(unit).texts(), Contains(HasSubstr("has no reading")));
+}
+
+TEST(KitToys, ACommandWhoseRequestCannotBeMade) {
+  const Unit& unit = toy::unit<Mistake::has_no_request>;
+  EXPECT_THAT(check_hosts(unit).texts(), Contains("position has no request: invalid_argument"));
+  EXPECT_THAT(check_hosts(unit).texts(), Contains("no vector's position is read by a command"));
+}
+
+TEST(KitToys, VectorsThatNoCommandReads) {
+  EXPECT_THAT(check_hosts(toy::unit<Mistake::no_vector>).texts(),
+              Contains("no vector's position is read by a command"));
+}
+
+TEST(KitToys, RepliesToTheRequestBefore) {
+  const Unit& unit = toy::unit<Mistake::is_stale>;
+  EXPECT_THAT(check_exchanges(unit, few).texts(), Contains(HasSubstr("another position than the shaft's")));
+  EXPECT_THAT(check_commands(unit).texts(), Contains(HasSubstr("another position than the shaft's")));
+}
+
+TEST(KitToys, AnEncoderBesideItsShaft) {
+  EXPECT_THAT(check_commands(toy::unit<Mistake::is_wrong>).texts(), Contains(HasSubstr("another position")));
+}
+
+TEST(KitToys, StorageThatIsNotEnough) {
+  EXPECT_THAT(check_storage(toy::unit<Mistake::wants_more>).texts(),
+              Contains(HasSubstr("needs more than host_storage")));
+  EXPECT_THAT(check_storage(toy::unit<Mistake::overflows>).texts(), Contains(HasSubstr("made beyond its storage")));
+}
+
+TEST(KitToys, ADecoderThatOverlooksAByte) {
+  EXPECT_THAT(check_decoding(toy::unit<Mistake::flips_pass>).texts(),
+              Contains(HasSubstr("bit 31 flipped is accepted")));
+}
+
+TEST(KitToys, AConversationThatDoesNotEnd) {
+  EXPECT_THAT(check_exchanges(toy::unit<Mistake::never_ends>, few).texts(), Contains(HasSubstr("hangs")));
+}
+
+}  // namespace
+}  // namespace absenc::kit

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// A unit's virtual encoder and its host in virtual time, from the descriptor alone: a shaft to be put anywhere, a line
+// with faults, one conversation after the other.
+#pragma once
+
+#include <cstring>
+#include <functional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "absenc/host/reply_guard.hpp"
+#include "absenc/sim/faulty_node.hpp"
+#include "absenc/sim/line.hpp"
+#include "tests/kit/frames.hpp"
+#include "tests/kit/player.hpp"
+
+namespace absenc::kit {
+
+/// Stands where it is put.
+struct Hand final : Shaft {
+  [[nodiscard]] ShaftState at(Time) const override { return {.position = position}; }
+  std::int64_t position = 0;
+};
+
+/// How a conversation ended.
+struct Ended {
+  bool made = false;   // the unit has a conversation for it
+  bool ended = false;  // within the time
+  Error error = Error::none;
+  std::string detail{};
+  Seen seen{};              // every result, in order
+  std::uint64_t damaged{};  // faults that changed bytes while it went on
+  std::uint64_t faults{};   // of all kinds
+  std::uint64_t asked{};    // requests answered meanwhile
+
+  [[nodiscard]] bool good() const { return made && ended && error == Error::none; }
+};
+
+template <class Item>
+class World {
+ public:
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
+  using Faulty = std::conditional_t<is_can, sim::FaultyNode, sim::FaultyDevice>;
+  using Line = sim::Line<Item>;
+
+  World(const Unit& unit, const Options& options, std::uint64_t seed)
+      : unit_(unit),
+        options_(options),
+        device_storage_(unit.device_storage),
+        host_storage_(unit.host_storage),
+        device_(machine_of<Item>(unit.device(options, shaft_, device_storage_))) {
+    if (device_ == nullptr) return;
+    device_->power_on(Time{}, Device<Item>::PowerOn::skip);
+    faulty_ = std::make_unique<Faulty>(*device_, sim::FaultRates{}, seed);
+    line_ = std::make_unique<Line>(unit.link, settings());
+    line_->attach(sim::Role::device, *faulty_);
+  }
+
+  /// Whether the unit has a virtual encoder with these options.
+  [[nodiscard]] bool made() const { return device_ != nullptr; }
+  [[nodiscard]] Device<Item>& device() { return *device_; }
+  [[nodiscard]] Line& line() { return *line_; }
+  [[nodiscard]] const Faulty& faulty() const { return *faulty_; }
+  [[nodiscard]] const Options& options() const { return options_; }
+  void set_rates(const sim::FaultRates& rates) { faulty_->set_rates(rates); }
+  void pass(Time time) { line_->run_until(line_->now() + time); }
+  /// Puts the shaft there. What was sent unasked has said where it was before.
+  void move(std::int64_t position) {
+    shaft_.position = position;
+    const bool unasked = is_can || (unit_.streams != nullptr && unit_.streams(options_));
+    if (unasked) pass(std::chrono::milliseconds(5));
+  }
+  [[nodiscard]] std::int64_t place() const { return shaft_.position; }
+
+  /// What the host knows of the encoder from now on; its end of the line follows.
+  void set_options(const Options& options) {
+    options_ = options;
+    SetRate set(settings());
+    attach(set);
+    line_->run(node_, line_->now());
+  }
+
+  /// One conversation to its end; one that streams up to its first result.
+  Ended run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
+    return run_in(host_storage_, command, arguments, limit);
+  }
+  Ended run_in(std::span<std::byte> storage, const Command& command, Arguments arguments,
+               Time limit = std::chrono::seconds(100)) {
+    Ended result;
+    Conversation<Item>* conversation = machine_of<Item>(unit_.host(options_, command, arguments, storage));
+    if (conversation == nullptr) return result;
+    result.made = true;
+    const std::uint64_t changed = changed_bytes();
+    const std::uint64_t faults = all_faults();
+    const std::uint64_t answered = device_->answered();
+    const bool is_guarded = guarded(command);
+    if (is_guarded) guard_.attach(*conversation, unit_, options_, !command.changes_encoder);
+    on_emit_ = [&] {
+      if (conversation->streams()) return false;
+      if (conversation->error() == Error::none) conversation->report(result.seen);
+      return true;
+    };
+    attach(is_guarded ? static_cast<Machine<Item>&>(guard_) : *conversation);
+    result.ended = line_->run(node_, line_->now() + limit);
+    if (is_guarded) guard_.conclude();
+    on_emit_ = {};
+    result.error = conversation->error();
+    result.detail = conversation->detail();
+    if (result.error == Error::none) conversation->report(result.seen);
+    if (conversation->reading() != nullptr) result.seen.reading = *conversation->reading();
+    result.damaged = changed_bytes() - changed;
+    result.faults = all_faults() - faults;
+    result.asked = device_->answered() - answered;
+    idle_.detach(*line_, node_);
+    return result;
+  }
+
+  /// Faults after which a wrong result is possible. All others leave frames as they were; where the host is the clock,
+  /// each changes what it reads.
+  [[nodiscard]] std::uint64_t changed_bytes() const {
+    using sim::FaultKind;
+    std::uint64_t sum = 0;
+    for (std::size_t kind = 0; kind < sim::fault_names.size(); ++kind) {
+      const auto fault = static_cast<FaultKind>(kind);
+      const bool keeps = fault == FaultKind::delay || fault == FaultKind::echo || fault == FaultKind::silence ||
+                         fault == FaultKind::repeat;
+      if (!keeps || unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange) {
+        sum += faulty_->counts()[kind];
+      }
+    }
+    return sum;
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t all_faults() const {
+    std::uint64_t sum = 0;
+    for (const std::uint64_t count : faulty_->counts()) sum += count;
+    return sum;
+  }
+
+  static constexpr std::size_t none = ~std::size_t{0};
+
+  /// Sets the host's end of the line.
+  class SetRate final : public Machine<Item> {
+   public:
+    explicit SetRate(const LineSettings& line) : line_(line) {}
+    void feed(const Event<Item>&) override {}
+    Step<Item> next(Time) override {
+      using Kind = typename Step<Item>::Kind;
+      return {.kind = std::exchange(done_, true) ? Kind::done : Kind::configure, .settings = line_};
+    }
+
+   private:
+    LineSettings line_;
+    bool done_ = false;
+  };
+  /// At the host's end while nobody converses: a conversation in storage that is used again must not be on the line.
+  struct Idle final : Machine<Item> {
+    void feed(const Event<Item>&) override {}
+    Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
+    void detach(Line& line, std::size_t node) { line.replace(node, *this); }
+  };
+
+  [[nodiscard]] LineSettings settings() const {
+    return (unit_.settings != nullptr ? unit_.settings(options_) : unit_.line).with_some_rate();
+  }
+  // As host::Session has it.
+  [[nodiscard]] bool guarded(const Command& command) const {
+    if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
+    return unit_.link != LinkKind::exchange && unit_.link != LinkKind::clocked;
+  }
+  void attach(Machine<Item>& machine) {
+    if (node_ == none) {
+      node_ = line_->attach(sim::Role::host, idle_, [this] { return !on_emit_ || on_emit_(); });
+    }
+    // How long a chip stays unselected between two conversations is up to who runs them.
+    if (unit_.link == LinkKind::exchange) pass(std::chrono::microseconds(20));
+    line_->replace(node_, machine);
+  }
+
+  const Unit& unit_;
+  Options options_;
+  Hand shaft_;
+  std::vector<std::byte> device_storage_;
+  std::vector<std::byte> host_storage_;
+  Device<Item>* device_;
+  std::unique_ptr<Faulty> faulty_;
+  std::unique_ptr<Line> line_;
+  host::ReplyGuard<Item> guard_;
+  Idle idle_;
+  std::function<bool()> on_emit_;
+  std::size_t node_ = none;
+};
+
+}  // namespace absenc::kit
