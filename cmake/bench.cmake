@@ -11,8 +11,5 @@ foreach(source IN LISTS bench_sources)
   set_target_properties(bench_${name} PROPERTIES OUTPUT_NAME ${name}
                         RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/bench")
   target_link_libraries(bench_${name} PRIVATE absenc::absenc absenc::os absenc::capture benchmark::benchmark)
-  if(name STREQUAL "units_bench")
-    target_sources(bench_${name} PRIVATE tests/kit/frames.cpp)
-  endif()
   add_dependencies(benchmarks bench_${name})
 endforeach()
