@@ -187,8 +187,8 @@ struct Definition {
   static constexpr void put(FieldSink& sink, const Format&, const Request& request) {
     fields.put(sink, values_of(request));
   }
-  static constexpr void put(FieldSink& sink, const Format& format, const Request&, const Position& position) {
-    fields.put(sink, values_of(format, position));
+  static constexpr void put(FieldSink& sink, const Format& format, const Request&, const Position& reply) {
+    fields.put(sink, values_of(format, reply));
   }
   static void put(FieldSink& sink, const Format& format, const Zeroed& found) {
     Values values = values_of(format, found.now);
