@@ -144,7 +144,8 @@ Outcome failure(const Line& line, Error error) {
 // Ends early when the sweep is aborted, or cannot go on.
 Part<Outcome> try_clocks(Line& line, Sweep& sweep) {
   Outcome bad = done;  // the last frame that was
-  for (unsigned clock = 1; clock <= clocks_khz.size() && !line.is_aborted(); ++clock) {
+  if (line.is_aborted()) co_return done;
+  for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
     sweep.left = clock;
     const Error error = co_await switch_clock(line, clock);
     if (error == Error::cross_check_failed) co_return {error, "the interface has another clock than it was given"};
@@ -159,7 +160,7 @@ Part<Outcome> try_clocks(Line& line, Sweep& sweep) {
     ++sweep.measured;
     line.emit();
   }
-  if (line.is_aborted() || sweep.recommended() != 0) co_return done;
+  if (sweep.recommended() != 0) co_return done;
   bad.detail = "no MA clock gave good frames only";
   co_return bad;
 }

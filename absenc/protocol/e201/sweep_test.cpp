@@ -18,7 +18,7 @@ using testing::Tamper;
 /// 10 us of latency, 32 + 8 bits: up to 20 bits of ACK fit, so M8 (45 bits) and M7 (22) are too fast.
 TEST(E201Sweep, CountsRecommendsAndRestores) {
   Bench bench("singleturn_bits=32");
-  bench.raw("M7");
+  bench.raw("M7\r");
   std::vector<Fields> progress;
   const Ended sweep = bench.run("clock-sweep", {5}, [&progress](const Conversation<std::uint8_t>& conversation) {
     testing::Collector collector;
@@ -66,7 +66,7 @@ TEST(E201Sweep, TheLongestRunIsRecommended) {
 TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
   for (unsigned steps = 0; steps < 400; steps += 3) {
     Bench bench;
-    bench.raw("M6");
+    bench.raw("M6\r");
     Conversation<std::uint8_t>& sweep = bench.make("clock-sweep", {100});
     const std::size_t host = bench.line.attach(sim::Role::host, sweep);
     for (unsigned i = 0; i < steps && !bench.line.done(host); ++i) bench.line.step();
@@ -75,6 +75,7 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
     ASSERT_TRUE(bench.line.run(host, asked + 1s));
     EXPECT_LT(bench.line.now() - asked, 30ms) << steps;
     EXPECT_EQ(sweep.error(), Error::none);
+    EXPECT_TRUE(steps != 0 || bench.tampered.asked() == "MvmMm") << bench.tampered.asked();
     EXPECT_EQ(bench.raw("m"), "6\r") << steps;
     testing::Collector collector;
     sweep.report(collector);
@@ -86,7 +87,7 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
 
 TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
   Bench bench;
-  bench.raw("M6");
+  bench.raw("M6\r");
   Conversation<std::uint8_t>& sweep = bench.make("clock-sweep", {3});
   const std::size_t host = bench.line.attach(sim::Role::host, sweep);
   std::string left;
