@@ -69,7 +69,7 @@ struct Toy {
   }
   static Result<unsigned> position_of(Bytes reply) {
     if (reply.size() != length) return Error::wrong_length;
-    const unsigned position = (reply[0] | reply[1] << 8) & low_mask(bits);
+    const unsigned position = (reply[0] | unsigned{reply[1]} << 8) & low_mask(bits);
     const auto wanted = encoded(position);
     const std::size_t checked = mistake == Mistake::flips_pass ? length - 1 : length;
     for (std::size_t i = 0; i < checked; ++i) {
@@ -91,7 +91,7 @@ struct Toy {
         for (const std::uint8_t byte : event.items) {
           if (size_ < heard_.size()) heard_[size_++] = byte;
         }
-        if (mistake == Mistake::takes_two && size_ >= 2) take(heard_[0] | heard_[1] << 8);
+        if (mistake == Mistake::takes_two && size_ >= 2) take(heard_[0] | unsigned{heard_[1]} << 8);
         if (mistake == Mistake::takes_more && size_ >= length) conclude(length);
       }
       if (event.kind == Kind::silence && !(mistake == Mistake::never_ends && size_ == 0)) conclude(size_);
@@ -126,7 +126,7 @@ struct Toy {
       state_ = State::done;
       error_ = Error::timeout;
       if (size == 0) return;
-      if (mistake == Mistake::takes_anything && size >= 2) return take(heard_[0] | heard_[1] << 8);
+      if (mistake == Mistake::takes_anything && size >= 2) return take(heard_[0] | unsigned{heard_[1]} << 8);
       const Result<unsigned> position = position_of(Bytes(heard_).first(size));
       if (position) return take(*position);
       error_ = position.error();
