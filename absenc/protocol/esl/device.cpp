@@ -45,8 +45,7 @@ author::Responder::Answer VirtualEncoder::respond(Bytes bytes, Time at, ByteBuff
     const bool crc_wrong =
         bytes.size() > 1 && checksum8(profile_.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back();
     in_a_row_ = 0;
-    if (crc_wrong || request.error() == Error::out_of_range) return Answer::for_others;
-    return report_bad_request(bytes[0], status::parity_error, at, reply);
+    return crc_wrong ? Answer::for_others : report_bad_request(bytes[0], status::parity_error, at, reply);
   }
   count(request->id, at);
   if (is_memory_access(request->id)) return answer_memory(*request, at, reply);

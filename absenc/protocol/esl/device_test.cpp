@@ -116,6 +116,51 @@ TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
   EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
+TEST(EslDevice, AnyPauseEndsWhatAnAbsentEncoderWasAskedAndNothingIsSentWhenOff) {
+  const testing::TestShaft shaft;
+  VirtualEncoder encoder({}, shaft);
+  encoder.power_on(Time{}, PowerOn::skip);
+  const RequestBytes others = encode_request({}, {DataId::position, 3});
+  encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 2us, .items = others});
+  EXPECT_EQ(encoder.next(2us).expect, 0u);
+  EXPECT_GT(encoder.next(2us).gap, Time{});
+  encoder.feed({.kind = Event<std::uint8_t>::Kind::silence, .at = 5us});
+  const RequestBytes own = encode_request({}, {DataId::position});
+  encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 9us, .items = own});
+  encoder.power_off(10us);
+  EXPECT_EQ(encoder.next(10us).kind, Step<std::uint8_t>::Kind::wait);
+}
+
+// So that the eighth reset after it is the first of eight.
+TEST(EslDevice, ABadRequestStartsTheCountAgain) {
+  for (const auto kind : {Event<std::uint8_t>::Kind::received, Event<std::uint8_t>::Kind::line_error}) {
+    testing::TestShaft shaft;
+    shaft.put(0, 1'000'000);
+    VirtualEncoder encoder({}, shaft);
+    encoder.power_on(Time{}, PowerOn::skip);
+    Time now{};
+    const auto hear = [&](Bytes bytes) {
+      now += reset_interval;
+      encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = bytes});
+      if (encoder.next(now).kind == Step<std::uint8_t>::Kind::transfer) {
+        encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now + 20us});
+      }
+    };
+    const RequestBytes zero = encode_request({}, {DataId::zero});
+    for (unsigned i = 0; i < 7; ++i) hear(zero);
+    hear(zero.view().first(1));
+    const Wire wrong{0x55};
+    encoder.feed({.kind = kind, .at = now + 1us, .items = wrong});
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::silence, .at = now + 3us});
+    static_cast<void>(encoder.next(now + 3us));
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now + 20us});
+    hear(zero);
+    EXPECT_EQ(encoder.reply_to(DataId::position, now).singleturn, 1'000'000u);
+    for (unsigned i = 0; i < 7; ++i) hear(zero);
+    EXPECT_EQ(encoder.reply_to(DataId::position, now).singleturn, 0u);
+  }
+}
+
 TEST(EslDevice, ARequestDuringItsTransmissionIsOneViolation) {
   Bench bench;
   Wire requests = wire(encode_request({}, {DataId::position}).view());
@@ -234,6 +279,17 @@ TEST(EslDevice, WhatClearsWhichAlarm) {
     bench.encoder.lower_alarms(row.alarm);
     EXPECT_EQ(bench.read().one.alarms, 0);
   }
+}
+
+TEST(EslDevice, WhatAPowerCycleLeaves) {
+  Bench bench;
+  bench.encoder.raise_alarms(alarms::turns_wrong | alarms::overspeed | alarms::memory_error);
+  for (unsigned i = 0; i < 5; ++i) bench.read();
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  const Reply reply = bench.read();
+  EXPECT_EQ(reply.one.alarms, alarms::turns_wrong);
+  EXPECT_EQ(reply.one.sequence, 1);
 }
 
 TEST(EslDevice, SupplySpeedAndTemperature) {

@@ -125,6 +125,22 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
   }
 }
 
+// Of characters that were damaged nobody knows what they would have been.
+TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
+  using Happening = Event<std::uint8_t>;
+  std::vector<std::byte> storage(unit.host_storage);
+  Conversation<std::uint8_t>& host =
+      *unit.host(testing::options_of({}), *find_command(unit, "position"), {}, storage).bytes;
+  static_cast<void>(host.next({}));
+  host.feed({.kind = Happening::Kind::sent, .at = 2us});
+  const Wire channel_1 = wire({.one = {.status = status::ready}});
+  host.feed({.kind = Happening::Kind::received, .at = 15us, .items = Bytes(channel_1).first(11)});
+  host.feed({.kind = Happening::Kind::line_error, .at = 16us});
+  host.feed({.kind = Happening::Kind::silence, .at = 20us});
+  EXPECT_EQ(host.error(), Error::wrong_length);
+  EXPECT_EQ(host.detail(), "");
+}
+
 TEST(EslHost, AProfileThatDoesNotFitIsNamed) {
   const Profile plain;
   struct Row {
@@ -243,6 +259,9 @@ TEST(EslHost, WhatCannotBeClearedIsNamed) {
     EXPECT_EQ(clear.error, Error::cross_check_failed);
     EXPECT_EQ(clear.detail, sentence);
   }
+  Bench bench;
+  bench.set(condition::ch2_alarms, alarms::memory_error);
+  EXPECT_EQ(bench.run("clear-alarms").detail, "memory_error remains; switch the encoder off and on");
 }
 
 TEST(EslHost, AMultiturnErrorNeedsDThenC) {

@@ -23,6 +23,7 @@ TEST(EslMemory, MemoryIsWrittenReadBackAndSparedWear) {
   const Outcome first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
   EXPECT_EQ(first.fields.at("written"), 1);
+  EXPECT_EQ(bench.encoder.answered(), 6u);  // page, two reads, the write, and two reads when its time is over
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
   const Outcome same = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(same.error, Error::none);
@@ -88,6 +89,15 @@ TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
     ASSERT_TRUE(info.fields.contains("page_left")) << first;
     EXPECT_EQ(info.fields.at("page_left"), 8);
   }
+}
+
+TEST(EslMemory, APageThatIsNotSelectedIsFound) {
+  Bench bench({}, [](unsigned index, Wire& reply) {
+    if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = page_select_address, .value = 3});
+  });
+  const Outcome select = bench.run("select-page", {4});
+  EXPECT_EQ(select.error, Error::cross_check_failed);
+  EXPECT_EQ(select.detail, "another page is selected");
 }
 
 TEST(EslMemory, MemoryOnABusIsRefused) {
