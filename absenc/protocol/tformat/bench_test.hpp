@@ -59,6 +59,15 @@ class Tampered final : public Machine<std::uint8_t> {
   Wire out_;
 };
 
+/// Refusals in place of these replies.
+inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
+  return [=](unsigned index, Wire& reply) {
+    if (index >= from && index < to) reply = wire(Reply{.status = alarm, .encoder_id = 0x11});
+  };
+}
+
+inline bool has(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+
 /// What a command of the unit came to.
 struct CommandResult {
   Error error = Error::none;

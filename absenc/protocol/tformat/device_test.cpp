@@ -160,7 +160,8 @@ TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory access before the page is ready");
   bench.pass(memory_time);
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA2);
-  // Page 0 after power on.
+  // Page 0 after power on, at once.
+  memory_write(bench, 126, 1);
   bench.switch_off_and_on();
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA0);
 }
@@ -326,11 +327,13 @@ TEST(TformatDevice, BatteryFlags) {
   bench.set(battery_voltage, 3600);
   EXPECT_EQ(bench.everything().alarms, 0);  // not latched
   bench.set(battery_voltage, 2600);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);      // it is on
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises with the power off only
   bench.switch_off_and_on();
   const Reply lost = bench.everything();
   EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
   EXPECT_FALSE(to_reading({}, lost).multiturn_valid);
+  EXPECT_EQ(lost.multiturn, 0u);  // nothing counted them
   bench.set(battery_voltage, 3600);
   reset(bench, DataId::reset_multiturn);
   EXPECT_EQ(bench.everything().alarms, 0);
