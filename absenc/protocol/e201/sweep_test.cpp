@@ -127,7 +127,7 @@ TEST(E201Sweep, WhatFails) {
            {'m', 4, false, {{"8"}}, "wrong_length", "ends with CR", "stream-off", true},
            {'4', 5, false, short_stream, "wrong_length", "without a pause", "stream-off", true},
            {'4', 1, true, {{"0000000000000000\r"}}, "line_stuck", "no MA clock", "supply-on", true},
-           {'4', 1, true, {}, "timeout", "no MA clock", "", true},
+           {'4', 1, true, {}, "timeout", "no MA clock", "check supply", true},
            {'M', 9, false, {}, "cross_check_failed", "could not be restored", "with clock and set-clock", false},
            {'m', 10, false, {}, "timeout", "not known whether", "with clock and set-clock", true}}) {
     Bench bench;
