@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/amt21/unit.hpp"
-#include "absenc/protocol/author/line.hpp"
 #include "bench/firmware/reader.hpp"
 
 int main() {

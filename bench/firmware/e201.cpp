@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/e201/host.hpp"
+#include "absenc/protocol/e201/frame.hpp"
 #include "bench/firmware/reader.hpp"
 
 int main() {
   using namespace absenc;
-  firmware::run<std::uint8_t, e201::ReadPosition>(e201::Format{});
+  firmware::run<std::uint8_t, author::ReadPosition<e201::Protocol>>(e201::Format{}, e201::Request{});
 }

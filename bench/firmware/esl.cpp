@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/esl/host.hpp"
+#include "absenc/protocol/esl/protocol.hpp"
 #include "bench/firmware/reader.hpp"
 
 int main() {
   using namespace absenc;
-  firmware::run<std::uint8_t, esl::Read>(esl::Profile{});
+  firmware::run<std::uint8_t, author::ReadPosition<esl::Protocol>>(esl::Profile{}, esl::Request{});
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/modbus/host.hpp"
+#include "absenc/protocol/raa38/modbus/protocol.hpp"
 #include "bench/firmware/reader.hpp"
 
 int main() {
   using namespace absenc;
-  firmware::run<std::uint8_t, raa38::rtu::ReadPosition>(raa38::rtu::Format{});
+  firmware::run<std::uint8_t, raa38::rtu::ReadPosition>(raa38::rtu::Format{}, raa38::rtu::Request{});
 }

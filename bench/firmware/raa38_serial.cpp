@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/serial/host.hpp"
+#include "absenc/protocol/raa38/serial/protocol.hpp"
 #include "bench/firmware/reader.hpp"
 
 int main() {
   using namespace absenc;
-  firmware::run<std::uint8_t, raa38::serial::ReadPosition>(raa38::serial::Settings{.mode = raa38::serial::Mode::bus});
+  firmware::run<std::uint8_t, raa38::serial::ReadPosition>(raa38::serial::Format{.mode = raa38::serial::Mode::bus},
+                                                           raa38::serial::Request{});
 }

@@ -23,6 +23,8 @@ class CanEngine : public Conversation<CanFrame> {
  public:
   void feed(const Event<CanFrame>& event) final;
   Step<CanFrame> next(Time now) final;
+  /// Nothing: see Engine.
+  void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }

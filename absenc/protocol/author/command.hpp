@@ -183,14 +183,14 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  // Whether there is a request with these arguments.
+  // Whether a request is made of these arguments, or the conversation says why there is none.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
-    if (request == nullptr) return true;
-    const Result<Request> asked = request(format, arguments);
-    if constexpr (requires { P::encode(format, *asked).empty(); }) {
-      return asked && (!P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked));
+    if constexpr (requires(const Request& asked) { P::encode(format, asked).empty(); }) {
+      if (request == nullptr) return true;
+      const Result<Request> asked = request(format, arguments);
+      return !asked || !P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked);
     } else {
-      return asked.has_value();
+      return true;
     }
   }
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {

@@ -388,8 +388,12 @@ struct UnitOf {
               .device = device,
               .resolution = resolution,
               .settings = settings};
-    if constexpr (
-        requires { P::reply_size(Format{}, Request{}); } || requires { &Definition::answered; }) {
+    constexpr bool tells = requires {
+      P::decode_request(Format{}, Bytes{});
+      P::manner(Format{}, Request{});
+    }
+    || requires { &Definition::answered; };
+    if constexpr (tells) {
       unit.answered = answered;
     }
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
