@@ -2,6 +2,7 @@
 // For tests: a conversation as the unit makes it, by the name of its command.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -46,5 +47,25 @@ class Talk : public Conversation<Item> {
   std::vector<std::int64_t> arguments_;
   Conversation<Item>* made_ = nullptr;
 };
+
+/// How long a conversation takes with a line on which something sends without a pause from its first request on.
+inline Time time_with_noise(Conversation<std::uint8_t>& conversation) {
+  using Kind = Step<std::uint8_t>::Kind;
+  constexpr std::uint8_t noise = 0x55;
+  Time now{};
+  Time began = never;
+  for (unsigned steps = 0; steps < 1'000'000; ++steps) {
+    const Step<std::uint8_t> step = conversation.next(now);
+    if (step.kind == Kind::done) return now - began;
+    now += std::chrono::microseconds(100);
+    if (step.kind == Kind::transfer) {
+      began = std::min(began, now);
+      conversation.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+    } else if (step.kind == Kind::wait && began != never) {
+      conversation.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = {&noise, 1}});
+    }
+  }
+  return never;
+}
 
 }  // namespace absenc::raa38::testing

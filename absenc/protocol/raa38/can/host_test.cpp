@@ -82,6 +82,19 @@ TEST(CanRead, WhatListeningHeardBeforeItBeganIsOld) {
   EXPECT_EQ(read.reading()->singleturn, 3u);
 }
 
+TEST(CanRead, ALongIdentifierIsToldWhereNothingElseComes) {
+  CanFrame extended = encode_position(0x20, 7);
+  extended.extended = true;
+  Talk read({}, "position");
+  ByHand by_hand(read);
+  by_hand.next();
+  by_hand.sent();
+  by_hand.receive(extended);
+  read.feed({.kind = Event<CanFrame>::Kind::silence, .at = by_hand.now + 50ms});
+  EXPECT_EQ(read.error(), Error::unexpected_reply);
+  EXPECT_NE(read.detail().find("29 bits"), std::string_view::npos) << read.detail();
+}
+
 TEST(CanRead, FramesOfOthersAreLeftAside) {
   CanFrame extended = encode_position(0x20, 7);
   extended.extended = true;
@@ -265,6 +278,65 @@ TEST(CanZero, ALateAnswerIsNoZero) {
   line.attach(sim::Role::device, node);
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, zero), 20s));
   EXPECT_EQ(zero.error(), Error::cross_check_failed);
+}
+
+// Sends by itself until it is told not to, and never again.
+struct Exhausted final : Machine<CanFrame> {
+  void feed(const Event<CanFrame>& event) override {
+    if (event.kind == Event<CanFrame>::Kind::sent) sending = false;
+    if (event.kind != Event<CanFrame>::Kind::received) return;
+    cyclic = cyclic && event.items[0].data[0] != command::cyclic;
+    asked = event.items[0].data[0] == command::read;
+  }
+  Step<CanFrame> next(Time now) override {
+    if (sending) return {.at = never};
+    if (!asked && !cyclic) return {.at = never};
+    if (!asked && now < due) return {.at = due};
+    due = now + 100ms;
+    asked = false;
+    sending = true;
+    return {.kind = Step<CanFrame>::Kind::transfer, .out = {&frame, 1}};
+  }
+  CanFrame frame = encode_position(0x20, 0);
+  Time due{};
+  bool cyclic = true;
+  bool asked = false;
+  bool sending = false;
+};
+
+TEST(CanZero, ANodeThatNoLongerSendsIsTold) {
+  Exhausted node;
+  sim::Line<CanFrame> line(LinkKind::can, {.rate = 250'000});
+  line.attach(sim::Role::device, node);
+  Talk zero({}, "zero");
+  EXPECT_TRUE(line.run(line.attach(sim::Role::host, zero), 20s));
+  EXPECT_EQ(zero.error(), Error::cross_check_failed);
+  EXPECT_NE(zero.detail().find("no longer sends"), std::string_view::npos) << zero.detail();
+}
+
+// A node that jumps instead of mirroring its position.
+TEST(CanDirection, AnotherPositionIsNoDirection) {
+  struct Jumping final : Machine<CanFrame> {
+    void feed(const Event<CanFrame>& event) override {
+      if (event.kind != Event<CanFrame>::Kind::received) return;
+      due = true;
+      const bool read = event.items[0].data[0] == command::read;
+      if (!read) counts = 7000;
+      frame = read ? encode_position(0x20, counts) : encode_answer(0x20, event.items[0].data[0]);
+    }
+    Step<CanFrame> next(Time) override {
+      if (!std::exchange(due, false)) return {.at = never};
+      return {.kind = Step<CanFrame>::Kind::transfer, .out = {&frame, 1}};
+    }
+    std::uint32_t counts = 1000;
+    bool due = false;
+    CanFrame frame{};
+  } node;
+  sim::Line<CanFrame> line(LinkKind::can, {.rate = 250'000});
+  line.attach(sim::Role::device, node);
+  Talk direction({}, "direction", {1});
+  EXPECT_TRUE(line.run(line.attach(sim::Role::host, direction), 20s));
+  EXPECT_EQ(direction.error(), Error::cross_check_failed);
 }
 
 TEST(CanDirection, IsMirrored) {

@@ -138,7 +138,8 @@ struct Scripted final : Machine<CanFrame> {
     const CanFrame& frame = event.items[0];
     if (frame.id == 0x220 && !dead) queue.push_back(encode_position(0x20, 5));
     if (frame.id == 0x7E5 && frame.data[0] != configuration::enter && has_answer) queue.push_back(answer);
-    if (frame.id == 0x7E5 && frame.data[0] != configuration::enter) dead = dies;
+    if (frame.id == 0x7E5 && frame.data[0] != configuration::enter) dead = dies, is_set = true;
+    if (is_set && frame.id == appears) queue.push_back(encode_position(static_cast<std::uint8_t>(appears), 5));
   }
   Step<CanFrame> next(Time) override {
     if (queue.empty() || sending) return {.at = never};
@@ -151,6 +152,8 @@ struct Scripted final : Machine<CanFrame> {
   bool has_answer = true;
   bool dies = false;  // answers nothing any more after a setting
   bool dead = false;
+  bool is_set = false;
+  std::uint32_t appears = 0;  // another node that answers afterwards
   bool sending = false;
   std::vector<CanFrame> queue;
   CanFrame out{};
@@ -178,6 +181,24 @@ TEST(CanSetNode, AnAnswerAloneIsNoNumber) {
   Fields left;
   set.report_left(left);
   EXPECT_EQ(left["node"], 0x42);
+}
+
+TEST(CanSetNode, AnotherNodeWithTheNewNumberIsFoundOut) {
+  Scripted node(encode_configuration_answer(0x7E5, configuration::node, 0));
+  node.appears = 0x242;
+  Talk set({}, "set-node", {0x42});
+  EXPECT_EQ(with(node, set).error(), Error::cross_check_failed);
+  EXPECT_NE(set.detail().find("another node was there"), std::string_view::npos) << set.detail();
+}
+
+TEST(CanSetNode, NotWithTwoOfOneNumber) {
+  Bench bench({.cyclic = 0});
+  bench.shaft.put(0, 100);
+  bench.add({.positive = 1, .negative = 0, .cyclic = 0});
+  bench.raw(encode_command(0x20, command::direction, 0));  // now they differ
+  Talk set({}, "set-node", {0x42});
+  EXPECT_EQ(bench.run(set).error(), Error::invalid_argument);
+  EXPECT_NE(set.detail().find("share the number"), std::string_view::npos) << set.detail();
 }
 
 TEST(CanSetNode, GoneAfterwards) {

@@ -155,6 +155,27 @@ TEST(Raa38ModbusHost, EachBadReplyHasItsWords) {
   }
 }
 
+// A procedure confirms such a reply too.
+TEST(Raa38ModbusHost, AProcedureDoesNotTrustAShortReplyEither) {
+  modbus::FrameBytes followed;
+  for (const std::uint8_t byte : framed({1, 3, 4, 0x00, 0x00, 0x05})) followed.push_back(byte);
+  followed.push_back(0);
+  const Wire whole(followed.view().begin(), followed.view().end());
+  const Wire cut(whole.begin(), whole.end() - 1);
+  Talk look(fine, "direction");
+  EXPECT_EQ(converse(look, [&](Bytes, unsigned before) { return before == 0 ? cut : whole; }), 2u);
+  EXPECT_EQ(look.error(), Error::wrong_length);
+}
+
+TEST(Raa38ModbusHost, ALineThatIsNeverSilentIsGivenUpAtOnce) {
+  for (const std::string_view command : {"position", "address", "baud", "direction", "scan", "zero"}) {
+    Talk talk({}, command);
+    EXPECT_LT(raa38::testing::time_with_noise(talk), 1500ms) << command;
+    EXPECT_EQ(talk.error(), Error::wrong_length);
+    EXPECT_TRUE(says(talk.detail(), "without a pause")) << command << ": " << talk.detail();
+  }
+}
+
 // ---- What is asked of the encoder beside its position
 
 struct Collector final : FieldSink {
@@ -241,6 +262,17 @@ TEST(Raa38ModbusHost, ScanAsksEveryAddressOfALine) {
   EXPECT_EQ(turned.error(), Error::invalid_argument);
 }
 
+TEST(Raa38ModbusHost, ScanAsksADamagedAnswerAgain) {
+  for (const unsigned damaged : {2u, 3u}) {
+    Talk scan({}, "scan", {5, 5});
+    converse(scan, [&](Bytes request, unsigned before) {
+      if (request[0] != 5) return Wire{};
+      return before <= damaged ? Wire{5, 3, 2, 0, 9, 0, 0} : framed({5, 3, 2, 0, 9});
+    });
+    EXPECT_EQ(report(scan), damaged == 2 ? "encoder_address=5 clash=0 " : "encoder_address=5 clash=1 ");
+  }
+}
+
 // ---- Settings
 
 TEST(Raa38ModbusSettings, AnAddressIsSetAndAsked) {
@@ -314,6 +346,24 @@ TEST(Raa38ModbusSettings, ASettingIsSentOnceWhateverComes) {
     }
     EXPECT_EQ(sent, 1u);
   }
+}
+
+TEST(Raa38ModbusSettings, AnAddressWhereSomethingIsDamagedIsTaken) {
+  unsigned sent = 0;
+  Talk set({}, "set-address", {2});
+  converse(set, [&](Bytes request, unsigned) {
+    if (request[1] != function::read) ++sent;
+    return request[0] == 1 ? position_of_1 : Wire{2, 3, 2, 0, 9, 0, 0};
+  });
+  EXPECT_EQ(set.error(), Error::invalid_argument);
+  EXPECT_TRUE(says(set.detail(), "though not well"));
+  EXPECT_EQ(sent, 0u);
+}
+
+TEST(Raa38ModbusSettings, ARefusalIsNotAskedForAgain) {
+  Talk set({}, "set-address", {2});
+  EXPECT_EQ(converse(set, [](Bytes, unsigned) { return framed({1, 0x83, 2}); }), 1u);
+  EXPECT_EQ(set.error(), Error::request_rejected);
 }
 
 TEST(Raa38ModbusSettings, ARefusedAddressIsToldInWords) {

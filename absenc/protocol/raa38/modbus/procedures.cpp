@@ -35,14 +35,14 @@ Part<Result<Reply>> look(Line& line, std::uint8_t address, unsigned attempts) {
     co_await line.stop(only(Error::invalid_argument, too_few_registers.found, too_few_registers.advice));
   }
   Result<Reply> reply = Error::timeout;
-  for (unsigned i = 0; i < attempts && !line.is_noisy(); ++i) {
+  for (unsigned i = 0; i < attempts; ++i) {
     reply = co_await line.attempt(request);
     if (reply && reply->doubtful_size != 0) {
       const Reply first = *reply;
       reply = co_await line.attempt(request);
       if (reply && differ_doubtfully(first, *reply)) reply = Error::wrong_length;
     }
-    if (reply || reply.error() == Error::request_rejected) break;
+    if (reply || reply.error() == Error::request_rejected || line.is_noisy()) break;
   }
   co_return reply;
 }
@@ -82,7 +82,7 @@ Procedure look_at_direction(Line& line, Seen& found) {
 Procedure ask_address(Line& line, Address& found) {
   const Result<Reply> reply = co_await line.attempt(which_address).repeated(2);
   found.address = reply ? reply->address : line.format().address;
-  if (reply) co_return done;
+  if (reply || line.is_noisy()) co_return {reply.error()};
   const Result<Reply> position = co_await look(line, found.address, 2);
   co_return {position.error()};
 }

@@ -58,6 +58,17 @@ TEST(RaaHandshake, AFrameTakesAsLongAsOrdered) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
+TEST(RaaHandshake, TheWholeFrameMayComeDuringThePulse) {
+  using Event = absenc::Event<std::uint8_t>;
+  const FrameBytes frame = encode_position(handshake, {383});
+  Talk read(handshake, "position");
+  ASSERT_EQ(read.next(Time{}).kind, Step<std::uint8_t>::Kind::pulse);
+  read.feed({.kind = Event::Kind::received, .at = 5us, .items = frame.view()});
+  read.feed({.kind = Event::Kind::sent, .at = trigger_width});
+  ASSERT_NE(read.reading(), nullptr);
+  EXPECT_EQ(read.reading()->singleturn, 383u);
+}
+
 TEST(RaaHandshake, T3MayBeShorterThanThePulse) {
   Format fast = handshake;
   fast.acquisition = Time(1);
@@ -246,6 +257,17 @@ TEST(RaaZeroing, AStreamWithoutFramesIsNoZero) {
   }
 }
 
+TEST(RaaZeroing, AStreamThatEndsAfterwardsIsTold) {
+  Bench bench(timing);
+  bench.device().set([](unsigned frame, Wire& reply) {
+    if (frame > 4) reply.assign(1, 0x00);
+  });
+  const Talk zero = converse(bench, "zero");
+  EXPECT_TRUE(bench.finished);
+  EXPECT_EQ(zero.error(), Error::bad_framing);
+  EXPECT_NE(zero.detail().find("could not be read back"), std::string_view::npos);
+}
+
 // ---- Scan
 
 TEST(RaaScan, FindsEverybodyAndClashes) {
@@ -263,6 +285,21 @@ TEST(RaaScan, FindsEverybodyAndClashes) {
   EXPECT_EQ(fields.numbers["clash"], (std::vector<std::int64_t>{0, 0, 1, 0}));
   EXPECT_EQ(fields.numbers["singleturn"], (std::vector<std::int64_t>{383, 383, 383}));
   for (const VirtualEncoder& encoder : bench.encoders) EXPECT_EQ(encoder.violation_count(), 0u);
+}
+
+TEST(RaaScan, AsksADamagedAnswerAgain) {
+  Bench bench(bus);
+  bench.device().set([](unsigned frame, Wire& reply) {
+    if (frame == 0) reply[4] ^= 1;
+  });
+  Fields fields = report(converse(bench, "scan"));
+  EXPECT_EQ(fields.numbers["clash"], std::vector<std::int64_t>{0});
+}
+
+TEST(RaaScan, ALineThatIsNeverSilentIsGivenUpAtOnce) {
+  Talk scan(bus, "scan");
+  EXPECT_LT(raa38::testing::time_with_noise(scan), 1500ms);
+  EXPECT_NE(scan.detail().find("without a pause"), std::string_view::npos);
 }
 
 TEST(RaaScan, NobodyAndSomebodyWhoTransmitsByHimself) {
