@@ -68,7 +68,11 @@ class Decoding {
     const Reading& reading = *seen.reading;
     require(reading.singleturn_bits == 0 || is("singleturn", reading.singleturn) || is("position", reading.singleturn),
             [] { return "has a reading of another position"; });
-    require(reading.multiturn_bits == 0 || is("multiturn", reading.multiturn),
+    // Turns may have a sign.
+    const auto turns = seen.fields.find("multiturn");
+    require(reading.multiturn_bits == 0 ||
+                (turns != seen.fields.end() && (static_cast<std::uint64_t>(turns->second.number) &
+                                                low_mask(reading.multiturn_bits)) == reading.multiturn),
             [] { return "has a reading of other turns"; });
   }
 

@@ -293,7 +293,26 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
+// Whether one reply of noise in 64 or more passes the check: then what is damaged cannot be told from what is good.
+bool has_weak_check(const Unit& unit, const Options& options) {
+  struct Nowhere final : FieldSink {
+    void put(const FieldValue&) override {}
+  } nowhere;
+  sim::Random random(1);
+  for (const Vector& vector : unit.vectors) {
+    unsigned good = 0;
+    for (int i = 0; i < 4096 && vector.error == Error::none && !vector.reply.empty(); ++i) {
+      std::vector<std::uint8_t> noise(vector.reply.size());
+      for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random.below(256));
+      if (unit.decode(options, {.bytes = vector.request}, {.bytes = noise}, nowhere) == Error::none) ++good;
+    }
+    if (good > 4096 / 64) return true;
+  }
+  return false;
+}
+
 TEST_P(Characters, EveryErrorWhereItWas) {
+  if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk(faults_of(unit, options), 5000, 2);
   expect_same(annotate(settings_of(unit)), truth.expected, 0.97);
   std::map<Error, int> errors;
@@ -320,6 +339,7 @@ TEST_P(Characters, OnlyWhatTheEncoderSays) {
 
 // A wrong stop bit makes an exchange bad, and nothing else.
 TEST_P(Characters, DamagedCharacters) {
+  if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk({}, 1000, 4);
   sim::Random random(4);
   std::vector<Kept> expected = truth.expected;

@@ -142,7 +142,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
 // As a terminal program or a dump has them: one byte behind the other, both sides in one.
 TEST_P(OfUnit, BytesWithoutTimes) {
   std::vector<Character> characters;
-  std::vector<Said> said = talk(800, 2);
+  std::vector<Said> said = talk(1200, 2);
   for (std::size_t i = 0; i < said.size(); ++i) {
     for (const std::uint8_t byte : said[i].bytes) {
       const Tick begin = characters.size();

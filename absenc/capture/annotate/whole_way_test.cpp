@@ -141,7 +141,7 @@ TEST_P(WholeWay, IsTheShortWay) {
   static_cast<void>(talker.talk());  // so that the waveform begins with a silent line
   talker.draw(waveform);
   std::vector<Character> all;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 300 || (expected.lines.empty() && all.size() < 1200); ++i) {  // some send nothing
     const Talk talk = talker.talk();
     ASSERT_FALSE(talk.collided);
     for (const Burst& burst : talk.bursts) bursts.put(burst);

@@ -159,8 +159,9 @@ struct Definition : Declares<Definition, Protocol> {
       command<Found, restart, request<Ask::reset>, Ask::reset>(
           {"reset", Verb::run, 0, "restart it, 200 ms", {}, true, false}),
       command<Nodes<addresses>, scan<Protocol, addresses, request_to>, request<Ask::position>>(
-          {"scan", Verb::scan, 0, "ask each of the 64 addresses"}),
+          {"scan", Verb::scan, 0, "ask each of the 64 addresses", {}, false, false}),
   };
+  static constexpr LineTiming timing{.turnaround = turn_around[0], .turnaround_limit = 1ms};
   static constexpr std::array conditions{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
   static constexpr std::string_view source = document;
   static constexpr std::string_view d14 = "singleturn_bits=14 multiturn_bits=14";

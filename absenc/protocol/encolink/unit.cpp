@@ -79,8 +79,9 @@ Result<Request> memory_reading(const Format&, Arguments arguments) {
 Result<Request> memory_writing(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
   const std::uint16_t size = size_of(address, arguments[2]);
-  if (size == 0 || size > 8) return Error::invalid_argument;
-  return Request{Config::position, write_request(address, size, static_cast<std::uint64_t>(arguments[1]))};
+  const auto value = static_cast<std::uint64_t>(arguments[1]);
+  if (size == 0 || size > 8 || value > low_mask(8u * size)) return Error::invalid_argument;
+  return Request{Config::position, write_request(address, size, value)};
 }
 
 constexpr auto not_known = nullptr;  // the value depends on the position, or nothing is sent
