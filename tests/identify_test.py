@@ -26,6 +26,7 @@ ENCODERS = [
     ("raa38-modbus", ["--option", "address=9"], {"address": 9}),
     ("raa38-modbus", ["--option", "baud=9600"], {"baud": "9600"}),
     ("raa38-can", ["--option", "node=0x21"], {"node": 0x21}),
+    ("amt21", ["--motion", "rpm=60", "--model", "AMT21xB"], {}),
 ]
 
 

@@ -63,8 +63,7 @@ class NewProtocol(unittest.TestCase):
                              capture_output=True, text=True)
         self.assertEqual(kit.returncode, 1)
         failed = [line for line in kit.stdout.splitlines() if line.startswith("[  FAILED  ]")]
-        self.assertEqual({line.split()[3].rstrip(",") for line in failed[:-1]},
-                         {"ProtocolName.IsNoLongerTheInventedOne"})
+        self.assertEqual({line.split()[3] for line in failed} - {"1"}, {"ProtocolName.IsNoLongerTheInventedOne"})
 
     def test_the_example_is_of_the_template(self):
         """What CONTRIBUTING shows is compiled by the test above."""
