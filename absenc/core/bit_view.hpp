@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 
 #include "absenc/core/bits.hpp"
@@ -51,6 +52,11 @@ struct BitView {
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
+    if (std::is_constant_evaluated()) {  // clang 14 has not made the template yet
+      std::size_t value = 0;
+      for (std::size_t i = 0; i < sizeof(std::size_t); ++i) value = value << 8 | bytes[at + i];
+      return value << (first - 8 * at);
+    }
     return register_at(at, std::make_index_sequence<sizeof(std::size_t)>{}) << (first - 8 * at);
   }
   // Written without a loop it becomes one load where the processor has one.

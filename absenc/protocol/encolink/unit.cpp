@@ -31,7 +31,6 @@ struct Protocol {
   using Format = encolink::Format;
   using Request = encolink::Request;
   using Line = encolink::Line;
-  static constexpr std::size_t longest_reply = padded_identity_bytes;
 
   static AccessBytes encode(const Format&, const Request& request) {
     if (request.access) return encode_access(*request.access);
