@@ -63,7 +63,8 @@ endif()
 file(GLOB kit_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/kit/*.cpp")
 absenc_test(kit ${kit_sources})
 list(FILTER kit_sources EXCLUDE REGEX "_test\\.cpp$")
-set_source_files_properties(${kit_sources} PROPERTIES COMPILE_OPTIONS -O2)  # a million exchanges of each unit
+# A million exchanges of each unit. What is precompiled for tests is not optimised.
+set_source_files_properties(${kit_sources} PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
 file(GLOB cross_tests CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/*_test.cpp")
 foreach(source IN LISTS cross_tests)
