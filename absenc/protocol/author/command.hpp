@@ -162,8 +162,6 @@ struct CommandOf {
   bool (*is_other)(const Format&) = nullptr;
   /// Of formats of which this is false no conversation is made: the options contradict it. Null: of all one is.
   bool (*possible)(const Format&) = nullptr;
-  /// Where its arguments make no request, its conversation is made all the same, and says what is wrong with them.
-  bool judges_arguments = false;
 
   [[nodiscard]] constexpr CommandOf unless(std::string_view (*why)(const Format&)) const {
     CommandOf one = *this;
@@ -197,7 +195,7 @@ struct CommandOf {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, why);
     if (possible != nullptr && !possible(format)) return {};
-    if (!judges_arguments && !can_ask(format, arguments)) return {};
+    if (!can_ask(format, arguments)) return {};
     const bool other = is_other != nullptr && is_other(format);
     return (other ? make_other : make)(format, arguments, storage);
   }

@@ -31,11 +31,7 @@ class ReadConfirmed : public HostOf<P> {
       first_at_ = this->sent_at();
       return this->ask(this->request());
     }
-    if (error == Error::none) {
-      reading_ = P::reading(this->format(), this->request(), this->last());
-      reading_.latched = this->sent_at();  // the latest it can have been taken
-      reading_.received = this->received_at();
-    }
+    if (error == Error::none) reading_ = this->last_reading();
     this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
   }
 

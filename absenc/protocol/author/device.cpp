@@ -13,7 +13,6 @@ using ByteEvent = Event<std::uint8_t>;
 void Responder::power_on(Time now, PowerOn kind) {
   power_ = Power::starting;
   ready_at_ = kind == PowerOn::skip ? now : now + times_.start_time;
-  kept_.clear();
   static_cast<void>(is_on(now));
 }
 
@@ -95,14 +94,11 @@ void Responder::damage(Time at) {
 // Silence: what was begun is no request.
 void Responder::end_run(Time at) {
   reply_.clear();
-  longer_ = {};
   if (is_on(at) && !transmitting_) {
     if (!damaged_ && !request_.empty()) refusing_ = is_refused(Flaw::cut_short, request_) || refusing_;
     if (std::exchange(refusing_, false)) {
       refuse(at, reply_);
       begin_reply(heard_at_ + times_.answer_time);
-    } else if (damaged_ && !request_.empty()) {
-      ended(respond_to_damaged(request_, heard_at_, reply_), heard_at_);
     }
   }
   forget();
@@ -120,8 +116,6 @@ void Responder::hear(std::uint8_t byte, Time at) {
     }
     return;
   }
-  heard_at_ = at;
-  if (refusing_) return;
   heard_at_ = at;
   if (damaged_ || refusing_) return;
   if (skipping_ != 0) {

@@ -71,14 +71,13 @@ class Responder : public Device<std::uint8_t> {
   void take_longer(Time time) { longer_ = time; }
   /// A whole request. Its reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
-  /// A request of which a character was damaged, as far as it came before. Its host ended at `at`; the line is silent.
-  virtual Answer respond_to_damaged(Bytes, Time, ByteBuffer<64>&) { return Answer::for_others; }
   enum class Flaw : std::uint8_t {
     damaged,    // a character
     unknown,    // no request begins so
     cut_short,  // by silence
   };
-  /// Whether what is no request is refused. What is not is as if it had not come.
+  /// Whether what is no request is refused. What is not is as if it had not come. Of a damaged one `heard` is what came
+  /// before the damage, perhaps nothing.
   virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
   /// The line is silent after something that is refused: the reply to it.
   virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}

@@ -26,7 +26,7 @@ template <auto member>
   return {info};
 }
 
-/// The fields of `Values`, a struct whose members they show. `first`: their place in the unit's table.
+/// The fields of `Values`, a struct whose members they show.
 template <class Values, auto... members>
 struct FieldsOf {
   constexpr explicit FieldsOf(const FieldOf<members>&... all) : infos{all.info...} {}
@@ -36,14 +36,7 @@ struct FieldsOf {
     (put_one(sink, infos[index++], shown<members>(values)), ...);
   }
 
-  /// What is declared of this member.
-  template <auto member>
-  [[nodiscard]] constexpr const FieldInfo& info() const {
-    std::size_t index = 0;
-    static_cast<void>(((index += same_member<member, members>() ? 0 : 1, same_member<member, members>()) || ...));
-    return infos[index];
-  }
-  /// Of the field that shows this member.
+  /// The field that shows this member.
   template <auto member>
   [[nodiscard]] constexpr const FieldInfo* of() const {
     std::size_t index = 0;
@@ -54,10 +47,6 @@ struct FieldsOf {
   std::array<FieldInfo, sizeof...(members)> infos;
 
  private:
-  template <auto one, auto other>
-  static constexpr bool same_member() {
-    return std::is_same_v<FieldOf<one>, FieldOf<other>>;
-  }
   template <auto member>
   static constexpr auto shown(const Values& values) {
     if constexpr (std::is_member_pointer_v<decltype(member)>) {

@@ -41,8 +41,18 @@ class HostOf : public Engine {
   [[nodiscard]] const Request& request() const { return request_; }
   /// The last good one.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// Nothing: who prints takes the conversation of the unit, which is Told (command.hpp).
-  void report(FieldSink&) const override {}
+  /// The position in the last good reply, with the times of its exchange. Where the document says when the encoder
+  /// takes the position, `P::latched(format, sent_at)` is that time.
+  [[nodiscard]] Reading last_reading() const {
+    Reading reading = P::reading(format_, request_, last_);
+    if constexpr (requires { P::latched(format_, sent_at()); }) {
+      reading.latched = P::latched(format_, sent_at());
+    } else {
+      reading.latched = sent_at();  // the latest it can have been taken
+    }
+    reading.received = received_at();
+    return reading;
+  }
 
  protected:
   explicit HostOf(const Format& format) : Engine(P::wire(format), storage_), format_(format) {}
@@ -85,8 +95,7 @@ class HostOf : public Engine {
 };
 
 /// A position, asked for once: what a drive repeats ten thousand times a second. `P::reading(format, request, reply)`
-/// makes a Reading of the reply; its times are those of the exchange. Where the document says when the encoder takes
-/// the position, `P::latched(format, sent_at)` is that time.
+/// makes a Reading of the reply.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
@@ -100,15 +109,7 @@ class ReadPosition : public HostOf<P> {
 
  private:
   void answered(Error error) final {
-    if (error == Error::none) {
-      reading_ = P::reading(this->format(), this->request(), this->last());
-      if constexpr (requires { P::latched(this->format(), this->sent_at()); }) {
-        reading_.latched = P::latched(this->format(), this->sent_at());
-      } else {
-        reading_.latched = this->sent_at();  // the latest it can have been taken
-      }
-      reading_.received = this->received_at();
-    }
+    if (error == Error::none) reading_ = this->last_reading();
     this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
   }
 

@@ -37,9 +37,7 @@ template <class P>
 Part<std::uint64_t> look(LineOf<P>& line, Looked<P>& found, typename P::Request request) {
   found.reply = co_await line.ask(request);
   found.request = request;
-  found.reading = P::reading(line.format(), request, found.reply);
-  found.reading.latched = line.sent_at();
-  found.reading.received = line.received_at();
+  found.reading = line.last_reading();
   co_return found.reading.singleturn;
 }
 

@@ -89,11 +89,6 @@ template <unsigned decimals, auto member>
   one.info.decimals = decimals;
   return one;
 }
-template <auto member>
-[[nodiscard]] constexpr OptionOf<member> with_decimals(unsigned decimals, OptionOf<member> one) {
-  one.info.decimals = decimals;
-  return one;
-}
 
 template <auto... members>
 struct OptionsOf {

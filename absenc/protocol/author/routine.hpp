@@ -91,7 +91,6 @@ class Routine {
       current_.resume();
     }
   }
-  [[nodiscard]] bool is_running() const { return static_cast<bool>(current_); }
   void begin(std::coroutine_handle<> first) {
     current_ = first;
     if (!first) return ended({.error = Error::buffer_too_small, .detail = "the storage is too small for this command"});

@@ -72,9 +72,7 @@ struct UnitOf {
   // ---- The functions of the descriptor
 
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
-    if constexpr (requires { Definition::decode(values, asked, frame, sink); }) {
-      return Definition::decode(values, asked, frame, sink);
-    } else if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
+    if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
       return Definition::decode(format(values), asked, frame, sink);
     } else {
       return decode_bytes(format(values), asked, frame, sink);
@@ -388,14 +386,11 @@ struct UnitOf {
               .device = device,
               .resolution = resolution,
               .settings = settings};
-    constexpr bool tells = requires {
+    constexpr bool by_manner = requires {
       P::decode_request(Format{}, Bytes{});
       P::manner(Format{}, Request{});
-    }
-    || requires { &Definition::answered; };
-    if constexpr (tells) {
-      unit.answered = answered;
-    }
+    };
+    if constexpr (by_manner || requires { &Definition::answered; }) unit.answered = answered;
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
     if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;

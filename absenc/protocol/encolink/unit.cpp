@@ -127,7 +127,6 @@ constexpr CommandOf<Protocol> command(const Command& info, Result<Request> (*req
   CommandOf<Protocol> made =
       author::command<Report, Protocol, Found, procedure, frame<Config::position>, bound...>(info);
   made.request = request;
-  made.judges_arguments = true;
   return made;
 }
 

@@ -54,17 +54,27 @@ author::Responder::Answer VirtualEncoder::respond(Bytes bytes, Time at, ByteBuff
   return Answer::sent;
 }
 
-author::Responder::Answer VirtualEncoder::respond_to_damaged(Bytes begin, Time at, ByteBuffer<64>& reply) {
-  if (address_of(begin[0]) != profile_.address) return Answer::for_others;
+bool VirtualEncoder::is_refused(Flaw flaw, Bytes heard) {
+  if (flaw != Flaw::damaged || heard.empty() || address_of(heard[0]) != profile_.address) return false;
   in_a_row_ = 0;
-  return report_bad_request(begin[0], status::stop_error, at, reply);
+  refused_field_ = heard[0];
+  return is_reported(heard[0]);
 }
 
-// Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF. CF is echoed as it came.
+void VirtualEncoder::refuse(Time at, ByteBuffer<64>& reply) {
+  static_cast<void>(report_bad_request(refused_field_, status::stop_error, at, reply));
+}
+
+// Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF.
+bool VirtualEncoder::is_reported(std::uint8_t field) const {
+  return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
+}
+
+// CF is echoed as it came.
 author::Responder::Answer VirtualEncoder::report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at,
                                                              ByteBuffer<64>& reply) {
+  if (!is_reported(field)) return Answer::for_others;
   const DataId id = *data_id(field);
-  if (profile_.bad_request == BadRequest::silent || is_memory_access(id)) return Answer::for_others;
   Reply report = reply_to(id, at);
   report.one.status |= status_bit;
   report.two.status |= status_bit;

@@ -86,10 +86,12 @@ class VirtualEncoder final : public author::Responder {
   [[nodiscard]] std::size_t request_size(Bytes begin) const override;
   [[nodiscard]] std::size_t others_reply_size(Bytes request) const override;
   Answer respond(Bytes bytes, Time at, ByteBuffer<64>& reply) override;
-  Answer respond_to_damaged(Bytes begin, Time at, ByteBuffer<64>& reply) override;
+  bool is_refused(Flaw flaw, Bytes heard) override;
+  void refuse(Time at, ByteBuffer<64>& reply) override;
   void started(Time at) override;
   void stopped(Time at) override;
 
+  [[nodiscard]] bool is_reported(std::uint8_t field) const;
   Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply);
   void count(DataId id, Time at);
   Answer answer_memory(const Request& request, Time at, ByteBuffer<64>& reply);
@@ -131,7 +133,8 @@ class VirtualEncoder final : public author::Responder {
   Time pending_at_{};
 
   DataId last_id_{};
-  unsigned in_a_row_ = 0;  // requests of `last_id_`
+  unsigned in_a_row_ = 0;           // requests of `last_id_`
+  std::uint8_t refused_field_ = 0;  // CF of a damaged request
   Time last_reset_{};
 };
 

@@ -88,8 +88,8 @@ struct Definition {
   static constexpr std::array models{
       ModelText{"QS35-M40M-E12F", "24 bits, 65536 turns, two channels (SIL3)", 10'000, ""}};
   static constexpr const auto& fields = esl::fields;
-  static constexpr const FieldInfo* status = &fields.info<&Values::ch1_status>();
-  static constexpr const FieldInfo* alarms = &fields.info<&Values::ch1_alarms>();
+  static constexpr const FieldInfo* status = fields.of<&Values::ch1_status>();
+  static constexpr const FieldInfo* alarms = fields.of<&Values::ch1_alarms>();
   static constexpr const auto& vectors = esl::vectors;
   static constexpr const auto& conditions = esl::conditions;
   static constexpr LineTiming timing{.pause_bits = 1, .turnaround = answer_time, .turnaround_limit = answer_limit};
@@ -226,8 +226,8 @@ bool probe_captures(Options& values, std::span<const Capture> captures, Evidence
 constinit const Unit unit = [] {
   Unit made = UnitOf<Definition>::make();
   made.memory = memory_areas;
-  made.second_status = &fields.info<&Values::ch2_status>();
-  made.second_alarms = &fields.info<&Values::ch2_alarms>();
+  made.second_status = fields.of<&Values::ch2_status>();
+  made.second_alarms = fields.of<&Values::ch2_alarms>();
   made.probe = probe_captures;
   return made;
 }();

@@ -142,8 +142,8 @@ struct Definition {
 
   static constexpr LineSettings line(const Format& format) { return {.rate = format.bit_rate()}; }
   static constexpr Resolution resolution(const Format& format) { return {.singleturn_bits = format.bits}; }
-  static constexpr Error decode(const Options& values, Frame request, Frame reply, FieldSink& sink) {
-    return can::decode(options.format(values), request.can, reply.can, sink);
+  static constexpr Error decode(const Format& format, Frame request, Frame reply, FieldSink& sink) {
+    return can::decode(format, request.can, reply.can, sink);
   }
   // The controller of the bus does it.
   static constexpr Delimit delimit(const Options&, Direction, Bytes bytes) {

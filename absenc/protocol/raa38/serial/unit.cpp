@@ -23,9 +23,9 @@ constexpr std::array<std::string_view, 3> second_byte_choices{"auto", "81", "ech
 constexpr std::array<std::string_view, 3> zeroing_choices{"none", "line", "command"};
 constexpr std::int64_t most_us = 10'000'000'000;  // ns: 10 s
 
+using author::decimal;
 using author::option;
 using author::probeable;
-using author::with_decimals;
 
 constexpr author::OptionsOf options{
     option<&Format::mode>("mode", "what starts a frame: the encoder itself, a pulse on CLK, or BC AA Bx", mode_choices),
@@ -36,19 +36,16 @@ constexpr author::OptionsOf options{
     option<&Format::zeroing>("zeroing", "how its zero is set: a pulse on CLR (line), or BC AA Cx on a bus (command)",
                              zeroing_choices),
     option<&Format::zero_unit>("zero_unit", "the x of Cx; -1: that of Bx", -1, unit_count - 1),
-    with_decimals(
-        3, option<&Format::refresh_millihertz>(
-               "refresh_hz", "timing: frames a second; 0: not known (the virtual encoder: 100)", 0, 100'000'000)),
+    decimal<3>(option<&Format::refresh_millihertz>(
+        "refresh_hz", "timing: frames a second; 0: not known (the virtual encoder: 100)", 0, 100'000'000)),
     option<&Format::maximum_rpm>(
         "max_rpm", "refuse positions that a shaft so fast cannot reach; 0: none; timing: needs refresh_hz", 0,
         1'000'000),
-    with_decimals(
-        3, option<&Format::acquisition>(
-               "acquisition_us", "T3, from pulse or request to the frame, us; 0: not known (the virtual encoder: 100)",
-               0, most_us)),
-    with_decimals(
-        3, option<&Format::transmission>(
-               "transmission_us", "T1 - T3, how long a frame takes, us; 0: as long as its characters", 0, most_us)),
+    decimal<3>(option<&Format::acquisition>(
+        "acquisition_us", "T3, from pulse or request to the frame, us; 0: not known (the virtual encoder: 100)", 0,
+        most_us)),
+    decimal<3>(option<&Format::transmission>(
+        "transmission_us", "T1 - T3, how long a frame takes, us; 0: as long as its characters", 0, most_us)),
 };
 constexpr std::size_t bits_option = options.find("bits");
 constexpr std::size_t second_byte_option = options.find("second_byte");
