@@ -71,22 +71,16 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its z
 
   std::optional<Reply> answer(const Request& asked, Time at) {
     const unsigned bits = format().singleturn_bits;
-    switch (asked.ask) {
-      case Ask::position:
-        return Reply{static_cast<std::int32_t>(counts(at, bits, 0) & ((1 << bits) - 1))};
-      case Ask::turns:
-        return Reply{static_cast<std::int32_t>(wrapped_difference(turns(at) - lost_, 0, turns_bits))};
-      case Ask::zero:
-        if (format().multiturn_bits != 0) {
-          violate("zero sent to an encoder with turns", at);
-          return std::nullopt;
-        }
-        store_zero(at, 0);
-        [[fallthrough]];
-      case Ask::reset:
-        restart(at + restart_time);
-        return std::nullopt;
+    if (asked.ask == Ask::position) return Reply{static_cast<std::int32_t>(counts(at, bits, 0) & ((1 << bits) - 1))};
+    if (asked.ask == Ask::turns) {
+      return Reply{static_cast<std::int32_t>(wrapped_difference(turns(at) - lost_, 0, turns_bits))};
     }
+    if (asked.ask == Ask::zero && format().multiturn_bits != 0) {
+      violate("zero sent to an encoder with turns", at);
+      return std::nullopt;
+    }
+    if (asked.ask == Ask::zero) store_zero(at, 0);
+    restart(at + restart_time);
     return std::nullopt;
   }
   void set_condition(std::size_t, std::int64_t value, Time) override { battery_ = value != 0; }
@@ -128,10 +122,16 @@ struct Definition : Declares<Definition, Protocol> {
       option<&Format::drops_low_bits>("drop_low_bits", "read an encoder of 14 bits as one of 12"),
   };
   static constexpr std::array models{
-      ModelText{"AMT21xB", "14 bits, 2 Mbit/s", 8000, "singleturn_bits=14 multiturn_bits=0 rate=2000000"},
-      ModelText{"AMT21xD", "14 bits and turns, 2 Mbit/s", 8000, "singleturn_bits=14 multiturn_bits=14 rate=2000000"},
+      ModelText{"AMT21xB", "14 bits, 2 Mbit/s", 4000, "singleturn_bits=14 multiturn_bits=0 rate=2000000"},
+      ModelText{"AMT21xD", "14 bits and turns, 2 Mbit/s", 4000, "singleturn_bits=14 multiturn_bits=14 rate=2000000"},
       ModelText{"AMT21xA", "12 bits, 2 Mbit/s", 8000, "singleturn_bits=12 multiturn_bits=0 rate=2000000"},
       ModelText{"AMT21xC", "12 bits and turns, 2 Mbit/s", 8000, "singleturn_bits=12 multiturn_bits=14 rate=2000000"},
+      ModelText{"AMT21xF", "14 bits, rate to be set", 4000, "singleturn_bits=14 multiturn_bits=0 rate=115200"},
+      ModelText{"AMT21xH", "14 bits and turns, rate to be set", 4000,
+                "singleturn_bits=14 multiturn_bits=14 rate=115200"},
+      ModelText{"AMT21xE", "12 bits, rate to be set", 8000, "singleturn_bits=12 multiturn_bits=0 rate=115200"},
+      ModelText{"AMT21xG", "12 bits and turns, rate to be set", 8000,
+                "singleturn_bits=12 multiturn_bits=14 rate=115200"},
   };
   using enum FieldInfo::Kind;
   static constexpr auto fields = fields_of<Values>(
@@ -184,7 +184,11 @@ struct Definition : Declares<Definition, Protocol> {
   static constexpr Request guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
 
   static constexpr Values values(const Format&, const Request& asked) {
-    return {.encoder_address = asked.address, .command = ask_names[static_cast<std::size_t>(asked.ask)]};
+    constexpr std::array<std::string_view, 2> answered{"position", "turns"};
+    return {.encoder_address = asked.address,
+            .command = asked.is_answered()      ? answered[static_cast<std::size_t>(asked.ask)]
+                       : asked.ask == Ask::zero ? "zero"
+                                                : "reset"};
   }
   static constexpr Values values(const Format& format, const Request& asked, const Reply& reply) {
     Values all = values(format, asked);

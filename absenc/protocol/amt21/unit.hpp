@@ -31,14 +31,15 @@ struct Format {
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits}; }
 };
 
-enum class Ask : std::uint8_t { position, turns, zero, reset };
-inline constexpr std::array<std::string_view, 4> ask_names{"position", "turns", "zero", "reset"};
-inline constexpr std::uint8_t zero_code = 0x5E;
-inline constexpr std::uint8_t reset_code = 0x75;
+/// What is added to the address; of zero and reset, which add 2, the byte behind it.
+enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
 struct Request {
   Ask ask = Ask::position;
   std::uint8_t address = 0x54;
+
+  /// The other two the encoder obeys without a word, and restarts.
+  [[nodiscard]] constexpr bool is_answered() const { return ask == Ask::position || ask == Ask::turns; }
 };
 
 /// Of a position counts; of turns revolutions, -8192 to 8191.
@@ -63,29 +64,27 @@ struct Protocol {
   }
   /// One wrong reply in four passes the two parity bits: it must be one of two bytes, with silence behind it.
   static constexpr author::Manner manner(const Format&, const Request& request) {
-    const bool answered = request.ask == Ask::position || request.ask == Ask::turns;
-    return {.attempts = answered ? 3u : 1u, .answered = answered, .ends_by_silence = true};
+    return {.attempts = request.is_answered() ? 3u : 1u, .answered = request.is_answered(), .ends_by_silence = true};
   }
   static constexpr std::size_t request_size(Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];
   }
   static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
-    const auto place = std::min<unsigned>(static_cast<unsigned>(request.ask), 2);
     ByteBuffer<2> bytes;
-    bytes.push_back(static_cast<std::uint8_t>(request.address + place));
-    if (place == 2) bytes.push_back(request.ask == Ask::zero ? zero_code : reset_code);
+    const auto ask = static_cast<std::uint8_t>(request.ask);
+    bytes.push_back(static_cast<std::uint8_t>(request.address + (request.is_answered() ? ask : 2)));
+    if (!request.is_answered()) bytes.push_back(ask);
     return bytes;
   }
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
     if (bytes.empty() || bytes.size() != request_size(bytes)) return Error::wrong_length;
-    Request request{static_cast<Ask>(bytes[0] & 3), static_cast<std::uint8_t>(bytes[0] & 0xFC)};
-    if (bytes.size() == 1) return request;
-    if (bytes[1] != zero_code && bytes[1] != reset_code) return Error::unexpected_reply;
-    request.ask = bytes[1] == zero_code ? Ask::zero : Ask::reset;
-    return request;
+    const Request request{static_cast<Ask>(bytes.size() == 1 ? bytes[0] & 3 : bytes[1]),
+                          static_cast<std::uint8_t>(bytes[0] & 0xFC)};
+    const bool known = bytes.size() == 1 || request.ask == Ask::zero || request.ask == Ask::reset;
+    return known ? Result<Request>(request) : Error::unexpected_reply;
   }
   static constexpr std::size_t reply_size(const Format&, const Request& request) {
-    return request.ask == Ask::position || request.ask == Ask::turns ? 2 : 0;
+    return request.is_answered() ? 2 : 0;
   }
   static constexpr ByteBuffer<2> encode_reply(const Format& format, const Request& request, const Reply& reply) {
     const unsigned shift = request.ask == Ask::position ? 14u - format.singleturn_bits : 0u;
