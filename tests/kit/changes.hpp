@@ -82,6 +82,13 @@ Seen read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
   return getter == nullptr ? Seen{} : run_repeated(world, *getter, least_arguments(*getter)).seen;
 }
 
+/// Whether a field has this value, as a number or in its text.
+[[nodiscard]] inline bool shows(const Seen& seen, std::int64_t value) {
+  return std::any_of(seen.fields.begin(), seen.fields.end(), [&](const auto& field) {
+    return field.second.number == value || field.second.bytes == std::to_string(value);
+  });
+}
+
 /// Empty when the encoder is as the command that ended well promised. There must be no faults.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
@@ -132,6 +139,12 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
         if (name.find('#') != std::string::npos || value.shows != Shows::other) continue;
         const auto found = written.fields.find(name);
         if (found != written.fields.end() && !(found->second == value)) return name + " reads as another";
+      }
+      // Words in place of the number say that this encoder does not tell it.
+      const auto told = now.fields.find(std::string(command.reads_back));
+      const bool in_words = told != now.fields.end() && !told->second.bytes.empty();
+      if (!now.fields.empty() && !values.empty() && !in_words && !shows(now, values[0])) {
+        return "what is read does not show it: " + to_text(now.fields);
       }
       return {};
     }

@@ -38,11 +38,22 @@ struct Tally {
   std::uint64_t not_changed = 0;  // though it was not so
   std::string promise{};
   std::string rule{};
-  std::map<std::string, Weight> weights{};          // by command
-  std::map<std::string, std::uint64_t> trials{};    // damaged replies, by command
-  std::map<std::string, std::uint64_t> mistakes{};  // wrong results, by command
-  std::map<std::string, std::uint64_t> costs{};     // exchanges of each command
-  std::map<std::string, bool> unchecked{};          // commands whose reply has no check
+  /// By command.
+  struct Command {
+    std::optional<Weight> weight{};
+    std::uint64_t trials = 0;       // damaged replies
+    std::uint64_t misplaced = 0;    // wrong positions
+    std::uint64_t mistaken = 0;     // wrong values of anything else
+    std::uint64_t cost = 0;         // exchanges
+    std::optional<bool> unchecked;  // whether its reply has no check
+  };
+  std::map<std::string, Command> commands{};
+};
+
+/// In what a result is another than the truth; empty: in nothing.
+struct Difference {
+  std::string text{};
+  bool position = false;
 };
 
 template <class Item>
@@ -105,7 +116,7 @@ class Campaign {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
       if (!may_be_asked_often(command)) continue;
-      std::uint64_t& cost = tally_.costs[std::string(command.name)];
+      std::uint64_t& cost = tally_.commands[std::string(command.name)].cost;
       if (cost > 20 && !random_.chance(0.1)) continue;
       Asked asked{&command,
                   command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
@@ -174,16 +185,17 @@ class Campaign {
     if (!result.good()) return;
     ++tally_.accepted;
     const bool may_miss = asked.command->verb == Verb::info && result.faults != 0;  // one of several questions
-    const std::string wrong = difference(asked, result.seen, may_miss);
-    if (wrong.empty()) return;
+    const Difference wrong = difference(asked, result, may_miss);
+    if (wrong.text.empty()) return;
     if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_so_now(asked, result.seen)) return;
     // What no check covers is taken whatever comes in its place: also what was said before.
     const bool unchecked = is_unchecked(asked);
     findings_.require(result.damaged != 0 || (unchecked && !quiet_),
-                      [&] { return where(asked) + wrong + ", though no byte was damaged"; });
+                      [&] { return where(asked) + wrong.text + ", though no byte was damaged"; });
     if (unchecked) return;
     ++tally_.wrong;
-    ++tally_.mistakes[std::string(asked.command->name)];
+    Tally::Command& command = tally_.commands[std::string(asked.command->name)];
+    ++(wrong.position ? command.misplaced : command.mistaken);
   }
 
   // A request that was misheard may have changed the encoder: then the truth is another one from now on.
@@ -237,43 +249,37 @@ class Campaign {
     if (tally_.promise.empty()) tally_.promise = what() + broken;
   }
 
-  /// Empty when all of it is so.
-  [[nodiscard]] std::string difference(const Asked& asked, const Seen& seen, bool may_miss) const {
+  [[nodiscard]] Difference difference(const Asked& asked, const Ended& result, bool may_miss) const {
     const Seen& truth = *asked.truth[place_];
-    if (seen.reading.has_value() != truth.reading.has_value()) return "has another reading";
-    if (seen.reading && !is_at(*seen.reading, places_[place_])) return "another position than the shaft's";
+    const Seen& seen = result.seen;
+    if (seen.reading.has_value() != truth.reading.has_value()) return {"has another reading"};
+    if (seen.reading && !is_at(*seen.reading, places_[place_])) return {"another position than the shaft's", true};
     for (const auto& [name, value] : truth.fields) {
       if (std::find(asked.varying.begin(), asked.varying.end(), name) != asked.varying.end()) continue;
       const auto found = seen.fields.find(name);
       if (found == seen.fields.end() && may_miss) continue;
-      if (found == seen.fields.end()) return "no " + name;
-      if (!(found->second == value)) return "another " + name + " than on a good line";
+      if (found == seen.fields.end()) return {"no " + name};
+      if (!(found->second == value)) return {"another " + name + " than on a good line"};
     }
     return {};
   }
 
   // What a check is worth depends on the frames of the conversation.
   void weigh(const Asked& asked, std::uint64_t damaged) {
-    const std::string name(asked.command->name);
-    tally_.trials[name] += damaged;
-    if (tally_.weights.contains(name)) return;
-    Weight worst{.damaged = 1};
+    Tally::Command& command = tally_.commands[std::string(asked.command->name)];
+    command.trials += damaged;
+    if (command.weight) return;
+    command.weight.emplace();
     for (const auto& [request, reply] : frames_of(asked)) {
-      const Weight weight = weight_of(unit_, world_.options(), request, reply, rates_,
-                                      asked.command->verb == Verb::read ? 20'000 : 4'000);
-      if (weight.damaged == 0) continue;
-      const auto chance = [](const Weight& one) {
-        return static_cast<double>(one.wrong) / static_cast<double>(one.damaged);
-      };
-      if (worst.damaged <= 1 || chance(weight) > chance(worst)) worst = weight;
+      command.weight->add(weight_of(unit_, world_.options(), request, reply, rates_,
+                                    asked.command->verb == Verb::read ? 20'000 : 4'000));
     }
-    tally_.weights[name] = worst;
   }
 
   // Whether no bit of one of its replies is covered by a check.
   bool is_unchecked(const Asked& asked) {
-    const std::string name(asked.command->name);
-    if (const auto known = tally_.unchecked.find(name); known != tally_.unchecked.end()) return known->second;
+    std::optional<bool>& unchecked = tally_.commands[std::string(asked.command->name)].unchecked;
+    if (unchecked) return *unchecked;
     const auto frames = frames_of(asked);
     const auto open = [&](const std::pair<Held, Held>& one) {
       if (unit_.covered == nullptr) return false;
@@ -282,13 +288,13 @@ class Campaign {
       }
       return true;
     };
-    return tally_.unchecked[name] = std::any_of(frames.begin(), frames.end(), open);
+    unchecked = std::any_of(frames.begin(), frames.end(), open);
+    return *unchecked;
   }
 
   [[nodiscard]] std::vector<std::pair<Held, Held>> frames_of(const Asked& asked);
 
-  // A host breaks no rule. What an encoder takes for one after faults (half a request, heard when a long reply had made
-  // it deaf) is rare.
+  // A host breaks no rule.
   void judge_rules(const Asked& asked, bool struck, std::uint32_t before) {
     const std::uint32_t broken = world_.device().violation_count() - before;
     quiet_ = quiet_ && !struck;
@@ -352,15 +358,19 @@ std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked)
 }
 
 void judge_weights(const Tally& tally, Findings& findings) {
-  for (const auto& [name, trials] : tally.trials) {
-    const auto mistakes = tally.mistakes.contains(name) ? tally.mistakes.at(name) : 0;
-    const std::uint64_t allowed = tally.weights.at(name).allowed(trials);
-    const auto text = [&, &command = name, &damaged = trials] {
-      return command + ": of " + std::to_string(damaged) + " damaged replies " + std::to_string(mistakes) +
-             " were taken for good and wrong; the check lets " + std::to_string(allowed) + " pass";
+  for (const auto& [name, command] : tally.commands) {
+    if (!command.weight) continue;
+    const auto judge = [&, &called = name, &all = command](std::uint64_t taken, const Share& share, const char* what) {
+      const std::uint64_t allowed = share.allowed(all.trials);
+      const auto text = [&] {
+        return called + ": of " + std::to_string(all.trials) + " damaged replies " + std::to_string(taken) +
+               " were taken for good with another " + what + "; the check lets " + std::to_string(allowed) + " pass";
+      };
+      findings.require(taken <= allowed, text);
+      if (taken > 0) findings.note(text());
     };
-    findings.require(mistakes <= allowed, text);
-    if (mistakes > 0) findings.note(text());
+    judge(command.misplaced, command.weight->position, "position");
+    judge(command.mistaken, command.weight->others, "value");
   }
 }
 
@@ -396,10 +406,11 @@ Findings check_exchanges(const Unit& unit, const Exchanges& wanted) {
     exchange<std::uint8_t>(unit, wanted, tally, findings);
   }
   judge_weights(tally, findings);
-  const std::uint64_t few = tally.conversations / 1000 + tally.misheard + 1;
-  findings.require(tally.broken <= few, [&] { return std::to_string(tally.broken) + " rules broken: " + tally.rule; });
-  // What was written is read back, so that two damaged replies must look good.
-  findings.require(tally.not_changed <= 2 + tally.changed / 100,
+  // A request that was misheard may be one that breaks them.
+  findings.require(tally.broken <= tally.misheard,
+                   [&] { return std::to_string(tally.broken) + " rules broken: " + tally.rule; });
+  // What was written is read back: two damaged replies would have to look good.
+  findings.require(tally.not_changed == 0,
                    [&] { return std::to_string(tally.not_changed) + " changes were not made: " + tally.promise; });
   findings.note(std::to_string(tally.changed) + " of " + std::to_string(tally.changes) + " changes were made");
   findings.require(tally.accepted > tally.conversations / 50, [&] {

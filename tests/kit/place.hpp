@@ -2,6 +2,8 @@
 // Where a shaft stands, as a reading of so many bits has it.
 #pragma once
 
+#include <optional>
+
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
 
@@ -26,6 +28,15 @@ namespace absenc::kit {
     if (reading.singleturn >> open != counts_at(position, reading.singleturn_bits) >> open) return false;
   }
   return !reading.multiturn_valid || reading.multiturn == turns_at(position, reading.multiturn_bits);
+}
+
+/// Whether two readings say the same as far as both hold. What is not there says nothing.
+[[nodiscard]] constexpr bool same_place(const std::optional<Reading>& one, const std::optional<Reading>& other) {
+  if (!one || !other) return true;
+  if (one->singleturn_valid_bits != 0 && other->singleturn_valid_bits != 0 && one->singleturn != other->singleturn) {
+    return false;
+  }
+  return !one->multiturn_valid || !other->multiturn_valid || one->multiturn == other->multiturn;
 }
 
 }  // namespace absenc::kit

@@ -33,7 +33,7 @@ TEST(KitToys, WithoutAMistakeNothingIsFound) { expect_no_finding<Mistake::none>(
 TEST(KitToys, AWeakCheckIsNoMistake) {
   expect_no_finding<Mistake::parity>();
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::parity>, few).notes(),
-              Contains(HasSubstr("taken for good and wrong")));
+              Contains(HasSubstr("taken for good with another position")));
 }
 
 TEST(KitToys, AHostThatTakesTwoBytes) {
@@ -45,7 +45,7 @@ TEST(KitToys, AHostThatTakesTwoBytes) {
 TEST(KitToys, AHostThatLooksAtNoCheck) {
   const Unit& unit = toy::unit<Mistake::takes_anything>;
   EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("bit 0 flipped")));
-  EXPECT_THAT(check_exchanges(unit, few).texts(), Contains(HasSubstr("taken for good and wrong")));
+  EXPECT_THAT(check_exchanges(unit, few).texts(), Contains(HasSubstr("taken for good with another position")));
 }
 
 TEST(KitToys, AHostThatLeavesAFrameToTheNext) {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tests/kit/place.hpp"
+
 namespace absenc::kit {
 namespace {
 
@@ -28,37 +30,48 @@ class Parrot final : public Machine<Item> {
   bool speaks_ = false;
 };
 
+/// What a frame says that is another than the undamaged one.
+struct Wrong {
+  bool position = false;
+  bool others = false;
+};
+
 struct Judge {
   const Unit& unit;
   const Options& options;
   const Held& request;
   const Held& reply;
-  std::map<std::string, Value> right = [this] {
+  Seen right = [this] {
     Seen seen;
     (void)unit.decode(options, request.frame(), reply.frame(), seen);
-    return seen.fields;
+    return seen;
   }();
 
-  [[nodiscard]] bool is_wrong(const Held& frame) const {
+  void judge(const Held& frame, Wrong& wrong) const {
     Seen seen;
-    return unit.decode(options, request.frame(), frame.frame(), seen) == Error::none && seen.fields != right;
+    if (unit.decode(options, request.frame(), frame.frame(), seen) != Error::none) return;
+    const bool elsewhere = !same_place(seen.reading, right.reading);
+    wrong.position = wrong.position || elsewhere;
+    wrong.others = wrong.others || (!elsewhere && seen.fields != right.fields);
   }
-  [[nodiscard]] bool is_wrong(Bytes bytes) const {
+  [[nodiscard]] Wrong judge(Bytes bytes) const {
+    Wrong wrong;
     Held part{.link = unit.link, .bytes = Wire(bytes.begin(), bytes.end())};
     if (unit.link == LinkKind::clocked) {
       part.bytes.resize(reply.bytes.size(), 0xFF);
       part.bits = reply.bits;
-      return is_wrong(part);
+      judge(part, wrong);
+      return wrong;
     }
     const bool anywhere = unit.streams != nullptr && unit.streams(options);
     for (std::size_t first = 0; first < (anywhere ? bytes.size() : 1); ++first) {
       for (std::size_t size = 1; size <= std::min(bytes.size() - first, reply.bytes.size() + 2); ++size) {
         part.bytes.assign(bytes.begin() + static_cast<std::ptrdiff_t>(first),
                           bytes.begin() + static_cast<std::ptrdiff_t>(first + size));
-        if (is_wrong(part)) return true;
+        judge(part, wrong);
       }
     }
-    return false;
+    return wrong;
   }
 };
 
@@ -66,6 +79,7 @@ struct Judge {
 
 Weight weight_of(const Unit& unit, const Options& options, const Held& request, const Held& reply,
                  const sim::FaultRates& rates, unsigned samples) {
+  std::uint64_t damaged = 0;
   Weight weight;
   const Judge judge{unit, options, request, reply};
   const auto sample = [&](auto& faulty, const auto& asks, auto&& wrong) {
@@ -80,8 +94,10 @@ Weight weight_of(const Unit& unit, const Options& options, const Held& request, 
         faulty.feed({.kind = Event<Item>::Kind::sent, .at = now});
         continue;
       }
-      ++weight.damaged;
-      if (step.kind == Step<Item>::Kind::transfer && wrong(step.out)) ++weight.wrong;
+      ++damaged;
+      const Wrong found = step.kind == Step<Item>::Kind::transfer ? wrong(step.out) : Wrong{};
+      weight.position.wrong += found.position ? 1 : 0;
+      weight.others.wrong += found.others ? 1 : 0;
       now += std::chrono::seconds(1);
       faulty.feed({.kind = Event<Item>::Kind::timer, .at = now});
       if (step.kind == Step<Item>::Kind::transfer) faulty.feed({.kind = Event<Item>::Kind::sent, .at = now});
@@ -91,14 +107,16 @@ Weight weight_of(const Unit& unit, const Options& options, const Held& request, 
     Parrot<CanFrame> parrot({*reply.can}, 0);
     sim::FaultyNode faulty(parrot, rates, 1);
     sample(faulty, std::vector{request.can.value_or(CanFrame{})}, [&](std::span<const CanFrame> frames) {
-      return std::any_of(frames.begin(), frames.end(),
-                         [&](const CanFrame& one) { return judge.is_wrong({.link = unit.link, .can = one}); });
+      Wrong wrong;
+      for (const CanFrame& one : frames) judge.judge({.link = unit.link, .can = one}, wrong);
+      return wrong;
     });
   } else {
     Parrot<std::uint8_t> parrot(reply.bytes, reply.bits);
     sim::FaultyDevice faulty(parrot, rates, 1);
-    sample(faulty, request.bytes.empty() ? Wire{0} : request.bytes, [&](Bytes bytes) { return judge.is_wrong(bytes); });
+    sample(faulty, request.bytes.empty() ? Wire{0} : request.bytes, [&](Bytes bytes) { return judge.judge(bytes); });
   }
+  weight.position.damaged = weight.others.damaged = std::max<std::uint64_t>(damaged, 1);
   return weight;
 }
 

@@ -11,19 +11,32 @@
 
 namespace absenc::kit {
 
-/// Damaged replies, and how many of them a careful host would take for what they are not.
-struct Weight {
-  std::uint64_t damaged = 0;
+/// Of so many damaged replies, how many looked good and were not.
+struct Share {
+  std::uint64_t damaged = 1;
   std::uint64_t wrong = 0;
+
+  [[nodiscard]] double chance() const { return static_cast<double>(wrong) / static_cast<double>(damaged); }
 
   /// How many of `trials` damaged replies may be taken. Both numbers come from the same chance p, so that of all wrong
   /// ones a share of trials / (trials + damaged) is expected; five standard deviations and ten more are exceeded by
   /// chance in less than one of a million campaigns.
   [[nodiscard]] std::uint64_t allowed(std::uint64_t trials) const {
-    const double ratio = static_cast<double>(trials) / static_cast<double>(damaged == 0 ? 1 : damaged);
-    const double expected = static_cast<double>(wrong) * ratio;
+    const double ratio = static_cast<double>(trials) / static_cast<double>(damaged);
     const double deviation = std::sqrt(static_cast<double>(wrong) * ratio * (1 + ratio));
-    return static_cast<std::uint64_t>(expected + 5 * deviation + 10 * std::max(1.0, ratio));
+    return static_cast<std::uint64_t>(static_cast<double>(wrong) * ratio + 5 * deviation + 10 * std::max(1.0, ratio));
+  }
+};
+
+/// What a careful host would take for what it is not: another position, and another value of anything else.
+struct Weight {
+  Share position{};
+  Share others{};
+
+  /// The worse of both.
+  void add(const Weight& other) {
+    if (other.position.chance() >= position.chance()) position = other.position;
+    if (other.others.chance() >= others.chance()) others = other.others;
   }
 };
 
