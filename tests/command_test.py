@@ -288,6 +288,7 @@ class Usage(Case):
                                ("tformat:/dev/ttyUSB0?echo=maybe", ["auto, on or off"]),
                                ("tformat:/dev/ttyUSB0?motion=still", ["it is for: sim"]),
                                ("tformat:tcp:host:4001?baud=9600", ["it is for: serial"]),
+                               ("amt21:/dev/ttyUSB0?baud=1152", ["rate is \"1152\"", "115200"]),
                                ("tformat:/dev/ttyUSB0?model", ["NAME=VALUE"]),
                                ("sim:tformat?singleturn=131072", ["0 to 131071"])]:
             with self.subTest(encoder):

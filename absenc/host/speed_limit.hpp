@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string_view>
 
 #include "absenc/protocol/unit.hpp"
 
@@ -15,15 +14,12 @@ struct SpeedLimit {
   std::uint32_t mm_s = 20'000;  // linear encoders
 };
 
-/// The option of a unit that says how fast its shaft turns, where there is one; 0: it does not.
-inline constexpr std::string_view maximum_rpm_name = "max_rpm";
-
 /// The option's, or else the model's, or else the usual one.
 [[nodiscard]] constexpr SpeedLimit speed_limit(const Unit& unit, const Options& options) {
   SpeedLimit limit;
   if (options.model != nullptr && options.model->maximum_rpm != 0) limit.rpm = options.model->maximum_rpm;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
-    if (unit.options[i].name == maximum_rpm_name && options[i] > 0) limit.rpm = static_cast<std::uint32_t>(options[i]);
+    if (unit.options[i].role == Role::maximum_rpm && options[i] > 0) limit.rpm = static_cast<std::uint32_t>(options[i]);
   }
   return limit;
 }

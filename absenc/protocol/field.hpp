@@ -8,6 +8,7 @@
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bytes.hpp"
+#include "absenc/protocol/role.hpp"
 
 namespace absenc {
 
@@ -17,9 +18,6 @@ struct FlagInfo {
   std::string_view meaning;  // what has happened
   std::string_view action;   // what the operator must do; "" when nothing
 };
-
-/// What of a reading a field shows: it holds as long as that does.
-enum class Shows : std::uint8_t { other, position, turns };
 
 struct FieldInfo {
   enum class Kind : std::uint8_t {
@@ -36,7 +34,7 @@ struct FieldInfo {
   std::string_view unit;  // "" for a plain number; "counts", "revolutions", "degC" ...
   std::string_view meaning;
   std::span<const FlagInfo> flags{};
-  Shows shows = Shows::other;
+  Role role = Role::other;
 };
 
 struct FieldValue {

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "absenc/core/result.hpp"
+#include "absenc/protocol/role.hpp"
 #include "absenc/protocol/word_format.hpp"
 
 namespace absenc {
@@ -33,6 +34,7 @@ struct Option {
   unsigned decimals = 0;
   bool describes_word = false;  // a word format says it instead: the two cannot be given together
   std::uint32_t step = 1;       // the values are `minimum` and what is multiples of this above it
+  Role role = Role::other;
 };
 
 struct OptionValue {

@@ -40,6 +40,7 @@ struct Argument {
   std::int64_t maximum;
   std::int64_t default_value = 0;
   bool required = true;
+  Role role = Role::other;
 };
 
 using Arguments = std::span<const std::int64_t>;  // one value for each Argument of the command, defaults filled in
@@ -57,9 +58,9 @@ struct Command {
   std::string_view changes_option{};  // config_set: the option that must follow its first argument
 };
 
-/// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments named
-/// `address`, `page` (only where there are pages), `count` (bytes to read; without it one at a time), `value` (the byte
-/// to write) and `force` (1: also what is protected). memory_read reports `data`, or `value` for a single byte.
+/// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments with
+/// the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
+/// single byte.
 struct MemoryArea {
   std::uint32_t page;  // 0 where there are no pages
   std::uint32_t first;
@@ -68,7 +69,7 @@ struct MemoryArea {
   bool writable = true;
   bool in_dump = true;            // whether it belongs to a copy of the memory
   std::uint32_t write_life = 0;   // writes that the document permits; 0: not known
-  std::string_view protection{};  // why only memory_write's argument `force` writes it; "": it needs none
+  std::string_view protection{};  // why only memory_write's argument of the role force writes it; "": it needs none
   bool life_in_total = false;     // write_life is of all bytes together; false: the document does not say of what
 
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
@@ -77,7 +78,7 @@ struct MemoryArea {
 };
 
 /// A register of the encoder: accessed as a whole, at its address. The commands memory_read and memory_write reach it
-/// by their arguments `address` and `value` (most significant byte first).
+/// by their arguments with the roles address and value.
 struct RegisterInfo {
   std::string_view name;
   std::uint32_t address;

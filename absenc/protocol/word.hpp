@@ -53,12 +53,12 @@ enum WordFieldIndex : std::size_t {
 };
 
 inline constexpr std::array<FieldInfo, 9> word_fields{{
-    {"multiturn", FieldInfo::Kind::counts, "revolutions", "turns", {}, Shows::turns},
-    {"singleturn", FieldInfo::Kind::counts, "counts", "position within the turn", {}, Shows::position},
-    {"angle_deg", FieldInfo::Kind::real, "deg", "position within the turn", {}, Shows::position},
-    {"position", FieldInfo::Kind::counts, "counts", "position of a linear encoder", {}, Shows::position},
-    {"position_um", FieldInfo::Kind::real, "um", "position of a linear encoder", {}, Shows::position},
-    {"position_mm", FieldInfo::Kind::real, "mm", "position of a linear encoder", {}, Shows::position},
+    {"multiturn", FieldInfo::Kind::counts, "revolutions", "turns", {}, Role::turns},
+    {"singleturn", FieldInfo::Kind::counts, "counts", "position within the turn", {}, Role::position},
+    {"angle_deg", FieldInfo::Kind::real, "deg", "position within the turn", {}, Role::of_position},
+    {"position", FieldInfo::Kind::counts, "counts", "position of a linear encoder", {}, Role::position},
+    {"position_um", FieldInfo::Kind::real, "um", "position of a linear encoder", {}, Role::of_position},
+    {"position_mm", FieldInfo::Kind::real, "mm", "position of a linear encoder", {}, Role::of_position},
     {"error", FieldInfo::Kind::boolean, "", "the encoder says that its position is wrong"},
     {"warning", FieldInfo::Kind::boolean, "", "the encoder works near its limits"},
     {"alarms", FieldInfo::Kind::flags, "", "error and warning", word_flags},

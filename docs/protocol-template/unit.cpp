@@ -52,14 +52,15 @@ struct Values {
 
 struct Definition : Declares<Definition, Protocol> {
   using Encoder = protocol_name::Encoder;
-  static constexpr std::string_view id = "protocol_name", name = "maker and protocol", document = "title of the document";
+  static constexpr std::string_view id = "protocol_name", name = "maker and protocol",
+                                    document = "title of the document";
   static constexpr LinkKind link = LinkKind::half_duplex;
   static constexpr std::size_t frames_size = 1200;
 
   static constexpr OptionsOf options{option<&Format::address>("address", "of the encoder on its line", 0, 255)};
   static constexpr std::array models{ModelText{"unnamed", "one sentence", 6000, ""}};
   static constexpr auto fields = fields_of<Values>(field<&Values::singleturn>(
-      {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Shows::position}));
+      {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Role::position}));
   static constexpr std::array commands{
       reading<request<Ask::position>>({"position", Verb::read, 0, "position"}),
       command<Found, set_zero, request<Ask::zero>>(

@@ -10,25 +10,23 @@
 
 namespace absenc::kit {
 
-/// The argument of that name; none when the command has no such.
-[[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, std::string_view name) {
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (command.arguments[i].name == name) return &values[i];
-  }
-  return nullptr;
+/// The argument of that role; none when the command has no such.
+[[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, Role role) {
+  const Argument* const found = find_role(command.arguments, role);
+  return found != nullptr ? &values[static_cast<std::size_t>(found - command.arguments.data())] : nullptr;
 }
 
 [[nodiscard]] inline Values memory_arguments(const Command& command, const MemoryArea& area, std::uint32_t address,
                                              std::uint8_t byte) {
   Values values = least_arguments(command);
-  const auto set = [&](std::string_view name, std::int64_t value) {
-    if (std::int64_t* one = argument(command, values, name)) *one = value;
+  const auto set = [&](Role role, std::int64_t value) {
+    if (std::int64_t* one = argument(command, values, role)) *one = value;
   };
-  set("address", address);
-  set("page", area.page);
-  set("count", 1);
-  set("value", byte);
-  set("force", area.protection.empty() ? 0 : 1);
+  set(Role::address, address);
+  set(Role::page, area.page);
+  set(Role::count, 1);
+  set(Role::value, byte);
+  set(Role::force, area.protection.empty() ? 0 : 1);
   return values;
 }
 
@@ -117,26 +115,25 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
       const Command* reader = find_command(unit, Verb::memory_read);
       if (reader == nullptr) return {};
       Values asked = least_arguments(*reader);
-      for (const std::string_view name : {"address", "page"}) {
-        if (std::int64_t* one = argument(*reader, asked, name)) *one = *argument(command, values, name);
+      for (const Role role : {Role::address, Role::page}) {
+        if (std::int64_t* one = argument(*reader, asked, role)) *one = *argument(command, values, role);
       }
       const Ended now = world.run(*reader, asked);
       if (!now.good()) return "it cannot be read: " + std::string(text_of(now.error).name);
-      const std::int64_t byte = *argument(command, values, "value");
-      const auto is = [&](const char* name) {
-        const auto found = now.seen.fields.find(name);
-        if (found == now.seen.fields.end()) return false;
-        const std::string& bytes = found->second.bytes;
-        return bytes.empty() ? found->second.number == byte : bytes == std::string(1, static_cast<char>(byte));
-      };
-      return is("data") || is("value") ? "" : "the byte is " + to_text(now.seen.fields);
+      const std::int64_t byte = *argument(command, values, Role::value);
+      const bool is = std::any_of(now.seen.fields.begin(), now.seen.fields.end(), [&](const auto& field) {
+        const Value& value = field.second;
+        return (value.role == Role::data && value.bytes == std::string(1, static_cast<char>(byte))) ||
+               (value.role == Role::value && value.number == byte);
+      });
+      return is ? "" : "the byte is " + to_text(now.seen.fields);
     }
     case Verb::config_set: {
       const Seen now = read_setting(world, unit, command);
       if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
       for (const auto& [name, value] : now.fields) {
         // Not one frame of many, nor where the shaft was.
-        if (name.find('#') != std::string::npos || value.shows != Shows::other) continue;
+        if (name.find('#') != std::string::npos || is_of_reading(value.role)) continue;
         const auto found = written.fields.find(name);
         if (found != written.fields.end() && !(found->second == value)) return name + " reads as another";
       }

@@ -38,6 +38,8 @@ void run_commands(const Unit& unit, const Configuration& way, Findings& findings
       findings.require(result.good() || may_fail,
                        [&] { return what() + std::string(text_of(result.error).name) + " " + result.detail; });
       if (!result.good()) break;
+      findings.require(command.verb != Verb::scan || !result.seen.numbers(Role::encoder).empty(),
+                       [&] { return what() + "does not say who answered"; });
       if (result.seen.reading) {
         findings.require(is_at(*result.seen.reading, world.place()),
                          [&] { return what() + "another position than the shaft's"; });

@@ -10,11 +10,10 @@
 namespace absenc::kit {
 namespace {
 
-bool takes(const Command* command, std::string_view name, std::uint32_t least, std::uint32_t most) {
+bool takes(const Command* command, Role role, std::uint32_t least, std::uint32_t most) {
   if (command == nullptr) return false;
-  return std::any_of(command->arguments.begin(), command->arguments.end(), [&](const Argument& one) {
-    return one.name == name && one.minimum <= least && one.maximum >= most;
-  });
+  const Argument* one = find_role(command->arguments, role);
+  return one != nullptr && one->minimum <= least && one->maximum >= most;
 }
 
 void declared_memory(const Unit& unit, Findings& findings) {
@@ -34,11 +33,13 @@ void declared_memory(const Unit& unit, Findings& findings) {
     require(area.writable || area.write_life == 0, "has a life though it cannot be written");
     for (const Command* command : {reads, writes}) {
       if (command == writes && !area.writable) continue;
-      require(takes(command, "address", area.first, last), "is not reached by `address`");
-      require(area.page == 0 || takes(command, "page", area.page, area.page), "is not reached by `page`");
-      require(command == reads || takes(command, "value", 0, 255), "is not written by `value`");
-      require(command == reads || area.protection.empty() || takes(command, "force", 1, 1),
-              "is not written by `force`");
+      require(takes(command, Role::address, area.first, last), "is not reached by an argument of the role address");
+      require(area.page == 0 || takes(command, Role::page, area.page, area.page),
+              "is not reached by an argument of the role page");
+      require(command == reads || takes(command, Role::value, 0, 255),
+              "is not written by an argument of the role value");
+      require(command == reads || area.protection.empty() || takes(command, Role::force, 1, 1),
+              "is not written by an argument of the role force");
     }
   }
 }
@@ -53,8 +54,10 @@ void declared_registers(const Unit& unit, Findings& findings) {
     require(one.size > 0 && (one.readable || one.writable), "is of no use");
     for (const Verb verb : {Verb::memory_read, Verb::memory_write}) {
       const Command* command = find_command(unit, verb);
-      require(takes(command, "address", one.address, one.address), "is not reached by `address`");
-      require(verb == Verb::memory_read || takes(command, "value", 0, 255), "is not written by `value`");
+      require(takes(command, Role::address, one.address, one.address),
+              "is not reached by an argument of the role address");
+      require(verb == Verb::memory_read || takes(command, Role::value, 0, 255),
+              "is not written by an argument of the role value");
     }
   }
   findings.require(unit.registers.empty() || unit.memory.empty(), [] { return "has bytes or registers, not both"; });
@@ -78,6 +81,51 @@ void declared_settings(const Unit& unit, Findings& findings) {
     const bool is_option = std::any_of(unit.options.begin(), unit.options.end(),
                                        [&](const Option& one) { return one.name == command.changes_option; });
     require(command.changes_option.empty() || is_option, "changes an option that does not exist");
+  }
+}
+
+// Of each role there is one, or who looks for it finds the wrong one.
+template <class Named>
+void declared_once(std::span<const Named> all, std::string_view whose, Findings& findings) {
+  for (const Named& one : all) {
+    findings.require(one.role == Role::other || find_role(all, one.role) == &one,
+                     [&] { return std::string(whose) + ": " + std::string(one.name) + " has the role of another"; });
+  }
+}
+
+// What others need to make use of a command.
+void declared_roles(const Unit& unit, Findings& findings) {
+  declared_once(unit.options, unit.id, findings);
+  const auto has_field = [&](Role role) { return find_role(unit.fields, role) != nullptr; };
+  for (const Command& command : unit.commands) {
+    declared_once(command.arguments, command.name, findings);
+    const auto require = [&](bool holds, const char* text) {
+      findings.require(holds, [&] { return std::string(command.name) + " needs " + text; });
+    };
+    const auto takes_role = [&](Role role) { return find_role(command.arguments, role) != nullptr; };
+    switch (command.verb) {
+      case Verb::read:
+        require(has_field(Role::position), "a field of the role position");
+        break;
+      case Verb::scan:
+        require(has_field(Role::encoder), "a field of the role encoder");
+        require(has_field(Role::clash), "a field of the role clash");
+        require(find_role(unit.options, Role::encoder) != nullptr, "an option of the role encoder");
+        break;
+      case Verb::memory_read:
+        require(has_field(Role::data) || has_field(Role::value), "a field of the role data or value");
+        require(takes_role(Role::address), "an argument of the role address");
+        break;
+      case Verb::memory_write:
+        require(takes_role(Role::address), "an argument of the role address");
+        require(takes_role(Role::value), "an argument of the role value");
+        break;
+      case Verb::reset_multiturn:
+        require(has_field(Role::turns), "a field of the role turns");
+        break;
+      default:
+        break;
+    }
   }
 }
 
@@ -116,6 +164,7 @@ Findings check_declarations(const Unit& unit) {
   declared_memory(unit, findings);
   declared_registers(unit, findings);
   declared_settings(unit, findings);
+  declared_roles(unit, findings);
   return findings;
 }
 

@@ -61,18 +61,15 @@ class Decoding {
   }
 
   void reading_shows(const Seen& seen) {
-    const auto is = [&](const char* name, std::uint64_t counts) {
-      const auto field = seen.fields.find(name);
-      return field != seen.fields.end() && static_cast<std::uint64_t>(field->second.number) == counts;
-    };
     const Reading& reading = *seen.reading;
-    require(reading.singleturn_bits == 0 || is("singleturn", reading.singleturn) || is("position", reading.singleturn),
+    const auto is = [&](Role role, std::uint64_t counts, unsigned bits) {
+      const std::vector<std::int64_t> numbers = seen.numbers(role);
+      return numbers.size() == 1 && (static_cast<std::uint64_t>(numbers[0]) & low_mask(bits)) == counts;
+    };
+    require(reading.singleturn_bits == 0 || is(Role::position, reading.singleturn, 64),
             [] { return "has a reading of another position"; });
     // Turns may have a sign.
-    const auto turns = seen.fields.find("multiturn");
-    require(reading.multiturn_bits == 0 ||
-                (turns != seen.fields.end() && (static_cast<std::uint64_t>(turns->second.number) &
-                                                low_mask(reading.multiturn_bits)) == reading.multiturn),
+    require(reading.multiturn_bits == 0 || is(Role::turns, reading.multiturn, reading.multiturn_bits),
             [] { return "has a reading of other turns"; });
   }
 

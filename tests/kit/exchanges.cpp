@@ -149,7 +149,7 @@ class Campaign {
       for (const auto& [name, value] : result.seen.fields) {
         const auto first = asked.truth[place]->fields.find(name);
         if (first != asked.truth[place]->fields.end() && first->second == value) continue;
-        findings_.require(value.shows == Shows::other,
+        findings_.require(!is_of_reading(value.role),
                           [&, &changed = name] { return where(asked) + changed + " changes though the shaft stands"; });
         asked.varying.push_back(name);
       }

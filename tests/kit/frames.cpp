@@ -70,11 +70,17 @@ void Seen::put(const FieldValue& value) {
     name = std::string(value.info->name) + "#" + std::to_string(number);
   }
   fields[name] = {value.number, static_cast<float>(value.real), std::string(value.bytes.begin(), value.bytes.end()),
-                  value.info->shows};
+                  value.info->role};
 }
 
-bool Seen::has_position() const {
-  return fields.contains("singleturn") || fields.contains("multiturn") || fields.contains("position");
+bool Seen::has_position() const { return !numbers(Role::position).empty() || !numbers(Role::turns).empty(); }
+
+std::vector<std::int64_t> Seen::numbers(Role role) const {
+  std::vector<std::int64_t> found;
+  for (const auto& [name, value] : fields) {
+    if (value.role == role) found.push_back(value.number);
+  }
+  return found;
 }
 
 std::map<std::string, Value> expected_fields(const Vector& vector) {

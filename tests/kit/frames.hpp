@@ -42,7 +42,7 @@ struct Value {
   std::int64_t number = 0;
   float real = 0;
   std::string bytes{};
-  Shows shows = Shows::other;
+  Role role = Role::other;
 
   friend bool operator==(const Value& one, const Value& other) {
     return one.number == other.number && one.real == other.real && one.bytes == other.bytes;
@@ -56,8 +56,10 @@ struct Seen final : FieldSink {
     reading = one;
     ++readings;
   }
-  /// What shows a position is there.
+  /// Whether a position or turns are there.
   [[nodiscard]] bool has_position() const;
+  /// The numbers of this role.
+  [[nodiscard]] std::vector<std::int64_t> numbers(Role role) const;
 
   std::map<std::string, Value> fields;
   std::optional<Reading> reading;

@@ -91,7 +91,7 @@ struct Feeding {
   }
   [[nodiscard]] bool shows_place(const std::string& name) const {
     return std::any_of(unit.fields.begin(), unit.fields.end(),
-                       [&](const FieldInfo& one) { return one.name == name && one.shows != Shows::other; });
+                       [&](const FieldInfo& one) { return one.name == name && is_of_reading(one.role); });
   }
 
   // ---- Links of characters

@@ -24,7 +24,7 @@ void change(const Unit& unit, const Configuration& way, const Command& command, 
     Values values = i == 0   ? least_arguments(command)
                     : i == 1 ? most_arguments(command)
                              : random_arguments(command, random);
-    if (std::int64_t* force = argument(command, values, "force")) *force = 0;
+    if (std::int64_t* force = argument(command, values, Role::force)) *force = 0;
     const auto what = [&] { return way.text + ", " + std::string(command.name) + to_text(Arguments(values)) + ": "; };
     const std::string before = to_text(read_setting(world, unit, command).fields);
     const Ended result = world.run(command, values);
@@ -81,7 +81,7 @@ void try_memory(const Unit& unit, const Configuration& way, Findings& findings) 
     const bool other = std::any_of(unit.memory.begin(), unit.memory.end(),
                                    [&](const MemoryArea& one) { return one.has(area.page, outside); });
     const Values values = memory_arguments(*reads, area, outside, 0);
-    if (other || outside > reads->arguments[0].maximum) continue;
+    if (other || outside > find_role(reads->arguments, Role::address)->maximum) continue;
     findings.require(!world.run(*reads, values).good(), [&] {
       return "memory " + std::to_string(area.page) + "/" + std::to_string(outside) + " is read, though it is not there";
     });

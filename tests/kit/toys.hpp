@@ -49,7 +49,7 @@ constexpr std::uint16_t parities(unsigned position) {
 }
 
 inline constexpr std::array<FieldInfo, 1> fields{
-    {{"singleturn", FieldInfo::Kind::number, "counts", "position", {}, Shows::position}}};
+    {{"singleturn", FieldInfo::Kind::number, "counts", "position", {}, Role::position}}};
 
 template <Mistake mistake>
 struct Toy {
@@ -242,5 +242,35 @@ inline constexpr Unit unit = [] {
   made.resolution = Made::resolution;
   return made;
 }();
+
+/// What an encoder with a memory and others on its line declares, and nothing that it does. One role is forgotten,
+/// though all names are there.
+template <Role forgotten>
+struct Declared {
+  static constexpr Role kept(Role role) { return role == forgotten ? Role::other : role; }
+  using enum FieldInfo::Kind;
+  static constexpr std::array<FieldInfo, 4> fields{
+      {{"singleturn", number, "counts", "position", {}, kept(Role::position)},
+       {"encoder", number, "", "who answers", {}, kept(Role::encoder)},
+       {"clash", boolean, "", "two of them do", {}, kept(Role::clash)},
+       {"value", number, "", "a byte", {}, kept(Role::value)}}};
+  static constexpr std::array<Option, 1> options{
+      {{.name = "encoder", .meaning = "", .default_value = 0, .maximum = 7, .role = kept(Role::encoder)}}};
+  static constexpr std::array<Argument, 2> arguments{{{"address", "of a byte", 0, 255, 0, true, kept(Role::address)},
+                                                      {"value", "of a byte", 0, 255, 0, true, kept(Role::value)}}};
+  static constexpr std::array<Command, 4> commands{
+      {{"position", Verb::read, 0, "position"},
+       {"scan", Verb::scan, 1, "who answers"},
+       {"memory-read", Verb::memory_read, 2, "a byte", std::span(arguments).first(1)},
+       {"memory-write", Verb::memory_write, 3, "a byte", arguments, true}}};
+  static constexpr Unit unit = [] {
+    Unit made{};
+    made.id = "toy";
+    made.fields = fields;
+    made.options = options;
+    made.commands = commands;
+    return made;
+  }();
+};
 
 }  // namespace absenc::kit::toy

@@ -10,6 +10,7 @@ namespace absenc::kit {
 namespace {
 
 using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
@@ -92,6 +93,30 @@ TEST(KitToys, ADecoderThatOverlooksAByte) {
 
 TEST(KitToys, AConversationThatDoesNotEnd) {
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::never_ends>, few).texts(), Contains(HasSubstr("hangs")));
+}
+
+template <Role forgotten>
+std::vector<std::string> findings_without() {
+  return check_declarations(toy::Declared<forgotten>::unit).texts();
+}
+
+TEST(KitToys, ARoleThatIsForgotten) {
+  EXPECT_THAT(findings_without<Role::other>(), IsEmpty());
+  EXPECT_THAT(findings_without<Role::position>(), ElementsAre("position needs a field of the role position"));
+  EXPECT_THAT(findings_without<Role::encoder>(),
+              ElementsAre("scan needs a field of the role encoder", "scan needs an option of the role encoder"));
+  EXPECT_THAT(findings_without<Role::clash>(), ElementsAre("scan needs a field of the role clash"));
+  EXPECT_THAT(findings_without<Role::address>(), ElementsAre("memory-read needs an argument of the role address",
+                                                             "memory-write needs an argument of the role address"));
+  EXPECT_THAT(findings_without<Role::value>(), ElementsAre("memory-read needs a field of the role data or value",
+                                                           "memory-write needs an argument of the role value"));
+}
+
+TEST(KitToys, ARoleThatTwoHave) {
+  const std::array two{toy::Declared<Role::other>::options[0], toy::Declared<Role::other>::options[0]};
+  Unit unit = toy::Declared<Role::other>::unit;
+  unit.options = two;
+  EXPECT_THAT(check_declarations(unit).texts(), ElementsAre("toy: encoder has the role of another"));
 }
 
 }  // namespace

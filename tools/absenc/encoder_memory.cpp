@@ -14,25 +14,18 @@ namespace absenc::tool {
 
 namespace {
 
-const Argument* find_argument(const Command& command, std::string_view name) {
-  for (const Argument& argument : command.arguments) {
-    if (argument.name == name) return &argument;
-  }
-  return nullptr;
-}
-
 /// What memory_read reports.
 struct ReadBytes final : FieldSink {
   void put(const FieldValue& field) override {
-    if (field.info->name == "data") data.assign(field.bytes.begin(), field.bytes.end());
-    if (field.info->name == "value" && data.empty()) data = {static_cast<std::uint8_t>(field.number)};
+    if (field.info->role == Role::data) data.assign(field.bytes.begin(), field.bytes.end());
+    if (field.info->role == Role::value && data.empty()) data = {static_cast<std::uint8_t>(field.number)};
   }
   std::vector<std::uint8_t> data;
 };
 
 // So many bytes of a run can be read at once.
 std::size_t most_at_once(const Unit& unit, const Command& command, MemoryAddress at) {
-  const Argument* count = find_argument(command, "count");
+  const Argument* count = find_role(command.arguments, Role::count);
   const auto most = count != nullptr ? static_cast<std::size_t>(count->maximum) : 1;
   for (const MemoryArea& area : unit.memory) {
     if (area.has(at.page, at.address)) return std::min<std::size_t>(most, area.first + area.count - at.address);
@@ -70,8 +63,9 @@ std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t 
   const Command& command = *find_command(encoder_->unit(), Verb::memory_read);
   ReadBytes bytes;
   run_into(*encoder_, command,
-           named_arguments(command,
-                           {{"page", at.page}, {"address", at.address}, {"count", static_cast<std::int64_t>(count)}}),
+           role_arguments(
+               command,
+               {{Role::page, at.page}, {Role::address, at.address}, {Role::count, static_cast<std::int64_t>(count)}}),
            bytes);
   if (bytes.data.size() == count) return bytes.data;
   throw ToolFailure(fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(encoder_->unit(), at),
@@ -81,12 +75,12 @@ std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t 
 void EncoderMemory::write(MemoryAddress at, std::uint8_t value, Access access) {
   const Command& command = *find_command(encoder_->unit(), Verb::memory_write);
   ReadBytes ignored;
-  run_into(
-      *encoder_, command,
-      named_arguments(
-          command,
-          {{"page", at.page}, {"address", at.address}, {"value", value}, {"force", access == Access::force ? 1 : 0}}),
-      ignored);
+  run_into(*encoder_, command,
+           role_arguments(command, {{Role::page, at.page},
+                                    {Role::address, at.address},
+                                    {Role::value, value},
+                                    {Role::force, access == Access::force ? 1 : 0}}),
+           ignored);
 }
 
 }  // namespace absenc::tool

@@ -63,7 +63,7 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
   if (setting.name.starts_with(clear)) {
     return set_pulse_wire(uri.wires.clear, setting.name.substr(clear.size()), setting);
   }
-  if (setting.name == "baud") {
+  if (setting.name == rate_setting) {
     std::uint32_t& rate = uri.place == Place::slcan ? uri.adapter_rate : uri.line.rate;
     rate = static_cast<std::uint32_t>(number_of(setting, 1, 100'000'000));
   } else if (setting.name == "log") {
@@ -84,7 +84,7 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
   } else if (setting.name == "echo") {
     constexpr std::array modes{host::EchoMode::automatic, host::EchoMode::on, host::EchoMode::off};
     uri.echo = modes[choice_of(setting, {"auto", "on", "off"})];
-  } else if (setting.name == host::maximum_rpm_name) {
+  } else if (setting.name == "max_rpm") {
     uri.maximum_rpm = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
   } else if (setting.name == "motion") {
     uri.device.motion = value;
@@ -112,20 +112,15 @@ bool allowed(const LinkParameter& parameter, Place place) {
   }
 }
 
-const Option* find_option(const Unit& unit, std::string_view name) {
-  const auto found =
-      std::find_if(unit.options.begin(), unit.options.end(), [&](const Option& option) { return option.name == name; });
-  return found == unit.options.end() ? nullptr : &*found;
-}
-
-// Takes what is a link parameter; the rest are options of the unit, also `baud` where its conversations depend on it.
+// Takes what is a link parameter; the rest are options of the unit, also its rate where its conversations depend on it.
 void take_settings(EncoderUri& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   std::vector<OptionText> of_link;
   for (const OptionText& setting : settings) {
     const LinkParameter* parameter = find_link_parameter(setting.name);
-    if (parameter == nullptr || find_option(*uri.unit, setting.name) != nullptr) {
-      options.push_back(setting);
+    const Option* option = find_option(*uri.unit, setting.name);
+    if (parameter == nullptr || option != nullptr) {
+      options.push_back({option != nullptr ? option->name : setting.name, setting.value});
     } else if (allowed(*parameter, uri.place)) {
       of_link.push_back(setting);
     } else {
@@ -287,6 +282,13 @@ EncoderUri parse_named(std::string_view name, std::span<const OptionText> writte
 }
 
 }  // namespace
+
+const Option* find_option(const Unit& unit, std::string_view name) {
+  for (const Option& option : unit.options) {
+    if (option.name == name) return &option;
+  }
+  return name == rate_setting && goes_over_serial(unit) ? find_role(unit.options, Role::rate) : nullptr;
+}
 
 const LinkParameter* find_link_parameter(std::string_view name) {
   const auto found = std::find_if(link_parameters.begin(), link_parameters.end(),

@@ -22,6 +22,9 @@ namespace absenc::tool {
 enum class Place : std::uint8_t { serial, tcp, spi, can, slcan, sim };
 inline constexpr std::array<std::string_view, 6> place_names{"serial", "tcp", "spi", "can", "slcan", "sim"};
 
+/// The setting that is the rate of an asynchronous line.
+inline constexpr std::string_view rate_setting = "baud";
+
 /// A setting of the way to the encoder, beside the options of its protocol.
 struct LinkParameter {
   std::string_view name;
@@ -32,7 +35,7 @@ struct LinkParameter {
 };
 
 inline constexpr std::array<LinkParameter, 21> link_parameters{{
-    {"baud", "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
+    {rate_setting, "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan"},
     {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
     {"trigger", "rts|dtr|gpio:NAME", "the wire whose pulse asks for a frame", "serial"},
@@ -48,8 +51,7 @@ inline constexpr std::array<LinkParameter, 21> link_parameters{{
     {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi"},
     {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi"},
     {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim"},
-    {host::maximum_rpm_name, "RPM",
-     "the fastest that the shaft turns: how long a pause may be to know its turns after it",
+    {"max_rpm", "RPM", "the fastest that the shaft turns: how long a pause may be to know its turns after it",
      "serial, tcp, spi, can, slcan, sim"},
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
@@ -61,6 +63,10 @@ inline constexpr std::array<LinkParameter, 21> link_parameters{{
      "sim", true},
     {"seed", "N", "another series of faults", "sim"},
 }};
+
+/// The option that a setting of this name sets; null: none. Where the rate is an option, because silences are measured
+/// in characters, `rate_setting` sets it, whatever the unit calls it.
+[[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
 
 /// Null when there is none with this name.
 [[nodiscard]] const LinkParameter* find_link_parameter(std::string_view name);

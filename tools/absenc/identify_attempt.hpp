@@ -55,13 +55,6 @@ inline bool fits(const Unit& unit, const LineSearch& search) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-inline const Option* find_option(const Unit& unit, std::string_view name) {
-  for (const Option& option : unit.options) {
-    if (option.name == name) return &option;
-  }
-  return nullptr;
-}
-
 inline bool has_setting(const Settings& settings, std::string_view name) {
   return std::any_of(settings.begin(), settings.end(),
                      [&](const std::string& one) { return split_setting(one).name == name; });
@@ -72,7 +65,11 @@ inline std::vector<OptionText> option_settings(const Unit& unit, const Settings&
   std::vector<OptionText> options;
   for (const std::string& setting : settings) {
     const OptionText one = split_setting(setting);
-    if (find_option(unit, one.name) != nullptr || (with_model && one.name == "model")) options.push_back(one);
+    if (const Option* option = find_option(unit, one.name)) {
+      options.push_back({option->name, one.value});
+    } else if (with_model && one.name == "model") {
+      options.push_back(one);
+    }
   }
   return options;
 }
@@ -80,11 +77,9 @@ inline std::vector<OptionText> option_settings(const Unit& unit, const Settings&
 /// Who was found by a scan.
 struct Addresses final : FieldSink {
   void put(const FieldValue& value) override {
-    if (address == nullptr) address = value.info;
-    if (value.info == address) all.push_back(value.number);
-    if (value.info->name == "clash" && value.number != 0 && !all.empty()) all.pop_back();
+    if (value.info->role == Role::encoder) all.push_back(value.number);
+    if (value.info->role == Role::clash && value.number != 0 && !all.empty()) all.pop_back();
   }
-  const FieldInfo* address = nullptr;  // the first of each record
   std::vector<std::int64_t> all;
 };
 
@@ -97,36 +92,10 @@ inline std::vector<std::uint8_t> request_of(const Unit& unit, const Options& opt
   return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*size)};
 }
 
-/// The option that is named as the field which says who sent something: "address" of "encoder_address".
-inline const Option* option_of(const Unit& unit, const Addresses& addresses) {
-  if (addresses.address == nullptr) return nullptr;
-  for (const Option& option : unit.options) {
-    if (addresses.address->name.ends_with(option.name)) return &option;
-  }
-  return nullptr;
-}
-
-/// The option that says which encoder is meant: named as the field, or else the number that changes the request.
-inline const Option* address_option(const Unit& unit, const Options& options, const Command& read,
-                                    const Addresses& addresses) {
-  if (addresses.address == nullptr) return nullptr;
-  if (const Option* named = option_of(unit, addresses)) return named;
-  for (std::size_t i = 0; i < unit.options.size(); ++i) {
-    const Option& option = unit.options[i];
-    if (!option.choices.empty()) continue;
-    Options first = options;
-    Options last = options;
-    first.values[i] = option.minimum;
-    last.values[i] = option.maximum;
-    if (request_of(unit, first, read) != request_of(unit, last, read)) return &option;
-  }
-  return nullptr;
-}
-
 /// Whether both may listen to what is sent at a rate.
 inline bool hears(const Unit& unit, std::uint32_t rate, const LineSearch& search) {
-  const bool any_rate = unit.line.rate == 0 || find_option(unit, "baud") != nullptr;
-  const bool users_rate = has_setting(search.settings, "baud");
+  const bool any_rate = unit.line.rate == 0 || find_role(unit.options, Role::rate) != nullptr;
+  const bool users_rate = has_setting(search.settings, rate_setting);
   return any_rate || users_rate || way_of(search) == Way::tcp || unit.line.rate == rate;
 }
 
@@ -309,7 +278,7 @@ class Attempt {
     add({});
     for (const Model& model : unit_.models) add({fmt::format("model={}", model.name)});
     for (const Option& option : unit_.options) {
-      if (unit_.link == LinkKind::clocked || option.name == "baud" || has_setting(settings_, option.name)) continue;
+      if (unit_.link == LinkKind::clocked || option.role == Role::rate || has_setting(settings_, option.name)) continue;
       for (const std::string_view choice : option.choices) add({fmt::format("{}={}", option.name, choice)});
     }
     return all;
@@ -323,7 +292,7 @@ class Attempt {
     Addresses addresses;
     std::vector<HeardExchange> ignored;
     converse(*command, options, ignored, &addresses);
-    const Option* option = address_option(unit_, options, *find_command(unit_, Verb::read), addresses);
+    const Option* option = find_role(unit_.options, Role::encoder);
     for (const std::int64_t address : addresses.all) {
       targets.push_back(settings);
       if (option != nullptr) targets.back().push_back(fmt::format("{}={}", option->name, address));

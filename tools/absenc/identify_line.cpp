@@ -48,7 +48,7 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
     Addresses addresses;
     const Frame reply = sender.exchanges.front().reply.frame();
     if (!likely.empty() && unit.decode(likely.front(), {}, reply, addresses) == Error::none) {
-      sender.option = option_of(unit, addresses);
+      if (!addresses.all.empty()) sender.option = find_role(unit.options, Role::encoder);
       if (sender.option != nullptr) sender.number = fmt::format("{}", addresses.all.front());
     }
     const auto same = std::find_if(all.begin(), all.end(), [&](const Sender& one) {
@@ -92,20 +92,21 @@ class Search {
 
  private:
   void try_rates(const Unit& unit) {
-    if (has_setting(search_.settings, "baud") || way_of(search_) != Way::serial) return;
+    if (has_setting(search_.settings, rate_setting) || way_of(search_) != Way::serial) return;
     std::vector<std::string> rates;
-    const Option* baud = find_option(unit, "baud");
-    if (baud != nullptr) {
-      for (std::size_t i = 0; i < baud->choices.size(); ++i) {
-        if (static_cast<std::int64_t>(i) != baud->default_value) rates.emplace_back(baud->choices[i]);
+    const Option* rate = find_role(unit.options, Role::rate);
+    if (rate != nullptr) {
+      for (std::size_t i = 0; i < rate->choices.size(); ++i) {
+        if (static_cast<std::int64_t>(i) != rate->default_value) rates.emplace_back(rate->choices[i]);
       }
     } else if (unit.line.rate == 0 && !os::is_pseudo_terminal(search_.place)) {
-      for (const std::uint32_t rate : common_rates) rates.push_back(fmt::format("{}", rate));
+      for (const std::uint32_t one : common_rates) rates.push_back(fmt::format("{}", one));
     }
-    for (const std::string& rate : rates) {
-      if (is_beyond_doubt()) return;
+    for (const std::string& value : rates) {
+      // Who answers well at one rate is at that one.
+      if (is_beyond_doubt() || is_explained(unit)) return;
       Settings settings = search_.settings;
-      settings.push_back("baud=" + rate);
+      settings.push_back(fmt::format("{}={}", rate_setting, value));
       attempt(unit, settings);
     }
   }
@@ -118,12 +119,12 @@ class Search {
 
   // Whether the user's rate is one that the unit can have.
   [[nodiscard]] bool takes_rate(const Unit& unit) const {
-    const Option* baud = find_option(unit, "baud");
-    if (baud == nullptr || baud->choices.empty()) return true;
+    const Option* rate = find_role(unit.options, Role::rate);
+    if (rate == nullptr || rate->choices.empty()) return true;
     return std::all_of(search_.settings.begin(), search_.settings.end(), [&](const std::string& setting) {
       const OptionText one = split_setting(setting);
-      return one.name != "baud" ||
-             std::find(baud->choices.begin(), baud->choices.end(), one.value) != baud->choices.end();
+      return one.name != rate_setting ||
+             std::find(rate->choices.begin(), rate->choices.end(), one.value) != rate->choices.end();
     });
   }
 
@@ -199,8 +200,8 @@ class Search {
       for (Hypothesis& one : capture::explain_stream(*other, bytes, listening)) {
         Settings settings = search_.settings;
         const bool needs_rate = other->line.rate != line.rate && way_of(search_) == Way::serial &&
-                                !has_setting(settings, "baud") && !os::is_pseudo_terminal(search_.place);
-        if (needs_rate) settings.push_back(fmt::format("baud={}", line.rate));
+                                !has_setting(settings, rate_setting) && !os::is_pseudo_terminal(search_.place);
+        if (needs_rate) settings.push_back(fmt::format("{}={}", rate_setting, line.rate));
         findings_.candidates.push_back({other, std::move(one), settings, true, line_of(link, line)});
       }
     }
@@ -213,13 +214,16 @@ class Search {
       const bool repeated = std::any_of(kept.begin(), kept.end(), [&](const Candidate& other) {
         return other.unit == one.unit && other.hypothesis.options.values == one.hypothesis.options.values;
       });
-      const bool answers =
-          std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [&](const Candidate& other) {
-            return other.unit == one.unit && !other.unasked && other.hypothesis.evidence.explains_all();
-          });
-      if (!repeated && !(one.unasked && answers)) kept.push_back(one);
+      if (!repeated && !(one.unasked && is_explained(*one.unit))) kept.push_back(one);
     }
     findings_.candidates = std::move(kept);
+  }
+
+  // Whether one of this unit answers, and all that it answers is explained.
+  [[nodiscard]] bool is_explained(const Unit& unit) const {
+    return std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [&](const Candidate& one) {
+      return one.unit == &unit && !one.unasked && one.hypothesis.evidence.explains_all();
+    });
   }
 
   [[nodiscard]] bool is_beyond_doubt() const {

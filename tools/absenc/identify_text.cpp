@@ -61,8 +61,10 @@ std::vector<std::string> all_settings(const Candidate& candidate) {
   std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
   for (const std::string& one : candidate.link_settings) {
     const std::string_view name = split_setting(one).name;
-    const bool said = std::any_of(settings.begin(), settings.end(),
-                                  [&](const std::string& other) { return split_setting(other).name == name; });
+    const Option* option = find_option(*candidate.unit, name);
+    const bool said = std::any_of(settings.begin(), settings.end(), [&](const std::string& other) {
+      return split_setting(other).name == (option != nullptr ? option->name : name);
+    });
     if (!said) settings.push_back(one);
   }
   return settings;

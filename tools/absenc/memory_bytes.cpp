@@ -65,7 +65,7 @@ const Command& register_command(const Invocation& invocation, const Unit& unit, 
 int read_register(const Invocation& invocation, const EncoderUri& uri) {
   const Command& command = register_command(invocation, *uri.unit, Verb::memory_read);
   const std::int64_t address = register_address(invocation, *uri.unit, false);
-  return run_command(invocation, uri, command, named_arguments(command, {{"address", address}}));
+  return run_command(invocation, uri, command, role_arguments(command, {{Role::address, address}}));
 }
 
 int write_register(const Invocation& invocation, const EncoderUri& uri) {
@@ -74,7 +74,8 @@ int write_register(const Invocation& invocation, const EncoderUri& uri) {
   const std::span<const std::string> values = invocation.texts("values");
   const Result<std::int64_t> value = parse_number(values.front());
   if (values.size() > 1 || !value) throw UsageError("a register takes one number");
-  return run_command(invocation, uri, command, named_arguments(command, {{"address", address}, {"value", *value}}));
+  return run_command(invocation, uri, command,
+                     role_arguments(command, {{Role::address, address}, {Role::value, *value}}));
 }
 
 int run_read(const Invocation& invocation) {

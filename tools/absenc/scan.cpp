@@ -17,7 +17,7 @@ namespace absenc::tool {
 
 namespace {
 
-/// Who was found: a new record whenever the first field comes again.
+/// Who was found: each record begins with whom it is of.
 struct Records final : FieldSink {
   struct Record {
     bool clash = false;
@@ -28,9 +28,9 @@ struct Records final : FieldSink {
   void put(const FieldValue& value) override {
     const FieldInfo& info = *value.info;
     if (std::find(fields.begin(), fields.end(), &info) == fields.end()) fields.push_back(&info);
-    if (&info == fields.front()) all.emplace_back();
+    if (info.role == Role::encoder || all.empty()) all.emplace_back();
     Record& record = all.back();
-    if (info.name == "clash") record.clash = value.number != 0;
+    if (info.role == Role::clash) record.clash = value.number != 0;
     record.texts[&info] = to_text(value);
     record.json.put(value);
   }

@@ -5,13 +5,12 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <string_view>
 
 #include "absenc/capture/annotate/annotation.hpp"
 
 namespace absenc::tool {
 
-/// Hands annotations on. A reply whose counter (a field named SOMETHING_sequence) stands where that encoder's last one
+/// Hands annotations on. A reply whose counter (a field of the role sequence) stands where that encoder's last one
 /// stood becomes a `sequence_mismatch`, as a host that looks at counters would have it.
 class SequenceWatch final : public capture::AnnotationSink {
  public:
@@ -45,9 +44,8 @@ class SequenceWatch final : public capture::AnnotationSink {
 
   struct Counter final : FieldSink {
     void put(const FieldValue& field) override {
-      const std::string_view name = field.info->name;
-      if (name == "address" || name == "encoder_address") address = field.number;
-      if (!value && name.ends_with("_sequence")) value = field.number;
+      if (field.info->role == Role::encoder) address = field.number;
+      if (!value && field.info->role == Role::sequence) value = field.number;
     }
     std::int64_t address = 0;
     std::optional<std::int64_t> value;

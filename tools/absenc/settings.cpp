@@ -136,16 +136,13 @@ void show_change(std::string_view name, const Setting& old, const Setting& now) 
   print_line(table(rows));
 }
 
-// With --force the setter's argument of that name is 1.
+// With --force the setter's argument of that role is 1.
 std::vector<std::int64_t> setter_arguments(const Invocation& invocation, const Unit& unit, const Command& setter) {
   std::vector<std::int64_t> values = require_arguments(setter, invocation.texts("values"));
   if (!invocation.has("--force")) return values;
-  const auto force = std::find_if(setter.arguments.begin(), setter.arguments.end(),
-                                  [](const Argument& argument) { return argument.name == "force"; });
-  if (force == setter.arguments.end()) {
-    throw UsageError(fmt::format("{} of {} knows no --force", setter.name, unit.id));
-  }
-  values[static_cast<std::size_t>(force - setter.arguments.begin())] = 1;
+  const Argument* force = find_role(setter.arguments, Role::force);
+  if (force == nullptr) throw UsageError(fmt::format("{} of {} knows no --force", setter.name, unit.id));
+  values[static_cast<std::size_t>(force - setter.arguments.data())] = 1;
   return values;
 }
 

@@ -130,11 +130,11 @@ std::vector<std::int64_t> require_arguments(const Command& command, std::span<co
   return values;
 }
 
-std::vector<std::int64_t> named_arguments(const Command& command, std::initializer_list<NamedArgument> values) {
+std::vector<std::int64_t> role_arguments(const Command& command, std::initializer_list<RoleArgument> values) {
   std::vector<std::int64_t> all;
   for (const Argument& argument : command.arguments) {
     const auto value =
-        std::find_if(values.begin(), values.end(), [&](const NamedArgument& one) { return one.name == argument.name; });
+        std::find_if(values.begin(), values.end(), [&](const RoleArgument& one) { return one.role == argument.role; });
     all.push_back(value != values.end() ? value->value : argument.default_value);
   }
   return all;
@@ -257,22 +257,22 @@ std::string to_text(const FieldValue& value) {
 }
 
 bool holds(const FieldInfo& field, const Reading& reading) {
-  if (field.shows == Shows::position && reading.singleturn_bits != 0)
+  if (field.role != Role::turns && is_of_reading(field.role) && reading.singleturn_bits != 0)
     return reading.ready && reading.singleturn_valid();
-  return field.shows != Shows::turns || reading.multiturn_bits == 0 || reading.multiturn_valid;
+  return field.role != Role::turns || reading.multiturn_bits == 0 || reading.multiturn_valid;
 }
 
 std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading) {
   if (holds(field, reading)) return value;
   if (!reading.ready) return fmt::format("INVALID ({}: the encoder is starting)", value);
   const unsigned valid = reading.singleturn_valid_bits;
-  if (field.shows == Shows::turns || valid == 0) return fmt::format("INVALID ({})", value);
+  if (field.role == Role::turns || valid == 0) return fmt::format("INVALID ({})", value);
   return fmt::format("INVALID (only the top {} of {} bits hold: {})", valid, reading.singleturn_bits, value);
 }
 
 void JsonFields::put(const FieldValue& value) {
   fields.set(value.info->name, to_json(value));
-  if (value.info->shows != Shows::other) judged_.push_back({value.info, true});
+  if (is_of_reading(value.info->role)) judged_.push_back({value.info, true});
 }
 
 void JsonFields::put_reading(const Reading& reading) {
@@ -286,7 +286,7 @@ void FieldTable::put(const FieldValue& value) {
   const FieldInfo& info = *value.info;
   std::string shown = to_text(value);
   if (!info.unit.empty()) shown += fmt::format(" {}", info.unit);
-  if (info.shows != Shows::other) judged_.push_back({&info, rows.size()});
+  if (is_of_reading(info.role)) judged_.push_back({&info, rows.size()});
   rows.push_back({std::string(info.name), shown, std::string(info.meaning)});
   if (info.kind != FieldInfo::Kind::flags) return;
   for (std::size_t i = 0; i < info.flags.size(); ++i) {

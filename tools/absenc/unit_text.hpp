@@ -31,13 +31,13 @@ namespace absenc::tool {
 /// One value for each argument of the command. Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written);
 
-struct NamedArgument {
-  std::string_view name;
+struct RoleArgument {
+  Role role;
   std::int64_t value;
 };
 /// In the order of the command, which need not have all of them; the others get their defaults.
-[[nodiscard]] std::vector<std::int64_t> named_arguments(const Command& command,
-                                                        std::initializer_list<NamedArgument> values);
+[[nodiscard]] std::vector<std::int64_t> role_arguments(const Command& command,
+                                                       std::initializer_list<RoleArgument> values);
 
 /// The bits of the flags with these names. Throws UsageError.
 [[nodiscard]] std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names);

@@ -117,8 +117,8 @@ struct Definition : Declares<Definition, Protocol> {
   static constexpr OptionsOf options{
       option<&Format::singleturn_bits>("singleturn_bits", "bits of the position", 12, 14, 2),
       option<&Format::multiturn_bits>("multiturn_bits", "bits of the turns; 0: none", 0, 14, 14),
-      option<&Format::address>("address", "of the encoder on its line", 0, 252, 4),
-      option<&Format::rate>("rate", "baud", rate_names),
+      with_role<Role::encoder>(option<&Format::address>("address", "of the encoder on its line", 0, 252, 4)),
+      with_role<Role::rate>(option<&Format::rate>("rate", "baud", rate_names)),
       option<&Format::drops_low_bits>("drop_low_bits", "read an encoder of 14 bits as one of 12"),
   };
   static constexpr std::array models{
@@ -135,12 +135,16 @@ struct Definition : Declares<Definition, Protocol> {
   };
   using enum FieldInfo::Kind;
   static constexpr auto fields = fields_of<Values>(
-      field<&Values::encoder_address>({"encoder_address", number, "", "whose request this is"}),
+      field<&Values::encoder_address>({"encoder_address", number, "", "whose request this is", {}, Role::encoder}),
       field<&Values::command>({"command", text, "", "what was asked"}),
-      field<&Values::singleturn>({"singleturn", number, "counts", "position within the turn", {}, Shows::position}),
-      field<&Values::multiturn>({"multiturn", number, "revolutions", "turns", {}, Shows::turns}),
-      field<&Values::clash>(
-          {"clash", boolean, "", "what came was damaged: two encoders of one address, or a bad line"}));
+      field<&Values::singleturn>({"singleturn", number, "counts", "position within the turn", {}, Role::position}),
+      field<&Values::multiturn>({"multiturn", number, "revolutions", "turns", {}, Role::turns}),
+      field<&Values::clash>({"clash",
+                             boolean,
+                             "",
+                             "what came was damaged: two encoders of one address, or a bad line",
+                             {},
+                             Role::clash}));
 
   static constexpr std::string_view no_turns(const Format& format) {
     return format.multiturn_bits == 0 ? "this encoder has no turns (multiturn_bits=14 says that it has)" : "";

@@ -90,6 +90,13 @@ template <unsigned decimals, auto member>
   return one;
 }
 
+/// The same option, which others than its unit know by this role.
+template <Role role, auto member>
+[[nodiscard]] constexpr OptionOf<member> with_role(OptionOf<member> one) {
+  one.info.role = role;
+  return one;
+}
+
 template <auto... members>
 struct OptionsOf {
   using Format = std::common_type_t<typename OptionOf<members>::Format...>;

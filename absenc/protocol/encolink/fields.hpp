@@ -94,8 +94,8 @@ inline constexpr auto frame_fields = [] {
   using enum FieldInfo::Kind;
   using author::field;
   return author::fields_of<Values>(
-      field<&Values::singleturn>({"singleturn", number, "counts", "position within the turn", {}, Shows::position}),
-      field<&Values::multiturn>({"multiturn", number, "revolutions", "turn counter", {}, Shows::turns}),
+      field<&Values::singleturn>({"singleturn", number, "counts", "position within the turn", {}, Role::position}),
+      field<&Values::multiturn>({"multiturn", number, "revolutions", "turn counter", {}, Role::turns}),
       field<&Values::error>({"error", boolean, "", "the position is not valid"}),
       field<&Values::warning>({"warning", boolean, "", "the position is valid, but something is near its limit"}),
       field<&Values::channel2>({"channel2", number, "", "one byte of channel 2; the checksum does not cover it"}),
@@ -114,8 +114,8 @@ inline constexpr auto frame_fields = [] {
       field<&Values::name>({"register", text, "", "its name in the table of registers"}),
       field<&Values::address>({"address", number, "", "of the register"}),
       field<&Values::length>({"length", number, "bytes", "of the register"}),
-      field<&Values::data>({"data", bytes, "", "the register's bytes, most significant first"}),
-      field<&Values::value>({"value", number, "", "the same as a number"}));
+      field<&Values::data>({"data", bytes, "", "the register's bytes, most significant first", {}, Role::data}),
+      field<&Values::value>({"value", number, "", "the same as a number", {}, Role::value}));
 }();
 
 inline constexpr FieldInfo calibrations_field{"calibrations", FieldInfo::Kind::number, "",

@@ -113,11 +113,12 @@ bool covered(const Options& values, Frame request, Frame reply, std::size_t bit)
 
 struct Report;  // what is told of each, below
 
-constexpr Argument address{"address", "of the register; the README lists them", 0, 0xFFFFFFFF};
+constexpr Argument address{"address", "of the register; the README lists them", 0, 0xFFFFFFFF, 0, true, Role::address};
 constexpr Argument length{"length", "bytes of the register; 0: as the table of registers says", 0, 8, 0, false};
 constexpr Argument keep{"save", "1: into the flash as well, so that it survives power off", 0, 1, 1, false};
 constexpr std::array<Argument, 2> read_arguments{{address, {"length", length.meaning, 0, access_capacity, 0, false}}};
-constexpr std::array<Argument, 3> write_arguments{{address, {"value", "big endian", 0, INT64_MAX}, length}};
+constexpr std::array<Argument, 3> write_arguments{
+    {address, {"value", "big endian", 0, INT64_MAX, 0, true, Role::value}, length}};
 constexpr std::array<Argument, 1> zero_arguments{{keep}};
 constexpr std::array<Argument, 2> preset_arguments{{{"turns", "", 0, 65535, 0, false}, keep}};
 constexpr std::array<Argument, 1> listen_arguments{{{"count", "frames", 1, UINT32_MAX, 100, false}}};

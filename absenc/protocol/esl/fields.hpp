@@ -77,21 +77,27 @@ using Kind = FieldInfo::Kind;
 inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::data_id>({"data_id", Kind::number, "", "which data was asked for (Table 3)"}),
     author::field<&Values::control_field>({"control_field", Kind::number, "", "CF: encoder address, data id, parity"}),
-    author::field<&Values::encoder_address>({"encoder_address", Kind::number, "", "EAD: which encoder on the line"}),
+    author::field<&Values::encoder_address>(
+        {"encoder_address", Kind::number, "", "EAD: which encoder on the line", {}, Role::encoder}),
     author::field<&Values::clash>(
-        {"clash", Kind::boolean, "",
-         "yes: its answer is damaged every time; two encoders share the address, or the line is bad"}),
+        {"clash",
+         Kind::boolean,
+         "",
+         "yes: its answer is damaged every time; two encoders share the address, or the line is bad",
+         {},
+         Role::clash}),
     author::field<&Values::ch1_status>({"ch1_status", Kind::flags, "", "SF of channel 1", status_flags}),
     author::field<&Values::ch1_alarms>({"ch1_alarms", Kind::flags, "", "ALM of channel 1", alarm_flags}),
     author::field<&Values::singleturn>(
-        {"singleturn", Kind::number, "counts", "ABS: position within the turn", {}, Shows::position}),
-    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Shows::turns}),
+        {"singleturn", Kind::number, "counts", "ABS: position within the turn", {}, Role::position}),
+    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Role::turns}),
     author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID: D8 multi-turn, 98 single-turn"}),
     author::field<&Values::safety>({"safety", Kind::number, "", "1: a safety encoder (ENID bit 7)"}),
     author::field<&Values::multiturn_bytes>({"multiturn_bytes", Kind::number, "", "of turns (ENID bits 6 and 5)"}),
     author::field<&Values::singleturn_bits>(
         {"singleturn_bits", Kind::number, "", "of the position within the turn (ENID bits 4 to 0)"}),
-    author::field<&Values::ch1_sequence>({"ch1_sequence", Kind::number, "", "SC1: counts the replies, 0 to 255"}),
+    author::field<&Values::ch1_sequence>(
+        {"ch1_sequence", Kind::number, "", "SC1: counts the replies, 0 to 255", {}, Role::sequence}),
     author::field<&Values::temperature>({"temperature_c", Kind::number, "degC", "inside the encoder"}),
     author::field<&Values::ch2_status>({"ch2_status", Kind::flags, "", "SF of channel 2", status_flags}),
     author::field<&Values::ch2_alarms>({"ch2_alarms", Kind::flags, "", "ALM of channel 2", alarm_flags}),
@@ -100,14 +106,16 @@ inline constexpr auto fields = author::fields_of<Values>(
                                        "counts",
                                        "RS: the position of channel 2, 9 bits (ID 6: 16)",
                                        {},
-                                       Shows::position}),
-    author::field<&Values::ch2_sequence>({"ch2_sequence", Kind::number, "", "SC2: counts the replies, 0 to 127"}),
+                                       Role::of_position}),
+    author::field<&Values::ch2_sequence>(
+        {"ch2_sequence", Kind::number, "", "SC2: counts the replies, 0 to 127", {}, Role::sequence}),
     author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
     author::field<&Values::memory_address>({"memory_address", Kind::number, "", "ADF: 0 to 126; 127 selects the page"}),
     author::field<&Values::busy>(
         {"busy", Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
-    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory"}),
-    author::field<&Values::data>({"data", Kind::bytes, "", "the bytes in memory from `memory_address` on"}),
+    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory", {}, Role::value}),
+    author::field<&Values::data>(
+        {"data", Kind::bytes, "", "the bytes in memory from `memory_address` on", {}, Role::data}),
     author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
     author::field<&Values::led_error>({"led_error", Kind::boolean, "", "the LED current is out of its range"}),
     author::field<&Values::lissajous_error>(

@@ -51,7 +51,7 @@ inline constexpr author::OptionsOf options{
                                                         choices::redundant_bit)),
     author::probeable(author::option<&Profile::id6_rs>("id6_rs", "bits of the redundant position in a reply to ID 6",
                                                        choices::id6_rs)),
-    author::option<&Profile::address>("address", "EAD of the encoder", 0, 7),
+    author::with_role<Role::encoder>(author::option<&Profile::address>("address", "EAD of the encoder", 0, 7)),
     author::option<&Profile::bus>(
         "bus",
         "several encoders share the line: memory cannot be read or written then; auto: where it is known, as on "

@@ -18,15 +18,15 @@ namespace {
 
 using namespace author;
 
-constexpr Argument address{"address", "of the byte", 0, last_address};
-constexpr Argument page{"page", "0 to 6, 8 or 14", 0, last_page, 0, false};
+constexpr Argument address{"address", "of the byte", 0, last_address, 0, true, Role::address};
+constexpr Argument page{"page", "0 to 6, 8 or 14", 0, last_page, 0, false, Role::page};
 constexpr std::array<Argument, 3> read_arguments{
-    {address, page, {"count", "bytes from the address on", 1, last_address + 1, 1, false}}};
+    {address, page, {"count", "bytes from the address on", 1, last_address + 1, 1, false, Role::count}}};
 constexpr std::array<Argument, 4> write_arguments{
     {address,
-     {"value", "the byte", 0, 255},
+     {"value", "the byte", 0, 255, 0, true, Role::value},
      page,
-     {"force", "1: also pages with calibration, lock bits and undescribed commands", 0, 1, 0, false}}};
+     {"force", "1: also pages with calibration, lock bits and undescribed commands", 0, 1, 0, false, Role::force}}};
 constexpr std::array<Argument, 1> page_arguments{{{"page", "0 to 6, 8 or 14", 0, last_page}}};
 
 constexpr std::uint8_t byte_of(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }

@@ -83,11 +83,11 @@ constexpr bool areas_are_what_is_open() {
 }
 static_assert(areas_are_what_is_open());
 
-constexpr Argument address{"address", "of the byte", 0, page_addresses - 1};
-constexpr Argument page{"page", "0 to 5, or 7", 0, service_page, 0, false};
+constexpr Argument address{"address", "of the byte", 0, page_addresses - 1, 0, true, Role::address};
+constexpr Argument page{"page", "0 to 5, or 7", 0, service_page, 0, false, Role::page};
 constexpr std::array<Argument, 3> read_arguments{
-    {address, page, {"count", "bytes from the address on", 1, page_addresses, 1, false}}};
-constexpr std::array<Argument, 3> write_arguments{{address, {"value", "the byte", 0, 255}, page}};
+    {address, page, {"count", "bytes from the address on", 1, page_addresses, 1, false, Role::count}}};
+constexpr std::array<Argument, 3> write_arguments{{address, {"value", "the byte", 0, 255, 0, true, Role::value}, page}};
 constexpr std::array<Argument, 1> threshold_arguments{{{"degrees", "degC, 1 to 127; 0: never", 0, 127}}};
 
 // ---- Refusals: the communication alarms of SF (6.3.2), or what else is answered like data ID 3 (8.4, 9.4)

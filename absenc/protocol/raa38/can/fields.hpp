@@ -32,9 +32,9 @@ enum FieldIndex : std::size_t {
 };
 
 inline constexpr std::array<FieldInfo, 16> fields{{
-    {"node", FieldInfo::Kind::number, "", "number of the node"},
-    {"singleturn", FieldInfo::Kind::counts, "counts", "position within one revolution", {}, Shows::position},
-    {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle", {}, Shows::position},
+    {"node", FieldInfo::Kind::number, "", "number of the node", {}, Role::encoder},
+    {"singleturn", FieldInfo::Kind::counts, "counts", "position within one revolution", {}, Role::position},
+    {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle", {}, Role::of_position},
     {"function", FieldInfo::Kind::text, "", "what the identifier stands for in CANopen; this encoder does not use it"},
     {"data", FieldInfo::Kind::bytes, "", "its data"},
     {"command", FieldInfo::Kind::text, "", "what is asked, or answered"},
@@ -47,7 +47,7 @@ inline constexpr std::array<FieldInfo, 16> fields{{
     {"before", FieldInfo::Kind::counts, "counts", "position before the command"},
     {"after", FieldInfo::Kind::counts, "counts", "position after it"},
     {"mirrored", FieldInfo::Kind::boolean, "", "whether the position is counted the other way since"},
-    {"clash", FieldInfo::Kind::boolean, "", "two nodes share this number, or the line is bad"},
+    {"clash", FieldInfo::Kind::boolean, "", "two nodes share this number, or the line is bad", {}, Role::clash},
 }};
 
 constexpr void put(FieldSink& sink, FieldIndex field, std::int64_t number) { sink.put({&fields[field], number}); }

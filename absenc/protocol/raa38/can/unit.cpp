@@ -16,14 +16,15 @@ namespace can {
 namespace {
 
 using author::option;
+using author::with_role;
 
 constexpr std::array<std::string_view, 3> rate_choices{"1000000", "500000", "250000"};
 constexpr std::array<std::string_view, 2> answer_choices{"7e5", "7e4"};
 
 constexpr author::OptionsOf options{
     option<&Format::bits>("bits", "of the position", 10, 21),
-    option<&Format::node>("node", "number of the encoder on the bus", 1, 255),
-    option<&Format::rate>("bitrate", "bits a second on the bus", rate_choices),
+    with_role<Role::encoder>(option<&Format::node>("node", "number of the encoder on the bus", 1, 255)),
+    with_role<Role::rate>(option<&Format::rate>("bitrate", "bits a second on the bus", rate_choices)),
     option<&Format::listens>("listen", "read what the node sends by itself instead of asking for it"),
     option<&Format::positive>("positive_value", "what command 22 carries to count up; the document does not say", 0,
                               255),
@@ -34,7 +35,7 @@ constexpr author::OptionsOf options{
         "answer_id", "virtual encoder: identifier on which it answers configuration commands", answer_choices),
 };
 
-constexpr Argument force{"force", "1: write even what is set already", 0, 1, 0, false};
+constexpr Argument force{"force", "1: write even what is set already", 0, 1, 0, false, Role::force};
 constexpr std::array<Argument, 1> cyclic_arguments{{{"readings", "a second", 1, 255}}};
 constexpr std::array<Argument, 2> node_arguments{{{"node", "new number", 1, 255}, force}};
 constexpr std::array<Argument, 2> rate_arguments{{{"rate", "1000000, 500000 or 250000", 1, 1'000'000}, force}};

@@ -33,14 +33,15 @@ struct Values {
 };
 
 inline constexpr auto fields = author::fields_of<Values>(
-    author::field<&Values::address>({"address", FieldInfo::Kind::number, "", "address of the encoder"}),
+    author::field<&Values::address>(
+        {"address", FieldInfo::Kind::number, "", "address of the encoder", {}, Role::encoder}),
     author::field<&Values::function>({"function", FieldInfo::Kind::number, "", "function code"}),
     author::field<&Values::first_register>({"first_register", FieldInfo::Kind::number, "", "where reading begins"}),
     author::field<&Values::registers>({"registers", FieldInfo::Kind::number, "", "how many are asked for"}),
     author::field<&Values::singleturn>(
-        {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Shows::position}),
+        {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Role::position}),
     author::field<&Values::angle>(
-        {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle", {}, Shows::position}),
+        {"angle_deg", FieldInfo::Kind::real, "deg", "the same as an angle", {}, Role::of_position}),
     author::field<&Values::new_address>({"new_address", FieldInfo::Kind::number, "", "address from now on"}),
     author::field<&Values::parameter>({"parameter", FieldInfo::Kind::number, "", "what function CC sets"}),
     author::field<&Values::setting>({"setting", FieldInfo::Kind::text, "", "the same in words"}),
@@ -50,8 +51,10 @@ inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::effect>({"effect", FieldInfo::Kind::text, "", "what became of the position"}),
     author::field<&Values::written>(
         {"written", FieldInfo::Kind::boolean, "", "whether the setting was sent; it is not where it is so already"}),
-    author::field<&Values::encoder_address>({"encoder_address", FieldInfo::Kind::number, "", "address that answers"}),
-    author::field<&Values::clash>({"clash", FieldInfo::Kind::boolean, "", "the answer is damaged every time"}),
+    author::field<&Values::encoder_address>(
+        {"encoder_address", FieldInfo::Kind::number, "", "address that answers", {}, Role::encoder}),
+    author::field<&Values::clash>(
+        {"clash", FieldInfo::Kind::boolean, "", "the answer is damaged every time", {}, Role::clash}),
     author::field<&Values::refuses>(
         {"refuses", FieldInfo::Kind::boolean, "", "it answers with an exception: another kind of Modbus slave?"}));
 

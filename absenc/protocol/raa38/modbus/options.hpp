@@ -17,11 +17,12 @@ inline constexpr std::array<std::string_view, 3> reply_data{"four", "three", "th
 }  // namespace choices
 
 inline constexpr author::OptionsOf options{
-    author::option<&Format::address>("address", "of the encoder", modbus::first_address, modbus::last_address),
+    author::with_role<Role::encoder>(
+        author::option<&Format::address>("address", "of the encoder", modbus::first_address, modbus::last_address)),
     author::probeable(author::option<&Format::bits>("bits", "of the position within the turn", 10, 21)),
     author::probeable(author::option<&Format::registers>("registers", "to ask for; auto: one up to 16 bits, two above",
                                                          choices::registers)),
-    author::option<&Format::baud>("baud", "bits a second", choices::baud),
+    author::with_role<Role::rate>(author::option<&Format::baud>("baud", "bits a second", choices::baud)),
     author::option<&Format::data>("reply_data",
                                   "virtual encoder: bytes of data for two registers, and how many the byte count says",
                                   choices::reply_data),

@@ -19,7 +19,8 @@ namespace {
 
 using author::command;
 
-constexpr Argument force{"force", "1: also what is so already (each time wears the memory)", 0, 1, 0, false};
+constexpr Argument force{"force",    "1: also what is so already (each time wears the memory)", 0, 1, 0, false,
+                         Role::force};
 constexpr std::array<Argument, 2> address_arguments{
     {{"address", "the new one", modbus::first_address, modbus::last_address}, force}};
 constexpr std::array<Argument, 2> baud_arguments{

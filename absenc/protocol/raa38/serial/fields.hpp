@@ -25,13 +25,14 @@ struct Values {
 
 using enum FieldInfo::Kind;
 inline constexpr auto fields = author::fields_of<Values>(
-    author::field<&Values::encoder_address>({"encoder_address", number, "", "the number behind B"}),
-    author::field<&Values::clash>({"clash", boolean, "", "every answer is damaged: two encoders, or a bad line"}),
+    author::field<&Values::encoder_address>({"encoder_address", number, "", "the number behind B", {}, Role::encoder}),
+    author::field<&Values::clash>(
+        {"clash", boolean, "", "every answer is damaged: two encoders, or a bad line", {}, Role::clash}),
     author::field<&Values::before>({"before", number, "counts", "position before the zero was set"}),
     author::field<&Values::singleturn>(
-        {"singleturn", number, "counts", "position within the turn", {}, Shows::position}),
+        {"singleturn", number, "counts", "position within the turn", {}, Role::position}),
     author::field<&Values::second_byte>({"second_byte", number, "", "81, or on a bus Bx: the encoder's number"}),
-    author::field<&Values::angle>({"angle_deg", real, "deg", "the same as an angle", {}, Shows::position}),
+    author::field<&Values::angle>({"angle_deg", real, "deg", "the same as an angle", {}, Role::of_position}),
     author::field<&Values::command>({"command", text, "", "read or zero_clear"}),
     author::field<&Values::unit>({"unit", number, "", "the number behind B or C"}),
     author::field<&Values::skipped>({"skipped", number, "bytes", "so far, that belonged to no good frame"}));

@@ -26,11 +26,13 @@ constexpr std::int64_t most_us = 10'000'000'000;  // ns: 10 s
 using author::decimal;
 using author::option;
 using author::probeable;
+using author::with_role;
 
 constexpr author::OptionsOf options{
     option<&Format::mode>("mode", "what starts a frame: the encoder itself, a pulse on CLK, or BC AA Bx", mode_choices),
     probeable(option<&Format::bits>("bits", "of a turn", least_bits, most_bits)),
-    option<&Format::unit>("unit", "bus: the encoder's number, the x of Bx", 0, unit_count - 1),
+    with_role<Role::encoder>(
+        option<&Format::unit>("unit", "bus: the encoder's number, the x of Bx", 0, unit_count - 1)),
     probeable(option<&Format::second_byte>("second_byte", "of a frame: 81, or on a bus the number (echo)",
                                            second_byte_choices)),
     option<&Format::zeroing>("zeroing", "how its zero is set: a pulse on CLR (line), or BC AA Cx on a bus (command)",
@@ -38,9 +40,9 @@ constexpr author::OptionsOf options{
     option<&Format::zero_unit>("zero_unit", "the x of Cx; -1: that of Bx", -1, unit_count - 1),
     decimal<3>(option<&Format::refresh_millihertz>(
         "refresh_hz", "timing: frames a second; 0: not known (the virtual encoder: 100)", 0, 100'000'000)),
-    option<&Format::maximum_rpm>(
+    with_role<Role::maximum_rpm>(option<&Format::maximum_rpm>(
         "max_rpm", "refuse positions that a shaft so fast cannot reach; 0: none; timing: needs refresh_hz", 0,
-        1'000'000),
+        1'000'000)),
     decimal<3>(option<&Format::acquisition>(
         "acquisition_us", "T3, from pulse or request to the frame, us; 0: not known (the virtual encoder: 100)", 0,
         most_us)),

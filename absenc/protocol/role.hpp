@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a field, an option or an argument is to those who know no protocol. Names are for people: nobody who walks the
+// units looks one of them up by its name.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace absenc {
+
+enum class Role : std::uint8_t {
+  other,  // only its unit knows
+  // Of a reading
+  position,     // field: the counts of the position, or of a linear encoder its place
+  turns,        // field: the turns
+  of_position,  // field: what holds as long as the position does: the same in degrees, or of a second channel
+  sequence,     // field: counts the replies, so that one that was seen before can be told
+  // Of a line
+  encoder,      // option, field: which of the encoders on the line; in a scan a new record begins with it
+  clash,        // field of a scan: not 0: whatever answers there is damaged every time
+  rate,         // option: bits a second
+  maximum_rpm,  // option: how fast the shaft turns at most; 0: not known
+  // Of a memory, of registers, and of settings
+  address,  // argument: of the byte or register
+  page,     // argument, where there are pages
+  count,    // argument: bytes to read; without it one at a time
+  force,    // argument: 1: also what is protected, or is so already
+  value,    // argument, field: the byte, or what a register holds, most significant byte first
+  data,     // field: the bytes, of several or of a register
+};
+
+/// Whether what has this role holds only as long as the reading, or a part of it, does.
+[[nodiscard]] constexpr bool is_of_reading(Role role) {
+  return role == Role::position || role == Role::turns || role == Role::of_position;
+}
+
+/// The first of these fields, options or arguments with this role, or null.
+template <class Named>
+[[nodiscard]] constexpr const Named* find_role(std::span<const Named> all, Role role) {
+  for (const Named& one : all) {
+    if (one.role == role) return &one;
+  }
+  return nullptr;
+}
+
+}  // namespace absenc
