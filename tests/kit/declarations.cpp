@@ -156,6 +156,35 @@ void request_of(const Unit& unit, const Configuration& way, const Command& comma
   }
 }
 
+// What lies outside its range, and one argument too few or too many, is no request and no conversation.
+void refused_arguments(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
+  std::vector<std::byte> storage(unit.host_storage);
+  const auto refused = [&](const Values& values) {
+    const auto what = [&] { return std::string(command.name) + to_text(Arguments(values)) + ": "; };
+    const Result<Wire> request = encoded(unit, way.options, command, values);
+    findings.require(!request && (request.error() == Error::invalid_argument || request.error() == Error::unsupported),
+                     [&] { return what() + "has a request"; });
+    const Any<Conversation> host = unit.host(way.options, command, values, storage);
+    findings.require(host.bytes == nullptr && host.frames == nullptr, [&] { return what() + "has a conversation"; });
+  };
+  const Values good = least_arguments(command);
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    const Argument& one = command.arguments[i];
+    Values values = good;
+    for (const bool above : {false, true}) {
+      if ((above ? one.maximum : one.minimum) == (above ? INT64_MAX : INT64_MIN)) continue;
+      for (const std::int64_t outside : {above ? one.maximum + 1 : one.minimum - 1, above ? INT64_MAX : INT64_MIN}) {
+        values[i] = outside;
+        refused(values);
+      }
+    }
+  }
+  Values more = good;
+  more.push_back(0);
+  refused(more);
+  if (!good.empty()) refused(Values(good.begin(), good.end() - 1));
+}
+
 }  // namespace
 
 Findings check_declarations(const Unit& unit) {
@@ -176,6 +205,7 @@ Findings check_requests(const Unit& unit, std::uint64_t seed) {
       for (unsigned i = 0; i < (command.arguments.empty() ? 1 : 100); ++i) {
         request_of(unit, way, command, random_arguments(command, random), findings);
       }
+      refused_arguments(unit, way, command, findings);
     }
   }
   return findings;

@@ -19,7 +19,7 @@ namespace absenc::kit {
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
 /// Requests of every command with random arguments: what `encode` makes is a good request with these arguments in its
-/// fields.
+/// fields. Arguments outside their ranges are refused.
 [[nodiscard]] Findings check_requests(const Unit& unit, std::uint64_t seed);
 
 /// Each command in exactly the storage that it needs, which is at most what is declared, and no byte behind it is

@@ -26,6 +26,7 @@ enum class Mistake : std::uint8_t {
   overflows,       // the host is made whatever storage there is
   flips_pass,      // decode does not look at the last byte
   never_ends,      // the host waits for ever when nothing comes
+  takes_all,       // any arguments make a request
 };
 
 inline constexpr std::uint8_t ask = 0x5A;
@@ -192,8 +193,9 @@ struct Toy {
     sink.put_reading(reading_of(*position));
     return Error::none;
   }
-  static Result<std::size_t> encode(const Options&, const Command&, Arguments, MutableBytes request) {
-    if (mistake == Mistake::has_no_request) return Error::invalid_argument;
+  static bool takes(Arguments arguments) { return arguments.empty() || mistake == Mistake::takes_all; }
+  static Result<std::size_t> encode(const Options&, const Command&, Arguments arguments, MutableBytes request) {
+    if (mistake == Mistake::has_no_request || !takes(arguments)) return Error::invalid_argument;
     if (request.empty()) return Error::buffer_too_small;
     request[0] = ask;
     return std::size_t{1};
@@ -202,7 +204,8 @@ struct Toy {
     const std::size_t size = direction == Direction::request ? 1 : length;
     return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
   }
-  static Any<Conversation> host(const Options&, const Command&, Arguments, std::span<std::byte> storage) {
+  static Any<Conversation> host(const Options&, const Command&, Arguments arguments, std::span<std::byte> storage) {
+    if (!takes(arguments)) return {};
     if (mistake == Mistake::overflows) return {.bytes = new (storage.data()) Host};
     return make_host<Host>(storage);
   }

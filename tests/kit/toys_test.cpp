@@ -95,6 +95,12 @@ TEST(KitToys, AConversationThatDoesNotEnd) {
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::never_ends>, few).texts(), Contains(HasSubstr("hangs")));
 }
 
+TEST(KitToys, ArgumentsThatNobodyAskedFor) {
+  const std::vector<std::string> texts = check_requests(toy::unit<Mistake::takes_all>, 1).texts();
+  EXPECT_THAT(texts, Contains("position 0: has a request"));
+  EXPECT_THAT(texts, Contains("position 0: has a conversation"));
+}
+
 template <Role forgotten>
 std::vector<std::string> findings_without() {
   return check_declarations(toy::Declared<forgotten>::unit).texts();

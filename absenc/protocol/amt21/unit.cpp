@@ -133,18 +133,13 @@ struct Definition : Declares<Definition, Protocol> {
       ModelText{"AMT21xG", "12 bits and turns, rate to be set", 8000,
                 "singleturn_bits=12 multiturn_bits=14 rate=115200"},
   };
-  using enum FieldInfo::Kind;
   static constexpr auto fields = fields_of<Values>(
-      field<&Values::encoder_address>({"encoder_address", number, "", "whose request this is", {}, Role::encoder}),
-      field<&Values::command>({"command", text, "", "what was asked"}),
-      field<&Values::singleturn>({"singleturn", number, "counts", "position within the turn", {}, Role::position}),
-      field<&Values::multiturn>({"multiturn", number, "revolutions", "turns", {}, Role::turns}),
-      field<&Values::clash>({"clash",
-                             boolean,
-                             "",
-                             "what came was damaged: two encoders of one address, or a bad line",
-                             {},
-                             Role::clash}));
+      field<&Values::encoder_address>("encoder_address", "", "whose request this is", Role::encoder),
+      field<&Values::command>("command", "", "what was asked"),
+      field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
+      field<&Values::multiturn>("multiturn", "revolutions", "turns", Role::turns),
+      field<&Values::clash>("clash", "", "what came was damaged: two encoders of one address, or a bad line",
+                            Role::clash));
 
   static constexpr std::string_view no_turns(const Format& format) {
     return format.multiturn_bits == 0 ? "this encoder has no turns (multiturn_bits=14 says that it has)" : "";

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <tuple>
 #include <type_traits>
@@ -20,10 +21,45 @@ struct FieldOf {
   FieldInfo info;
 };
 
+namespace detail {
+template <class Values, class T>
+T shown_by(T Values::*);
+template <class Values, class T>
+T shown_by(T (*)(const Values&));
+template <class T>
+T held_by(const T&);
+template <class T>
+T held_by(const std::optional<T>&);
+
+/// How a value of this type is shown.
+template <class T>
+constexpr FieldInfo::Kind kind_of() {
+  if (std::is_same_v<T, bool>) return FieldInfo::Kind::boolean;
+  if (std::is_same_v<T, double>) return FieldInfo::Kind::real;
+  if (std::is_same_v<T, std::string_view>) return FieldInfo::Kind::text;
+  if (std::is_same_v<T, Bytes>) return FieldInfo::Kind::bytes;
+  if (std::is_same_v<T, std::uint64_t>) return FieldInfo::Kind::counts;
+  return FieldInfo::Kind::number;
+}
+}  // namespace detail
+
 /// What is shown may be an optional: what it does not hold is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(const FieldInfo& info) {
   return {info};
+}
+/// The type of the member says how it is shown.
+template <auto member>
+[[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view unit, std::string_view meaning,
+                                              Role role = Role::other) {
+  using Held = decltype(detail::held_by(detail::shown_by(member)));
+  return {{.name = name, .kind = detail::kind_of<Held>(), .unit = unit, .meaning = meaning, .role = role}};
+}
+/// Bit n is flags[n].
+template <auto member>
+[[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view meaning,
+                                              std::span<const FlagInfo> flags) {
+  return {{.name = name, .kind = FieldInfo::Kind::flags, .meaning = meaning, .flags = flags}};
 }
 
 /// The fields of `Values`, a struct whose members they show.

@@ -108,8 +108,16 @@ struct UnitOf {
 
   static constexpr const CommandOf<P>& find(const Command& command) { return command_table[command.id]; }
 
+  // One for each that the command has, in its range.
+  static constexpr bool are_good(const Command& command, Arguments arguments) {
+    return std::equal(
+        arguments.begin(), arguments.end(), command.arguments.begin(), command.arguments.end(),
+        [](std::int64_t value, const Argument& one) { return value >= one.minimum && value <= one.maximum; });
+  }
+
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
+    if (!are_good(command, arguments)) return Error::invalid_argument;
     const Format f = format(values);
     const CommandOf<P>& one = find(command);
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
@@ -153,6 +161,7 @@ struct UnitOf {
 
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                                 std::span<std::byte> storage) {
+    if (!are_good(command, arguments)) return {};
     return find(command).run(format(values), arguments, storage);
   }
 
