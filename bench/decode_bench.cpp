@@ -97,10 +97,10 @@ void biss_known_format(benchmark::State& state) {
 BENCHMARK(biss_known_format);
 
 void biss_any_format(benchmark::State& state) {
-  biss::Format format = known;
-  benchmark::DoNotOptimize(format);
-  run_biss(state, [&format](const Samples& samples) {
-    const Result<biss::Reply> reply = biss::decode(format, {samples.packed, 64});
+  biss::Format any = known;
+  benchmark::DoNotOptimize(any);
+  run_biss(state, [&any](const Samples& samples) {
+    const Result<biss::Reply> reply = biss::decode(any, {samples.packed, 64});
     benchmark::DoNotOptimize(reply);
     return reply ? reply->word.position : 0;
   });

@@ -79,7 +79,8 @@ class Annotator {
   std::size_t answer_here();
   [[nodiscard]] bool goes_on(std::size_t size);
   [[nodiscard]] std::optional<std::size_t> asked_before(Tick begin) const;
-  std::size_t echoed_answer_here(std::size_t which);
+  [[nodiscard]] std::size_t echoed_answer_size(Bytes request);
+  std::size_t echoed_answer_here(std::size_t which, std::size_t size);
   std::size_t repeated_here();
   std::size_t request_here();
   [[nodiscard]] bool is_request(std::size_t size);

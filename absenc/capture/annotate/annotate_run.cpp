@@ -112,10 +112,17 @@ std::size_t Annotator::answer_here() {
   }
   std::size_t& usual = reply_sizes_[asked.storage[0]];
   const std::size_t size = reply_at(asked.bytes(), at_, usual);
-  if (size == 0) return echoed_answer_here(*which);
+  const bool leaves_rest = whole_ && size < rest(at_).size();
+  if (size == 0 || leaves_rest) {
+    // What leaves a rest may be good by accident; the request again, with its reply behind it that leaves none, is not.
+    const std::size_t echoed = echoed_answer_size(asked.bytes());
+    if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return echoed_answer_here(*which, echoed);
+    if (size == 0) return 0;
+    static_cast<void>(judge_.decode({.bytes = asked.bytes()}, {.bytes = rest(at_).first(size)}));  // its reading again
+  }
   // Some replies are the same as their requests, which nobody answered and which now come again.
   if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
-  if (whole_ && size < rest(at_).size() && usual != 0 && size != usual && !goes_on(size)) return 0;
+  if (leaves_rest && usual != 0 && size != usual && !goes_on(size)) return 0;
   last_reply_at_ = at_;
   last_reply_size_ = usual = size;
   exchanges_.answer(*which, piece(size), Error::none, Remark::none, judge_.reading());
@@ -130,18 +137,20 @@ bool Annotator::goes_on(std::size_t size) {
          (behind.size() >= size && std::equal(reply.begin(), reply.end(), behind.begin()));
 }
 
-// An adapter, or an encoder, that sends the request back.
-std::size_t Annotator::echoed_answer_here(std::size_t which) {
-  const Bytes request = exchanges_.waiting()[which].bytes();
+// An adapter, or an encoder, sends the request back. The size of both, or 0.
+std::size_t Annotator::echoed_answer_size(Bytes request) {
   const Bytes bytes = rest(at_);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
   const std::size_t size = reply_at(request, at_ + request.size());
-  if (size == 0) return 0;
-  const std::size_t echo = request.size();
+  return size == 0 ? 0 : request.size() + size;
+}
+
+std::size_t Annotator::echoed_answer_here(std::size_t which, std::size_t size) {
+  const std::size_t echo = exchanges_.waiting()[which].bytes().size();
   at_ += echo;
-  exchanges_.answer(which, piece(size), Error::none, Remark::echo, judge_.reading());
+  exchanges_.answer(which, piece(size - echo), Error::none, Remark::echo, judge_.reading());
   at_ -= echo;
-  return echo + size;
+  return size;
 }
 
 std::size_t Annotator::repeated_here() {
