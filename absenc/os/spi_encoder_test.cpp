@@ -40,7 +40,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
       ssi::ReadPosition read(format);
       ASSERT_TRUE(run(read, port));
       ASSERT_EQ(read.error(), Error::none) << bits;
-      EXPECT_EQ(read.word(), encoder.word({})) << bits;
+      EXPECT_EQ(read.found(), word_of(format.word, shaft.state, 0)) << bits;
     }
     EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
   }
@@ -57,7 +57,7 @@ TEST_F(SpiEncoder, SsiReadTwice) {
   ssi::ReadPosition read(format);
   ASSERT_TRUE(run(read, port));
   EXPECT_EQ(read.error(), Error::none);
-  EXPECT_EQ(read.word(), encoder.word({}));
+  EXPECT_EQ(read.found(), word_of(format.word, shaft.state, 0));
 }
 
 TEST_F(SpiEncoder, Biss) {
@@ -68,10 +68,12 @@ TEST_F(SpiEncoder, Biss) {
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
   for (const std::uint32_t rate : {200'000u, 1'000'000u, 4'000'000u}) {
     shaft.state.position += 0x1'8673'2468;
-    biss::ReadPosition read(format, {.rate = rate, .latency = std::chrono::microseconds(10)});
+    biss::Format clocked = format;
+    clocked.ma_khz = rate / 1000;
+    biss::ReadPosition read(clocked);
     ASSERT_TRUE(run(read, port));
     ASSERT_EQ(read.error(), Error::none) << rate;
-    EXPECT_EQ(read.reply().word, encoder.encoder().word({})) << rate;
+    EXPECT_EQ(read.found().word, word_of(format.word, shaft.state, 0)) << rate;
     EXPECT_EQ(kernel.settings().speed, rate);
   }
   EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
@@ -131,7 +133,7 @@ TEST_F(SpiEncoder, EncolinkNoticesAClockTooSoonAfterChipSelect) {
 
 TEST_F(SpiEncoder, NobodyThere) {
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
-  biss::ReadPosition read({}, {});
+  biss::ReadPosition read({});
   ASSERT_TRUE(run(read, port));
   EXPECT_EQ(read.error(), Error::line_stuck);
 }

@@ -45,15 +45,17 @@ TEST(Options, AWordStandsInForTheOptionsThatDescribeOne) {
   const Resolved resolved = resolve(biss::unit, {}, {{"ma_khz", "500"}, {"word", word}, {"unit_um", "0.5"}});
   ASSERT_EQ(resolved.error.kind, OptionError::Kind::none);
   EXPECT_EQ(resolved.options.model, nullptr);
-  const biss::Format format = biss::to_format(Options(resolved.options));
-  EXPECT_EQ(format.word.bits(), 40u);
-  EXPECT_EQ(format.word.fields()[2].name, "battery");
-  EXPECT_EQ(format.scale.unit_um, 0.5);
+  EXPECT_EQ(resolved.options.word.bits(), 40u);
+  EXPECT_EQ(resolved.options.word.fields()[2].name, "battery");
   const Resolution resolution = biss::unit.resolution(resolved.options);
   EXPECT_EQ(resolution.singleturn_bits, 24u);
   EXPECT_EQ(resolution.multiturn_bits, 12u);
   EXPECT_EQ(resolution.unit_um, 0.5);
-  EXPECT_EQ(resolved.options[biss::option_ma_khz], 500);
+  for (std::size_t i = 0; i < biss::unit.options.size(); ++i) {
+    if (biss::unit.options[i].name == "ma_khz") {
+      EXPECT_EQ(resolved.options[i], 500);
+    }
+  }
 }
 
 TEST(Options, AWordExcludesWhatSaysTheSame) {

@@ -83,6 +83,7 @@ struct PlacedField {
 /// its fields, which calls `use` with each until it returns false.
 template <class Format>
 struct Given {
+  static constexpr bool is_known = false;
   using Word = absenc::Word;
   const Format& format;
   const WordFormat& word;
@@ -102,6 +103,7 @@ struct Given {
 /// The same of a format that is known when the program is written: nothing of it is left to run time.
 template <const auto& known>
 struct Known {
+  static constexpr bool is_known = true;
   static constexpr const auto& format = known;
   static constexpr const WordFormat& word = known.word;
   static constexpr std::size_t size = word.fields().size();
@@ -155,7 +157,31 @@ class GrayFields {
   bool odd_ = false;
 };
 
-// `Bits`: BitView or BitNumber.
+// The bits from `first` on for a format that is known at run time only: in one number where they fit, which is faster,
+// and one piece of code for both. All of them must be there.
+class SomeBits {
+ public:
+  constexpr SomeBits(BitView bits, std::size_t first, unsigned count)
+      : size(count), number_(count <= 64 ? bits.load(first, count) : 0), bits_(bits), first_(first) {}
+
+  [[nodiscard, gnu::always_inline]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
+    return size <= 64 ? BitNumber{number_, size}.load(first, count) : load_from(bits_, first_ + first, count);
+  }
+
+  const unsigned size;
+
+ private:
+  [[nodiscard, gnu::noinline]] static constexpr std::uint64_t load_from(const BitView& bits, std::size_t first,
+                                                                        unsigned count) {
+    return bits.load(first, count);
+  }
+
+  std::uint64_t number_;
+  BitView bits_;
+  std::size_t first_;
+};
+
+// `Bits`: BitView, BitNumber or SomeBits.
 template <class Source, class Bits>
 constexpr Error take_word(const Source& source, const Bits& bits, std::size_t first, typename Source::Word& word) {
   if (bits.size < first || bits.size - first < source.word.bits()) return Error::wrong_length;

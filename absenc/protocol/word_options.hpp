@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the units of position words have in common in their descriptors: options, models, frames of bits.
+// What the units of position words have in common in their descriptors: options, models, fields.
 #pragma once
 
 #include <array>
 
+#include "absenc/protocol/author/option.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "absenc/protocol/word.hpp"
 
 namespace absenc {
 
-/// These five stand in a row among a unit's options.
 inline constexpr Option singleturn_bits_option{.name = "singleturn_bits",
                                                .meaning = "bits of the position within the turn; 0: linear encoder",
                                                .default_value = 19,
@@ -50,18 +50,28 @@ inline constexpr Option after_word_option{.name = "after_word",
                                           .default_value = 0,
                                           .choices = after_word_choices};
 
-/// `first`: the index of singleturn_bits.
-[[nodiscard]] constexpr PositionBits position_bits(const Options& values, std::size_t first) {
-  const auto bits = [&values, first](std::size_t i) { return static_cast<unsigned>(values[first + i]); };
-  if (bits(3) != 0) return {.position = bits(3)};
-  return {.position = bits(0), .multiturn = bits(1), .multiturn_first = bits(2) != 0};
-}
+/// A format, and what options say of its word, as they are given.
+template <class Format>
+struct WordSettings : Format {
+  std::uint8_t singleturn_bits = 0;
+  std::uint8_t multiturn_bits = 0;
+  bool multiturn_first = true;
+  std::uint8_t position_bits = 0;
+  std::int64_t unit_pm = 0;
 
-/// `position_bits` and `unit_um`: indices of these options. A word is linear when there is a unit.
-[[nodiscard]] constexpr Scale scale_of(const Options& values, std::size_t position_bits, std::size_t unit_um) {
-  const std::size_t linear = values.has_word() ? unit_um : position_bits;
-  return {.linear = values[linear] != 0, .unit_um = static_cast<double>(values[unit_um]) / 1e6};
-}
+  [[nodiscard]] constexpr PositionBits bits() const {
+    if (position_bits != 0) return {.position = position_bits};
+    return {singleturn_bits, multiturn_bits, multiturn_first};
+  }
+  /// The format with its word: that of `values`, or else the one that its options describe. `linear`: whether they
+  /// describe a linear encoder; a word is one of a linear encoder when there is a unit.
+  [[nodiscard]] constexpr Format with_word(const Options& values, const WordFormat& described, bool linear) const {
+    Format format = *this;
+    format.word = values.has_word() ? values.word : described;
+    format.scale = {.linear = values.has_word() ? unit_pm != 0 : linear, .unit_um = static_cast<double>(unit_pm) / 1e6};
+    return format;
+  }
+};
 
 /// Whether there is a position, and position and turns have at most 64 bits together.
 [[nodiscard]] constexpr bool is_usable(const WordFormat& word) {
@@ -75,11 +85,6 @@ inline constexpr Option after_word_option{.name = "after_word",
   return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn), scale.linear ? scale.unit_um : 0};
 }
 
-/// The bits of a clocked frame; all of its bytes when it does not say how many count.
-[[nodiscard]] constexpr BitView to_bits(const Frame& frame) {
-  return {frame.bytes, frame.bits != 0 ? frame.bits : frame.bytes.size() * 8};
-}
-
 template <std::size_t a, std::size_t b>
 [[nodiscard]] constexpr std::array<FieldInfo, a + b> joined_fields(const std::array<FieldInfo, a>& first,
                                                                    const std::array<FieldInfo, b>& second) {
@@ -89,29 +94,16 @@ template <std::size_t a, std::size_t b>
   return fields;
 }
 
-namespace detail {
-template <std::size_t singleturn, std::size_t multiturn, std::size_t position, std::size_t unit>
-struct PositionModels {
-  static constexpr std::array<OptionValue, 3> rotary_19{{{singleturn, 19}, {multiturn, 0}, {position, 0}}};
-  static constexpr std::array<OptionValue, 3> rotary_19_16{{{singleturn, 19}, {multiturn, 16}, {position, 0}}};
-  static constexpr std::array<OptionValue, 4> linear_26{
-      {{singleturn, 0}, {multiturn, 0}, {position, 26}, {unit, 1'000'000}}};
-  static constexpr std::array<OptionValue, 4> linear_32{
-      {{singleturn, 0}, {multiturn, 0}, {position, 32}, {unit, 50'000}}};
-};
-}  // namespace detail
-
 /// The encoders of the four examples in RLS "E201-9S Decoding the BiSS information". No speed is given for them.
-template <std::size_t singleturn, std::size_t multiturn, std::size_t position, std::size_t unit>
-inline constexpr std::array<Model, 4> position_models{{
-    {"rotary-19", "single-turn, 19 bits (example 4)", 0,
-     detail::PositionModels<singleturn, multiturn, position, unit>::rotary_19},
-    {"rotary-19-16", "19 bits, 65536 turns (example 3)", 0,
-     detail::PositionModels<singleturn, multiturn, position, unit>::rotary_19_16},
-    {"linear-26-1um", "linear, 26 bits of 1 um (example 2)", 0,
-     detail::PositionModels<singleturn, multiturn, position, unit>::linear_26},
-    {"linear-32-0.05um", "linear, 32 bits of 0.05 um (example 1)", 0,
-     detail::PositionModels<singleturn, multiturn, position, unit>::linear_32},
-}};
+inline constexpr std::array position_models{
+    author::ModelText{"rotary-19", "single-turn, 19 bits (example 4)", 0,
+                      "singleturn_bits=19 multiturn_bits=0 position_bits=0"},
+    author::ModelText{"rotary-19-16", "19 bits, 65536 turns (example 3)", 0,
+                      "singleturn_bits=19 multiturn_bits=16 position_bits=0"},
+    author::ModelText{"linear-26-1um", "linear, 26 bits of 1 um (example 2)", 0,
+                      "singleturn_bits=0 multiturn_bits=0 position_bits=26 unit_um=1"},
+    author::ModelText{"linear-32-0.05um", "linear, 32 bits of 0.05 um (example 1)", 0,
+                      "singleturn_bits=0 multiturn_bits=0 position_bits=32 unit_um=0.05"},
+};
 
 }  // namespace absenc

@@ -256,7 +256,7 @@ TEST_F(Sigrok, ReadsTheSamplesOfBiss) {
   Picture waveform(LinkKind::clocked, biss::line_settings);
   waveform.observe(bench.line);
   bench.shaft.state.position = 0x123'95C6'1234;
-  biss::ReadPosition read(format, {});
+  biss::ReadPosition read(format);
   bench.run(read);
   ASSERT_EQ(read.error(), Error::none);
   const Time latency = std::chrono::microseconds(10);

@@ -4,5 +4,5 @@
 
 int main() {
   using namespace absenc;
-  firmware::run<std::uint8_t, biss::ReadPosition>(biss::Format{}, biss::Clocking{});
+  firmware::run<std::uint8_t, biss::ReadPosition>(biss::Format{});
 }

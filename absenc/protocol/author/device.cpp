@@ -8,33 +8,11 @@ namespace absenc::author {
 using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
-// ---- Power
-
-void Responder::power_on(Time now, PowerOn kind) {
-  power_ = Power::starting;
-  ready_at_ = kind == PowerOn::skip ? now : now + times_.start_time;
-  static_cast<void>(is_on(now));
-}
-
 void Responder::power_off(Time now) {
-  if (is_on(now)) stopped(now);
-  power_ = Power::off;
+  EncoderOn::power_off(now);
   forget();
   kept_.clear();
   refusing_ = reply_pending_ = transmitting_ = false;
-}
-
-void Responder::restart(Time until) {
-  power_ = Power::starting;
-  ready_at_ = until;
-}
-
-bool Responder::is_on(Time now) {
-  if (power_ == Power::starting && now >= ready_at_) {
-    power_ = Power::on;
-    started(ready_at_);
-  }
-  return power_ == Power::on;
 }
 
 // ---- The line
@@ -144,7 +122,7 @@ void Responder::ended(Answer answer, Time at) {
       refusing_ = true;
       break;
     case Answer::none:
-      ++answered_;
+      count_answer();
       break;
     case Answer::for_others:
       skipping_ = others_reply_size(request_);
@@ -156,18 +134,13 @@ void Responder::begin_reply(Time at) {
   reply_at_ = at;
   reply_pending_ = transmitting_ = true;
   interruption_.begin();
-  ++answered_;
+  count_answer();
 }
 
 void Responder::transmit(Bytes bytes, Time at) {
   reply_.clear();
   reply_.append(bytes);
   begin_reply(at);
-}
-
-void Responder::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
 }
 
 }  // namespace absenc::author

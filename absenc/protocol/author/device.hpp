@@ -12,7 +12,7 @@
 #include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
 #include "absenc/core/shaft.hpp"
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/author/encoder.hpp"
 #include "absenc/protocol/interruption.hpp"
 
 namespace absenc::author {
@@ -28,31 +28,17 @@ struct DeviceTimes {
 };
 
 /// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
-class Responder : public Device<std::uint8_t> {
+class Responder : public EncoderOn<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
 
-  void power_on(Time now, PowerOn kind) override;
   void power_off(Time now) override;
-  void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
-  void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
-  [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
-  [[nodiscard]] std::span<const Violation> violations() const final { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const final { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const final { return answered_; }
 
  protected:
-  explicit Responder(const DeviceTimes& times) : times_(times) {}
+  explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
-  /// A rule of the document that the host broke.
-  void violate(std::string_view rule, Time at);
-  /// Does not hear anything until `time`, as after a reset.
-  void restart(Time until);
-  [[nodiscard]] bool is_on(Time now);
-  [[nodiscard]] std::uint32_t raised() const { return raised_; }
-  void change_memory() { ++memory_version_; }
   /// Sends what no request on a line of characters asks for: what a chip select does, or nobody.
   void transmit(Bytes bytes, Time at);
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
@@ -81,12 +67,8 @@ class Responder : public Device<std::uint8_t> {
   virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
   /// The line is silent after something that is refused: the reply to it.
   virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
-  /// Power has come, and the start-up is over, at the time at which it was.
-  virtual void started(Time) {}
-  virtual void stopped(Time) {}
 
  private:
-  enum class Power : std::uint8_t { off, starting, on };
   void hear(std::uint8_t byte, Time at);
   void begin_reply(Time at);
   void ended(Answer answer, Time at);
@@ -95,8 +77,6 @@ class Responder : public Device<std::uint8_t> {
   void forget();
 
   DeviceTimes times_;
-  Power power_ = Power::off;
-  Time ready_at_{};
   ByteBuffer<32> request_;
   bool damaged_ = false;  // a character of it: the rest is none until the line is silent
   Time heard_at_{};
@@ -109,11 +89,6 @@ class Responder : public Device<std::uint8_t> {
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;
-  std::uint32_t raised_ = 0;
-  std::uint32_t memory_version_ = 0;
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
-  std::uint64_t answered_ = 0;
 };
 
 /// A virtual encoder of a protocol with requests and replies (line.hpp), with `memory_size` bytes that survive power

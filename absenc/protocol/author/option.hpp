@@ -28,6 +28,14 @@ constexpr std::int64_t number_of(const Value& value) {
     return static_cast<std::int64_t>(value);
   }
 }
+// The one that derives from all others.
+template <class One, class... Others>
+struct MostDerived {
+  using Type = One;
+};
+template <class One, class Next, class... Others>
+struct MostDerived<One, Next, Others...>
+    : MostDerived<std::conditional_t<std::is_base_of_v<One, Next>, Next, One>, Others...> {};
 }  // namespace detail
 
 template <auto member>
@@ -97,9 +105,10 @@ template <Role role, auto member>
   return one;
 }
 
+/// Members of one struct, and of what it derives from.
 template <auto... members>
 struct OptionsOf {
-  using Format = std::common_type_t<typename OptionOf<members>::Format...>;
+  using Format = typename detail::MostDerived<typename OptionOf<members>::Format...>::Type;
 
   constexpr explicit OptionsOf(const OptionOf<members>&... all) : infos{all.info...} {}
 

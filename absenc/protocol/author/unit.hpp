@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "absenc/core/hex.hpp"
+#include "absenc/protocol/author/clocked_line.hpp"
 #include "absenc/protocol/author/command.hpp"
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/author/field.hpp"
@@ -37,24 +38,26 @@ struct Declares {
 
 /// A Definition has these, all static and constexpr:
 ///
-/// - `Protocol` (line.hpp, device.hpp), and `Encoder`, the virtual one, made of (format, shaft): BusDevice
+/// - `Protocol` (line.hpp, device.hpp; clocked_line.hpp), and `Encoder`, the virtual one, made of (format, shaft):
+///   BusDevice, ClockedDevice
 /// - `id`, `name`, `document`, `link`
 /// - `options`: OptionsOf (option.hpp), whose defaults are those of Format; or `Format format(const Options&)`
 /// - `models`: an array of ModelText
 /// - `fields`: FieldsOf (field.hpp)
 /// - `commands`: an array of CommandOf (command.hpp)
 /// - `vectors`: an array of VectorText (text.hpp) or of Vector; they hold, or it does not compile. `frames_are_texts`:
-///   those of the texts are no hexadecimal
+///   those of the texts are no hexadecimal; clocked ones are texts of 0 and 1
 /// - `frames_size`: bytes of storage that the procedures' frames need at the most
 /// - `values(format, request)`, `values(format, request, reply)`, `values(format, found)`: see put_values (command.hpp)
 /// - `Request guess_request(const Format&, Bytes reply)`: what was asked, of a reply alone; or a Result, where it
-///   may not tell
+///   may not tell. On a clocked line, where nothing is asked, there is none
 ///
 /// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
-/// false: no virtual encoder is made; `answer_to_bad(error, reply)`, of a request that is none; `status`, `alarms`,
-/// `conditions`, `timing`, `covered`, `memory`, `registers`, `over_spi`, `probe`, `streams`, `extra_lines` as in Unit;
-/// and `decode`, `delimit`, `answered` themselves, with the parameters that they have there.
+/// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
+/// is none; `status`, `alarms`, `conditions`, `timing`, `covered`, `memory`, `registers`, `over_spi`, `probe`,
+/// `streams`, `extra_lines` as in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they
+/// have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -74,9 +77,22 @@ struct UnitOf {
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
       return Definition::decode(format(values), asked, frame, sink);
+    } else if constexpr (Clocked<P>) {
+      return decode_bits(format(values), to_bits(frame), sink);
     } else {
       return decode_bytes(format(values), asked, frame, sink);
     }
+  }
+
+  static constexpr Error decode_bits(const Format& f, BitView bits, FieldSink& sink) {
+    if constexpr (requires { Definition::is_usable(f); }) {
+      if (!Definition::is_usable(f)) return Error::invalid_argument;
+    }
+    const auto reply = P::decode(f, bits);
+    if (!reply) return reply.error();
+    put_values<Definition>(sink, f, *reply);
+    sink.put_reading(P::reading(f, *reply));
+    return Error::none;
   }
 
   static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
@@ -118,8 +134,14 @@ struct UnitOf {
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
     if (!are_good(command, arguments)) return Error::invalid_argument;
-    const Format f = format(values);
-    const CommandOf<P>& one = find(command);
+    if constexpr (Clocked<P>) {
+      return std::size_t{0};
+    } else {
+      return encode_bytes(format(values), find(command), arguments, out);
+    }
+  }
+  static Result<std::size_t> encode_bytes(const Format& f, const CommandOf<P>& one, Arguments arguments,
+                                          MutableBytes out) {
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
     if (one.request == nullptr) return Error::unsupported;
     const Result<Request> request = one.request(f, arguments);
@@ -150,6 +172,8 @@ struct UnitOf {
   static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
     if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
       return Definition::delimit(values, direction, bytes);
+    } else if constexpr (Clocked<P>) {
+      return {Delimit::Kind::complete, bytes.size()};  // the pause of the clock ends a frame
     } else {
       if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
       const std::size_t size =
@@ -272,7 +296,7 @@ struct UnitOf {
 
   static constexpr VectorParts parts_of(const VectorText& text) {
     return VectorParts(
-        text, requires { Definition::frames_are_texts; });
+        text, Clocked<P> || requires { Definition::frames_are_texts; });
   }
   static constexpr bool has_texts = std::is_same_v<std::remove_cvref_t<decltype(Definition::vectors[0])>, VectorText>;
   static constexpr auto texts = [] {
@@ -335,6 +359,9 @@ struct UnitOf {
       const CanFrame reply = can_frame_of_text(vector.reply);
       return decode(values, {.can = vector.request.empty() ? nullptr : &request},
                     {.can = vector.reply.empty() ? nullptr : &reply}, sink);
+    } else if constexpr (Clocked<P>) {
+      const auto bits = bits_of_text(vector.reply);
+      return decode(values, {}, {.bytes = bits.bytes(), .bits = bits.size()}, sink);
     } else {
       return decode(values, {.bytes = vector.request}, {.bytes = vector.reply}, sink);
     }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a virtual BiSS encoder and a host on one clocked line in virtual time.
+// For tests: a virtual encoder and a host on one clocked line in virtual time.
 #pragma once
 
-#include <map>
 #include <string>
 
 #include "absenc/protocol/biss/device.hpp"
@@ -72,6 +71,9 @@ struct ClockedBench {
     RawHost host(bits, line.now() + pause, rate);
     return run(host).text;
   }
+  [[nodiscard]] std::string_view last_rule() const {
+    return encoder.violations().empty() ? "" : encoder.violations().back().rule;
+  }
 
   static constexpr std::size_t none = ~std::size_t{0};
   TestShaft shaft;
@@ -82,18 +84,5 @@ struct ClockedBench {
 };
 
 using Bench = ClockedBench<VirtualEncoder>;
-
-/// Name and value of every field; real numbers rounded.
-inline std::map<std::string, std::int64_t> report(const Conversation<std::uint8_t>& conversation) {
-  struct Collector final : FieldSink {
-    void put(const FieldValue& value) override {
-      fields[std::string(value.info->name)] =
-          value.info->kind == FieldInfo::Kind::real ? static_cast<std::int64_t>(value.real) : value.number;
-    }
-    std::map<std::string, std::int64_t> fields;
-  } collector;
-  conversation.report(collector);
-  return collector.fields;
-}
 
 }  // namespace absenc::biss::testing

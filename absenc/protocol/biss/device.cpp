@@ -3,11 +3,6 @@
 
 namespace absenc::biss {
 
-namespace {
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-}  // namespace
-
 void Encoder::sample(Time at, Time period, Samples& samples) {
   samples.clear();
   // The half of a period without an edge that is longer than the timeout ends the frame: SLO is idle again.
@@ -20,7 +15,7 @@ void Encoder::sample(Time at, Time period, Samples& samples) {
   if (!encode(format_, reply, samples)) {  // not ready within all the clocks that anybody gives
     samples.clear();
     samples.append(low_mask(idle_bits), idle_bits);
-    while (samples.size() < sample_capacity) samples.append(0, 1);
+    while (samples.size() < Samples::capacity()) samples.append(0, 1);
   }
   life_counter_ = (life_counter_ + 1u) & low_mask(life_counter_bits);
   delay(period, samples);
@@ -41,7 +36,7 @@ void Encoder::delay(Time period, Samples& samples) {
     if (index < by) return true;  // still idle
     return index - by < driven.size() && driven.view()[index - by];
   };
-  for (std::size_t i = 0; i < driven.size() + late && i < sample_capacity; ++i) {
+  for (std::size_t i = 0; i < driven.size() + late && i < Samples::capacity(); ++i) {
     noise_ = noise_ * 1'664'525 + 1'013'904'223;
     const bool other = (noise_ >> 31) != 0;
     unsigned by = late;
@@ -51,40 +46,31 @@ void Encoder::delay(Time period, Samples& samples) {
   }
 }
 
-ByteStep VirtualEncoder::next(Time) {
-  if (!driving_) return {.at = never};
-  driving_ = false;
-  return {.kind = ByteStep::Kind::transfer, .out = samples_.bytes()};
-}
+VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
+    : VirtualEncoder(format, shaft,
+                     {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
+                      .line_delay = format.line_delay}) {}
 
-void VirtualEncoder::feed(const ByteEvent& event) {
-  if (event.kind == ByteEvent::Kind::selected) {
-    if (encoder_.is_powered()) selected(event.at, event.width > Time{} ? event.width : line_settings.bits(1));
-  } else if (event.kind == ByteEvent::Kind::sent && event.bits > 0) {
-    if (needed_ > 0 && event.bits < needed_) violate("fewer clocks than the frame has bits", event.at);
-    if (needed_ > 0) ++answered_;
-    needed_ = 0;
-    free_at_ = event.at + encoder_.behaviour().timeout;
-  }
-}
-
-void VirtualEncoder::selected(Time at, Time period) {
-  driving_ = true;
+void VirtualEncoder::selected(Time at, Time period, Samples& samples) {
+  const Time timeout = encoder_.behaviour().timeout;
+  if (period == Time{}) period = line_settings.bits(1);
   if (period < shortest_period) violate("MA faster than 10 MHz", at);
+  needed_ = 0;
   if (at < free_at_) {  // SLO is still low
     violate("clocked before the BiSS timeout has passed", at);
-    samples_.clear();
-    samples_.append(0, 64);
+    samples.append(0, 64);
     return;
   }
-  if (period / 2 >= encoder_.behaviour().timeout) violate("MA slower than the BiSS timeout allows", at);
-  encoder_.sample(at, period, samples_);
+  if (period / 2 >= timeout) violate("MA slower than the BiSS timeout allows", at);
+  encoder_.set_alarms(raised());
+  encoder_.sample(at, period, samples);
   needed_ = clocks(encoder_.format(), encoder_.behaviour().latency, period);
 }
 
-void VirtualEncoder::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
+void VirtualEncoder::clocked(Time at, std::size_t clocks) {
+  if (clocks < needed_) violate("fewer clocks than the frame has bits", at);
+  if (needed_ > 0) count_answer();
+  free_at_ = at + encoder_.behaviour().timeout;
 }
 
 }  // namespace absenc::biss

@@ -2,8 +2,9 @@
 // A virtual BiSS-C encoder: what it puts on SLO at any clock, and the rules of timing that its host breaks.
 #pragma once
 
-#include "absenc/protocol/biss/timing.hpp"
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/core/shaft.hpp"
+#include "absenc/protocol/author/clocked_device.hpp"
+#include "absenc/protocol/biss/frame.hpp"
 
 namespace absenc::biss {
 
@@ -15,8 +16,7 @@ struct Behaviour {
   Time timeout = 20us;
 };
 
-inline constexpr std::size_t sample_capacity = 512;
-using Samples = BitBuffer<sample_capacity>;
+using Samples = author::DrivenBits;
 
 /// The encoder without its line: also what stands behind an adapter.
 class Encoder {
@@ -33,7 +33,6 @@ class Encoder {
   [[nodiscard]] bool is_powered() const { return powered_; }
   void set_power(bool on) { powered_ = on; }
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
-  [[nodiscard]] std::uint32_t alarms() const { return alarms_; }
 
  private:
   void delay(Time period, Samples& samples);
@@ -47,38 +46,20 @@ class Encoder {
   std::uint32_t noise_ = 1;
 };
 
-class VirtualEncoder final : public Device<std::uint8_t> {
+class VirtualEncoder final : public author::ClockedDevice {
  public:
-  VirtualEncoder(const Format& format, const Shaft& shaft, const Behaviour& behaviour = {})
+  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  VirtualEncoder(const Format& format, const Shaft& shaft);
+  VirtualEncoder(const Format& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour) {}
 
-  void feed(const Event<std::uint8_t>& event) override;
-  Step<std::uint8_t> next(Time now) override;
-
-  void power_on(Time, PowerOn) override { encoder_.set_power(true); }
-  void power_off(Time) override { encoder_.set_power(false); }
-  void raise_alarms(std::uint32_t bits) override { encoder_.set_alarms(encoder_.alarms() | bits); }
-  void lower_alarms(std::uint32_t bits) override { encoder_.set_alarms(encoder_.alarms() & ~bits); }
-  [[nodiscard]] MutableBytes memory() override { return {}; }
-  [[nodiscard]] std::uint32_t memory_version() const override { return 0; }
-  [[nodiscard]] std::span<const Violation> violations() const override { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const override { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const override { return answered_; }
-
-  [[nodiscard]] Encoder& encoder() { return encoder_; }
-
  private:
-  void selected(Time at, Time period);
-  void violate(std::string_view rule, Time at);
+  void selected(Time at, Time period, Samples& samples) override;
+  void clocked(Time at, std::size_t clocks) override;
 
   Encoder encoder_;
-  Samples samples_;
-  bool driving_ = false;
   unsigned needed_ = 0;  // clocks of this frame; 0: there is none
   Time free_at_{};       // the timeout after the last clock
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
-  std::uint64_t answered_ = 0;
 };
 
 }  // namespace absenc::biss

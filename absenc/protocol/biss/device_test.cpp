@@ -22,27 +22,33 @@ TEST(BissDevice, PutsExample4OnTheLine) {
 }
 
 TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
-  const auto rule = [](Bench& bench) {
-    return bench.encoder.violations().empty() ? "" : bench.encoder.violations().back().rule;
-  };
-  Bench few(line_settings, bits_19);
-  few.clock(40, 1ms, 1'000'000);
-  EXPECT_EQ(rule(few), "fewer clocks than the frame has bits");
+  Bench bench(line_settings, bits_19);
+  bench.clock(41, 1ms, 1'000'000);
+  EXPECT_EQ(bench.last_rule(), "");
+  bench.clock(40, 1ms, 1'000'000);
+  EXPECT_EQ(bench.last_rule(), "fewer clocks than the frame has bits");
+  bench.clock(200, 1ms, 12'500'000);
+  EXPECT_EQ(bench.last_rule(), "MA faster than 10 MHz");
+  EXPECT_EQ(bench.clock(64, 1ms, 20'000), std::string(64, '1'));
+  EXPECT_EQ(bench.encoder.violations()[2].rule, "MA slower than the BiSS timeout allows");
 
   Bench soon(line_settings, bits_19);
   soon.clock(64, 1ms, 1'000'000);
   EXPECT_EQ(soon.clock(16, 19us, 1'000'000), "0000000000000000");
-  EXPECT_EQ(rule(soon), "clocked before the BiSS timeout has passed");
+  EXPECT_EQ(soon.last_rule(), "clocked before the BiSS timeout has passed");
+  EXPECT_EQ(soon.encoder.answered(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
   EXPECT_EQ(soon.encoder.violation_count(), 2u);  // and that frame was too short
+}
 
-  Bench fast(line_settings, bits_19);
-  fast.clock(200, 1ms, 12'500'000);
-  EXPECT_EQ(rule(fast), "MA faster than 10 MHz");
-
-  Bench slow(line_settings, bits_19);
-  EXPECT_EQ(slow.clock(64, 1ms, 20'000), std::string(64, '1'));
-  EXPECT_EQ(slow.encoder.violations()[0].rule, "MA slower than the BiSS timeout allows");
+TEST(BissDevice, ItsOwnTimeIsThatOfTheOptionsOrTenMicroseconds) {
+  const auto ack = [](Time latency, Time ready) {
+    Bench bench(line_settings, Format{.latency = latency, .ready = ready});
+    return bench.clock(64, 1ms, 1'000'000).find("1", 2) - 2;
+  };
+  EXPECT_EQ(ack(50us, 0us), 10u);
+  EXPECT_EQ(ack(4us, 0us), 4u);
+  EXPECT_EQ(ack(4us, 7us), 7u);
 }
 
 /// Good frames of 100 at a clock.
@@ -71,22 +77,13 @@ TEST(BissDevice, LineDelayCorruptsAtHighClocks) {
 }
 
 TEST(BissDevice, AWholeBitLateIsOneMoreIdleSample) {
-  testing::TestShaft shaft;
-  Encoder encoder(bits_19, shaft, {.latency = 2us, .line_delay = 1500ns});
-  encoder.set_power(true);
-  Samples samples;
-  encoder.sample(Time{}, 1us, samples);
-  EXPECT_EQ(samples.view().load(0, 7), 0b1110010u);
+  Bench bench(line_settings, Format{.ready = 2us, .line_delay = 1500ns});
+  EXPECT_EQ(bench.clock(7, 1ms, 1'000'000), "1110010");
 }
 
 TEST(BissDevice, NeverReadyIsNeverAStartBit) {
-  testing::TestShaft shaft;
-  Encoder encoder(bits_19, shaft, {.latency = 1ms});
-  encoder.set_power(true);
-  Samples samples;
-  encoder.sample(Time{}, 1us, samples);
-  EXPECT_EQ(samples.size(), sample_capacity);
-  EXPECT_EQ(decode(bits_19, samples.view()).error(), Error::bad_framing);
+  Bench bench(line_settings, Format{.ready = 1ms});
+  EXPECT_EQ(bench.clock(512, 1ms, 1'000'000), "11" + std::string(510, '0'));
 }
 
 }  // namespace

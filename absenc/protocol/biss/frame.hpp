@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS-C frames (unidirectional) as samples of SLO, one for each clock of MA: encode, decode and every check a frame
-// allows. README.md draws the frame. Sources: RLS "E201-9S Decoding the BiSS information"; BiSS Safety.
+// BiSS-C frames (unidirectional) as samples of SLO, one for each clock of MA: encode, decode, every check a frame
+// allows, and its times. README.md draws the frame. Sources: RLS "E201-9S Decoding the BiSS information"; BiSS Safety.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/core/result.hpp"
+#include "absenc/core/time.hpp"
+#include "absenc/link/line.hpp"
 #include "absenc/protocol/word.hpp"
 
 namespace absenc::biss {
+
+using namespace std::chrono_literals;
 
 /// x^6 + x + 1 over position and both status bits, sent inverted.
 inline constexpr CrcParameters crc6_parameters{6, 0x03, 0, false, false, 0x3F};
@@ -23,10 +28,22 @@ enum class Check : std::uint8_t { crc6, crc16 };
 inline constexpr unsigned life_counter_bits = 6;  // before a CRC-16; counts 0 to 63 and goes on at 0
 inline constexpr unsigned idle_bits = 2;          // SLO goes low on the second rising edge of MA
 
+inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
+inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
+inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
+
 struct Format {
   WordFormat word = "position:19 error:1! warning:1!"_word;
   Check check = Check::crc6;
   Scale scale{};
+  std::uint32_t ma_khz = 1000;  // 10 to 10 000
+  Time latency = 10us;          // the longest that the encoder needs, up to 1 ms: makes the number of clocks
+  // Of the virtual encoder.
+  Time ready{};  // what it needs itself; 0: as `latency`, but at most 10 us
+  Time line_delay{};
+
+  /// Of MA.
+  [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
 };
 
 /// Turns and position, nError, nWarning.
@@ -40,6 +57,19 @@ struct Format {
 /// Word, life counter and CRC: what follows the CDS bit.
 [[nodiscard]] constexpr unsigned data_bits(const Format& format) {
   return format.word.bits() + (format.check == Check::crc6 ? 6 : life_counter_bits + 16);
+}
+
+/// ACK bits of an encoder that needs `latency` from the second rising edge of MA until its position is ready. Both up
+/// to a second: a small processor divides 32 bits.
+[[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
+  const auto needed = static_cast<std::uint32_t>(latency.count());
+  const auto clock = static_cast<std::uint32_t>(period.count());
+  return std::max(1u, static_cast<unsigned>((needed + clock - 1) / clock));
+}
+
+/// Clocks that a whole frame needs.
+[[nodiscard]] constexpr unsigned clocks(const Format& format, Time latency, Time period) {
+  return idle_bits + ack_bits(latency, period) + 2 + data_bits(format);
 }
 
 template <class WordType>
@@ -83,8 +113,12 @@ constexpr Error take_frame(const Source& source, BitView samples, ReplyType& rep
   const unsigned size = data_bits(source.format);
   if (size > samples.size - first) return Error::truncated;
   reply.ack_bits = static_cast<unsigned>(start - idle);
-  if (size > 64) return take_data(source, samples, first, reply);
-  return take_data(source, BitNumber{samples.load(first, size), size}, 0, reply);
+  if constexpr (!Source::is_known) {
+    return take_data(source, absenc::detail::SomeBits(samples, first, size), 0, reply);
+  } else {
+    if (size > 64) return take_data(source, samples, first, reply);
+    return take_data(source, BitNumber{samples.load(first, size), size}, 0, reply);
+  }
 }
 
 template <class Source>

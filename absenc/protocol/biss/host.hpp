@@ -1,53 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of BiSS-C on a clocked link: the host drives MA and samples SLO.
+// Host side of BiSS-C: the host drives MA and samples SLO.
 #pragma once
 
-#include "absenc/protocol/biss/timing.hpp"
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/biss/frame.hpp"
 
 namespace absenc::biss {
 
-/// How an encoder is clocked.
-struct Clocking {
-  std::uint32_t rate = line_settings.rate;  // of MA, Hz
-  Time latency = 10us;                      // the longest that the encoder needs: makes the number of clocks
+/// BiSS-C as the engine and the virtual encoder use it.
+struct Protocol {
+  using Format = biss::Format;
+  using Request = author::NoRequest;
+  using Reply = biss::Reply;
+  static constexpr unsigned most_clocks = 512;
+
+  static constexpr author::ClockedWire wire(const Format& format) { return {format.ma_khz * 1000, timeout_maximum}; }
+  static constexpr unsigned clocks(const Format& format) {
+    return biss::clocks(format, format.latency, format.period());
+  }
+  static constexpr Result<Reply> decode(const Format& format, BitView samples) { return biss::decode(format, samples); }
+  static constexpr Reading reading(const Format& format, const Reply& reply) {
+    return to_reading(format.word, reply.word, format.scale);
+  }
 };
 
 /// One frame. With BiSS Safety two of them, whose life counters must follow each other (sequence_mismatch).
-class ReadPosition final : public Conversation<std::uint8_t> {
+class ReadPosition : public author::ClockedHostOf<Protocol> {
  public:
-  ReadPosition(const Format& format, const Clocking& clocking);
-
-  void feed(const Event<std::uint8_t>& event) override;
-  Step<std::uint8_t> next(Time now) override;
-  [[nodiscard]] Error error() const override { return error_; }
-  [[nodiscard]] std::string_view detail() const override;
-  [[nodiscard]] const Reading* reading() const override;
-  void report(FieldSink& sink) const override;
-  [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
-
-  /// Of the last good frame.
-  [[nodiscard]] const Reply& reply() const { return reply_; }
+  explicit ReadPosition(const Format& format) : ClockedHostOf(format) {}
 
  private:
-  enum class State : std::uint8_t { configure, ready, clocking, done };
-  static constexpr std::size_t capacity = 64;
+  void clocked(BitView samples) final;
 
-  void received(Bytes bytes);
-  void finish(Error error);
-
-  Format format_;
-  Clocking clocking_;
-  unsigned bits_;
-  State state_ = State::configure;
   bool second_ = false;
-  Time earliest_{};
-  Time sent_at_{};
-  Time received_at_{};
-  ByteBuffer<capacity> samples_;
-  Reply reply_{};
-  Reading reading_{};
-  Error error_ = Error::none;
 };
 
 }  // namespace absenc::biss

@@ -2,7 +2,7 @@
 // The virtual E201-9S, asked by hand.
 #include <gtest/gtest.h>
 
-#include "absenc/protocol/biss/timing.hpp"
+#include "absenc/protocol/biss/frame.hpp"
 #include "absenc/protocol/e201/bench_test.hpp"
 
 namespace absenc::e201 {

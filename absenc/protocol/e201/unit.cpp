@@ -167,17 +167,7 @@ struct Definition {
   static constexpr std::string_view noise_advice = check_stream;
 
   static constexpr auto options = e201::options;
-  // Those of the document's examples. No speed is given for them.
-  static constexpr std::array models{
-      ModelText{"rotary-19", "single-turn, 19 bits (example 4)", 0,
-                "singleturn_bits=19 multiturn_bits=0 position_bits=0"},
-      ModelText{"rotary-19-16", "19 bits, 65536 turns (example 3)", 0,
-                "singleturn_bits=19 multiturn_bits=16 position_bits=0"},
-      ModelText{"linear-26-1um", "linear, 26 bits of 1 um (example 2)", 0,
-                "singleturn_bits=0 multiturn_bits=0 position_bits=26 unit_um=1"},
-      ModelText{"linear-32-0.05um", "linear, 32 bits of 0.05 um (example 1)", 0,
-                "singleturn_bits=0 multiturn_bits=0 position_bits=32 unit_um=0.05"},
-  };
+  static constexpr auto models = position_models;
   static constexpr struct {
     decltype(joined_fields(joined_fields(word_fields, biss::own_fields), own_fields.infos)) infos;
   } fields{joined_fields(joined_fields(word_fields, biss::own_fields), own_fields.infos)};

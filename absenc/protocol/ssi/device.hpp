@@ -2,50 +2,26 @@
 // A virtual SSI encoder: a shift register that is loaded when its pause is over.
 #pragma once
 
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/core/shaft.hpp"
+#include "absenc/protocol/author/clocked_device.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
-#include "absenc/protocol/ssi/timing.hpp"
 
 namespace absenc::ssi {
 
-class VirtualEncoder final : public Device<std::uint8_t> {
+class VirtualEncoder final : public author::ClockedDevice {
  public:
-  VirtualEncoder(const Format& format, const Shaft& shaft, const Timing& timing = {})
-      : format_(format), timing_(timing), shaft_(&shaft) {}
-
-  void feed(const Event<std::uint8_t>& event) override;
-  Step<std::uint8_t> next(Time now) override;
-
-  void power_on(Time, PowerOn) override { powered_ = true; }
-  void power_off(Time) override { powered_ = false; }
-  void raise_alarms(std::uint32_t bits) override { alarms_ |= bits; }
-  void lower_alarms(std::uint32_t bits) override { alarms_ &= ~bits; }
-  [[nodiscard]] MutableBytes memory() override { return {}; }
-  [[nodiscard]] std::uint32_t memory_version() const override { return 0; }
-  [[nodiscard]] std::span<const Violation> violations() const override { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const override { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const override { return answered_; }
-
-  [[nodiscard]] Word word(Time at) const { return word_of(format_.word, shaft_->at(at), alarms_); }
+  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  VirtualEncoder(const Format& format, const Shaft& shaft) : format_(format), shaft_(&shaft) {}
 
  private:
-  void selected(Time at, Time period);
-  void violate(std::string_view rule, Time at);
+  void selected(Time at, Time period, author::DrivenBits& bits) override;
+  void clocked(Time at, std::size_t clocks) override;
 
   Format format_;
-  Timing timing_;
   const Shaft* shaft_;
-  bool powered_ = false;
-  std::uint32_t alarms_ = 0;
   Word latched_{};
   std::size_t shifted_ = 0;  // bits of `latched_` that were clocked out
-  BitBuffer<frame_capacity> bits_;
-  bool driving_ = false;
-  bool answering_ = false;
-  Time free_at_{};
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
-  std::uint64_t answered_ = 0;
+  Time free_at_{};           // when the pause after the last clock is over
 };
 
 }  // namespace absenc::ssi

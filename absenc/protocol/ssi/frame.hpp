@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI words, MSB first: encode, decode and the few checks that the line allows. README.md draws the frame.
+// SSI words, MSB first: encode, decode, the few checks that the line allows, and its times. README.md draws the frame.
 #pragma once
 
 #include <cstddef>
@@ -7,10 +7,16 @@
 
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/result.hpp"
+#include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
 #include "absenc/protocol/word.hpp"
 
 namespace absenc::ssi {
+
+using namespace std::chrono_literals;
+
+inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
+inline constexpr Time pause_margin = 10us;  // what the host leaves on top of Tm
 
 /// What the encoder sends when it is clocked on.
 enum class AfterWord : std::uint8_t { repeat, zero, one };
@@ -20,6 +26,12 @@ struct Format {
   AfterWord after_word = AfterWord::repeat;
   unsigned extra_clocks = 0;  // behind the word, to be compared; as many as the word has bits read it twice
   Scale scale{};
+  // What varies by product (3.5, note).
+  Time pause = 500us;  // Tm: more than that between two words, or the old one goes on
+  std::uint32_t clock_khz = 200;
+  // Of the virtual encoder: the clock that it allows. 250 kHz is also what Tcs says.
+  std::uint32_t slowest_khz = 100;
+  std::uint32_t fastest_khz = 250;
 };
 
 inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;
@@ -50,7 +62,12 @@ namespace detail {
 template <class Source>
 constexpr Result<typename Source::Word> decode_clocked_on(const Source& source, BitView bits, std::size_t first) {
   typename Source::Word word;
-  const Error error = absenc::detail::take_word(source, bits, first, word);
+  Error error = Error::none;
+  if constexpr (Source::is_known) {
+    error = absenc::detail::take_word(source, bits, first, word);
+  } else {
+    error = absenc::detail::take_word(source, absenc::detail::SomeBits(bits, first, source.word.bits()), 0, word);
+  }
   bool matches = true;
   for (std::size_t i = source.word.bits(); first + i < bits.size; ++i) {
     matches = matches && bits[first + i] == bit_behind(source.format, bits, i, first);

@@ -1,45 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of SSI on a clocked link.
+// Host side of SSI.
 #pragma once
 
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/author/clocked_line.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
-#include "absenc/protocol/ssi/timing.hpp"
 
 namespace absenc::ssi {
 
-/// One word, and the bits behind it that `format.extra_clocks` asks for.
-class ReadPosition final : public Conversation<std::uint8_t> {
- public:
-  /// `pause`: Tm of the encoder.
-  explicit ReadPosition(const Format& format, Time pause = Timing{}.pause);
+/// SSI as the engine uses it. The port has the rate of the clock already.
+struct Protocol {
+  using Format = ssi::Format;
+  using Request = author::NoRequest;
+  using Reply = Word;
+  static constexpr unsigned most_clocks = frame_capacity;
 
-  void feed(const Event<std::uint8_t>& event) override;
-  Step<std::uint8_t> next(Time now) override;
-  [[nodiscard]] Error error() const override { return error_; }
-  [[nodiscard]] std::string_view detail() const override;
-  [[nodiscard]] const Reading* reading() const override;
-  void report(FieldSink& sink) const override;
-  [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
-
-  [[nodiscard]] const Word& word() const { return word_; }
-
- private:
-  enum class State : std::uint8_t { ready, clocking, done };
-
-  void received(Bytes bytes);
-  void finish(Error error);
-
-  Format format_;
-  Time pause_;
-  State state_ = State::ready;
-  Time clocked_at_{};
-  Time sent_at_{};
-  Time received_at_{};
-  ByteBuffer<frame_capacity / 8> bits_;
-  Word word_{};
-  Reading reading_{};
-  Error error_ = Error::none;
+  static constexpr author::ClockedWire wire(const Format& format) { return {.rest = format.pause + pause_margin}; }
+  static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
+  static constexpr Result<Word> decode(const Format& format, BitView bits) { return ssi::decode(format, bits); }
+  static constexpr Reading reading(const Format& format, const Word& word) {
+    return to_reading(format.word, word, format.scale);
+  }
 };
+
+/// One word, and the bits behind it that `format.extra_clocks` asks for.
+using ReadPosition = author::ReadClocked<Protocol>;
 
 }  // namespace absenc::ssi

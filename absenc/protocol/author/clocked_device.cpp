@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/author/clocked_device.hpp"
+
+#include <utility>
+
+namespace absenc::author {
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+ByteStep ClockedDevice::next(Time) {
+  if (!std::exchange(pending_, false)) return {.at = never};
+  return {.kind = ByteStep::Kind::transfer, .out = bits_.bytes()};
+}
+
+void ClockedDevice::feed(const ByteEvent& event) {
+  if (event.kind == ByteEvent::Kind::selected && is_on(event.at)) {
+    bits_.clear();
+    selected(event.at, event.width, bits_);
+    pending_ = driving_ = true;
+  } else if (event.kind == ByteEvent::Kind::sent && event.bits > 0 && std::exchange(driving_, false)) {
+    clocked(event.at, event.bits);
+  }
+}
+
+void ClockedDevice::power_off(Time now) {
+  EncoderOn::power_off(now);
+  pending_ = driving_ = false;
+}
+
+}  // namespace absenc::author

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Device side of a clocked line: drives its bits while the host clocks. It knows no protocol, and is compiled once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "absenc/core/bit_view.hpp"
+#include "absenc/protocol/author/encoder.hpp"
+
+namespace absenc::author {
+
+/// What is driven on the line, a bit for each clock. The line idles behind them.
+using DrivenBits = BitBuffer<512>;
+
+class ClockedDevice : public EncoderOn<std::uint8_t> {
+ public:
+  void feed(const Event<std::uint8_t>& event) final;
+  Step<std::uint8_t> next(Time now) final;
+  void power_off(Time now) override;
+  [[nodiscard]] MutableBytes memory() override { return {}; }
+
+ protected:
+  explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
+  ~ClockedDevice() = default;
+
+  /// The clock begins, with this period; 0: it is not known. `bits`, empty now, is what the encoder drives.
+  virtual void selected(Time at, Time period, DrivenBits& bits) = 0;
+  /// The host has stopped after so many clocks, one at least.
+  virtual void clocked(Time at, std::size_t clocks) = 0;
+
+ private:
+  DrivenBits bits_;
+  bool pending_ = false;  // to be driven
+  bool driving_ = false;
+};
+
+}  // namespace absenc::author

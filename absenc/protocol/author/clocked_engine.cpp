@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/author/clocked_engine.hpp"
+
+#include <algorithm>
+
+namespace absenc::author {
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+// ---- For the subclass
+
+void ClockedEngine::clock(unsigned count) {
+  if (count > 8 * storage_.size()) return finish({.error = Error::invalid_argument});
+  count_ = count;
+  state_ = State::ready;
+}
+
+void ClockedEngine::finish(const Outcome& outcome) {
+  outcome_ = outcome;
+  state_ = State::over;
+}
+
+// ---- Steps
+
+ByteStep ClockedEngine::next(Time now) {
+  if (state_ == State::over) return {.kind = ByteStep::Kind::done};
+  if (!begun_) {
+    begun_ = true;
+    rested_at_ = now + wire_.rest;  // somebody may have clocked just before
+    if (wire_.rate != 0) return {.kind = ByteStep::Kind::configure, .settings = {.rate = wire_.rate}};
+  }
+  ByteStep step{.expect = (count_ + 7) / 8, .bits = count_, .at = never};
+  if (state_ == State::ready) {
+    state_ = State::clocking;
+    begun_at_ = std::max(now, rested_at_);
+    step.kind = ByteStep::Kind::transfer;
+    step.at = rested_at_;
+  }
+  return step;
+}
+
+// ---- Events
+
+void ClockedEngine::feed(const ByteEvent& event) {
+  if (state_ != State::clocking) return;
+  if (event.kind == ByteEvent::Kind::sent) {
+    sent_at_ = event.at;
+    // 32 bits: a processor without division spends long on 64.
+    if (wire_.rate != 0) begun_at_ = event.at - Time(count_ * (1'000'000'000u / wire_.rate));
+  }
+  if (event.kind != ByteEvent::Kind::received) return;
+  received_at_ = event.at;
+  rested_at_ = event.at + wire_.rest;
+  received(event.items);
+}
+
+void ClockedEngine::received(Bytes bytes) {
+  const std::size_t whole = (count_ + 7) / 8;
+  size_ = std::min(bytes.size(), whole);
+  std::copy_n(bytes.begin(), size_, storage_.begin());
+  if (size_ < whole) return finish({.error = Error::wrong_length});
+  state_ = State::over;  // unless the subclass goes on
+  clocked({Bytes(storage_).first(size_), count_});
+}
+
+}  // namespace absenc::author

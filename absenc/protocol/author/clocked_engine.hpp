@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Host side of a clocked line: lets the clock rest, clocks bits out of the encoder and hands them on. It knows no
+// protocol, and is compiled once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/core/bit_view.hpp"
+#include "absenc/protocol/author/routine.hpp"
+#include "absenc/protocol/conversation.hpp"
+
+namespace absenc::author {
+
+/// How an encoder is clocked, as its document has it.
+struct ClockedWire {
+  std::uint32_t rate = 0;  // of the clock, Hz, which is set first; 0: it stays as the line has it
+  Time rest{};             // of the clock before each transfer, after which the encoder takes a new position
+};
+
+/// One transfer after the other; a subclass says how many clocks each has, and what becomes of its bits.
+class ClockedEngine : public Conversation<std::uint8_t> {
+ public:
+  void feed(const Event<std::uint8_t>& event) final;
+  Step<std::uint8_t> next(Time now) final;
+  [[nodiscard]] Error error() const final { return outcome_.error; }
+  [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
+  [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  /// Nothing: see Engine.
+  void report(FieldSink&) const override {}
+  [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
+    return {{}, Bytes(storage_).first(size_), sent_at_, received_at_};
+  }
+
+  /// The first edge of the clock in the last transfer: when it was due, or, where the rate is known, by its end.
+  [[nodiscard]] Time begun_at() const { return begun_at_; }
+  [[nodiscard]] Time received_at() const { return received_at_; }
+  /// Never: nothing comes but what is clocked out.
+  [[nodiscard]] bool is_noisy() const { return false; }
+
+ protected:
+  /// `storage`: for the bits of the longest transfer.
+  ClockedEngine(const ClockedWire& wire, MutableBytes storage) : wire_(wire), storage_(storage) {}
+  ~ClockedEngine() = default;
+
+  /// Gives so many clocks, when the clock has rested. More than there is storage for end the conversation:
+  /// invalid_argument.
+  void clock(unsigned count);
+  /// The conversation is over. Its texts must stay.
+  void finish(const Outcome& outcome);
+  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
+
+  /// All bits of the transfer are there. Calls `clock` or `finish`.
+  virtual void clocked(BitView bits) = 0;
+
+ private:
+  enum class State : std::uint8_t { ready, clocking, over };
+  void received(Bytes bytes);
+
+  ClockedWire wire_;
+  MutableBytes storage_;
+  std::size_t size_ = 0;
+  unsigned count_ = 0;  // clocks of this transfer
+  State state_ = State::over;
+  bool begun_ = false;
+  Time rested_at_{};
+  Time begun_at_{};
+  Time sent_at_{};
+  Time received_at_{};
+  Outcome outcome_{};
+};
+
+}  // namespace absenc::author

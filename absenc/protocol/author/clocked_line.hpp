@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// The engine of a clocked line with a protocol.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "absenc/protocol/author/clocked_engine.hpp"
+#include "absenc/protocol/author/command.hpp"
+
+namespace absenc::author {
+
+/// The host sends nothing but clocks.
+struct NoRequest {};
+
+/// What the document says of frames of clocked bits:
+///
+///   struct Protocol {
+///     using Format, Reply;
+///     using Request = NoRequest;
+///     static constexpr unsigned most_clocks;                 // of one transfer
+///     static ClockedWire wire(const Format&);
+///     static unsigned clocks(const Format&);                 // of one reading; more than `most_clocks` are refused
+///     static Result<Reply> decode(const Format&, BitView);
+///     static Reading reading(const Format&, const Reply&);
+///   };
+template <class P>
+concept Clocked = requires {
+  P::most_clocks;
+};
+
+/// A position with typed replies; a subclass says what becomes of the bits.
+template <Clocked P>
+class ClockedHostOf : public ClockedEngine {
+ public:
+  using Format = typename P::Format;
+  using Reply = typename P::Reply;
+
+  [[nodiscard]] const Format& format() const { return format_; }
+  /// The last good reply.
+  [[nodiscard]] const Reply& found() const { return found_; }
+  [[nodiscard]] const Reading* reading() const final {
+    return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
+  }
+
+ protected:
+  explicit ClockedHostOf(const Format& format) : ClockedEngine(P::wire(format), storage_), format_(format) { ask(); }
+  ~ClockedHostOf() = default;
+
+  void ask() { clock(P::clocks(format_)); }
+  [[nodiscard]] Error take(BitView bits) {
+    const Result<Reply> reply = P::decode(format_, bits);
+    if (reply) found_ = *reply;
+    return reply.error();
+  }
+  /// Ends it, with no error by the last good reply, whose position was taken at the first edge of the clock.
+  void conclude(Error error) {
+    if (error == Error::none) {
+      reading_ = P::reading(format_, found_);
+      reading_.latched = begun_at();
+      reading_.received = received_at();
+    }
+    finish({.error = error});
+  }
+
+ private:
+  Format format_;
+  Reply found_{};
+  Reading reading_{};
+  std::array<std::uint8_t, (P::most_clocks + 7) / 8> storage_;
+};
+
+/// A position, clocked out once.
+template <Clocked P>
+class ReadClocked : public ClockedHostOf<P> {
+ public:
+  explicit ReadClocked(const typename P::Format& format) : ClockedHostOf<P>(format) {}
+
+ private:
+  void clocked(BitView bits) final { this->conclude(this->take(bits)); }
+};
+
+/// What Reader, made of the format, reads.
+template <class Definition, Clocked P, class Reader = ReadClocked<P>>
+[[nodiscard]] constexpr CommandOf<P> clocked_reading(const Command& info) {
+  using Made = Told<Definition, Reader>;
+  return {.info = info,
+          .request = nullptr,
+          .make = [](const typename P::Format& format, Arguments,
+                     std::span<std::byte> storage) { return make_host<Made>(storage, format); },
+          .size = sizeof(Made)};
+}
+
+/// The bits of a clocked frame; all of its bytes when it does not say how many count.
+[[nodiscard]] constexpr BitView to_bits(const Frame& frame) {
+  return {frame.bytes, frame.bits != 0 ? frame.bits : frame.bytes.size() * 8};
+}
+
+}  // namespace absenc::author

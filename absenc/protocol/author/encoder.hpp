@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every virtual encoder has, whatever its line: power, alarms that somebody raised, the rules that its host broke,
+// how often it answered.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/protocol/conversation.hpp"
+
+namespace absenc::author {
+
+template <class Item>
+class EncoderOn : public Device<Item> {
+ public:
+  void power_on(Time now, typename Device<Item>::PowerOn kind) override {
+    power_ = Power::starting;
+    ready_at_ = kind == Device<Item>::PowerOn::skip ? now : now + start_time_;
+    static_cast<void>(is_on(now));
+  }
+  void power_off(Time now) override {
+    if (is_on(now)) stopped(now);
+    power_ = Power::off;
+  }
+  void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
+  void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
+  [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
+  [[nodiscard]] std::span<const Violation> violations() const final { return violations_; }
+  [[nodiscard]] std::uint32_t violation_count() const final { return violation_count_; }
+  [[nodiscard]] std::uint64_t answered() const final { return answered_; }
+
+ protected:
+  /// `start_time`: from power on to the first request that is answered.
+  explicit EncoderOn(Time start_time) : start_time_(start_time) {}
+  ~EncoderOn() = default;
+
+  /// A rule of the document that the host broke.
+  void violate(std::string_view rule, Time at) {
+    violations_.push_back({rule, at});
+    ++violation_count_;
+  }
+  /// Does not hear anything until `time`, as after a reset.
+  void restart(Time until) {
+    power_ = Power::starting;
+    ready_at_ = until;
+  }
+  [[nodiscard]] bool is_on(Time now) {
+    if (power_ == Power::starting && now >= ready_at_) {
+      power_ = Power::on;
+      started(ready_at_);
+    }
+    return power_ == Power::on;
+  }
+  [[nodiscard]] std::uint32_t raised() const { return raised_; }
+  void change_memory() { ++memory_version_; }
+  void count_answer() { ++answered_; }
+
+  /// Power has come, and the start-up is over, at the time at which it was.
+  virtual void started(Time) {}
+  virtual void stopped(Time) {}
+
+ private:
+  enum class Power : std::uint8_t { off, starting, on };
+
+  Time start_time_;
+  Power power_ = Power::off;
+  Time ready_at_{};
+  std::uint32_t raised_ = 0;
+  std::uint32_t memory_version_ = 0;
+  Buffer<Violation, 16> violations_;
+  std::uint32_t violation_count_ = 0;
+  std::uint64_t answered_ = 0;
+};
+
+}  // namespace absenc::author
