@@ -53,8 +53,8 @@ struct Declares {
 /// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made; `answer_to_bad(error, reply)`, of a request that is none; `status`, `alarms`,
-/// `conditions`, `timing`, `covered`, `memory`, `registers`, `over_spi`, `probe`, `streams`, `extra_lines` as in Unit;
-/// and `decode`, `delimit`, `answered` themselves, with the parameters that they have there.
+/// `conditions`, `timing`, `covered`, `bits`, `memory`, `registers`, `over_spi`, `probe`, `streams`, `extra_lines` as
+/// in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -397,6 +397,7 @@ struct UnitOf {
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
     if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
     if constexpr (requires { Definition::covered; }) unit.covered = Definition::covered;
+    if constexpr (requires { &Definition::bits; }) unit.bits = Definition::bits;
     if constexpr (requires { Definition::registers; }) unit.registers = Definition::registers;
     if constexpr (requires { Definition::over_spi; }) unit.over_spi = Definition::over_spi;
     if constexpr (requires { Definition::probe; }) unit.probe = Definition::probe;
