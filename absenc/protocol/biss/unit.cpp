@@ -99,6 +99,13 @@ bool covered(const Options&, Frame, Frame reply, std::size_t bit) {
   return bit + 1 < idle || bit > samples.end_of_run(idle);
 }
 
+// Behind the start bit and CDS.
+BitRanges place_of(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+  const BitView samples = to_bits(reply);
+  const std::size_t start = samples.end_of_run(samples[0] ? samples.end_of_run(0) : 0);
+  return place_in_word(to_format(values).word, field, start + 2);
+}
+
 }  // namespace
 
 Format to_format(const Options& values) {
@@ -129,6 +136,7 @@ constinit const Unit unit{
     .device = device,
     .resolution = resolution,
     .covered = covered,
+    .bits = place_of,
 };
 
 }  // namespace absenc::biss

@@ -122,6 +122,10 @@ Resolution resolution(const Options& values) {
 // SSI has no checksum.
 bool covered(const Options&, Frame, Frame, std::size_t) { return false; }
 
+BitRanges place_of(const Options& values, Frame, Frame, const FieldInfo& field) {
+  return place_in_word(to_format(values).word, field, 0);
+}
+
 WordFormat word_of_options(const Options& values) {
   const PositionBits bits{.position = static_cast<unsigned>(values[option_bits]),
                           .multiturn = static_cast<unsigned>(values[option_multiturn_bits]),
@@ -161,6 +165,7 @@ constinit const Unit unit{
     .device = device,
     .resolution = resolution,
     .covered = covered,
+    .bits = place_of,
     .settings = settings,
 };
 
