@@ -49,11 +49,11 @@ def end(process, number=signal.SIGTERM):
 class Emulator:
     """`absenc emulate`, ready to be opened."""
 
-    def __init__(self, directory, *arguments, protocol="tformat", name="encoder", line="--pty"):
+    def __init__(self, directory, *arguments, protocol="tformat", name="encoder", line="--pty",
+                 stdin=subprocess.DEVNULL):
         self.path = os.path.join(directory, name)
         command = [ABSENC, "emulate", protocol, line, self.path, *arguments]
-        self.process = subprocess.Popen(command, bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE)
+        self.process = subprocess.Popen(command, bufsize=0, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.ready = self.line()
         if self.ready is None:
             raise AssertionError(f"the emulator did not become ready: {end(self.process)}")

@@ -3,6 +3,7 @@
 import csv
 import functools
 import io
+import json
 import os
 import shutil
 import subprocess
@@ -186,6 +187,28 @@ class Text(Case):
         self.assertIn("encoder_id=17", good["fields"])
         self.assertEqual((bad["angle_deg"], bad["fields"], bad["error"]), ("", "", "bad_checksum"))
         self.assertIn("checksum", bad["message"])
+
+    def test_where_fields_stand(self):
+        capture = self.capture(exchange(74565, 4660))
+        result = absenc("decode", "tformat", capture, "--bits")
+        self.assert_good(result)
+        self.assertIn("singleturn 16-32, encoder_id 40-47, multiturn 48-63, alarms 72-79]", result.stdout)
+        [line] = json_lines(absenc("decode", "tformat", capture, "--bits", "--json").stdout)
+        self.assertEqual(line["bits"]["singleturn"], [{"first": 16, "count": 17}])
+        self.assertNotIn("bits", json_lines(absenc("decode", "tformat", capture, "--json").stdout)[0])
+        self.assert_wrong_usage(absenc("decode", "tformat", capture, "--bits", "--csv"), "--bits")
+        self.assert_wrong_usage(absenc("decode", "tformat", capture, "--bits", "--stats"), "--bits")
+        self.assert_wrong_usage(absenc("decode", "e201", capture, "--bits"), "does not say where")
+
+    def test_where_fields_of_one_frame_stand(self):
+        # Big endian: the low byte comes last.
+        result = absenc("decode", "raa38", "--hex", "ff81017f00", "--bits", "--option", "bits=14")
+        self.assert_good(result)
+        self.assertRegex(result.stdout, r"singleturn +383 counts +bits 16-21 24-31")
+        result = absenc("decode", "ssi", "--hex", "0000000000101", "--option", "bits=13", "--option", "gray=false",
+                        "--bits", "--json")
+        self.assert_good(result)
+        self.assertEqual(json.loads(result.stdout)["bits"]["singleturn"], [{"first": 0, "count": 13}])
 
     def test_times_and_directions(self):
         request, reply = exchange(7)

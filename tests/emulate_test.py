@@ -4,6 +4,7 @@ import fcntl
 import itertools
 import json
 import os
+import pty
 import re
 import select
 import shutil
@@ -12,6 +13,7 @@ import socket
 import stat
 import struct
 import subprocess
+import sys
 import time
 import tty
 import unittest
@@ -358,6 +360,179 @@ class Behaviour(EmulateCase):
             ends[1].__exit__()
         in_use = absenc("emulate", "tformat", "--tcp", str(port), "--for", "60")
         self.assert_failed(in_use, f"TCP port {port} is in use")
+
+
+class Console(EmulateCase):
+    """What is written on standard input while it runs."""
+
+    def told(self, *arguments, **settings):
+        """An emulator, and a way to tell it a line and get its answer."""
+        emulator = self.emulator(*arguments, stdin=subprocess.PIPE, **settings)
+
+        def tell(line):
+            emulator.process.stdin.write(f"{line}\n".encode())
+            return emulator.line().rstrip("\n")
+        return emulator, tell
+
+    def run_json(self, *arguments):
+        result = absenc(*arguments, "--json")
+        self.assert_good(result)
+        return json.loads(result.stdout)
+
+    def temperature(self, place):
+        return self.run_json("run", place, "temperature")["fields"]["temperature_c"]
+
+    def test_a_condition(self):
+        emulator, tell = self.told()
+        place = f"tformat:{emulator.path}?latency=300"
+        self.assertEqual(tell("temperature"), "ok: temperature is 35 degC")
+        self.assertEqual(tell("  temperature = 85 "), "ok: temperature is 85 degC")
+        self.assertEqual(self.temperature(place), 85)
+        self.assertEqual(tell("temperature=-20"), "ok: temperature is -20 degC")
+        self.assertEqual(self.temperature(place), -20)
+
+    def test_power_without_a_battery(self):
+        emulator, tell = self.told("--multiturn", "7")
+        place = f"tformat:{emulator.path}?latency=300"
+        self.assertEqual(self.run_json("read", place)["multiturn"], 7)
+        self.assertEqual(tell("battery=0"), "ok: battery is 0 mV")
+        self.assertEqual(tell("power on"), "ok: power is on already")
+        self.assertEqual(tell("power off"), "ok: power is off")
+        self.assertEqual(absenc("read", place).returncode, 1)
+        self.assertEqual(tell("power off"), "ok: power is off already")
+        before = time.monotonic()
+        self.assertEqual(tell("power on"), "ok: power is on; it takes its time to start")
+        result = absenc("alarms", place, "--json")
+        while result.returncode != 0 and time.monotonic() < before + PATIENCE:
+            result = absenc("alarms", place, "--json")
+        self.assertGreaterEqual(time.monotonic() - before, 1.5)
+        self.assertIn("battery_error", result.stdout)
+        self.assertEqual(self.run_json("read", place)["multiturn"], 0)
+
+    def test_alarms(self):
+        emulator, tell = self.told()
+        with Client.open(emulator.path) as client:
+            self.assertEqual(tell("alarm over_heat battery_alarm"), "ok: raised over_heat, battery_alarm")
+            self.assertEqual(client.exchange(3)[9], 0x90)
+            self.assertEqual(tell("clear over_heat"), "ok: lowered over_heat")
+            self.assertEqual(client.exchange(3)[9], 0x80)
+
+    def test_an_encoder_that_sends_by_itself_goes_on(self):
+        emulator, tell = self.told("--motion", "rpm=60", "--option", "refresh_hz=200", protocol="raa38")
+        with Client.open(emulator.path) as client:
+            self.assertTrue(client.receive(20))
+            self.assertEqual(tell("power off"), "ok: power is off")
+            deadline = time.monotonic() + PATIENCE
+            while client.receive(20, patience=0.1) and time.monotonic() < deadline:
+                pass
+            self.assertLess(time.monotonic(), deadline)
+            self.assertEqual(tell("power on"), "ok: power is on; it takes its time to start")
+            self.assertGreaterEqual(len(client.receive(20)), 20)
+
+    def test_several_encoders(self):
+        emulator, tell = self.told("--also", "address=3", protocol="esl")
+
+        def answers():
+            places = [f"esl:{emulator.path}?latency=300&address={address}" for address in (0, 3)]
+            return [absenc("read", place).returncode == 0 for place in places]
+        self.assertEqual(answers(), [True, True])
+        self.assertEqual(tell("2: power off"), "ok: 2: power is off")
+        self.assertEqual(answers(), [True, False])
+        self.assertEqual(tell("power off"), "ok: 1: power is off; 2: power is off already")
+        self.assertEqual(answers(), [False, False])
+        self.assertEqual(tell("3: help"), 'error: "3" is no encoder of this line: they are 1 to 2')
+
+    def test_a_can_node(self):
+        emulator, tell = self.told(protocol="raa38-can")
+        place = f"raa38-can:slcan:{emulator.path}?latency=300"
+        self.assert_good(absenc("read", place))
+        self.assertEqual(tell("power off"), "ok: power is off")
+        self.assertEqual(absenc("read", place).returncode, 1)
+
+    def test_what_it_does_not_know(self):
+        _, tell = self.told()
+        for line, words in [("temprature=85", ['"temprature"', "did you mean temperature?", "power, alarm, clear, help"]),
+                            ("x", ['"x"', "battery, temperature, power"]),
+                            ("temperature=hot", ["-20 to 127 degC"]), ("temperature=128", ["-20 to 127 degC"]),
+                            ("battery=", ["0 to 4750 mV"]), ("battery=1 2", ["0 to 4750 mV"]),
+                            ("power", ["power on", "power off"]), ("power of", ["power off"]),
+                            ("alarm", ["which alarm?", "over_heat"]), ("alarm overheat", ["did you mean over_heat?"])]:
+            with self.subTest(line):
+                answer = tell(line)
+                self.assertTrue(answer.startswith("error: "), answer)
+                for word in words:
+                    self.assertIn(word, answer)
+
+    def test_help(self):
+        _, tell = self.told()
+        for words in ("battery=0 to 4750 mV", "power off", "alarm NAME", "over_heat"):
+            self.assertIn(words, tell("help"))
+
+    def test_the_end_of_the_input_ends_nothing(self):
+        emulator, tell = self.told()
+        self.assertEqual(tell("temperature=50"), "ok: temperature is 50 degC")
+        emulator.process.stdin.write(b"\n\nbattery=100")
+        emulator.process.stdin.close()
+        self.assertEqual(emulator.line(), "ok: battery is 100 mV\n")
+        self.assertEqual(self.temperature(f"tformat:{emulator.path}?latency=300"), 50)
+        emulator.process.stdin = None
+        self.assertEqual(emulator.end()[0], 0)
+
+    def test_nobody_who_reads_the_answers(self):
+        emulator, _ = self.told()
+        emulator.process.stdout.close()
+        emulator.process.stdout = open(os.devnull, "rb")  # as `end` wants it
+        emulator.process.stdin.write(b"temperature=50\ntemperature=60\n")
+        place = f"tformat:{emulator.path}?latency=300"
+        deadline = time.monotonic() + PATIENCE
+        while self.temperature(place) == 35 and time.monotonic() < deadline:
+            pass
+        self.assertIn(self.temperature(place), (50, 60))
+
+    def test_a_terminal_that_belongs_to_another_program(self):
+        path = self.file("encoder")
+        child, master = pty.fork()
+        if child == 0:  # the shell of the terminal; the emulator is in the background
+            program = ("import os, signal, subprocess, sys\n"
+                       "emulator = subprocess.Popen(sys.argv[1:], preexec_fn=os.setpgrp)\n"
+                       "print('pid', emulator.pid, flush=True)\n"
+                       "signal.pause()")
+            os.execv(sys.executable, [sys.executable, "-c", program, ABSENC, "emulate", "tformat", "--pty", path])
+        shown = b""
+        try:
+            deadline = time.monotonic() + PATIENCE
+            while not (b"ready" in shown and re.search(rb"pid \d+\r", shown)):
+                self.assertTrue(select.select([master], [], [], max(0, deadline - time.monotonic()))[0], shown)
+                shown += os.read(master, 4096)
+            os.write(master, b"power off\n")
+            for _ in range(5):
+                self.assert_good(absenc("read", f"tformat:{path}?latency=300"))
+        finally:
+            os.kill(int(re.search(rb"pid (\d+)", shown)[1]), signal.SIGKILL)
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            os.close(master)
+
+    def test_conditions_at_the_start(self):
+        emulator = self.emulator("--condition", "temperature=90", "--condition", "battery=0", "--multiturn", "7")
+        place = f"tformat:{emulator.path}?latency=300"
+        self.assertEqual(self.temperature(place), 90)
+        self.assertEqual(self.run_json("read", place)["multiturn"], 0)
+        self.assertEqual(self.temperature("sim:tformat?condition=temperature=90"), 90)
+
+    def test_wrong_conditions(self):
+        for condition, words in [("temprature=1", ["did you mean temperature?"]), ("battery", ["NAME=VALUE"]),
+                                 ("temperature=200", ["-20 to 127 degC"])]:
+            with self.subTest(condition):
+                self.assert_wrong_usage(absenc("emulate", "tformat", "--condition", condition), *words)
+                self.assert_wrong_usage(absenc("read", f"sim:tformat?condition={condition}"), *words)
+        self.assert_wrong_usage(absenc("emulate", "raa38", "--condition", "battery=0"), "has no conditions")
+
+    def test_they_are_listed(self):
+        listed = self.run_json("list", "tformat")["conditions"]
+        self.assertIn({"name": "temperature", "unit": "degC", "meaning": "of the board", "minimum": -20,
+                       "maximum": 127, "normal": 35}, listed)
+        self.assertIn("0 to 4750 mV", absenc("list", "tformat").stdout)
 
 
 class Port(EmulateCase):

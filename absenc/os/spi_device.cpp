@@ -105,14 +105,18 @@ Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
 
 void SpiDevice::feed(const ByteEvent& event) {
   device_->feed(event);
+  ask(event.at);
+}
+
+void SpiDevice::ask(Time now) {
   for (;;) {
-    const ByteStep step = device_->next(event.at);
+    const ByteStep step = device_->next(now);
     switch (step.kind) {
       case ByteStep::Kind::transfer:
         driven_.assign(step.out.begin(), step.out.end());
         break;
       case ByteStep::Kind::wait:
-        timer_ = step.at > event.at ? step.at : never;
+        timer_ = step.at > now ? step.at : never;
         return;
       case ByteStep::Kind::done:
         timer_ = never;

@@ -32,6 +32,8 @@ class SpiDevice {
   /// `kind`: exchange or clocked, otherwise std::invalid_argument. `device` must outlive it.
   SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device);
 
+  /// Asks the device for its first step, as every carrier does before the first event: it may want a timer.
+  void begin(Time now) { ask(now); }
   /// Returns when it ends. On a clocked link a pause of the clock between two transfers ends a word.
   Time message(std::span<const SpiTransfer> transfers, Time start);
 
@@ -49,6 +51,7 @@ class SpiDevice {
   void deselect(Time at);
   Time clock(const SpiTransfer& transfer, Time at);
   void feed(const Event<std::uint8_t>& event);
+  void ask(Time now);
   [[nodiscard]] bool suits(std::uint8_t mode) const;
   [[nodiscard]] bool driven(std::size_t clock, std::uint8_t mode) const;
   [[nodiscard]] bool shifts_at_leading_edge(std::uint8_t mode) const;

@@ -150,6 +150,17 @@ struct EvidenceSink {
   ~EvidenceSink() = default;
 };
 
+/// Where a value, or a part of it, stands in a frame. Bits count as those of `Unit::covered`: on lines of characters
+/// the last of a range is the most significant, on clocked links the first.
+struct BitRange {
+  std::size_t first = 0;
+  std::size_t count = 0;
+  bool inverted = false;  // a 0 on the wire is a 1 of the value
+};
+
+/// The parts of one value, the least significant first.
+using BitRanges = Buffer<BitRange, 8>;
+
 enum class Direction : std::uint8_t { request, reply };
 
 /// Where a frame ends in a run of bytes.
@@ -224,6 +235,9 @@ struct Unit {
   /// Whether a flip of this bit of this good reply must be noticed; null: every bit. Bits count from the least
   /// significant of the first byte on; on clocked links in the order of the wire.
   bool (*covered)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
+  /// Where this good reply has a field that it carries: no ranges where it has it in no fixed place, or makes it of
+  /// something else. Null: not told of any.
+  BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
   /// About a reply that `decode` refuses with `error`, what the document says; null: nothing.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
   /// The line as the options describe it; null: always `line`.

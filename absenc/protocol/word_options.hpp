@@ -85,6 +85,33 @@ struct WordSettings : Format {
   return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn), scale.linear ? scale.unit_um : 0};
 }
 
+/// Where a field of a word that begins at bit `first` stands. What is Gray-coded stands in no bits of its own.
+[[nodiscard]] constexpr BitRanges place_in_word(const WordFormat& format, const FieldInfo& field, std::size_t first) {
+  const auto is = [&field](WordFieldIndex index) { return &field == &word_fields[index]; };
+  const auto shows = [&](const WordField& one) {
+    switch (one.meaning) {
+      case Meaning::position:
+        return !format.gray() && (is(word_field_singleturn) || is(word_field_position));
+      case Meaning::multiturn:
+        return !format.gray() && is(word_field_multiturn);
+      case Meaning::error:
+        return is(word_field_error);
+      case Meaning::warning:
+        return is(word_field_warning);
+      case Meaning::value:
+        return field.name == one.name;
+      default:
+        return false;
+    }
+  };
+  BitRanges ranges;
+  for (const WordField& one : format.fields()) {
+    if (ranges.empty() && shows(one)) ranges.push_back({first, one.bits, one.active_low});
+    first += one.bits;
+  }
+  return ranges;
+}
+
 template <std::size_t a, std::size_t b>
 [[nodiscard]] constexpr std::array<FieldInfo, a + b> joined_fields(const std::array<FieldInfo, a>& first,
                                                                    const std::array<FieldInfo, b>& second) {

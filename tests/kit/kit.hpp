@@ -13,6 +13,10 @@ namespace absenc::kit {
 /// reply too many.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
+/// Where the unit says that the fields of good replies stand: vectors, those that a flip makes of them, and what the
+/// virtual encoder answers. The bits, cut out and put together, are the field's number.
+[[nodiscard]] Findings check_places(const Unit& unit);
+
 /// Every vector's reply fed to the conversations of the commands whose request it has: whole, byte by byte, cut at each
 /// byte, with each bit flipped, garbage before and behind, one frame too many. A vector's reading that no command
 /// reads, and a command without a request, are findings.
@@ -34,6 +38,10 @@ namespace absenc::kit {
 
 /// The first and the last byte of each memory area are written and read back; what cannot be written is refused.
 [[nodiscard]] Findings check_memory(const Unit& unit);
+
+/// Each condition of the virtual encoder, at the ends of its range, is seen by a host: in some configuration a command
+/// tells something else than normally, at once, after the power was away, or of alarms and resets.
+[[nodiscard]] Findings check_conditions(const Unit& unit);
 
 /// On an undamaged line each command ends well, in each configuration of the unit, and positions are where the shaft
 /// stands.

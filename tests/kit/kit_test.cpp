@@ -35,6 +35,12 @@ TEST_P(Kit, DecodesItsVectors) {
   expect_none(findings);
 }
 
+TEST_P(Kit, FieldsStandWhereItSays) {
+  const Findings findings = check_places(unit);
+  EXPECT_EQ(findings.looks() > 100, unit.bits != nullptr);
+  expect_none(findings);
+}
+
 TEST_P(Kit, HostsTakeWhatVectorsSay) {
   const Findings findings = check_hosts(unit);
   EXPECT_GT(findings.looks(), 100u);
@@ -51,6 +57,7 @@ TEST_P(Kit, DeclaresWhatIsThere) { expect_none(check_declarations(unit)); }
 TEST_P(Kit, RequestsHaveTheirArguments) { expect_none(check_requests(unit, 1)); }
 TEST_P(Kit, StorageIsEnough) { expect_none(check_storage(unit)); }
 TEST_P(Kit, ChangesAreMade) { expect_none(check_settings(unit)); }
+TEST_P(Kit, ConditionsAreSeen) { expect_none(check_conditions(unit)); }
 TEST_P(Kit, MemoryKeepsItsBytes) { expect_none(check_memory(unit)); }
 
 /// The series of faults, of which sanitizers see the first (CMakePresets.json), and the unit.

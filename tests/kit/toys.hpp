@@ -25,6 +25,8 @@ enum class Mistake : std::uint8_t {
   wants_more,      // host_storage is less than the host needs
   overflows,       // the host is made whatever storage there is
   flips_pass,      // decode does not look at the last byte
+  misplaced,       // where it says that the position stands, a part of it stands
+  no_condition,    // the virtual encoder is what it is, whatever is set
   never_ends,      // the host waits for ever when nothing comes
   takes_all,       // any arguments make a request
 };
@@ -147,7 +149,7 @@ struct Toy {
       using Kind = Event<std::uint8_t>::Kind;
       if (event.kind == Kind::received && event.items[0] == ask) {
         const auto now = static_cast<unsigned>(counts_at(shaft_.at(event.at).position, bits));
-        said_ = mistake == Mistake::is_stale ? before_ : now + (mistake == Mistake::is_wrong ? 1 : 0);
+        said_ = mistake == Mistake::is_stale ? before_ : now + off_ + (mistake == Mistake::is_wrong ? 1 : 0);
         before_ = now;
         at_ = event.at + std::chrono::microseconds(3);
         speaks_ = true;
@@ -164,6 +166,9 @@ struct Toy {
     void power_off(Time) override {}
     void raise_alarms(std::uint32_t) override {}
     void lower_alarms(std::uint32_t) override {}
+    void set_condition(std::size_t, std::int64_t value, Time) override {
+      if (mistake != Mistake::no_condition) off_ = static_cast<unsigned>(value);
+    }
     [[nodiscard]] MutableBytes memory() override { return {}; }
     [[nodiscard]] std::uint32_t memory_version() const override { return 0; }
     [[nodiscard]] std::span<const Violation> violations() const override { return {}; }
@@ -173,6 +178,7 @@ struct Toy {
    private:
     const Shaft& shaft_;
     unsigned said_ = 0;
+    unsigned off_ = 0;  // its condition
     unsigned before_ = 0;
     Time at_{};
     bool speaks_ = false;
@@ -204,6 +210,11 @@ struct Toy {
     const std::size_t size = direction == Direction::request ? 1 : length;
     return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
   }
+  static BitRanges places(const Options&, Frame, Frame, const FieldInfo& field) {
+    BitRanges ranges;
+    if (&field == &fields[0]) ranges.push_back({0, mistake == Mistake::misplaced ? bits - 4 : bits});
+    return ranges;
+  }
   static Any<Conversation> host(const Options&, const Command&, Arguments arguments, std::span<std::byte> storage) {
     if (!takes(arguments)) return {};
     if (mistake == Mistake::overflows) return {.bytes = new (storage.data()) Host};
@@ -217,6 +228,7 @@ struct Toy {
 
   static constexpr std::array<Model, 1> models{{{"toy", "", 0, {}}}};
   static constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position"}}};
+  static constexpr std::array<Condition, 1> conditions{{{"eccentricity", "counts", "beside its shaft", 0, 100, 0}}};
   static constexpr std::array<Expected, 1> expected{{{"singleturn", weak ? 8619 : 0x1234}}};
   static constexpr std::array<std::uint8_t, 1> asks{mistake == Mistake::no_vector ? std::uint8_t{0x5B} : ask};
   static constexpr std::array<std::uint8_t, length> says = encoded(weak ? 8619 : 0x1234);
@@ -234,6 +246,7 @@ inline constexpr Unit unit = [] {
   made.models = Made::models;
   made.fields = fields;
   made.commands = Made::commands;
+  made.conditions = Made::conditions;
   made.vectors = Made::vectors;
   made.host_storage = sizeof(typename Made::Host) - (mistake == Mistake::wants_more ? 8 : 0);
   made.device_storage = sizeof(typename Made::Encoder);
@@ -241,6 +254,7 @@ inline constexpr Unit unit = [] {
   made.encode = Made::encode;
   made.delimit = Made::delimit;
   made.host = Made::host;
+  made.bits = Made::places;
   made.device = Made::device;
   made.resolution = Made::resolution;
   return made;

@@ -22,8 +22,9 @@ template <Mistake mistake>
 void expect_no_finding() {
   const Unit& unit = toy::unit<mistake>;
   for (const Findings& findings :
-       {check_decoding(unit), check_hosts(unit), check_requests(unit, 1), check_storage(unit), check_declarations(unit),
-        check_settings(unit), check_memory(unit), check_commands(unit), check_exchanges(unit, few)}) {
+       {check_decoding(unit), check_places(unit), check_hosts(unit), check_requests(unit, 1), check_storage(unit),
+        check_declarations(unit), check_settings(unit), check_memory(unit), check_conditions(unit),
+        check_commands(unit), check_exchanges(unit, few)}) {
     EXPECT_THAT(findings.texts(), IsEmpty());
   }
 }
@@ -89,6 +90,15 @@ TEST(KitToys, StorageThatIsNotEnough) {
 TEST(KitToys, ADecoderThatOverlooksAByte) {
   EXPECT_THAT(check_decoding(toy::unit<Mistake::flips_pass>).texts(),
               Contains(HasSubstr("bit 31 flipped is accepted")));
+}
+
+TEST(KitToys, AFieldThatStandsElsewhere) {
+  EXPECT_THAT(check_places(toy::unit<Mistake::misplaced>).texts(), Contains(HasSubstr("has more bits")));
+}
+
+TEST(KitToys, AConditionThatNothingShows) {
+  EXPECT_THAT(check_conditions(toy::unit<Mistake::no_condition>).texts(),
+              ElementsAre("condition eccentricity is not seen by any host, whatever it is"));
 }
 
 TEST(KitToys, AConversationThatDoesNotEnd) {

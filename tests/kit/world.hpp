@@ -34,6 +34,8 @@ struct Ended {
   std::uint64_t damaged{};  // faults that changed bytes while it went on
   std::uint64_t faults{};   // of all kinds
   std::uint64_t asked{};    // requests answered meanwhile
+  Wire sent{};              // the last exchange, on links that carry bytes
+  Wire received{};
 
   [[nodiscard]] bool good() const { return made && ended && error == Error::none; }
 };
@@ -113,6 +115,11 @@ class World {
     result.damaged = changed_bytes() - changed;
     result.faults = all_faults() - faults;
     result.asked = device_->answered() - answered;
+    if constexpr (!is_can) {
+      const auto exchange = conversation->exchange();
+      result.sent.assign(exchange.sent.begin(), exchange.sent.end());
+      result.received.assign(exchange.received.begin(), exchange.received.end());
+    }
     idle_.detach(*line_, node_);
     return result;
   }

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "absenc/capture/lines/can_line.hpp"
+#include "tools/absenc/bit_text.hpp"
 #include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/reading_text.hpp"
@@ -104,8 +105,8 @@ std::string message_of(const Unit& unit, const Options& options, const Annotatio
 }
 
 AnnotationPrinter::AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock,
-                                     AnnotationFormat format)
-    : unit_(unit), options_(options), clock_(clock), format_(format) {
+                                     AnnotationFormat format, ShowBits bits)
+    : unit_(unit), options_(options), clock_(clock), format_(format), bits_(bits) {
   if (format != AnnotationFormat::csv) return;
   const bool linear = unit.resolution(options).unit_um > 0;
   kept_ = fmt::format("{},kind,request,reply,turnaround_us,{},fields,error,message\n",
@@ -140,6 +141,10 @@ std::string AnnotationPrinter::text(const Annotation& annotation) const {
   } else if (has_fields(annotation)) {
     line += "   " + field_words(unit_, options_, annotation);
   }
+  if (bits_ == ShowBits::yes && has_fields(annotation)) {
+    const std::string places = FieldPlaces(unit_, options_, annotation.request, annotation.reply).text();
+    if (!places.empty()) line += fmt::format("   [{}]", places);
+  }
   const std::string message = message_of(unit_, options_, annotation);
   if (annotation.error != Error::none) line += fmt::format("   {}", text_of(annotation.error).name);
   if (!message.empty()) line += fmt::format("{}{}", annotation.error != Error::none ? ": " : "   ", message);
@@ -165,6 +170,9 @@ std::string AnnotationPrinter::json(const Annotation& annotation) const {
     FieldsWithReading numbers(fields);  // whether they hold stands beside them
     static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, numbers));
     json.set("fields", fields.fields);
+    if (bits_ == ShowBits::yes) {
+      json.set("bits", FieldPlaces(unit_, options_, annotation.request, annotation.reply).json());
+    }
   }
   if (annotation.reading != nullptr && annotation.reading->singleturn_bits != 0) {
     const Reading& reading = *annotation.reading;

@@ -38,11 +38,13 @@ class TickClock {
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 enum class AnnotationFormat : std::uint8_t { text, json, csv };
+enum class ShowBits : std::uint8_t { no, yes };  // where in the reply its fields stand
 
 /// Prints each annotation as it comes; many at a time where nobody waits for them.
 class AnnotationPrinter final : public capture::AnnotationSink {
  public:
-  AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format);
+  AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format,
+                    ShowBits bits = ShowBits::no);
 
   void put(const capture::Annotation& annotation) override;
   /// Prints what is still kept. Throws OutputClosed, ToolFailure.
@@ -57,6 +59,7 @@ class AnnotationPrinter final : public capture::AnnotationSink {
   const Options& options_;
   TickClock clock_;
   AnnotationFormat format_;
+  ShowBits bits_;
   std::string kept_;
 };
 

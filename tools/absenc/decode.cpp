@@ -4,6 +4,7 @@
 #include <array>
 
 #include "tools/absenc/annotation_text.hpp"
+#include "tools/absenc/bit_text.hpp"
 #include "tools/absenc/capture_run.hpp"
 #include "tools/absenc/capture_statistics.hpp"
 #include "tools/absenc/diagnosis.hpp"
@@ -44,12 +45,16 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
   FieldsWithReading sink(json ? static_cast<FieldSink&>(fields) : rows);
   const Error error = unit.decode(options, request.frame(), reply.frame(), sink);
   if (error == Error::none) {
+    const bool bits = invocation.has("--bits");
+    const FieldPlaces places(unit, options, request.frame(), reply.frame());
     if (json) {
       Json good = Json::object().set("protocol", unit.id).set("ok", true).set("fields", fields.fields);
+      if (bits) good.set("bits", places.json());
       if (sink.reading()) set_validity(good, *sink.reading());
       print_line(good.line());
     } else {
       if (sink.reading()) rows.put_reading(*sink.reading());
+      if (bits) places.add_to(rows.rows);
       print_line(table(rows.rows));
     }
     return exit_good;
@@ -105,6 +110,9 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   const bool statistics_only = invocation.has("--stats");
   const bool json = invocation.has("--json");
   if (json && invocation.has("--csv")) throw UsageError("--json and --csv cannot be given together");
+  if (invocation.has("--bits") && (statistics_only || invocation.has("--csv"))) {
+    throw UsageError("--bits is about each frame: with --json or as text, without --stats and --csv");
+  }
   if (statistics_only && invocation.has("--csv")) throw UsageError("--stats is text or, with --json, an object");
 
   CaptureRun run(unit, asked_for, capture_choices(invocation, invocation.text("file")));
@@ -114,7 +122,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   const AnnotationFormat format = json                      ? AnnotationFormat::json
                                   : invocation.has("--csv") ? AnnotationFormat::csv
                                                             : AnnotationFormat::text;
-  AnnotationPrinter printer(unit, options, clock, format);
+  AnnotationPrinter printer(unit, options, clock, format, invocation.has("--bits") ? ShowBits::yes : ShowBits::no);
   Counted counted(statistics, statistics_only ? nullptr : &printer);
   SequenceWatch watched(unit, options, counted);
   Progress progress;
@@ -144,6 +152,9 @@ int run_decode(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
   const bool one = invocation.has("--hex") || invocation.has("--request");
+  if (invocation.has("--bits") && unit.bits == nullptr) {
+    throw UsageError(fmt::format("{} does not say where in a frame its fields stand", unit.id));
+  }
   if (invocation.has("file")) {
     if (one) throw UsageError("a capture and --hex or --request cannot be given together");
     return decode_capture(invocation, unit, options);
@@ -154,7 +165,7 @@ int run_decode(const Invocation& invocation) {
   return decode_one(invocation, unit, options);
 }
 
-constexpr std::array<Parameter, 14> parameters{{
+constexpr std::array<Parameter, 15> parameters{{
     parameter::protocol,
     {"file", "",
      "a capture: a sigrok session, VCD, CSV or binary export of a logic analyser, a log of candump, bytes "
@@ -173,14 +184,16 @@ constexpr std::array<Parameter, 14> parameters{{
     {"--rate", "HZ", "samples a second, where the file does not tell"},
     {"--stats", "", "only what it comes to: counts, errors, turn-around times, the way of the position"},
     {"--csv", "", "a line for each exchange"},
+    {"--bits", "", "also where in the reply each field stands, by the bits as they come on the wire, from 0 on"},
     parameter::model,
     parameter::protocol_option,
     {"--json", "", "one JSON object; of a capture one a line"},
 }};
 
-constexpr std::array<Example, 4> examples{{
+constexpr std::array<Example, 5> examples{{
     {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"",
      "a position, its turns and alarms"},
+    {"absenc decode tformat --hex 0200cdab0165 --option strict=false --bits", "the same, and which bits they are"},
     {"absenc decode tformat --hex 0200cdab0165 --option strict=false --json", "without the request, for a program"},
     {"absenc decode tformat drive.sr --channel D0 --stats", "what an hour of a line under load comes to"},
     {"absenc decode ssi probe.vcd --channel clock=D0,data=D1 --option bits=17", "each word of a clocked encoder"},

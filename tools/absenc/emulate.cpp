@@ -15,6 +15,7 @@
 #include "absenc/os/slcan_port.hpp"
 #include "absenc/os/spi_device.hpp"
 #include "absenc/os/spidev.hpp"
+#include "tools/absenc/console.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/memory_file.hpp"
 #include "tools/absenc/memory_keeper.hpp"
@@ -156,11 +157,13 @@ struct Emulation {
   int run(const Serve& serve) {
     const Time start = os::now();
     line.power_on(start);
-    MemoryKeeper<Item> keeper(line.machine(), line.first(), file);
+    Console console(line.unit(), line.devices());
+    Consoled<Item> consoled(line.machine(), console);
+    MemoryKeeper<Item> keeper(consoled, line.first(), file);
     std::vector<std::string> notes;
     int status = exit_good;
     try {
-      notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : line.machine());
+      notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : consoled);
       if (keeps_memory) keeper.finish();
     } catch (const ToolFailure& failure) {
       print_message(failure.what());
@@ -209,6 +212,7 @@ Notes serve_terminal(Machine<std::uint8_t>& machine, const Invocation& invocatio
 Notes serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const LineSettings& line,
                 const Invocation& invocation, Time end) {
   os::SpiDevice device(unit.link, line, machine);
+  device.begin(os::now());
   os::Spidev spidev(device);
   os::SpidevNode node(std::string(invocation.text("--spidev")), spidev);
   print_line(fmt::format("ready: {}", node.path()));
@@ -271,7 +275,7 @@ int run_emulate(const Invocation& invocation) {
                                     : emulate_bytes(unit, options, invocation);
 }
 
-constexpr std::array<Parameter, 19> parameters{{
+constexpr std::array<Parameter, 20> parameters{{
     parameter::protocol,
     {"--pty", "PATH", "where to put the link to the pseudo-terminal; CAN: that of an slcan adapter",
      "only the pseudo-terminal itself"},
@@ -288,6 +292,8 @@ constexpr std::array<Parameter, 19> parameters{{
     {"--singleturn", "COUNTS", "position within the turn at the start", "0"},
     {"--multiturn", "TURNS", "turns at the start", "0"},
     {"--motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV (lines of seconds,degrees)", "still"},
+    {"--condition", "NAME=VALUE", "set this condition: temperature, battery ..., as `absenc list <protocol>` has them",
+     "", false, true},
     {"--alarm", "NAME", "raise this alarm", "", false, true},
     {"--fault", "KIND=RATE",
      "how often a reply is damaged, from 0 to 1; kinds: drop, corrupt, truncate, delay, echo, garbage, silence, "
@@ -302,10 +308,12 @@ constexpr std::array<Parameter, 19> parameters{{
     {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
 }};
 
-constexpr std::array<Example, 6> examples{{
+constexpr std::array<Example, 7> examples{{
     {"absenc emulate tformat --pty /tmp/encoder --motion rpm=60", "a turning encoder; read it as tformat:/tmp/encoder"},
     {"absenc emulate tformat --tcp 4001 --alarm battery_alarm --fault corrupt=0.01 --memory encoder.txt",
      "one that misbehaves, for whoever connects, and remembers what was written"},
+    {"echo temperature=120 | absenc emulate tformat --pty /tmp/encoder --condition battery=0",
+     "one without a battery, that gets too hot"},
     {"absenc emulate esl --pty /tmp/line --also address=3 --also \"address=5&singleturn=1000&motion=rpm=60\"",
      "three on one line; `absenc scan esl:/tmp/line` finds them"},
     {"absenc emulate e201 --port /dev/ttyUSB1", "for whoever is at the other end of a cable"},
@@ -320,6 +328,7 @@ DeviceSettings device_settings(const Invocation& invocation) {
   if (invocation.has("--singleturn")) settings.singleturn = invocation.number("--singleturn", 0, 0, INT64_MAX);
   if (invocation.has("--multiturn")) settings.multiturn = invocation.number("--multiturn", 0, 0, INT64_MAX);
   settings.motion = invocation.text("--motion", "still");
+  for (const std::string& condition : invocation.texts("--condition")) settings.conditions.push_back(condition);
   for (const std::string& alarm : invocation.texts("--alarm")) settings.alarms.push_back(alarm);
   for (const std::string& fault : invocation.texts("--fault")) settings.faults.push_back(fault);
   settings.seed = static_cast<std::uint64_t>(invocation.number("--seed", 1, 0, INT64_MAX));
@@ -352,6 +361,12 @@ const Subcommand emulate_subcommand{
     "emulate",
     "be a virtual encoder on a pseudo-terminal, a serial or TCP port, an SPI device or a CAN interface",
     "Prints \"ready: PATH\" when it can be opened, and with --tcp also \"ready: tcp:127.0.0.1:PORT\".\n"
+    "While it runs, each line on standard input is answered by one on standard output, \"ok: ...\" or \"error: ...\":\n"
+    "  NAME=VALUE       set a condition; NAME alone asks for it\n"
+    "  power off        and power on, which takes the time of the document\n"
+    "  alarm NAME       raise alarms; clear NAME lowers them\n"
+    "  help             what this encoder can be told\n"
+    "With --also a line is for all of them, with a number in front for one: \"2: power off\" is the first of --also.\n"
     "At the end, a summary goes to standard error: requests, faults, and the rules that the host broke.",
     parameters,
     examples,

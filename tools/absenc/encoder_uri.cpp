@@ -92,6 +92,8 @@ void set_link_parameter(EncoderUri& uri, const OptionText& setting) {
     uri.device.singleturn = number_of(setting, 0, INT64_MAX);
   } else if (setting.name == "multiturn") {
     uri.device.multiturn = number_of(setting, 0, INT64_MAX);
+  } else if (setting.name == "condition") {
+    uri.device.conditions.push_back(value);
   } else if (setting.name == "alarm") {
     uri.device.alarms.push_back(value);
   } else if (setting.name == "fault") {

@@ -34,7 +34,7 @@ struct LinkParameter {
   bool repeatable = false;
 };
 
-inline constexpr std::array<LinkParameter, 21> link_parameters{{
+inline constexpr std::array<LinkParameter, 22> link_parameters{{
     {rate_setting, "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan"},
     {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
@@ -56,6 +56,8 @@ inline constexpr std::array<LinkParameter, 21> link_parameters{{
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
     {"multiturn", "TURNS", "turns at the start", "sim"},
+    {"condition", "NAME=VALUE",
+     "a condition of the virtual encoder: temperature, battery ...; may be given more than once", "sim", true},
     {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", true},
     {"fault", "KIND=RATE",
      "a fault to inject, with its probability for each reply (request_corrupt: for each byte heard); may be given more "

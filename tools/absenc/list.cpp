@@ -143,6 +143,15 @@ Rows field_rows(const Unit& unit) {
   return rows;
 }
 
+Rows condition_rows(const Unit& unit) {
+  Rows rows;
+  for (const Condition& condition : unit.conditions) {
+    rows.push_back({std::string(condition.name), range_of(condition), fmt::format("normally {}", condition.normal),
+                    std::string(condition.meaning)});
+  }
+  return rows;
+}
+
 std::string details(const Unit& unit) {
   std::string text = table(Rows{{std::string(unit.id), std::string(unit.name)},
                                 {"document", std::string(unit.document)},
@@ -159,6 +168,10 @@ std::string details(const Unit& unit) {
   text += section(fmt::format("Registers (absenc memory read {}:PORT <name>)", unit.id), register_rows(unit));
   text += section(fmt::format("Memory (absenc memory read {}:PORT <address> --page P)", unit.id), memory_rows(unit));
   text += section("Fields", field_rows(unit));
+  text += section(fmt::format("Conditions of the virtual encoder (emulate --condition NAME=VALUE, "
+                              "\"sim:{}?condition=NAME=VALUE\")",
+                              unit.id),
+                  condition_rows(unit));
   return text;
 }
 
@@ -266,6 +279,20 @@ Json fields_json(const Unit& unit) {
   return fields;
 }
 
+Json conditions_json(const Unit& unit) {
+  Json conditions = Json::array();
+  for (const Condition& condition : unit.conditions) {
+    conditions.append(Json::object()
+                          .set("name", condition.name)
+                          .set("unit", condition.unit)
+                          .set("meaning", condition.meaning)
+                          .set("minimum", condition.minimum)
+                          .set("maximum", condition.maximum)
+                          .set("normal", condition.normal));
+  }
+  return conditions;
+}
+
 Json unit_json(const Unit& unit) {
   static constexpr std::array<std::string_view, 3> parities{"none", "odd", "even"};
   return Json::object()
@@ -283,7 +310,8 @@ Json unit_json(const Unit& unit) {
       .set("commands", commands_json(unit))
       .set("memory", memory_json(unit))
       .set("registers", registers_json(unit))
-      .set("fields", fields_json(unit));
+      .set("fields", fields_json(unit))
+      .set("conditions", conditions_json(unit));
 }
 
 Json name_json(std::string_view name, const EncoderUri& uri) {

@@ -140,6 +140,27 @@ std::vector<std::int64_t> role_arguments(const Command& command, std::initialize
   return all;
 }
 
+const Condition* find_condition(const Unit& unit, std::string_view name) {
+  const auto found = std::find_if(unit.conditions.begin(), unit.conditions.end(),
+                                  [&](const Condition& condition) { return condition.name == name; });
+  return found == unit.conditions.end() ? nullptr : &*found;
+}
+
+std::int64_t require_value(const Condition& condition, std::string_view written) {
+  const Result<std::int64_t> value = parse_number(written);
+  if (value && *value >= condition.minimum && *value <= condition.maximum) return *value;
+  throw UsageError(
+      fmt::format("{} is \"{}\", but must be a number from {}", condition.name, written, range_of(condition)));
+}
+
+std::string range_of(const Condition& condition) {
+  return fmt::format("{} to {}", condition.minimum, to_text(condition, condition.maximum));
+}
+
+std::string to_text(const Condition& condition, std::int64_t value) {
+  return fmt::format("{}{}{}", value, condition.unit.empty() ? "" : " ", condition.unit);
+}
+
 std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names) {
   std::uint32_t bits = 0;
   for (const std::string& name : names) {

@@ -42,6 +42,15 @@ struct RoleArgument {
 /// The bits of the flags with these names. Throws UsageError.
 [[nodiscard]] std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names);
 
+/// Null when the virtual encoder has no condition of this name.
+[[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
+/// Throws UsageError.
+[[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
+/// "-20 to 127 degC"
+[[nodiscard]] std::string range_of(const Condition& condition);
+/// "85 degC"
+[[nodiscard]] std::string to_text(const Condition& condition, std::int64_t value);
+
 /// "1 to 24" or "true, false"
 [[nodiscard]] std::string range_of(const Option& option);
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);

@@ -5,9 +5,11 @@
 
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "absenc/core/bits.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/nearest.hpp"
 #include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
@@ -55,6 +57,13 @@ sim::FaultRates fault_rates(const DeviceSettings& settings) {
   return rates;
 }
 
+std::string unknown_condition(const Unit& unit, std::string_view name) {
+  if (unit.conditions.empty()) return fmt::format("the virtual encoder of {} has no conditions to be set", unit.id);
+  std::vector<std::string_view> names;
+  for (const Condition& condition : unit.conditions) names.push_back(condition.name);
+  return fmt::format("there is no condition \"{}\"{}", name, suggestion(name, names));
+}
+
 }  // namespace
 
 VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const DeviceSettings& settings)
@@ -69,6 +78,14 @@ VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const Dev
     throw UsageError(fmt::format("the encoders of {} have no alarms", unit.id));
   }
   if (unit.alarms != nullptr) alarms_ = require_flags(*unit.alarms, settings.alarms);
+  for (const Condition& condition : unit.conditions) conditions_.push_back(condition.normal);
+  for (const std::string& text : settings.conditions) {
+    const OptionText written = split_setting(text);
+    const Condition* condition = find_condition(unit, written.name);
+    if (condition == nullptr) throw UsageError(unknown_condition(unit, written.name));
+    conditions_[static_cast<std::size_t>(condition - unit.conditions.data())] =
+        require_value(*condition, written.value);
+  }
   if (settings.faults.empty()) return;
   const sim::FaultRates rates = fault_rates(settings);
   if (device_.bytes != nullptr) faulty_ = std::make_unique<sim::FaultyDevice>(*device_.bytes, rates, settings.seed);
@@ -89,16 +106,45 @@ const sim::FaultCounts* VirtualDevice::faults() const {
   return faulty_node_ ? &faulty_node_->counts() : nullptr;
 }
 
+// What both kinds of device can do.
+template <class Use>
+void VirtualDevice::each(Use use) {
+  if (device_.bytes != nullptr) use(*device_.bytes);
+  if (device_.frames != nullptr) use(*device_.frames);
+}
+
 void VirtualDevice::power_on(Time now) {
   motion_.begin_at(now);
-  const auto switch_on = [&](auto* device) {
-    if (device == nullptr) return;
-    using Kind = typename std::remove_pointer_t<decltype(device)>::PowerOn;
-    device->power_on(now, real_power_on_ ? Kind::real : Kind::skip);
-    device->raise_alarms(alarms_);
-  };
-  switch_on(device_.bytes);
-  switch_on(device_.frames);
+  for (std::size_t i = 0; i < conditions_.size(); ++i) {
+    set_condition(i, conditions_[i], now);
+  }
+  switch_on(now, real_power_on_);
+  raise_alarms(alarms_);
+}
+
+void VirtualDevice::switch_on(Time now, bool real) {
+  if (std::exchange(is_on_, true)) return;
+  each([&]<class Item>(Device<Item>& device) {
+    device.power_on(now, real ? Device<Item>::PowerOn::real : Device<Item>::PowerOn::skip);
+  });
+}
+
+void VirtualDevice::switch_off(Time now) {
+  if (!std::exchange(is_on_, false)) return;
+  each([&](auto& device) { device.power_off(now); });
+}
+
+void VirtualDevice::raise_alarms(std::uint32_t bits) {
+  each([&](auto& device) { device.raise_alarms(bits); });
+}
+
+void VirtualDevice::lower_alarms(std::uint32_t bits) {
+  each([&](auto& device) { device.lower_alarms(bits); });
+}
+
+void VirtualDevice::set_condition(std::size_t index, std::int64_t value, Time now) {
+  conditions_[index] = value;
+  each([&](auto& device) { device.set_condition(index, value, now); });
 }
 
 }  // namespace absenc::tool

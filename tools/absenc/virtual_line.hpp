@@ -25,7 +25,7 @@ template <class Item>
 class VirtualLine {
  public:
   VirtualLine(const Unit& unit, const Options& options, const Invocation& invocation)
-      : further_(invocation.texts("--also")) {
+      : unit_(unit), further_(invocation.texts("--also")) {
     const DeviceSettings settings = device_settings(invocation);
     Options first = options;
     if (!further_.empty()) tell_shared(unit, first);
@@ -59,6 +59,13 @@ class VirtualLine {
     for (const auto& device : devices_) device->power_on(now);
   }
 
+  [[nodiscard]] const Unit& unit() const { return unit_; }
+  [[nodiscard]] std::vector<VirtualDevice*> devices() {
+    std::vector<VirtualDevice*> all;
+    for (const auto& device : devices_) all.push_back(device.get());
+    return all;
+  }
+
   void summarize(Time start) const {
     for (std::size_t i = 0; i < devices_.size(); ++i) {
       const std::string name = i > 0 ? further_[i - 1] + ": " : devices_.size() > 1 ? "the first: " : "";
@@ -77,6 +84,7 @@ class VirtualLine {
     }
   }
 
+  const Unit& unit_;
   std::span<const std::string> further_;
   std::vector<std::unique_ptr<VirtualDevice>> devices_;
   std::unique_ptr<std::conditional_t<is_can, sim::FrameBus, sim::Bus>> bus_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 
+#include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/scan.hpp"
 #include "absenc/protocol/author/unit.hpp"
 
@@ -179,6 +180,12 @@ struct Definition : Declares<Definition, Protocol> {
       VectorText{"amt21-9", "zero", source, "", "565e", "", "encoder_address=84 command=zero"},
       VectorText{"amt21-10", "a reset has no reply", source, "", "5675", "3492", "wrong_length"},
   };
+
+  static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
+    const unsigned singleturn = options.format(values).singleturn_bits;
+    if (&field == fields.of<&Values::singleturn>()) return bits_of(0, 14 - singleturn, singleturn);
+    return bits_of(0, 0, &field == fields.of<&Values::multiturn>() ? turns_bits : 0);
+  }
 
   static constexpr Request guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
 

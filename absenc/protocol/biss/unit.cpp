@@ -98,6 +98,12 @@ struct Definition {
     const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
     return bit + 1 < idle || bit > samples.end_of_run(idle);
   }
+  // Behind the start bit and CDS.
+  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+    const BitView samples = to_bits(reply);
+    const std::size_t start = samples.end_of_run(samples[0] ? samples.end_of_run(0) : 0);
+    return place_in_word(format(values).word, field, start + 2);
+  }
 };
 
 }  // namespace

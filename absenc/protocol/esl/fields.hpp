@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 
+#include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/esl/reply.hpp"
 
@@ -193,6 +194,81 @@ constexpr void put_part(Values& values, Part part, const Reply& reply, bool firs
   for (const Part part : layout_of(reply.id).one()) detail::put_part(values, part, reply, true);
   for (const Part part : layout_of(reply.id).two()) detail::put_part(values, part, reply, false);
   return values;
+}
+
+namespace detail {
+
+// Where a part that begins at this byte has a field; no place: it is not one of its own.
+constexpr BitRanges place_in(const Profile& profile, Part part, std::size_t byte, bool first, const FieldInfo& field) {
+  using author::bits_of;
+  const auto is = [&field](const FieldInfo* one) { return one == &field; };
+  // RS: its low bit stands beside or behind SC2, those above in a byte before.
+  const auto redundant = [&](std::size_t low_bit) {
+    BitRanges ranges = bits_of(byte + 1, low_bit, 1);
+    ranges.push_back({8 * byte, 8});
+    return ranges;
+  };
+  const bool low_at_7 = profile.rs1_sc2 == RedundantBit::b7;
+  const bool as_document = profile.memory_address_order == FieldOrder::document;
+  switch (part) {
+    case Part::status: {
+      if (!is(first ? fields.of<&Values::ch1_status>() : fields.of<&Values::ch2_status>())) return {};
+      if (profile.status_order == FieldOrder::document) return bits_of(byte, 0, 8);
+      BitRanges ranges = bits_of(byte, 6, 2);
+      ranges.push_back({8 * byte + 4, 2});
+      ranges.push_back({8 * byte, 4});
+      return ranges;
+    }
+    case Part::alarms:
+      return bits_of(byte, 0, is(first ? fields.of<&Values::ch1_alarms>() : fields.of<&Values::ch2_alarms>()) ? 8 : 0);
+    case Part::singleturn:
+      return bits_of(byte, 0, is(fields.of<&Values::singleturn>()) ? singleturn_bits : 0);
+    case Part::multiturn:
+      return bits_of(byte, 0, is(fields.of<&Values::multiturn>()) ? multiturn_bits : 0);
+    case Part::sequence:
+      return bits_of(byte, 0, is(fields.of<&Values::ch1_sequence>()) ? 8 : 0);
+    case Part::encoder_id:
+      if (is(fields.of<&Values::encoder_id>())) return bits_of(byte, 0, 8);
+      if (is(fields.of<&Values::safety>())) return bits_of(byte, 7, 1);
+      if (is(fields.of<&Values::multiturn_bytes>())) return bits_of(byte, 5, 2);
+      return bits_of(byte, 0, is(fields.of<&Values::singleturn_bits>()) ? 5 : 0);
+    case Part::temperature:
+      return bits_of(byte, 0, is(fields.of<&Values::temperature>()) ? 8 : 0);
+    case Part::redundant_sequence:
+      if (is(fields.of<&Values::redundant>())) return redundant(low_at_7 ? 7 : 0);
+      return bits_of(byte + 1, low_at_7 ? 0 : 1, is(fields.of<&Values::ch2_sequence>()) ? 7 : 0);
+    case Part::zero_sequence:
+      return bits_of(byte, low_at_7 ? 0 : 1, is(fields.of<&Values::ch2_sequence>()) ? 7 : 0);
+    case Part::redundant_alone:
+      return is(fields.of<&Values::redundant>()) ? redundant(profile.idc_rs1 == RedundantBit::b7 ? 7 : 0) : BitRanges{};
+    case Part::redundant_calibration:
+      if (!is(fields.of<&Values::redundant>())) return {};
+      return profile.id6_rs == Id6Redundant::bits_16 ? author::big_endian_bits(byte, 2, 16) : redundant(0);
+    case Part::memory_address:
+      if (is(fields.of<&Values::busy>())) return bits_of(byte, as_document ? 0 : 7, 1);
+      return bits_of(byte, as_document ? 1 : 0, is(fields.of<&Values::memory_address>()) ? 7 : 0);
+    case Part::value:
+      return bits_of(byte, 0, is(fields.of<&Values::value>()) ? 8 : 0);
+  }
+  return {};
+}
+
+}  // namespace detail
+
+/// Where a good reply has a field that it carries.
+[[nodiscard]] constexpr BitRanges place_of(const Profile& profile, Bytes reply, const FieldInfo& field) {
+  if (&field == fields.of<&Values::encoder_address>()) return author::bits_of(0, 0, 3);
+  if (&field == fields.of<&Values::data_id>()) return author::bits_of(0, 3, 4);
+  const Layout& layout = layout_of(data_id(reply[0]).value_or(DataId::position));
+  for (const bool first : {true, false}) {
+    std::size_t byte = first ? 1 : layout.length_one + 1;
+    for (const Part part : first ? layout.one() : layout.two()) {
+      const BitRanges place = detail::place_in(profile, part, byte, first, field);
+      if (!place.empty()) return place;
+      byte += size_of(part);
+    }
+  }
+  return {};
 }
 
 /// What was asked: the request, or without one what the reply's own control field says; the address of a memory access

@@ -92,6 +92,9 @@ struct Definition {
   static constexpr const FieldInfo* alarms = fields.of<&Values::ch1_alarms>();
   static constexpr const auto& vectors = esl::vectors;
   static constexpr const auto& conditions = esl::conditions;
+  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+    return place_of(options.format(values), reply.bytes, field);
+  }
   static constexpr LineTiming timing{.pause_bits = 1, .turnaround = answer_time, .turnaround_limit = answer_limit};
   static constexpr Resolution resolution(const Profile&) { return {singleturn_bits, multiturn_bits}; }
 

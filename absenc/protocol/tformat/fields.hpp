@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 
+#include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 
@@ -108,6 +109,23 @@ inline constexpr auto fields = author::fields_of<Values>(
   if (everything) all.alarms = reply.alarms;
   if (reply.id != DataId::multiturn && reply.id != DataId::encoder_id) all.singleturn = reply.singleturn;
   return all;
+}
+
+/// Where a good reply has a field that it carries (Figures of 6.3).
+[[nodiscard]] constexpr BitRanges place_of(const Format& format, Bytes reply, const FieldInfo& field) {
+  const DataId id = data_id(reply[0]).value_or(DataId::everything);
+  const bool everything = id == DataId::everything;
+  using author::bits_of;
+  if (&field == fields.of<&Values::data_id>()) return bits_of(0, 3, 4);
+  if (&field == fields.of<&Values::status>()) return bits_of(1, 0, 8);
+  if (&field == fields.of<&Values::address>()) return bits_of(1, 0, 7);
+  if (&field == fields.of<&Values::busy>()) return bits_of(1, 7, 1);
+  if (&field == fields.of<&Values::value>()) return bits_of(2, 0, 8);
+  if (&field == fields.of<&Values::singleturn>()) return bits_of(2, 0, format.singleturn_bits);
+  if (&field == fields.of<&Values::encoder_id>()) return bits_of(everything ? 5 : 2, 0, 8);
+  if (&field == fields.of<&Values::multiturn>()) return bits_of(everything ? 6 : 2, 0, format.multiturn_bits);
+  if (&field == fields.of<&Values::alarms>()) return bits_of(9, 0, 8);
+  return {};
 }
 
 }  // namespace absenc::tformat

@@ -182,6 +182,9 @@ struct Definition {
   static constexpr const auto& memory = areas;
   static constexpr const auto& conditions = tformat::conditions;
   static constexpr const auto& vectors = tformat::vectors;
+  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+    return place_of(options.format(values), reply.bytes, field);
+  }
   static constexpr std::array commands{
       position<DataId::everything>({"position", Verb::read, 0, "position, turns, encoder id and alarms"}),
       position<DataId::singleturn>({"singleturn", Verb::read_part, 0, "position within the turn"}),

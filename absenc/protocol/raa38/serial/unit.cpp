@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/raa38/serial/device.hpp"
 #include "absenc/protocol/raa38/serial/explain.hpp"
@@ -169,6 +170,12 @@ struct Definition {
           {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
   };
 
+  static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
+    const Format format = options.format(values);
+    if (&field == fields.of<&Values::second_byte>()) return author::bits_of(1, 0, 8);
+    if (&field != fields.of<&Values::singleturn>()) return {};
+    return author::big_endian_bits(2, format.data_bytes(), format.bits);
+  }
   static constexpr LineSettings line(const Format&) { return line_settings; }
   static constexpr Resolution resolution(const Format& format) { return {format.bits, 0}; }
   static constexpr Request guess_request(const Format&, Bytes) { return {Request::Kind::trigger}; }

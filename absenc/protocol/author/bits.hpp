@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a value stands in a frame of characters, for `Unit::bits`.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::author {
+
+/// `count` bits from bit `first` of byte `byte` on, the bytes behind it more significant; of 0 bits there is no place.
+[[nodiscard]] constexpr BitRanges bits_of(std::size_t byte, std::size_t first, std::size_t count) {
+  BitRanges ranges;
+  if (count != 0) ranges.push_back({8 * byte + first, count});
+  return ranges;
+}
+
+/// The low `count` bits of a number in `size` bytes from `byte` on, the most significant first.
+[[nodiscard]] constexpr BitRanges big_endian_bits(std::size_t byte, std::size_t size, std::size_t count) {
+  BitRanges ranges;
+  for (std::size_t i = size; i > 0 && count > 0; --i) {
+    const std::size_t here = std::min<std::size_t>(count, 8);
+    ranges.push_back({8 * (byte + i - 1), here});
+    count -= here;
+  }
+  return ranges;
+}
+
+}  // namespace absenc::author

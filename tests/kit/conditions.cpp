@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can be set around a virtual encoder is seen by its host.
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "tests/kit/changes.hpp"
+#include "tests/kit/kit.hpp"
+
+namespace absenc::kit {
+namespace {
+
+constexpr std::int64_t some_turns = 0x5'6000'0000;  // 5.375
+
+/// An encoder with one condition, and what its host is told.
+template <class Item>
+class Setting {
+ public:
+  Setting(const Unit& unit, const Configuration& way, std::size_t condition, std::int64_t value)
+      : world_(unit, way.options, 1) {
+    if (!made()) return;
+    world_.device().set_condition(condition, value, now());
+    move();
+  }
+
+  [[nodiscard]] bool made() const { return world_.made(); }
+  void move() { world_.move(world_.place() + some_turns); }
+  // While the shaft goes on.
+  void lose_power() {
+    world_.device().power_off(now());
+    move();
+    world_.device().power_on(now(), Device<Item>::PowerOn::skip);
+    world_.pass(std::chrono::milliseconds(1));
+  }
+  void raise(std::uint32_t alarms) { world_.device().raise_alarms(alarms); }
+  [[nodiscard]] std::string ask(const Command& command) {
+    const Ended result = world_.run(command, least_arguments(command));
+    return std::string(text_of(result.error).name) + " " + to_text(result.seen.fields);
+  }
+
+ private:
+  [[nodiscard]] Time now() { return world_.line().now(); }
+
+  World<Item> world_;
+};
+
+std::uint32_t all_alarms(const Unit& unit) {
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; unit.alarms != nullptr && i < unit.alarms->flags.size(); ++i) {
+    if (!unit.alarms->flags[i].name.empty()) bits |= 1u << i;
+  }
+  return bits;
+}
+
+// Whether the same done to both is told differently: at once, after the power was away, of alarms, and after resets.
+template <class Item>
+bool differ(const Unit& unit, Setting<Item>&& one, Setting<Item>&& other) {
+  if (!one.made()) return false;
+  const auto asked = [&](const Command& command) { return one.ask(command) != other.ask(command); };
+  const auto seen = [&] {
+    return std::any_of(unit.commands.begin(), unit.commands.end(), [&](const Command& command) {
+      return !command.changes_encoder && command.verb != Verb::scan && asked(command);
+    });
+  };
+  const auto both = [&](auto&& act) {
+    act(one);
+    act(other);
+    return seen();
+  };
+  if (seen() || both([](auto& it) { it.lose_power(); })) return true;
+  if (both([&](auto& it) { it.raise(all_alarms(unit)); })) return true;
+  return std::any_of(unit.commands.begin(), unit.commands.end(), [&](const Command& command) {
+    const bool resets =
+        command.verb == Verb::clear_alarms || command.verb == Verb::reset_multiturn || command.verb == Verb::zero;
+    return resets && (asked(command) || both([](auto& it) { it.move(); }));
+  });
+}
+
+template <class Item>
+bool is_seen(const Unit& unit, std::size_t index) {
+  const Condition& condition = unit.conditions[index];
+  const std::vector<Configuration> ways = configurations(unit);
+  return std::any_of(ways.begin(), ways.end(), [&](const Configuration& way) {
+    const auto differs = [&](std::int64_t value) {
+      return value != condition.normal &&
+             differ<Item>(unit, {unit, way, index, condition.normal}, {unit, way, index, value});
+    };
+    return differs(condition.minimum) || differs(condition.maximum);
+  });
+}
+
+}  // namespace
+
+Findings check_conditions(const Unit& unit) {
+  Findings findings;
+  std::set<std::string_view> names;
+  for (std::size_t i = 0; i < unit.conditions.size(); ++i) {
+    const Condition& one = unit.conditions[i];
+    const auto require = [&](bool holds, const char* text) {
+      findings.require(holds, [&] { return "condition " + std::string(one.name) + " " + text; });
+    };
+    require(names.insert(one.name).second, "is there twice");
+    require(one.minimum < one.maximum && one.minimum <= one.normal && one.normal <= one.maximum, "has no such range");
+    require(unit.link == LinkKind::can ? is_seen<CanFrame>(unit, i) : is_seen<std::uint8_t>(unit, i),
+            "is not seen by any host, whatever it is");
+  }
+  return findings;
+}
+
+}  // namespace absenc::kit

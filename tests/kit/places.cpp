@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a unit says that a field stands in a frame, there it stands.
+#include <algorithm>
+#include <set>
+
+#include "tests/kit/kit.hpp"
+#include "tests/kit/place.hpp"
+#include "tests/kit/world.hpp"
+
+namespace absenc::kit {
+namespace {
+
+bool bit_of(const Held& frame, std::size_t bit) {
+  const std::span<const std::uint8_t> bytes = frame.can ? frame.can->bytes() : Bytes(frame.bytes);
+  return (bytes[bit / 8] & (frame.link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
+}
+
+/// What these bits say; more than 64 say nothing.
+std::uint64_t cut_out(const Held& frame, const BitRanges& ranges, unsigned& width) {
+  std::uint64_t value = 0;
+  width = 0;
+  for (const BitRange& range : ranges.view()) {
+    for (std::size_t i = 0; i < range.count && width < 64; ++i, ++width) {
+      const std::size_t bit = range.first + (frame.link == LinkKind::clocked ? range.count - 1 - i : i);
+      if (bit_of(frame, bit) != range.inverted) value |= std::uint64_t{1} << width;
+    }
+  }
+  return value;
+}
+
+/// Looks at each field of one good frame.
+class Places final : public FieldSink {
+ public:
+  Places(const Unit& unit, Findings& findings) : unit_(unit), findings_(findings) {}
+
+  /// Whether it is one.
+  bool look(const Options& options, const Held& request, const Held& reply) {
+    struct Nothing final : FieldSink {
+      void put(const FieldValue&) override {}
+    } nothing;
+    if (unit_.decode(options, request.frame(), reply.frame(), nothing) != Error::none) return false;
+    options_ = &options;
+    request_ = &request;
+    reply_ = &reply;
+    static_cast<void>(unit_.decode(options, request.frame(), reply.frame(), *this));
+    return true;
+  }
+
+  void put(const FieldValue& value) override {
+    const FieldInfo& info = *value.info;
+    const BitRanges ranges = unit_.bits(*options_, request_->frame(), reply_->frame(), info);
+    if (ranges.empty()) return;
+    const auto require = [&](bool holds, const char* text) {
+      findings_.require(holds, [&] { return std::string(info.name) + " of " + to_text(*reply_) + " " + text; });
+    };
+    const bool inside = std::all_of(ranges.view().begin(), ranges.view().end(), [&](const BitRange& range) {
+      return range.count > 0 && range.first + range.count <= reply_->bit_count();
+    });
+    require(inside, "stands outside the frame");
+    const bool is_number =
+        info.kind != FieldInfo::Kind::real && info.kind != FieldInfo::Kind::text && info.kind != FieldInfo::Kind::bytes;
+    require(is_number, "is no number, and yet has bits");
+    if (!inside || !is_number) return;
+    unsigned width = 0;
+    const std::uint64_t bits = cut_out(*reply_, ranges, width);
+    require(bits == (static_cast<std::uint64_t>(value.number) & low_mask(width)), "stands elsewhere");
+    const bool fits = value.number < 0 || (static_cast<std::uint64_t>(value.number) & ~low_mask(width)) == 0;
+    require(fits, "has more bits");
+    placed_.insert(info.role);
+  }
+
+  /// Of what was seen, the position has a place.
+  void conclude() {
+    findings_.require(placed_.contains(Role::position), [] { return "no frame says where the position stands"; });
+  }
+
+ private:
+  const Unit& unit_;
+  Findings& findings_;
+  const Options* options_ = nullptr;
+  const Held* request_ = nullptr;
+  const Held* reply_ = nullptr;
+  std::set<Role> placed_;
+};
+
+// Where a flip makes another good frame, the fields follow it.
+void look_at_vectors(const Unit& unit, Places& places) {
+  for (const Vector& vector : unit.vectors) {
+    const std::optional<Options> options = options_of(unit, vector.options);
+    const Held request = held(unit, vector.request);
+    const Held reply = held(unit, vector.reply);
+    if (!options || reply.empty() || !places.look(*options, request, reply)) continue;
+    for (std::size_t bit = 0; bit < reply.bit_count(); ++bit) places.look(*options, request, reply.flipped(bit));
+  }
+}
+
+// What the virtual encoder says, wherever the shaft is.
+void look_at_exchanges(const Unit& unit, Places& places) {
+  sim::Random random(11);
+  for (const Configuration& way : configurations(unit)) {
+    World<std::uint8_t> world(unit, way.options, 1);
+    if (!world.made()) continue;
+    for (const Command& command : unit.commands) {
+      for (unsigned i = 0; i < 20 && !command.changes_encoder && command.verb != Verb::scan; ++i) {
+        world.move(static_cast<std::int64_t>(random.next()));
+        const Ended result = world.run(command, least_arguments(command));
+        if (!result.good()) break;
+        const Held sent{.link = unit.link, .bytes = result.sent};
+        places.look(way.options, sent, {.link = unit.link, .bytes = result.received});
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Findings check_places(const Unit& unit) {
+  Findings findings;
+  if (unit.bits == nullptr) return findings;
+  Places places(unit, findings);
+  look_at_vectors(unit, places);
+  if (unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex) look_at_exchanges(unit, places);
+  places.conclude();
+  return findings;
+}
+
+}  // namespace absenc::kit
