@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "absenc/protocol/esl/device.hpp"
-#include "absenc/protocol/esl/options.hpp"
 #include "absenc/protocol/esl/reply.hpp"
 #include "absenc/protocol/esl/unit.hpp"
 #include "absenc/sim/bench_test.hpp"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/esl/device.hpp"
 
+#include "absenc/protocol/esl/reply.hpp"
+
 namespace absenc::esl {
 
 namespace {
@@ -104,18 +106,16 @@ author::Responder::Answer VirtualEncoder::answer_memory(const Request& request, 
   }
   const bool writing = request.id == DataId::write_memory;
   const bool selecting = request.memory_address == page_select_address;
-  const MemoryArea* area = find_area(page_, request.memory_address);
-  const bool exists = selecting ? !writing || is_page(request.value) : area != nullptr;
+  const bool exists = selecting ? !writing || is_page(request.value) : stored(page_, request.memory_address) != nullptr;
   if (!exists) return Answer::for_others;  // not said: it is not acknowledged then
   Reply reply{.id = request.id,
               .encoder_address = profile_.address,
               .memory_address = request.memory_address,
               .value = request.value};
-  const bool immediate = selecting || area->kind == MemoryArea::Kind::registers;
   if (at < page_ready_at_) {
     violate("memory access before the page is ready", at);
     reply.busy = true;
-  } else if (at < busy_until_ && !immediate) {
+  } else if (at < busy_until_ && !is_immediate(page_, request.memory_address)) {
     reply.busy = true;
   } else if (writing) {
     write_byte(request, reply, at);
@@ -131,10 +131,10 @@ void VirtualEncoder::read_byte(const Request& request, Reply& reply, Time at) {
   const std::uint8_t address = request.memory_address;
   if (address == page_select_address) {
     reply.value = page_;
-  } else if (page_ == register_page) {
-    reply.value = address == error_info_address ? error_info() : page8_[address];
-  } else if (page_ == 14 && address >= 0x20) {
-    reply.value = page14_[address - 0x20];
+  } else if (page_ == register_page && address == error_info_address) {
+    reply.value = error_info();
+  } else if (is_immediate(page_, address)) {
+    reply.value = *stored(page_, address);
   } else if (byte_pending_ && pending_address_ == address && at - pending_at_ >= eeprom_read_time) {
     byte_pending_ = false;
     reply.value = *stored(page_, address);
@@ -155,22 +155,23 @@ void VirtualEncoder::write_byte(const Request& request, Reply& reply, Time at) {
   if (address == page_select_address) {
     page_ = request.value;
     page_ready_at_ = at + page_time;
-  } else if (page_ == register_page) {
-    page8_[address] = request.value;
-  } else if (page_ == 14 && address >= 0x20) {
-    page14_[address - 0x20] = request.value;
-  } else {
-    *stored(page_, address) = request.value;
-    change_memory();
-    busy_until_ = at + eeprom_write_time;
+    return;
   }
+  *stored(page_, address) = request.value;
+  if (is_immediate(page_, address)) return;
+  change_memory();
+  busy_until_ = at + eeprom_write_time;
 }
 
 std::uint8_t* VirtualEncoder::stored(std::uint8_t page, std::uint8_t address) {
-  const MemoryArea* area = find_area(page, address);
-  if (area == nullptr || area->kind == MemoryArea::Kind::registers) return nullptr;
-  if (page == 14) return &memory_[mtp_at + address];
-  return &memory_[std::size_t{page} * page_size + address];
+  std::uint8_t* in_memory = memory_.data();
+  std::uint8_t* in_registers = registers_.data();
+  for (const MemoryArea& area : memory_map) {
+    std::uint8_t*& begin = area.write_life == life::registers ? in_registers : in_memory;
+    if (area.has(page, address)) return begin + (address - area.first);
+    begin += area.count;
+  }
+  return nullptr;
 }
 
 void VirtualEncoder::count_reset(DataId id, Time at) {
@@ -190,8 +191,9 @@ void VirtualEncoder::execute_reset(DataId id, Time at) {
   const std::uint16_t turns_before = turns(at);
   if (id == DataId::zero || value_of(condition::id_d_clears_singleturn) != 0) {
     // Each channel takes its own measurement as its zero.
-    store_little_endian(MutableBytes(memory_).subspan(zero_at, 4), counts_of(shaft_->at(at).position));
-    store_little_endian(MutableBytes(memory_).subspan(zero2_at, 4), counts_of(shaft_->at(at).position));
+    for (const std::size_t to : {zero_at, zero_at + 4}) {
+      store_little_endian(MutableBytes(memory_).subspan(to, 4), counts_of(shaft_->at(at).position));
+    }
   }
   if (id == DataId::reset_multiturn) turns_cleared_ = true;
   set_turns(id == DataId::reset_multiturn ? 0 : turns_before, at);
@@ -200,18 +202,21 @@ void VirtualEncoder::execute_reset(DataId id, Time at) {
 
 // ---- State
 
+std::uint32_t VirtualEncoder::zero(Channel channel) const {
+  const std::size_t at = channel == Channel::one ? zero_at : zero_at + 4;
+  return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
+}
+
 // Each channel from its own sight of the shaft and its own zero.
 std::uint32_t VirtualEncoder::singleturn(Channel channel, Time now) const {
-  const std::size_t at = channel == Channel::one ? zero_at : zero2_at;
-  const auto zero = static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
   const std::int32_t stuck = value_of(condition::ch1_stuck, channel);
-  return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : counts_of(shaft_->at(now).position) - zero) & 0xFFFFFF;
+  const std::uint32_t seen = counts_of(shaft_->at(now).position) - zero(channel);
+  return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : seen) & 0xFFFFFF;
 }
 
 // Turns change where the zeroed position wraps.
 std::uint64_t VirtualEncoder::shaft_turns(Time now) const {
-  const std::uint64_t zero = load_little_endian(Bytes(memory_).subspan(zero_at, 4));
-  return static_cast<std::uint64_t>((shaft_->at(now).position - static_cast<std::int64_t>(zero << 8)) >> 32);
+  return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
 }
 
 std::uint16_t VirtualEncoder::turns(Time now) const {
@@ -280,7 +285,7 @@ Reply VirtualEncoder::reply_to(DataId id, Time now) const {
   const auto offset = static_cast<std::uint32_t>(value_of(condition::redundant_offset)) << 15;
   const std::uint32_t two = (singleturn(Channel::two, now) + offset) & 0xFFFFFF;
   reply.redundant = static_cast<std::uint16_t>(two >> (wide ? 8 : 15));
-  reply.temperature = static_cast<std::uint8_t>(value_of(condition::temperature));
+  reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
   return reply;
 }
 
@@ -295,8 +300,7 @@ void VirtualEncoder::power_on(Time now, PowerOn kind) {
 void VirtualEncoder::started(Time) {
   page_ = register_page;
   page_ready_at_ = busy_until_ = Time{};
-  page8_.fill(0);
-  page14_.fill(0);
+  registers_.fill(0);
   counters_.fill(0);
 }
 

@@ -10,7 +10,6 @@
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/esl/frame.hpp"
 #include "absenc/protocol/esl/timing.hpp"
-#include "absenc/protocol/unit.hpp"
 
 namespace absenc::esl {
 
@@ -71,17 +70,14 @@ class VirtualEncoder final : public author::Responder {
 
   /// What a reply to `id` would say now.
   [[nodiscard]] Reply reply_to(DataId id, Time now) const;
-  /// The byte of a page in the EEPROM or MTP image; null for registers and what does not exist.
+  /// The byte of a page; null for what does not exist.
   [[nodiscard]] std::uint8_t* stored(std::uint8_t page, std::uint8_t address);
 
  private:
-  static constexpr std::size_t page_size = 0x7F;
-  static constexpr std::size_t page6_at = 6 * page_size;  // behind pages 0 to 5
-  static constexpr std::size_t mtp_at = page6_at + 0x0C;
-  static constexpr std::size_t zero_at = mtp_at + 0x20;  // channel one, 4 bytes, little endian
-  static constexpr std::size_t zero2_at = zero_at + 4;   // channel two
-  static constexpr std::size_t turns_at = zero2_at + 4;  // what is taken off the turns of the shaft, 8 bytes
-  static constexpr std::size_t memory_size = turns_at + 8;
+  // Behind the EEPROM and the MTP: the zeros of the channels, 4 bytes each, little endian, and what is taken off the
+  // turns of the shaft, 8 bytes.
+  static constexpr std::size_t zero_at = memory_size(false);
+  static constexpr std::size_t turns_at = zero_at + 8;
 
   [[nodiscard]] std::size_t request_size(Bytes begin) const override;
   [[nodiscard]] std::size_t others_reply_size(Bytes request) const override;
@@ -100,6 +96,7 @@ class VirtualEncoder final : public author::Responder {
   void count_reset(DataId id, Time at);
   void execute_reset(DataId id, Time at);
 
+  [[nodiscard]] std::uint32_t zero(Channel channel) const;
   [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const;
   [[nodiscard]] std::uint16_t turns(Time now) const;
   [[nodiscard]] std::uint64_t shaft_turns(Time now) const;
@@ -115,9 +112,8 @@ class VirtualEncoder final : public author::Responder {
   Profile profile_;
   const Shaft* shaft_;
   std::array<std::int32_t, conditions.size()> condition_{};
-  std::array<std::uint8_t, memory_size> memory_{};
-  std::array<std::uint8_t, 0x30> page8_{};   // registers are lost at power off
-  std::array<std::uint8_t, 0x20> page14_{};  // 20 to 3F
+  std::array<std::uint8_t, turns_at + 8> memory_{};
+  std::array<std::uint8_t, memory_size(true)> registers_{};  // lost at power off
 
   Time ready_at_{};
   std::uint8_t latches_ = 0;

@@ -41,26 +41,33 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_voltage", "the supply is above 3.7 V", "check the supply; it clears with the voltage"},
 }};
 
-/// Each is there where a frame or a command has it.
-struct Values {
+/// What is shown of a frame, or of what a procedure found: each where it is there, of a reply what its id carries.
+struct Shown {
+  constexpr Shown() = default;
+  constexpr Shown(const Profile& profile, const Request& request)
+      : data_id(request.id),
+        control_field(esl::control_field(profile, request.encoder_address, request.id)),
+        encoder_address(request.encoder_address) {
+    if (is_memory_access(request.id)) memory_address = request.memory_address;
+    if (request.id == DataId::write_memory) value = request.value;
+  }
+  constexpr explicit Shown(const Reply& one) { show(one); }
+
+  constexpr void show(const Reply& one) {
+    data_id = one.id;
+    encoder_address = one.encoder_address;
+    reply = one;
+    if (!is_memory_access(one.id)) return;
+    memory_address = one.memory_address;
+    busy = one.busy;
+    value = one.value;
+  }
+
   std::optional<DataId> data_id{};
   std::optional<std::uint8_t> control_field{};
   std::optional<std::uint8_t> encoder_address{};
+  std::optional<Reply> reply{};
   std::optional<bool> clash{};
-  std::optional<std::uint8_t> ch1_status{};
-  std::optional<std::uint8_t> ch1_alarms{};
-  std::optional<std::uint32_t> singleturn{};
-  std::optional<std::uint16_t> multiturn{};
-  std::optional<std::uint8_t> encoder_id{};
-  std::optional<unsigned> safety{};
-  std::optional<unsigned> multiturn_bytes{};
-  std::optional<unsigned> singleturn_bits{};
-  std::optional<std::uint8_t> ch1_sequence{};
-  std::optional<std::int8_t> temperature{};  // its sign is assumed
-  std::optional<std::uint8_t> ch2_status{};
-  std::optional<std::uint8_t> ch2_alarms{};
-  std::optional<std::uint16_t> redundant{};
-  std::optional<std::uint8_t> ch2_sequence{};
   std::optional<std::uint8_t> page{};
   std::optional<std::uint8_t> memory_address{};
   std::optional<bool> busy{};
@@ -73,133 +80,77 @@ struct Values {
   std::optional<std::uint8_t> page_left{};
 };
 
-using Kind = FieldInfo::Kind;
-inline constexpr auto fields = author::fields_of<Values>(
-    author::field<&Values::data_id>({"data_id", Kind::number, "", "which data was asked for (Table 3)"}),
-    author::field<&Values::control_field>({"control_field", Kind::number, "", "CF: encoder address, data id, parity"}),
-    author::field<&Values::encoder_address>({"encoder_address", Kind::number, "", "EAD: which encoder on the line"}),
-    author::field<&Values::clash>(
-        {"clash", Kind::boolean, "",
-         "yes: its answer is damaged every time; two encoders share the address, or the line is bad"}),
-    author::field<&Values::ch1_status>({"ch1_status", Kind::flags, "", "SF of channel 1", status_flags}),
-    author::field<&Values::ch1_alarms>({"ch1_alarms", Kind::flags, "", "ALM of channel 1", alarm_flags}),
-    author::field<&Values::singleturn>(
-        {"singleturn", Kind::number, "counts", "ABS: position within the turn", {}, Shows::position}),
-    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Shows::turns}),
-    author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID: D8 multi-turn, 98 single-turn"}),
-    author::field<&Values::safety>({"safety", Kind::number, "", "1: a safety encoder (ENID bit 7)"}),
-    author::field<&Values::multiturn_bytes>({"multiturn_bytes", Kind::number, "", "of turns (ENID bits 6 and 5)"}),
-    author::field<&Values::singleturn_bits>(
-        {"singleturn_bits", Kind::number, "", "of the position within the turn (ENID bits 4 to 0)"}),
-    author::field<&Values::ch1_sequence>({"ch1_sequence", Kind::number, "", "SC1: counts the replies, 0 to 255"}),
-    author::field<&Values::temperature>({"temperature_c", Kind::number, "degC", "inside the encoder"}),
-    author::field<&Values::ch2_status>({"ch2_status", Kind::flags, "", "SF of channel 2", status_flags}),
-    author::field<&Values::ch2_alarms>({"ch2_alarms", Kind::flags, "", "ALM of channel 2", alarm_flags}),
-    author::field<&Values::redundant>({"redundant_singleturn",
-                                       Kind::number,
-                                       "counts",
-                                       "RS: the position of channel 2, 9 bits (ID 6: 16)",
-                                       {},
-                                       Shows::position}),
-    author::field<&Values::ch2_sequence>({"ch2_sequence", Kind::number, "", "SC2: counts the replies, 0 to 127"}),
-    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
-    author::field<&Values::memory_address>({"memory_address", Kind::number, "", "ADF: 0 to 126; 127 selects the page"}),
-    author::field<&Values::busy>(
-        {"busy", Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
-    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory"}),
-    author::field<&Values::data>({"data", Kind::bytes, "", "the bytes in memory from `memory_address` on"}),
-    author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
-    author::field<&Values::led_error>({"led_error", Kind::boolean, "", "the LED current is out of its range"}),
-    author::field<&Values::lissajous_error>(
-        {"lissajous_error", Kind::boolean, "", "the signals of the disc are out of their range"}),
-    author::field<&Values::safe_singleturn>(
-        {"safe_singleturn", Kind::number, "counts", "the position, every check of a safety reader passed"}),
-    author::field<&Values::page_left>(
-        {"page_left", Kind::number, "",
-         "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
-
-/// Every field that the request carries.
-[[nodiscard]] constexpr Values values_of(const Profile& profile, const Request& request) {
-  Values values{.data_id = request.id,
-                .control_field = control_field(profile, request.encoder_address, request.id),
-                .encoder_address = request.encoder_address};
-  if (is_memory_access(request.id)) values.memory_address = request.memory_address;
-  if (request.id == DataId::write_memory) values.value = request.value;
-  return values;
-}
-
 namespace detail {
-
-constexpr void put_part(Values& values, Part part, const Reply& reply, bool first) {
-  const ChannelReply& channel = first ? reply.one : reply.two;
-  switch (part) {
-    case Part::status:
-      (first ? values.ch1_status : values.ch2_status) = channel.status;
-      break;
-    case Part::alarms:
-      (first ? values.ch1_alarms : values.ch2_alarms) = channel.alarms;
-      break;
-    case Part::singleturn:
-      values.singleturn = reply.singleturn;
-      break;
-    case Part::multiturn:
-      values.multiturn = reply.multiturn;
-      break;
-    case Part::sequence:
-      values.ch1_sequence = channel.sequence;
-      break;
-    case Part::encoder_id:  // the same in both channels
-      values.encoder_id = channel.encoder_id;
-      values.safety = channel.encoder_id >> 7;
-      values.multiturn_bytes = channel.encoder_id >> 5 & 3;
-      values.singleturn_bits = channel.encoder_id & 0x1F;
-      break;
-    case Part::temperature:
-      values.temperature = static_cast<std::int8_t>(reply.temperature);
-      break;
-    case Part::redundant_sequence:
-      values.redundant = reply.redundant;
-      [[fallthrough]];
-    case Part::zero_sequence:
-      values.ch2_sequence = channel.sequence;
-      break;
-    case Part::redundant_alone:
-    case Part::redundant_calibration:
-      values.redundant = reply.redundant;
-      break;
-    case Part::memory_address:
-      values.memory_address = reply.memory_address;
-      values.busy = reply.busy;
-      break;
-    case Part::value:
-      values.value = reply.value;
-      break;
+// What stands in this part of a reply, where its id carries it in that channel.
+template <Channel channel, unsigned part, auto member>
+constexpr auto in(const Shown& all) {
+  const Reply reply = all.reply.value_or(Reply{});
+  const unsigned parts = channel == Channel::one ? layout_of(reply.id).one : layout_of(reply.id).two;
+  const bool is_there = all.reply && (parts & part) != 0;
+  if constexpr (requires { reply.*member; }) {
+    return is_there ? std::optional(reply.*member) : std::nullopt;
+  } else {
+    return is_there ? std::optional((channel == Channel::one ? reply.one : reply.two).*member) : std::nullopt;
   }
 }
-
+// Bits of ENID, which is the same in both channels.
+template <unsigned shift, unsigned mask>
+constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
+  const auto id = in<Channel::one, part::encoder_id, &ChannelReply::encoder_id>(all);
+  return id ? std::optional(unsigned{*id} >> shift & mask) : std::nullopt;
+}
 }  // namespace detail
 
-/// Every field that a reply of this id carries.
-[[nodiscard]] constexpr Values values_of(const Reply& reply) {
-  Values values{.data_id = reply.id, .encoder_address = reply.encoder_address};
-  for (const Part part : layout_of(reply.id).one()) detail::put_part(values, part, reply, true);
-  for (const Part part : layout_of(reply.id).two()) detail::put_part(values, part, reply, false);
-  return values;
-}
-
-/// What was asked: the request, or without one what the reply's own control field says; the address of a memory access
-/// is then taken as it comes.
-constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes reply) {
-  if (!request.empty()) return decode_request(profile, request);
-  if (reply.empty()) return Error::wrong_length;
-  const auto id = data_id(reply[0]);
-  if (!id) return Error::unexpected_reply;
-  Request asked{*id, address_of(reply[0])};
-  if (is_memory_access(asked.id) && reply.size() == reply_length(asked.id)) {
-    asked.memory_address = detail::address_from_wire(profile, reply[1]);
-    asked.value = reply[2];
-  }
-  return asked;
-}
+inline constexpr auto fields = [] {
+  using author::field;
+  using detail::in;
+  using enum Channel;
+  using enum FieldInfo::Kind;
+  return author::fields_of<Shown>(
+      field<&Shown::data_id>({"data_id", number, "", "which data was asked for (Table 3)"}),
+      field<&Shown::control_field>({"control_field", number, "", "CF: encoder address, data id, parity"}),
+      field<&Shown::encoder_address>({"encoder_address", number, "", "EAD: which encoder on the line"}),
+      field<&Shown::clash>(
+          {"clash", boolean, "",
+           "yes: its answer is damaged every time; two encoders share the address, or the line is bad"}),
+      field<in<one, part::status, &ChannelReply::status>>({"ch1_status", flags, "", "SF of channel 1", status_flags}),
+      field<in<one, part::alarms, &ChannelReply::alarms>>({"ch1_alarms", flags, "", "ALM of channel 1", alarm_flags}),
+      field<in<one, part::singleturn, &Reply::singleturn>>(
+          {"singleturn", number, "counts", "ABS: position within the turn", {}, Shows::position}),
+      field<in<one, part::multiturn, &Reply::multiturn>>({"multiturn", number, "revolutions", "ABM", {}, Shows::turns}),
+      field<in<one, part::encoder_id, &ChannelReply::encoder_id>>(
+          {"encoder_id", number, "", "ENID: D8 multi-turn, 98 single-turn"}),
+      field<detail::of_encoder_id<7, 1>>({"safety", number, "", "1: a safety encoder (ENID bit 7)"}),
+      field<detail::of_encoder_id<5, 3>>({"multiturn_bytes", number, "", "of turns (ENID bits 6 and 5)"}),
+      field<detail::of_encoder_id<0, 0x1F>>(
+          {"singleturn_bits", number, "", "of the position within the turn (ENID bits 4 to 0)"}),
+      field<in<one, part::sequence, &ChannelReply::sequence>>(
+          {"ch1_sequence", number, "", "SC1: counts the replies, 0 to 255"}),
+      field<in<one, part::temperature, &Reply::temperature>>({"temperature_c", number, "degC", "inside the encoder"}),
+      field<in<two, part::status, &ChannelReply::status>>({"ch2_status", flags, "", "SF of channel 2", status_flags}),
+      field<in<two, part::alarms, &ChannelReply::alarms>>({"ch2_alarms", flags, "", "ALM of channel 2", alarm_flags}),
+      field<in<two, part::redundant, &Reply::redundant>>({"redundant_singleturn",
+                                                          number,
+                                                          "counts",
+                                                          "RS: the position of channel 2, 9 bits (ID 6: 16)",
+                                                          {},
+                                                          Shows::position}),
+      field<in<two, part::zero_sequence | part::redundant_sequence, &ChannelReply::sequence>>(
+          {"ch2_sequence", number, "", "SC2: counts the replies, 0 to 127"}),
+      field<&Shown::page>({"page", number, "", "memory page"}),
+      field<&Shown::memory_address>({"memory_address", number, "", "ADF: 0 to 126; 127 selects the page"}),
+      field<&Shown::busy>({"busy", number, "", "1 while the memory is read or written: the request was not executed"}),
+      field<&Shown::value>({"value", number, "", "EDF: the byte in memory"}),
+      field<&Shown::data>({"data", bytes, "", "the bytes in memory from `memory_address` on"}),
+      field<&Shown::written>({"written", boolean, "", "false when the value was there already"}),
+      field<&Shown::led_error>({"led_error", boolean, "", "the LED current is out of its range"}),
+      field<&Shown::lissajous_error>(
+          {"lissajous_error", boolean, "", "the signals of the disc are out of their range"}),
+      field<&Shown::safe_singleturn>(
+          {"safe_singleturn", number, "counts", "the position, every check of a safety reader passed"}),
+      field<&Shown::page_left>(
+          {"page_left", number, "",
+           "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
+}();
 
 }  // namespace absenc::esl

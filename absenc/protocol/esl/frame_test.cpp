@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "absenc/core/hex.hpp"
-#include "absenc/protocol/esl/options.hpp"
 #include "absenc/sim/random.hpp"
 
 namespace absenc::esl {
@@ -26,7 +25,7 @@ constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', 
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {
-    if (option == option_sequence_step) continue;
+    if (option == options.find("sequence_step")) continue;
     std::vector<Profile> more;
     for (const Profile& profile : profiles) {
       for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
@@ -49,19 +48,19 @@ Reply sample(DataId id, std::uint8_t address) {
   }
   reply.one.status = status::ready | status::non_safety_error;
   reply.two.status = status::ready | status::channel_2 | status::temperature_warning;
-  if (layout.has(Part::alarms)) {
+  if (layout.has(part::alarms)) {
     reply.one.alarms = alarms::overspeed;
     reply.two.alarms = alarms::xc_error | alarms::over_voltage;
   }
-  if (layout.has(Part::singleturn)) reply.singleturn = 0xABCDEF;
-  if (layout.has(Part::multiturn)) reply.multiturn = 0xFEDC;
-  if (layout.has(Part::temperature)) reply.temperature = 0xF6;
-  if (layout.has(Part::sequence)) {
+  if (layout.has(part::singleturn)) reply.singleturn = 0xABCDEF;
+  if (layout.has(part::multiturn)) reply.multiturn = 0xFEDC;
+  if (layout.has(part::temperature)) reply.temperature = -10;
+  if (layout.has(part::sequence)) {
     reply.one.sequence = 0xD5;
     reply.two.sequence = 0x55;
   }
-  if (layout.has(Part::encoder_id)) reply.one.encoder_id = reply.two.encoder_id = 0xD8;
-  if (layout.has_two() && layout.has(Part::singleturn)) reply.redundant = 0xABCDEF >> 15;
+  if (layout.has(part::encoder_id)) reply.one.encoder_id = reply.two.encoder_id = 0xD8;
+  if (layout.has_two() && layout.has(part::singleturn)) reply.redundant = 0xABCDEF >> 15;
   return reply;
 }
 
