@@ -18,6 +18,7 @@ namespace absenc::esl::testing {
 
 using TestShaft = sim::testing::TestShaft<24>;
 using Wire = std::vector<std::uint8_t>;
+using PowerOn = Device<std::uint8_t>::PowerOn;
 
 inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 inline Wire wire(const Reply& reply) { return wire(encode_reply({}, reply).view()); }
@@ -86,31 +87,41 @@ struct HostedLine : sim::Line<std::uint8_t> {
   std::optional<std::size_t> node{};
 };
 
-/// Runs a command of the unit; `arguments` may leave out the last ones.
+/// A command of the unit; `arguments` may leave out the last ones.
+struct Made {
+  Made(const Profile& profile, std::string_view command, std::vector<std::int64_t> arguments = {})
+      : host(make(profile, *find_command(unit, command), std::move(arguments))) {}
+  Conversation<std::uint8_t>& make(const Profile& profile, const Command& info, std::vector<std::int64_t> arguments) {
+    for (const Argument& more : info.arguments.subspan(arguments.size())) arguments.push_back(more.default_value);
+    return *unit.host(options_of(profile), info, arguments, storage).bytes;
+  }
+  std::vector<std::byte> storage = std::vector<std::byte>(unit.host_storage);
+  Conversation<std::uint8_t>& host;
+};
+
 inline Outcome run(HostedLine& line, const Profile& profile, std::string_view command,
                    std::vector<std::int64_t> arguments = {}) {
-  const Command& info = *find_command(unit, command);
-  for (std::size_t i = arguments.size(); i < info.arguments.size(); ++i) {
-    arguments.push_back(info.arguments[i].default_value);
-  }
-  std::vector<std::byte> storage(unit.host_storage);
-  Conversation<std::uint8_t>& host = *unit.host(options_of(profile), info, arguments, storage).bytes;
+  const Made made(profile, command, std::move(arguments));
   Outcome outcome;
-  outcome.ended = line.converse(host);
-  outcome.error = host.error();
-  outcome.detail = host.detail();
-  if (host.reading() != nullptr) outcome.reading = *host.reading();
-  host.report(outcome);
-  outcome.sent = wire(host.exchange().sent);
-  outcome.received_at = host.exchange().received_at;
+  outcome.ended = line.converse(made.host);
+  outcome.error = made.host.error();
+  outcome.detail = made.host.detail();
+  if (made.host.reading() != nullptr) outcome.reading = *made.host.reading();
+  made.host.report(outcome);
+  outcome.sent = wire(made.host.exchange().sent);
+  outcome.received_at = made.host.exchange().received_at;
   return outcome;
+}
+
+inline bool says(const Outcome& outcome, std::string_view words) {
+  return outcome.detail.find(words) != std::string::npos;
 }
 
 /// One encoder on a line of its own.
 struct Bench {
   explicit Bench(const Profile& bench_profile = {}, Tampered::Tamper tamper = {})
       : profile(bench_profile), encoder(bench_profile, shaft), device(encoder, std::move(tamper)) {
-    encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    encoder.power_on(Time{}, PowerOn::skip);
     line.attach(sim::Role::device, device);
   }
 
@@ -134,6 +145,10 @@ struct Bench {
     return decode_reply(profile, {id, profile.address}, bytes).value();
   }
   void set(condition::Index index, std::int64_t value) { encoder.set_condition(index, value, line.now()); }
+  void switch_off_and_on(PowerOn kind = PowerOn::skip) {
+    encoder.power_off(line.now());
+    encoder.power_on(line.now(), kind);
+  }
   void pass(Time time) { line.run_until(line.now() + time); }
   [[nodiscard]] std::uint32_t violations() const { return encoder.violation_count(); }
 

@@ -11,9 +11,9 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
+using testing::PowerOn;
 using testing::Wire;
 using testing::wire;
-using PowerOn = Device<std::uint8_t>::PowerOn;
 
 Request memory_read(std::uint8_t address) { return {DataId::read_memory, 0, address}; }
 Request memory_write(std::uint8_t address, std::uint8_t value) { return {DataId::write_memory, 0, address, value}; }
@@ -223,8 +223,7 @@ TEST(EslDevice, MemorySurvivesPowerOffAndRegistersDoNot) {
   bench.raw(memory_write(0x05, 0x11));
   *bench.encoder.stored(14, 0x1F) = 0x22;
   *bench.encoder.stored(6, 0x0B) = 0x33;
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   EXPECT_EQ(bench.raw(memory_read(0x05))[2], 0);
   EXPECT_EQ(*bench.encoder.stored(14, 0x1F), 0x22);
   EXPECT_EQ(*bench.encoder.stored(6, 0x0B), 0x33);
@@ -271,8 +270,7 @@ TEST(EslDevice, WhatClearsWhichAlarm) {
     reset(bench, DataId::clear_alarms);
     EXPECT_EQ(bench.read().one.alarms == 0, row.by_d_and_c) << int{row.alarm};
     if (row.by_c || row.by_d_and_c) continue;
-    bench.encoder.power_off(bench.line.now());
-    bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+    bench.switch_off_and_on();
     EXPECT_EQ(bench.read().one.alarms == 0, row.by_power) << int{row.alarm};
     bench.encoder.lower_alarms(row.alarm);
     EXPECT_EQ(bench.read().one.alarms, 0);
@@ -283,8 +281,7 @@ TEST(EslDevice, WhatAPowerCycleLeaves) {
   Bench bench;
   bench.encoder.raise_alarms(alarms::turns_wrong | alarms::overspeed | alarms::memory_error);
   for (unsigned i = 0; i < 5; ++i) bench.read();
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  bench.switch_off_and_on();
   const Reply reply = bench.read();
   EXPECT_EQ(reply.one.alarms, alarms::turns_wrong);
   EXPECT_EQ(reply.one.sequence, 1);

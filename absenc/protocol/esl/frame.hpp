@@ -213,12 +213,10 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 }
 
 /// EAD, the id, its parity bit, which makes the number of ones odd.
-[[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, std::uint8_t id) {
+[[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId data) {
+  const auto id = static_cast<unsigned>(data);
   const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
-  return static_cast<std::uint8_t>((address & 7) | (id & 0xFu) << 3 | (odd_parity(covered) ? 0 : 0x80));
-}
-[[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId id) {
-  return control_field(profile, address, static_cast<std::uint8_t>(id));
+  return static_cast<std::uint8_t>((address & 7) | id << 3 | (odd_parity(covered) ? 0 : 0x80));
 }
 [[nodiscard]] constexpr std::uint8_t address_of(std::uint8_t field) { return field & 7; }
 
@@ -266,30 +264,11 @@ namespace detail {
   return static_cast<std::uint8_t>(value << 4 | (value >> 2 & 0x0C) | value >> 6);
 }
 
-[[nodiscard]] constexpr std::uint8_t address_to_wire(const Profile& profile, std::uint8_t address, bool busy) {
-  if (profile.memory_address_order == FieldOrder::document) {
-    return static_cast<std::uint8_t>(address << 1 | (busy ? 1 : 0));
-  }
-  return static_cast<std::uint8_t>((address & 0x7F) | (busy ? 0x80 : 0));
+// A byte whose b7 stands at b0 where `at_b0`: {busy, ADF}, {RS1, SC2}, {0, SC2}, or RS1 alone.
+[[nodiscard]] constexpr std::uint8_t to_wire(bool at_b0, unsigned byte) {
+  return std::rotl(static_cast<std::uint8_t>(byte), at_b0 ? 1 : 0);
 }
-[[nodiscard]] constexpr std::uint8_t address_from_wire(const Profile& profile, std::uint8_t field) {
-  return profile.memory_address_order == FieldOrder::document ? static_cast<std::uint8_t>(field >> 1) : field & 0x7F;
-}
-[[nodiscard]] constexpr bool busy_from_wire(const Profile& profile, std::uint8_t field) {
-  return (field & (profile.memory_address_order == FieldOrder::document ? 0x01 : 0x80)) != 0;
-}
-
-// {RS1, SC2}, {0, SC2}, or RS1 alone.
-constexpr std::uint8_t join(RedundantBit order, unsigned bit, unsigned counter) {
-  counter &= 0x7F;
-  return static_cast<std::uint8_t>(order == RedundantBit::b7 ? bit << 7 | counter : counter << 1 | bit);
-}
-constexpr unsigned redundant_bit(RedundantBit order, std::uint8_t byte) {
-  return order == RedundantBit::b7 ? byte >> 7 : byte & 1u;
-}
-constexpr std::uint8_t counter_bits(RedundantBit order, std::uint8_t byte) {
-  return order == RedundantBit::b7 ? byte & 0x7F : static_cast<std::uint8_t>(byte >> 1);
-}
+[[nodiscard]] constexpr std::uint8_t from_wire(bool at_b0, std::uint8_t byte) { return std::rotr(byte, at_b0 ? 1 : 0); }
 
 }  // namespace detail
 
@@ -299,7 +278,7 @@ constexpr std::uint8_t counter_bits(RedundantBit order, std::uint8_t byte) {
   RequestBytes bytes;
   bytes.push_back(control_field(profile, request.encoder_address, request.id));
   if (is_memory_access(request.id)) {
-    bytes.push_back(detail::address_to_wire(profile, request.memory_address, false));
+    bytes.push_back(detail::to_wire(profile.memory_address_order == FieldOrder::document, request.memory_address));
     if (request.id == DataId::write_memory) bytes.push_back(request.value);
   }
   if (bytes.size() < request_length(profile, request.id)) bytes.push_back(checksum8(profile.crc_bit_order, bytes));
@@ -313,9 +292,12 @@ constexpr void encode_parts(const Profile& profile, unsigned parts, const Reply&
   const auto put = [&](unsigned one, std::size_t size, std::uint32_t value) {
     for (; (parts & one) != 0 && size > 0; --size, value >>= 8) bytes.push_back(static_cast<std::uint8_t>(value));
   };
+  // In two bytes: its upper bits, and {RS1, SC2}.
   const auto redundant = [&reply](RedundantBit order, unsigned counter) {
-    return reply.redundant >> 1 | std::uint32_t{join(order, reply.redundant & 1, counter)} << 8;
+    const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | counter);
+    return reply.redundant >> 1 | second << 8;
   };
+  const unsigned counter = channel.sequence & 0x7Fu;
   const bool wide = profile.id6_rs == Id6Redundant::bits_16;
   put(part::status, 1, status_to_wire(profile, channel.status));
   put(part::alarms, 1, channel.alarms);
@@ -324,12 +306,13 @@ constexpr void encode_parts(const Profile& profile, unsigned parts, const Reply&
   put(part::encoder_id, 1, channel.encoder_id);
   put(part::temperature, 1, static_cast<std::uint8_t>(reply.temperature));
   put(part::sequence, 1, channel.sequence);
-  put(part::zero_sequence, 1, join(profile.rs1_sc2, 0, channel.sequence));
-  put(part::redundant_sequence, 2, redundant(profile.rs1_sc2, channel.sequence));
+  put(part::zero_sequence, 1, to_wire(profile.rs1_sc2 == RedundantBit::b0, counter));
+  put(part::redundant_sequence, 2, redundant(profile.rs1_sc2, counter));
   put(part::redundant_alone, 2, redundant(profile.idc_rs1, 0));
   put(part::redundant_calibration, 2,
       wide ? reply.redundant >> 8 | (reply.redundant & 0xFFu) << 8 : redundant(RedundantBit::b0, 0));
-  put(part::memory_address, 1, address_to_wire(profile, reply.memory_address, reply.busy));
+  put(part::memory_address, 1,
+      to_wire(profile.memory_address_order == FieldOrder::document, reply.memory_address | (reply.busy ? 0x80u : 0u)));
   put(part::value, 1, reply.value);
 }
 

@@ -15,10 +15,9 @@ namespace {
 
 using testing::Bench;
 using testing::Outcome;
+using testing::says;
 using testing::Wire;
 using testing::wire;
-
-bool says(const Outcome& outcome, std::string_view words) { return outcome.detail.find(words) != std::string::npos; }
 
 TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   Bench bench;
@@ -109,6 +108,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
        [](unsigned, Wire& reply) { std::rotate(reply.begin(), reply.begin() + 11, reply.end()); }},
       {"channel 2 is missing", Error::wrong_length, [](unsigned, Wire& reply) { reply.resize(11); }},
       {"number of bytes", Error::wrong_length, [](unsigned, Wire& reply) { reply.pop_back(); }},
+      {"CRC of the reply is wrong", Error::bad_checksum, [](unsigned, Wire& reply) { reply[4] ^= 1, reply[13] ^= 1; }},
       {"address of another encoder", Error::unexpected_reply,
        [&](unsigned, Wire& reply) { reply = wire({.encoder_address = 1, .one = {.status = status::ready}}); }},
       {"wrong parity bit in the request", Error::request_rejected,
@@ -128,9 +128,8 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
 // Of characters that were damaged nobody knows what they would have been.
 TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
   using Happening = Event<std::uint8_t>;
-  std::vector<std::byte> storage(unit.host_storage);
-  Conversation<std::uint8_t>& host =
-      *unit.host(testing::options_of({}), *find_command(unit, "position"), {}, storage).bytes;
+  const testing::Made made({}, "position");
+  Conversation<std::uint8_t>& host = made.host;
   static_cast<void>(host.next({}));
   host.feed({.kind = Happening::Kind::sent, .at = 2us});
   const Wire channel_1 = wire({.one = {.status = status::ready}});
@@ -213,8 +212,7 @@ TEST(EslHost, Resets) {
   EXPECT_EQ(after.reading->singleturn, 0u);
   EXPECT_EQ(bench.violations(), 0u);
   // The zero survives power off, in both channels.
-  bench.encoder.power_off(bench.line.now());
-  bench.encoder.power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::skip);
+  bench.switch_off_and_on();
   EXPECT_EQ(bench.read().singleturn, 0u);
   EXPECT_EQ(bench.read().redundant, 0u);
   EXPECT_EQ(bench.read().multiturn, 0u);
@@ -295,8 +293,7 @@ TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
     EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
   }
   Bench starting;
-  starting.encoder.power_off(Time{});
-  starting.encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::real);
+  starting.switch_off_and_on(testing::PowerOn::real);
   const Outcome zero = starting.run("zero");
   EXPECT_EQ(zero.error, Error::invalid_argument);
   EXPECT_TRUE(says(zero, "not ready"));
@@ -355,7 +352,7 @@ struct Line8 {
       shafts.back()->put(place, place * 1'000'000 + 77);
       encoders.push_back(
           std::make_unique<VirtualEncoder>(Profile{.address = address, .bus = sharing_yes}, *shafts.back()));
-      encoders.back()->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+      encoders.back()->power_on(Time{}, testing::PowerOn::skip);
       line.attach(sim::Role::device, *encoders.back());
     }
   }
@@ -391,9 +388,8 @@ TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
                                               std::tuple{Wire{1, 4, 4}, std::vector{1, 4}, std::vector{4}},
                                               std::tuple{Wire{}, std::vector<int>{}, std::vector<int>{}}}) {
     Line8 bus(there);
-    const Command& info = *find_command(unit, "scan");
-    std::vector<std::byte> storage(unit.host_storage);
-    Conversation<std::uint8_t>& host = *unit.host(testing::options_of({}), info, {}, storage).bytes;
+    const testing::Made made({}, "scan");
+    Conversation<std::uint8_t>& host = made.host;
     EXPECT_TRUE(bus.line.converse(host));
     EXPECT_EQ(host.error(), nodes.empty() ? Error::timeout : Error::none);
     Scan found;

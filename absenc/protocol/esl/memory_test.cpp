@@ -9,10 +9,9 @@ namespace {
 
 using testing::Bench;
 using testing::Outcome;
+using testing::says;
 using testing::Wire;
 using testing::wire;
-
-bool says(const Outcome& outcome, std::string_view words) { return outcome.detail.find(words) != std::string::npos; }
 
 // Arguments of memory-read: address, page, count; of memory-write: address, value, page, force.
 constexpr const char* read = "memory-read";

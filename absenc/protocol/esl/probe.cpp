@@ -45,26 +45,21 @@ Profile with_other_parity(Profile profile) {
 struct Asked {
   Request request{};
   bool parity_wrong = false;
-  bool accepted = true;
+  bool accepted = false;
 };
 
 Asked asked_by(const Profile& profile, const Capture& capture) {
   const Bytes bytes = capture.request.empty() ? capture.reply : capture.request;
-  Asked asked;
   const std::optional<DataId> id = data_id(bytes[0]);
-  if (!id) return {.accepted = false};
-  asked.request = {*id, address_of(bytes[0])};
-  asked.parity_wrong = bytes[0] != control_field(profile, asked.request.encoder_address, *id);
-  if (is_memory_access(*id) && bytes.size() >= 3) {
-    asked.request.memory_address = detail::address_from_wire(profile, bytes[1]);
-    asked.request.value = bytes[2];
-  }
-  if (capture.request.empty()) return asked;
-  const bool busy = is_memory_access(*id) && bytes.size() >= 3 && detail::busy_from_wire(profile, bytes[1]);
-  asked.accepted =
+  if (!id) return {};
+  bool busy = false;
+  const Request request = detail::split_request(profile, *id, bytes, busy);
+  const bool good =
       !busy && bytes.size() == request_length(profile, *id) &&
       (bytes.size() == 1 || checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) == bytes.back());
-  return asked;
+  return {.request = request,
+          .parity_wrong = bytes[0] != control_field(profile, request.encoder_address, *id),
+          .accepted = good || capture.request.empty()};
 }
 
 // An encoder answers only what it accepts, and reports a wrong parity bit only where there is one.

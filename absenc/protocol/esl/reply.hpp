@@ -104,6 +104,19 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
 [[nodiscard]] constexpr const CheckText& text_of(Check check) { return check_texts[static_cast<std::size_t>(check)]; }
 [[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
 
+namespace detail {
+// What a request of this id says, or what the reply to it says of it: unchecked, and of memory only as far as it goes.
+constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
+  Request request{id, address_of(bytes[0])};
+  if (!is_memory_access(id) || bytes.size() < 3) return request;
+  const std::uint8_t field = from_wire(profile.memory_address_order == FieldOrder::document, bytes[1]);
+  busy = (field & 0x80) != 0;
+  request.memory_address = field & 0x7F;
+  if (id == DataId::write_memory) request.value = bytes[2];
+  return request;
+}
+}  // namespace detail
+
 /// Errors: wrong_length; unsupported (an id that Table 3 does not list); bad_checksum (parity or CRC); out_of_range
 /// (the busy bit is 0 in requests).
 [[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
@@ -114,21 +127,19 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
   if (bytes.size() > 1 && checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back()) {
     return Error::bad_checksum;
   }
-  Request request{*id, address_of(bytes[0])};
-  if (bytes[0] != control_field(profile, request.encoder_address, *id)) return Error::bad_checksum;
-  if (!is_memory_access(*id)) return request;
-  if (detail::busy_from_wire(profile, bytes[1])) return Error::out_of_range;
-  request.memory_address = detail::address_from_wire(profile, bytes[1]);
-  if (*id == DataId::write_memory) request.value = bytes[2];
-  return request;
+  if (bytes[0] != control_field(profile, address_of(bytes[0]), *id)) return Error::bad_checksum;
+  bool busy = false;
+  const Request request = detail::split_request(profile, *id, bytes, busy);
+  return busy ? Result<Request>(Error::out_of_range) : request;
 }
 
 namespace detail {
 
-// RS in the two bytes of which `order` tells the lowest bit; the other bits of the second.
-constexpr std::uint8_t split(RedundantBit order, Bytes bytes, Reply& reply) {
-  reply.redundant = static_cast<std::uint16_t>(unsigned{bytes[0]} << 1 | redundant_bit(order, bytes[1]));
-  return counter_bits(order, bytes[1]);
+// RS in two bytes, the lowest bit in the second; the other bits of that.
+constexpr std::uint8_t split_redundant(RedundantBit order, Bytes bytes, Reply& reply) {
+  const std::uint8_t second = from_wire(order == RedundantBit::b0, bytes[1]);
+  reply.redundant = static_cast<std::uint16_t>(bytes[0] << 1 | second >> 7);
+  return second & 0x7F;
 }
 
 constexpr void decode_parts(const Profile& profile, unsigned parts, Bytes bytes, Reply& reply, ChannelReply& channel) {
@@ -148,21 +159,23 @@ constexpr void decode_parts(const Profile& profile, unsigned parts, Bytes bytes,
   if (has(part::temperature, 1)) reply.temperature = static_cast<std::int8_t>(here[0]);
   if (has(part::sequence, 1)) channel.sequence = here[0];
   if (has(part::zero_sequence, 1)) {
-    reply.unused_bits |= redundant_bit(profile.rs1_sc2, here[0]) != 0;
-    channel.sequence = counter_bits(profile.rs1_sc2, here[0]);
+    const std::uint8_t byte = from_wire(profile.rs1_sc2 == RedundantBit::b0, here[0]);
+    reply.unused_bits |= (byte & 0x80) != 0;
+    channel.sequence = byte & 0x7F;
   }
-  if (has(part::redundant_sequence, 2)) channel.sequence = split(profile.rs1_sc2, here, reply);
-  if (has(part::redundant_alone, 2)) reply.unused_bits |= split(profile.idc_rs1, here, reply) != 0;
+  if (has(part::redundant_sequence, 2)) channel.sequence = split_redundant(profile.rs1_sc2, here, reply);
+  if (has(part::redundant_alone, 2)) reply.unused_bits |= split_redundant(profile.idc_rs1, here, reply) != 0;
   if (has(part::redundant_calibration, 2)) {
     if (profile.id6_rs == Id6Redundant::bits_16) {
       reply.redundant = static_cast<std::uint16_t>(here[0] << 8 | here[1]);
     } else {
-      reply.unused_bits |= split(RedundantBit::b0, here, reply) != 0;
+      reply.unused_bits |= split_redundant(RedundantBit::b0, here, reply) != 0;
     }
   }
   if (has(part::memory_address, 1)) {
-    reply.memory_address = address_from_wire(profile, here[0]);
-    reply.busy = busy_from_wire(profile, here[0]);
+    const std::uint8_t field = from_wire(profile.memory_address_order == FieldOrder::document, here[0]);
+    reply.memory_address = field & 0x7F;
+    reply.busy = (field & 0x80) != 0;
   }
   if (has(part::value, 1)) reply.value = here[0];
 }

@@ -54,18 +54,14 @@ constexpr std::string_view no_memory(const Profile& profile) {
 
 // ---- What is said of errors
 
-/// What was asked: the request, or without one what the reply's own control field says; the address of a memory access
-/// is then taken as it comes.
+// Without the request the reply's own control field says what was asked; the address of a memory access is taken as it
+// comes.
 constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes reply) {
   if (!request.empty()) return decode_request(profile, request);
   const auto id = data_id(reply[0]);
   if (!id) return Error::unexpected_reply;
-  Request asked{*id, address_of(reply[0])};
-  if (is_memory_access(asked.id) && reply.size() == reply_length(asked.id)) {
-    asked.memory_address = detail::address_from_wire(profile, reply[1]);
-    asked.value = reply[2];
-  }
-  return asked;
+  bool busy = false;
+  return detail::split_request(profile, *id, reply, busy);
 }
 
 // The check behind `error`; `passed` where the error is none of the frame's.
