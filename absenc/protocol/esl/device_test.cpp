@@ -28,16 +28,6 @@ void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
   }
 }
 
-TEST(EslDevice, AnswersEveryIdWithItsLength) {
-  Bench bench;
-  for (const std::uint8_t id : std::to_array<std::uint8_t>({0x1, 0x2, 0x4, 0x5, 0x6, 0x8, 0x9, 0xA, 0xB, 0xC, 0xD})) {
-    EXPECT_EQ(bench.raw(Request{static_cast<DataId>(id)}).size(), reply_length(static_cast<DataId>(id)));
-  }
-  EXPECT_EQ(bench.raw(memory_read(0x20)), memory_reply(memory_read(0x20), false, 0));
-  EXPECT_EQ(bench.raw(memory_write(0x20, 7)), memory_reply(memory_write(0x20, 7), false, 7));
-  EXPECT_EQ(bench.encoder.violation_count(), 0u);
-}
-
 TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   Bench bench;
   testing::RawHost host(wire(hex<"0875">), 5us);
@@ -95,69 +85,67 @@ TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {
   }
 }
 
+// An encoder without a line: what happens to it by hand.
+struct Alone {
+  using Happening = Event<std::uint8_t>::Kind;
+  Alone() { encoder.power_on(Time{}, PowerOn::skip); }
+  Step<std::uint8_t> feed(Happening kind, Time at, const Wire& bytes = {}) {
+    encoder.feed({.kind = kind, .at = at, .items = bytes});
+    return encoder.next(at);
+  }
+  testing::TestShaft shaft;
+  VirtualEncoder encoder{{}, shaft};
+};
+constexpr auto waits = Step<std::uint8_t>::Kind::wait;
+
 // A request of three characters, the second of them damaged: the answer waits for the end of the frame set.
 TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
-  const testing::TestShaft shaft;
-  VirtualEncoder encoder({}, shaft);
-  encoder.power_on(Time{}, PowerOn::skip);
-  using Happening = Event<std::uint8_t>;
-  const Wire first{control_field({}, 0, DataId::position)};
-  const Wire last{0x55};
-  encoder.feed({.kind = Happening::Kind::received, .at = 1us, .items = first});
-  encoder.feed({.kind = Happening::Kind::line_error, .at = 2us});
-  EXPECT_EQ(encoder.next(2us).kind, Step<std::uint8_t>::Kind::wait);
-  encoder.feed({.kind = Happening::Kind::received, .at = 3us, .items = last});
-  EXPECT_EQ(encoder.next(3us).kind, Step<std::uint8_t>::Kind::wait);
-  encoder.feed({.kind = Happening::Kind::silence, .at = 3us + 2 * line_settings.character()});
-  const Step<std::uint8_t> step = encoder.next(3us + 2 * line_settings.character());
+  Alone alone;
+  alone.feed(Alone::Happening::received, 1us, {control_field({}, 0, DataId::position)});
+  EXPECT_EQ(alone.feed(Alone::Happening::line_error, 2us).kind, waits);
+  EXPECT_EQ(alone.feed(Alone::Happening::received, 3us, {0x55}).kind, waits);
+  const Step<std::uint8_t> step = alone.feed(Alone::Happening::silence, 3us + 2 * line_settings.character());
   ASSERT_EQ(step.kind, Step<std::uint8_t>::Kind::transfer);
   EXPECT_EQ(step.at, 3us + answer_time);
   EXPECT_EQ(step.out[1] & status::rejected, status::stop_error);
-  EXPECT_EQ(encoder.violation_count(), 0u);
+  EXPECT_EQ(alone.encoder.violation_count(), 0u);
 }
 
 TEST(EslDevice, AnyPauseEndsWhatAnAbsentEncoderWasAskedAndNothingIsSentWhenOff) {
-  const testing::TestShaft shaft;
-  VirtualEncoder encoder({}, shaft);
-  encoder.power_on(Time{}, PowerOn::skip);
-  const RequestBytes others = encode_request({}, {DataId::position, 3});
-  encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 2us, .items = others});
-  EXPECT_EQ(encoder.next(2us).expect, 0u);
-  EXPECT_GT(encoder.next(2us).gap, Time{});
-  encoder.feed({.kind = Event<std::uint8_t>::Kind::silence, .at = 5us});
-  const RequestBytes own = encode_request({}, {DataId::position});
-  encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 9us, .items = own});
-  encoder.power_off(10us);
-  EXPECT_EQ(encoder.next(10us).kind, Step<std::uint8_t>::Kind::wait);
+  Alone alone;
+  const Step<std::uint8_t> step =
+      alone.feed(Alone::Happening::received, 2us, wire(encode_request({}, {DataId::position, 3}).view()));
+  EXPECT_EQ(step.expect, 0u);
+  EXPECT_GT(step.gap, Time{});
+  alone.feed(Alone::Happening::silence, 5us);
+  const Wire own = wire(encode_request({}, {DataId::position}).view());
+  alone.encoder.feed({.kind = Alone::Happening::received, .at = 9us, .items = own});
+  alone.encoder.power_off(10us);
+  EXPECT_EQ(alone.encoder.next(10us).kind, waits);
 }
 
 // So that the eighth reset after it is the first of eight.
 TEST(EslDevice, ABadRequestStartsTheCountAgain) {
-  for (const auto kind : {Event<std::uint8_t>::Kind::received, Event<std::uint8_t>::Kind::line_error}) {
-    testing::TestShaft shaft;
-    shaft.put(0, 1'000'000);
-    VirtualEncoder encoder({}, shaft);
-    encoder.power_on(Time{}, PowerOn::skip);
+  for (const auto kind : {Alone::Happening::received, Alone::Happening::line_error}) {
+    Alone alone;
+    alone.shaft.put(0, 1'000'000);
     Time now{};
-    const auto hear = [&](Bytes bytes) {
-      now += reset_interval;
-      encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = bytes});
-      if (encoder.next(now).kind == Step<std::uint8_t>::Kind::transfer) {
-        encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now + 20us});
+    const Wire zero = wire(encode_request({}, {DataId::zero}).view());
+    const auto ask = [&](int times) {
+      for (; times > 0; --times) {
+        alone.feed(Alone::Happening::received, now += reset_interval, zero);
+        alone.feed(Alone::Happening::sent, now + 20us);
       }
     };
-    const RequestBytes zero = encode_request({}, {DataId::zero});
-    for (unsigned i = 0; i < 7; ++i) hear(zero);
-    hear(zero.view().first(1));
-    const Wire wrong{0x55};
-    encoder.feed({.kind = kind, .at = now + 1us, .items = wrong});
-    encoder.feed({.kind = Event<std::uint8_t>::Kind::silence, .at = now + 3us});
-    static_cast<void>(encoder.next(now + 3us));
-    encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now + 20us});
-    hear(zero);
-    EXPECT_EQ(encoder.reply_to(DataId::position, now).singleturn, 1'000'000u);
-    for (unsigned i = 0; i < 7; ++i) hear(zero);
-    EXPECT_EQ(encoder.reply_to(DataId::position, now).singleturn, 0u);
+    ask(7);
+    alone.feed(Alone::Happening::received, now += reset_interval, {zero[0]});
+    alone.feed(kind, now + 1us, {0x55});
+    alone.feed(Alone::Happening::silence, now + 3us);
+    alone.feed(Alone::Happening::sent, now + 20us);
+    ask(1);
+    EXPECT_EQ(alone.encoder.reply_to(DataId::position, now).singleturn, 1'000'000u);
+    ask(7);
+    EXPECT_EQ(alone.encoder.reply_to(DataId::position, now).singleturn, 0u);
   }
 }
 

@@ -34,25 +34,6 @@ TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   EXPECT_EQ(read.fields.at("redundant_singleturn"), 0xABCDEF >> 15);
 }
 
-TEST(EslHost, ReadsEveryId) {
-  Bench bench;
-  bench.shaft.put(4660, 0xABCDEF);
-  for (const auto& [command, field, value] :
-       {std::tuple{"singleturn", "singleturn", 0xABCDEF}, std::tuple{"position-short", "multiturn", 4660},
-        std::tuple{"singleturn-short", "singleturn", 0xABCDEF},
-        std::tuple{"calibration", "redundant_singleturn", 0xABCD}, std::tuple{"alarms", "ch2_alarms", 0},
-        std::tuple{"temperature", "temperature_c", 35}, std::tuple{"encoder-id", "encoder_id", 0xD8},
-        std::tuple{"encoder-id", "safety", 1}, std::tuple{"encoder-id", "multiturn_bytes", 2},
-        std::tuple{"encoder-id", "singleturn_bits", 24}, std::tuple{"safe-position", "safe_singleturn", 0xABCDEF}}) {
-    const Outcome outcome = bench.run(command);
-    EXPECT_EQ(outcome.error, Error::none) << command;
-    ASSERT_TRUE(outcome.fields.contains(field)) << command;
-    EXPECT_EQ(outcome.fields.at(field), value) << command;
-  }
-  EXPECT_FALSE(bench.run("temperature").reading.has_value());
-  EXPECT_EQ(bench.violations(), 0u);
-}
-
 TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   Bench bench;
   for (unsigned i = 0; i < 20; ++i) EXPECT_EQ(bench.run("encoder-id").error, Error::none);
