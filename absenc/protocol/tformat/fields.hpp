@@ -60,35 +60,36 @@ struct Values {
   std::optional<std::uint8_t> page_left{};
 };
 
-using Kind = FieldInfo::Kind;
-inline constexpr auto fields = author::fields_of<Values>(
-    author::field<&Values::data_id>({"data_id", Kind::number, "", "which data was asked for (Table 1)"}),
-    author::field<&Values::control_field>(
-        {"control_field", Kind::number, "", "first byte of the request: sync code, data id, parity"}),
-    author::field<&Values::status>({"status", Kind::flags, "", "SF", status_flags}),
-    author::field<&Values::singleturn>({"singleturn",
-                                        Kind::number,
-                                        "counts",
-                                        "ABS: position within the turn, rising counter-clockwise",
-                                        {},
-                                        Shows::position}),
-    author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID"}),
-    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Shows::turns}),
-    author::field<&Values::alarms>({"alarms", Kind::flags, "", "ALMC", alarm_flags}),
-    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
-    author::field<&Values::address>({"address", Kind::number, "", "ADF: memory address; 127 selects the page"}),
-    author::field<&Values::busy>(
-        {"busy", Kind::number, "", "1 while the encoder writes: the request was not executed"}),
-    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory"}),
-    author::field<&Values::data>({"data", Kind::bytes, "", "the bytes in memory from `address` on"}),
-    author::field<&Values::temperature>(
-        {"temperature_c", Kind::number, "degC", "of the encoder's board, within 3 degC"}),
-    author::field<&Values::overheat_enabled>({"overheat_enabled", Kind::boolean, "", "whether over_heat is watched"}),
-    author::field<&Values::overheat_threshold>({"overheat_threshold_c", Kind::number, "degC", "over_heat above this"}),
-    author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
-    author::field<&Values::page_left>(
-        {"page_left", Kind::number, "",
-         "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
+inline constexpr auto fields = [] {
+  using author::field;
+  using enum FieldInfo::Kind;
+  return author::fields_of<Values>(
+      field<&Values::data_id>({"data_id", number, "", "which data was asked for (Table 1)"}),
+      field<&Values::control_field>(
+          {"control_field", number, "", "first byte of the request: sync code, data id, parity"}),
+      field<&Values::status>({"status", flags, "", "SF", status_flags}),
+      field<&Values::singleturn>({"singleturn",
+                                  number,
+                                  "counts",
+                                  "ABS: position within the turn, rising counter-clockwise",
+                                  {},
+                                  Shows::position}),
+      field<&Values::encoder_id>({"encoder_id", number, "", "ENID"}),
+      field<&Values::multiturn>({"multiturn", number, "revolutions", "ABM", {}, Shows::turns}),
+      field<&Values::alarms>({"alarms", flags, "", "ALMC", alarm_flags}),
+      field<&Values::page>({"page", number, "", "memory page"}),
+      field<&Values::address>({"address", number, "", "ADF: memory address; 127 selects the page"}),
+      field<&Values::busy>({"busy", number, "", "1 while the encoder writes: the request was not executed"}),
+      field<&Values::value>({"value", number, "", "EDF: the byte in memory"}),
+      field<&Values::data>({"data", bytes, "", "the bytes in memory from `address` on"}),
+      field<&Values::temperature>({"temperature_c", number, "degC", "of the encoder's board, within 3 degC"}),
+      field<&Values::overheat_enabled>({"overheat_enabled", boolean, "", "whether over_heat is watched"}),
+      field<&Values::overheat_threshold>({"overheat_threshold_c", number, "degC", "over_heat above this"}),
+      field<&Values::written>({"written", boolean, "", "false when the value was there already"}),
+      field<&Values::page_left>(
+          {"page_left", number, "",
+           "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
+}();
 
 [[nodiscard]] constexpr Values values_of(const Request& request) {
   Values all{.data_id = request.id, .control_field = control_field(request.id)};
