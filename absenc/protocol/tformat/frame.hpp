@@ -7,6 +7,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <numeric>
 #include <optional>
 
 #include "absenc/core/angle.hpp"
@@ -119,13 +121,12 @@ inline constexpr std::size_t reply_capacity = 11;
 using RequestBytes = ByteBuffer<request_capacity>;
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// G(X) = X^8 + 1 (6.3.4): the same as the exclusive OR of all bytes, which is how `checksum` computes it.
+/// G(X) = X^8 + 1 (6.3.4): the same as the exclusive OR of all bytes, which is how `checksum` computes it: by `reduce`,
+/// whose order is free, because a loop waits for each byte in turn.
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
-  std::uint8_t sum = 0;
-  for (const std::uint8_t byte : bytes) sum ^= byte;
-  return sum;
+  return std::reduce(bytes.begin(), bytes.end(), std::uint8_t{0}, std::bit_xor<>{});
 }
 
 /// Sync code 010, the id, its even parity (6.3.1).
