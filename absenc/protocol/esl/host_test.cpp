@@ -15,7 +15,6 @@ namespace {
 
 using testing::Bench;
 using testing::Outcome;
-using testing::says;
 using testing::Wire;
 using testing::wire;
 
@@ -72,7 +71,7 @@ TEST(EslHost, SilenceIsATimeout) {
   EXPECT_EQ(bench.line.now(), 2us + answer_limit);
   EXPECT_EQ(read.detail, "it is also silent when request_crc, crc_bit_order or address is another");
   EXPECT_EQ(read.sent.size(), 2u);
-  EXPECT_TRUE(says(bench.run("memory-read", {0}), "(Figure 18)"));
+  EXPECT_TRUE(bench.run("memory-read", {0}).says("(Figure 18)"));
 }
 
 // Each with its own name and sentence.
@@ -80,7 +79,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
   struct Row {
     const char* sentence;
     Error error;
-    testing::Tampered::Tamper tamper;
+    testing::Tamper tamper;
   };
   const std::vector<Row> rows{
       {"CRC of channel 1 is wrong", Error::bad_checksum, [](unsigned, Wire& reply) { reply[4] ^= 1; }},
@@ -99,7 +98,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
     Bench bench({}, row.tamper);
     const Outcome read = bench.run("position");
     EXPECT_EQ(text_of(read.error).name, text_of(row.error).name) << row.sentence;
-    EXPECT_TRUE(says(read, row.sentence)) << read.detail;
+    EXPECT_TRUE(read.says(row.sentence)) << read.detail;
     EXPECT_FALSE(read.reading.has_value());
     EXPECT_GE(bench.line.now(), read.received_at + gap_limit) << row.sentence;
     EXPECT_EQ(bench.violations(), 0u);
@@ -109,7 +108,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
 // Of characters that were damaged nobody knows what they would have been.
 TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
   using Happening = Event<std::uint8_t>;
-  const testing::Made made({}, "position");
+  const kit::Made made(unit, testing::options_of({}), "position");
   Conversation<std::uint8_t>& host = made.host;
   static_cast<void>(host.next({}));
   host.feed({.kind = Happening::Kind::sent, .at = 2us});
@@ -144,9 +143,9 @@ TEST(EslHost, AProfileThatDoesNotFitIsNamed) {
        }) {
     Bench bench(row.encoder);
     bench.shaft.put(0, 0xABCDEF);
-    const Outcome read = testing::run(bench.line, row.host, row.command);
+    const Outcome read = bench.line.run_command(unit, testing::options_of(row.host), row.command);
     EXPECT_NE(read.error, Error::none) << row.sentence;
-    EXPECT_TRUE(says(read, row.sentence)) << row.sentence << ": " << read.detail;
+    EXPECT_TRUE(read.says(row.sentence)) << row.sentence << ": " << read.detail;
   }
 }
 
@@ -168,7 +167,7 @@ TEST(EslHost, ANodeThatNeverStopsDoesNotHoldTheHost) {
     const Outcome read = bench.run(command);
     EXPECT_EQ(read.error, Error::wrong_length);
     EXPECT_TRUE(read.ended);
-    EXPECT_TRUE(says(read, "without a pause")) << read.detail;
+    EXPECT_TRUE(read.says("without a pause")) << read.detail;
     EXPECT_LE(bench.line.now(), 2 * noise_limit);
   }
 }
@@ -261,7 +260,7 @@ TEST(EslHost, AnIdDThatMovesTheSingleTurnZeroIsFound) {
   bench.set(condition::id_d_clears_singleturn, 1);
   const Outcome turns = bench.run("reset-multiturn");
   EXPECT_EQ(turns.error, Error::cross_check_failed);
-  EXPECT_TRUE(says(turns, "single-turn zero too"));
+  EXPECT_TRUE(turns.says("single-turn zero too"));
 }
 
 TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
@@ -270,14 +269,14 @@ TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
     bench.shaft.spin(rpm, Time{});
     const Outcome zero = bench.run("zero");
     EXPECT_EQ(zero.error, Error::invalid_argument);
-    EXPECT_TRUE(says(zero, "nothing was sent"));
+    EXPECT_TRUE(zero.says("nothing was sent"));
     EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
   }
   Bench starting;
   starting.switch_off_and_on(testing::PowerOn::real);
   const Outcome zero = starting.run("zero");
   EXPECT_EQ(zero.error, Error::invalid_argument);
-  EXPECT_TRUE(says(zero, "not ready"));
+  EXPECT_TRUE(zero.says("not ready"));
 }
 
 // Replies 0 and 1 are looks, 2 to 9 answer the requests, 10 and, when they fail, 11 and 12 are the verification.
@@ -300,7 +299,7 @@ TEST(EslHost, ALostReplyStopsAResetUnlessItIsTheLast) {
     bench.shaft.put(5, 0);
     const Outcome reset = bench.run("reset-multiturn");
     EXPECT_EQ(reset.error, row.error) << row.first;
-    EXPECT_TRUE(says(reset, row.words)) << reset.detail;
+    EXPECT_TRUE(reset.says(row.words)) << reset.detail;
     EXPECT_EQ(bench.encoder.answered(), row.sent) << row.first;
     EXPECT_EQ(bench.encoder.reply_to(DataId::position, bench.line.now()).multiturn, row.turns) << row.first;
   }
@@ -318,7 +317,7 @@ TEST(EslHost, AResetThatDidNotHappenIsFound) {
     });
     const Outcome reset = bench.run(command);
     EXPECT_EQ(reset.error, Error::cross_check_failed);
-    EXPECT_TRUE(says(reset, words)) << reset.detail;
+    EXPECT_TRUE(reset.says(words)) << reset.detail;
     EXPECT_FALSE(reset.reading.has_value());
   }
 }
@@ -339,7 +338,7 @@ struct Line8 {
   }
   std::vector<std::unique_ptr<testing::TestShaft>> shafts;
   std::vector<std::unique_ptr<VirtualEncoder>> encoders;
-  testing::HostedLine line;
+  kit::HostedLine line{line_settings};
 };
 
 TEST(EslBus, EachAnswersItsOwnRequestsAtOnceBehindThoseOfOthers) {
@@ -347,7 +346,7 @@ TEST(EslBus, EachAnswersItsOwnRequestsAtOnceBehindThoseOfOthers) {
   bus.encoders[3]->power_off(Time{});
   for (unsigned round = 0; round < 100; ++round) {
     for (std::uint8_t address = 0; address < most_encoders; ++address) {
-      const Outcome read = testing::run(bus.line, {.address = address}, "position");
+      const Outcome read = bus.line.run_command(unit, testing::options_of({.address = address}), "position");
       ASSERT_EQ(read.error, address == 3 ? Error::timeout : Error::none) << round << " " << int{address};
       if (address == 3) continue;
       EXPECT_EQ(read.reading->singleturn, address * 1'000'000u + 77);
@@ -369,7 +368,7 @@ TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
                                               std::tuple{Wire{1, 4, 4}, std::vector{1, 4}, std::vector{4}},
                                               std::tuple{Wire{}, std::vector<int>{}, std::vector<int>{}}}) {
     Line8 bus(there);
-    const testing::Made made({}, "scan");
+    const kit::Made made(unit, testing::options_of({}), "scan");
     Conversation<std::uint8_t>& host = made.host;
     EXPECT_TRUE(bus.line.converse(host));
     EXPECT_EQ(host.error(), nodes.empty() ? Error::timeout : Error::none);

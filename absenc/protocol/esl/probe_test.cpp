@@ -24,7 +24,7 @@ std::vector<Taken> captured(const Profile& profile, const std::vector<Request>& 
   std::vector<Taken> taken;
   for (Request request : requests) {
     request.encoder_address = profile.address;
-    taken.push_back({testing::wire(encode_request(profile, request).view()), bench.raw(request)});
+    taken.push_back({testing::wire_of(request, profile), bench.raw(request)});
   }
   return taken;
 }

@@ -400,7 +400,7 @@ TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
     shaft.put(static_cast<std::int64_t>(random.below(65536)), static_cast<std::int64_t>(random.below(1 << 24)));
     if (random.chance(0.05)) encoder.raise_alarms(1u << random.below(8));
     if (random.chance(0.05)) encoder.lower_alarms(0xFF);
-    testing::Made read({}, "safe-position");
+    kit::Made read(unit, testing::options_of({}), "safe-position");
     ASSERT_TRUE(host.run(read.host, 10s)) << "hangs";
     if (read.host.error() != Error::none) continue;
     ++safe;

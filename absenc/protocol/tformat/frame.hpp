@@ -7,7 +7,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <numeric>
 #include <optional>
 
@@ -126,7 +125,8 @@ using ReplyBytes = ByteBuffer<reply_capacity>;
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
-  return std::reduce(bytes.begin(), bytes.end(), std::uint8_t{0}, std::bit_xor<>{});
+  return std::reduce(bytes.begin(), bytes.end(), std::uint8_t{0},
+                     [](std::uint8_t one, std::uint8_t other) -> std::uint8_t { return one ^ other; });
 }
 
 /// Sync code 010, the id, its even parity (6.3.1).
