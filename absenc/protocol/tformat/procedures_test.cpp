@@ -44,6 +44,11 @@ TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
   });
   EXPECT_EQ(odd.run("temperature").fields, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   EXPECT_EQ(odd.encoder.answered(), 3u);
+  // One that says another page in the end than was selected again.
+  Bench other([](unsigned index, Wire& reply) {
+    if (index == 4) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 3});
+  });
+  EXPECT_EQ(other.run("temperature").fields, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   struct Row {
     unsigned lost;  // from this reply on: page, page select, temperature, page select, page
     Error error;
