@@ -152,7 +152,7 @@ struct Lengths {
 };
 inline constexpr std::array<Lengths, 16> lengths = [] {
   std::array<Lengths, 16> table{};
-  for (const std::size_t id : {0x0, 0x1, 0x7, 0x8, 0xC}) table[id] = {1, 6};
+  for (const std::size_t id : {0x0u, 0x1u, 0x7u, 0x8u, 0xCu}) table[id] = {1, 6};
   table[0x2] = {1, 4};
   table[0x3] = {1, 11};
   table[0x6] = {4, 4};
