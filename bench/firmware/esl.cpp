@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/esl/protocol.hpp"
+#include "absenc/protocol/esl/reply.hpp"
 #include "bench/firmware/reader.hpp"
 
 int main() {

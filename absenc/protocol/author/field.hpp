@@ -59,7 +59,7 @@ template <auto member>
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view meaning,
                                               std::span<const FlagInfo> flags) {
-  return {{.name = name, .kind = FieldInfo::Kind::flags, .meaning = meaning, .flags = flags}};
+  return {{name, FieldInfo::Kind::flags, {}, meaning, flags}};
 }
 
 /// The fields of `Values`, a struct whose members they show.

@@ -8,9 +8,7 @@
 
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/author/device.hpp"
-#include "absenc/protocol/esl/frame.hpp"
-#include "absenc/protocol/esl/timing.hpp"
-#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/esl/reply.hpp"
 
 namespace absenc::esl {
 
@@ -61,52 +59,280 @@ inline constexpr std::array<Condition, 16> conditions{{
 class VirtualEncoder final : public author::Responder {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
-  VirtualEncoder(const Profile& profile, const Shaft& shaft);
-
-  void power_on(Time now, PowerOn kind) override;
-  void raise_alarms(std::uint32_t bits) override;
-  void lower_alarms(std::uint32_t bits) override;
-  void set_condition(std::size_t index, std::int64_t value, Time now) override;
+  VirtualEncoder(const Profile& profile, const Shaft& shaft)
+      : Responder({.character = line_settings.character(), .answer_time = answer_time}),
+        profile_(profile),
+        shaft_(&shaft) {
+    for (std::size_t i = 0; i < conditions.size(); ++i) condition_[i] = static_cast<std::int32_t>(conditions[i].normal);
+  }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-
+  /// The byte of a page; null for what does not exist.
+  [[nodiscard]] std::uint8_t* stored(std::uint8_t page, std::uint8_t address) {
+    std::uint8_t* in_memory = memory_.data();
+    std::uint8_t* in_registers = registers_.data();
+    for (const MemoryArea& area : memory_map) {
+      std::uint8_t*& begin = area.write_life == life::registers ? in_registers : in_memory;
+      if (area.has(page, address)) return begin + (address - area.first);
+      begin += area.count;
+    }
+    return nullptr;
+  }
+  void set_condition(std::size_t index, std::int64_t value, Time) override {
+    condition_[index] = static_cast<std::int32_t>(value);
+  }
+  void raise_alarms(std::uint32_t bits) override {
+    latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
+    forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
+  }
+  void lower_alarms(std::uint32_t bits) override {
+    latches_ &= static_cast<std::uint8_t>(~bits);
+    forced_ &= static_cast<std::uint8_t>(~bits);
+  }
   /// What a reply to `id` would say now.
-  [[nodiscard]] Reply reply_to(DataId id, Time now) const;
-  /// The byte of a page in the EEPROM or MTP image; null for registers and what does not exist.
-  [[nodiscard]] std::uint8_t* stored(std::uint8_t page, std::uint8_t address);
+  [[nodiscard]] Reply reply_to(DataId id, Time now) const {
+    Reply reply{.id = id, .encoder_address = profile_.address};
+    reply.one = channel_now(Channel::one, now);
+    reply.two = channel_now(Channel::two, now);
+    reply.singleturn = singleturn(Channel::one, now);
+    reply.multiturn = turns(now);
+    const bool wide = id == DataId::calibration && profile_.id6_rs == Id6Redundant::bits_16;
+    const auto offset = static_cast<std::uint32_t>(value_of(condition::redundant_offset)) << 15;
+    const std::uint32_t two = (singleturn(Channel::two, now) + offset) & 0xFFFFFF;
+    reply.redundant = static_cast<std::uint16_t>(two >> (wide ? 8 : 15));
+    reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
+    return reply;
+  }
+  // It answers from the first moment on: SF tells when it is ready.
+  void power_on(Time now, PowerOn kind) override {
+    ready_at_ = kind == PowerOn::real ? now + start_up : now;
+    Responder::power_on(now, kind);
+  }
 
  private:
-  static constexpr std::size_t page_size = 0x7F;
-  static constexpr std::size_t page6_at = 6 * page_size;  // behind pages 0 to 5
-  static constexpr std::size_t mtp_at = page6_at + 0x0C;
-  static constexpr std::size_t zero_at = mtp_at + 0x20;  // channel one, 4 bytes, little endian
-  static constexpr std::size_t zero2_at = zero_at + 4;   // channel two
-  static constexpr std::size_t turns_at = zero2_at + 4;  // what is taken off the turns of the shaft, 8 bytes
-  static constexpr std::size_t memory_size = turns_at + 8;
+  static constexpr std::int32_t overspeed_above = 10'000'000;  // 1/1000 rpm (Table 8)
+  static constexpr std::int32_t under_voltage_below = 2900;    // mV, typical
+  static constexpr std::int32_t over_voltage_above = 3700;
+  static constexpr std::int32_t standing_still = 1'000;  // 1/1000 rpm: what a servo at rest may tremble
+  static constexpr std::int32_t warning_above = 105;     // degC: the document gives no limit
+  static constexpr Time start_up = 100ms;                // until ready; the document gives none
+  static constexpr Time reset_interval_least = 35us;     // "typical 40 us": what is surely too fast
 
-  [[nodiscard]] std::size_t request_size(Bytes begin) const override;
-  [[nodiscard]] std::size_t others_reply_size(Bytes request) const override;
-  Answer respond(Bytes bytes, Time at, ByteBuffer<64>& reply) override;
-  bool is_refused(Flaw flaw, Bytes heard) override;
-  void refuse(Time at, ByteBuffer<64>& reply) override;
-  void started(Time at) override;
-  void stopped(Time at) override;
+  static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
+  static constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<std::uint32_t>(position) >> 8; }
 
-  [[nodiscard]] bool is_reported(std::uint8_t field) const;
-  Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply);
-  void count(DataId id, Time at);
-  Answer answer_memory(const Request& request, Time at, ByteBuffer<64>& reply);
-  void read_byte(const Request& request, Reply& reply, Time at);
-  void write_byte(const Request& request, Reply& reply, Time at);
-  void count_reset(DataId id, Time at);
-  void execute_reset(DataId id, Time at);
+  // Behind the EEPROM and the MTP: the zeros of the channels, 4 bytes each, little endian, and what is taken off the
+  // turns of the shaft, 8 bytes.
+  static constexpr std::size_t zero_at = memory_size(false);
+  static constexpr std::size_t turns_at = zero_at + 8;
 
-  [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const;
-  [[nodiscard]] std::uint16_t turns(Time now) const;
-  [[nodiscard]] std::uint64_t shaft_turns(Time now) const;
-  void set_turns(std::uint16_t turns, Time now);
-  [[nodiscard]] std::uint8_t alarms_now() const;
-  [[nodiscard]] ChannelReply channel_now(Channel channel, Time now) const;
-  [[nodiscard]] std::uint8_t error_info() const;
+  // ---- Requests
+
+  // Whatever its parity bit: a wrong one is reported.
+  [[nodiscard]] std::size_t request_size(Bytes begin) const override {
+    const std::optional<DataId> id = data_id(begin[0]);
+    return id ? request_length(profile_, *id) : 0;
+  }
+  [[nodiscard]] std::size_t others_reply_size(Bytes request) const override {
+    return address_of(request[0]) == profile_.address ? 0 : reply_length(*data_id(request[0]));
+  }
+  Answer respond(Bytes bytes, Time at, ByteBuffer<64>& reply) override {
+    if (magnitude(shaft_->at(at).speed_millirpm) > overspeed_above) latches_ |= alarms::overspeed;
+    if (address_of(bytes[0]) != profile_.address) return Answer::for_others;
+    const Result<Request> request = decode_request(profile_, bytes);
+    if (!request) {
+      const bool crc_wrong =
+          bytes.size() > 1 && checksum8(profile_.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back();
+      in_a_row_ = 0;
+      return crc_wrong ? Answer::for_others : report_bad_request(bytes[0], status::parity_error, at, reply);
+    }
+    count(request->id, at);
+    const std::optional<Reply> made =
+        is_memory_access(request->id) ? access_memory(*request, at) : reply_to(request->id, at);
+    if (!made) return Answer::for_others;
+    reply.append(encode_reply(profile_, *made));
+    if (is_reset(request->id)) count_reset(request->id, at);  // after the reply, which still shows the old state
+    return Answer::sent;
+  }
+  bool is_refused(Flaw flaw, Bytes heard) override {
+    if (flaw != Flaw::damaged || heard.empty() || address_of(heard[0]) != profile_.address) return false;
+    in_a_row_ = 0;
+    refused_field_ = heard[0];
+    return is_reported(heard[0]);
+  }
+  void refuse(Time at, ByteBuffer<64>& reply) override {
+    report_bad_request(refused_field_, status::stop_error, at, reply);
+  }
+  // Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF.
+  [[nodiscard]] bool is_reported(std::uint8_t field) const {
+    return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
+  }
+  // CF is echoed as it came.
+  Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply) {
+    if (!is_reported(field)) return Answer::for_others;
+    const DataId id = *data_id(field);
+    Reply report = reply_to(id, at);
+    report.one.status |= status_bit;
+    report.two.status |= status_bit;
+    reply.append(encode_reply(profile_, report, field));
+    return Answer::sent;
+  }
+  void count(DataId id, Time at) {
+    if (is_reset(id) && in_a_row_ > 0 && id == last_id_ && at - last_reset_ < reset_interval_least) {
+      violate("reset sent too fast: much less than 40 us after the one before", at);
+      in_a_row_ = 0;
+    }
+    in_a_row_ = id == last_id_ ? in_a_row_ + 1 : 1;
+    last_id_ = id;
+    if (id == DataId::encoder_id && in_a_row_ == reset_requests) {
+      violate("ID 8 sent eight times in a row: dynamic addressing, which nothing describes", at);
+    }
+    if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) {
+      for (std::uint8_t& counter : counters_) ++counter;
+    }
+  }
+  // That there is no such address is not acknowledged: the document does not say it.
+  std::optional<Reply> access_memory(const Request& request, Time at) {
+    if (profile_.bus == sharing_yes) {
+      violate("memory access with several encoders on the line", at);
+      return std::nullopt;
+    }
+    const bool writing = request.id == DataId::write_memory;
+    const bool exists = request.memory_address == page_select_address
+                            ? !writing || is_page(request.value)
+                            : stored(page_, request.memory_address) != nullptr;
+    if (!exists) return std::nullopt;
+    Reply reply{.id = request.id,
+                .encoder_address = profile_.address,
+                .memory_address = request.memory_address,
+                .value = request.value};
+    if (at < page_ready_at_) violate("memory access before the page is ready", at);
+    reply.busy = at < page_ready_at_ || (at < busy_until_ && !is_immediate(page_, request.memory_address));
+    if (!reply.busy) writing ? write_byte(request.memory_address, request.value, at) : read_byte(reply, at);
+    if (reply.busy) reply.value = 0;
+    return reply;
+  }
+  void read_byte(Reply& reply, Time at) {
+    const std::uint8_t address = reply.memory_address;
+    const bool fetched = byte_pending_ && at - pending_at_ >= eeprom_read_time;
+    if (!is_immediate(page_, address)) {
+      if (byte_pending_ && !fetched) violate("memory read again less than 200 us after the request before", at);
+      byte_pending_ = reply.busy = !fetched || pending_address_ != address;
+      if (reply.busy) {
+        pending_address_ = address;
+        pending_at_ = at;
+      }
+    }
+    if (address == page_select_address) {
+      reply.value = page_;
+    } else {
+      reply.value = page_ == register_page && address == error_info_address ? error_info() : *stored(page_, address);
+    }
+  }
+  void write_byte(std::uint8_t address, std::uint8_t value, Time at) {
+    byte_pending_ = false;
+    if (address == page_select_address) {
+      page_ = value;
+      page_ready_at_ = at + page_time;
+      return;
+    }
+    *stored(page_, address) = value;
+    if (is_immediate(page_, address)) return;
+    change_memory();
+    busy_until_ = at + eeprom_write_time;
+  }
+  void count_reset(DataId id, Time at) {
+    last_reset_ = at;
+    if (in_a_row_ < reset_requests) return;
+    in_a_row_ = 0;
+    if (magnitude(shaft_->at(at).speed_millirpm) > standing_still) return violate("reset while the shaft turns", at);
+    execute_reset(id, at);
+  }
+  void execute_reset(DataId id, Time at) {
+    if (id == DataId::clear_alarms) {
+      latches_ &= static_cast<std::uint8_t>(~alarms::xc_error);
+      if (turns_cleared_) latches_ &= static_cast<std::uint8_t>(~alarms::multiturn_error);
+      return;
+    }
+    const std::uint16_t turns_before = turns(at);
+    if (id == DataId::zero || value_of(condition::id_d_clears_singleturn) != 0) {
+      // Each channel takes its own measurement as its zero.
+      for (const std::size_t to : {zero_at, zero_at + 4}) {
+        store_little_endian(MutableBytes(memory_).subspan(to, 4), counts_of(shaft_->at(at).position));
+      }
+    }
+    if (id == DataId::reset_multiturn) turns_cleared_ = true;
+    set_turns(id == DataId::reset_multiturn ? 0 : turns_before, at);
+    busy_until_ = at + eeprom_write_time;
+  }
+
+  // ---- State
+
+  [[nodiscard]] std::uint32_t zero(Channel channel) const {
+    const std::size_t at = channel == Channel::one ? zero_at : zero_at + 4;
+    return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
+  }
+  // Each channel from its own sight of the shaft and its own zero.
+  [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const {
+    const std::int32_t stuck = value_of(condition::ch1_stuck, channel);
+    const std::uint32_t seen = counts_of(shaft_->at(now).position) - zero(channel);
+    return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : seen) & 0xFFFFFF;
+  }
+  // Turns change where the zeroed position wraps.
+  [[nodiscard]] std::uint64_t shaft_turns(Time now) const {
+    return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
+  }
+  [[nodiscard]] std::uint16_t turns(Time now) const {
+    const std::uint64_t offset = load_little_endian(Bytes(memory_).subspan(turns_at, 8));
+    return static_cast<std::uint16_t>(shaft_turns(now) - offset);
+  }
+  void set_turns(std::uint16_t turns, Time now) {
+    store_little_endian(MutableBytes(memory_).subspan(turns_at, 8), shaft_turns(now) - turns);
+    change_memory();
+  }
+  [[nodiscard]] std::uint8_t alarms_now() const {
+    unsigned bits = latches_ | forced_;
+    if (value_of(condition::supply_voltage) < under_voltage_below) bits |= alarms::under_voltage;
+    if (value_of(condition::supply_voltage) > over_voltage_above) bits |= alarms::over_voltage;
+    return static_cast<std::uint8_t>(bits);
+  }
+  [[nodiscard]] std::uint8_t error_info() const {
+    if ((latches_ & alarms::led_or_lissajous_error) == 0) return 0;
+    return value_of(condition::lissajous) != 0 ? error_info_lissajous : error_info_led;
+  }
+  [[nodiscard]] ChannelReply channel_now(Channel channel, Time now) const {
+    const unsigned alarms = alarms_now() | static_cast<unsigned>(value_of(condition::ch1_alarms, channel));
+    const unsigned led = value_of(condition::lissajous) != 0 ? 0u : unsigned{alarms::led_or_lissajous_error};
+    const unsigned safety = alarms::singleturn_error | alarms::memory_error | alarms::voltage | led;
+    unsigned bits = channel == Channel::two ? status::channel_2 : 0u;
+    if ((alarms & safety) != 0) bits |= status::safety_error;
+    if ((alarms & ~safety) != 0) bits |= status::non_safety_error;
+    if (value_of(condition::temperature) > warning_above) bits |= status::temperature_warning;
+    if (now >= ready_at_) bits |= status::ready;
+    if (value_of(condition::forced_test) != 0) bits |= status::forced_test_passed;
+    bits |= static_cast<unsigned>(value_of(condition::ch1_status_set, channel));
+    bits &= ~static_cast<unsigned>(value_of(condition::ch1_status_clear, channel));
+    const std::int32_t stuck = value_of(condition::ch1_sequence, channel);
+    const int counter = stuck >= 0 ? stuck : counters_[static_cast<std::size_t>(channel)];
+    return {.status = static_cast<std::uint8_t>(bits),
+            .alarms = static_cast<std::uint8_t>(alarms),
+            .sequence = static_cast<std::uint8_t>(channel == Channel::one ? counter : counter & 0x7F),
+            .encoder_id = 0xD8};
+  }
+
+  // ---- Power
+
+  void started(Time) override {
+    page_ = register_page;
+    page_ready_at_ = busy_until_ = Time{};
+    registers_.fill(0);
+    counters_.fill(0);
+  }
+  void stopped(Time) override {
+    latches_ &= alarms::turns_wrong;  // the others need a power cycle; these an ID C
+    turns_cleared_ = false;
+    byte_pending_ = false;
+    in_a_row_ = 0;
+  }
   // Of channel 2 the one behind that of channel 1.
   [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
     return condition_[index + (channel == Channel::two ? 1 : 0)];
@@ -115,9 +341,8 @@ class VirtualEncoder final : public author::Responder {
   Profile profile_;
   const Shaft* shaft_;
   std::array<std::int32_t, conditions.size()> condition_{};
-  std::array<std::uint8_t, memory_size> memory_{};
-  std::array<std::uint8_t, 0x30> page8_{};   // registers are lost at power off
-  std::array<std::uint8_t, 0x20> page14_{};  // 20 to 3F
+  std::array<std::uint8_t, turns_at + 8> memory_{};
+  std::array<std::uint8_t, memory_size(true)> registers_{};  // lost at power off
 
   Time ready_at_{};
   std::uint8_t latches_ = 0;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/field.hpp"
@@ -42,26 +43,33 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_voltage", "the supply is above 3.7 V", "check the supply; it clears with the voltage"},
 }};
 
-/// Each is there where a frame or a command has it.
-struct Values {
+/// What is shown of a frame, or of what a procedure found: each where it is there, of a reply what its id carries.
+struct Shown {
+  constexpr Shown() = default;
+  constexpr Shown(const Profile& profile, const Request& request)
+      : data_id(request.id),
+        control_field(esl::control_field(profile, request.encoder_address, request.id)),
+        encoder_address(request.encoder_address) {
+    if (is_memory_access(request.id)) memory_address = request.memory_address;
+    if (request.id == DataId::write_memory) value = request.value;
+  }
+  constexpr explicit Shown(const Reply& one) { show(one); }
+
+  constexpr void show(const Reply& one) {
+    data_id = one.id;
+    encoder_address = one.encoder_address;
+    reply = one;
+    if (!is_memory_access(one.id)) return;
+    memory_address = one.memory_address;
+    busy = one.busy;
+    value = one.value;
+  }
+
   std::optional<DataId> data_id{};
   std::optional<std::uint8_t> control_field{};
   std::optional<std::uint8_t> encoder_address{};
+  std::optional<Reply> reply{};
   std::optional<bool> clash{};
-  std::optional<std::uint8_t> ch1_status{};
-  std::optional<std::uint8_t> ch1_alarms{};
-  std::optional<std::uint32_t> singleturn{};
-  std::optional<std::uint16_t> multiturn{};
-  std::optional<std::uint8_t> encoder_id{};
-  std::optional<unsigned> safety{};
-  std::optional<unsigned> multiturn_bytes{};
-  std::optional<unsigned> singleturn_bits{};
-  std::optional<std::uint8_t> ch1_sequence{};
-  std::optional<std::int8_t> temperature{};  // its sign is assumed
-  std::optional<std::uint8_t> ch2_status{};
-  std::optional<std::uint8_t> ch2_alarms{};
-  std::optional<std::uint16_t> redundant{};
-  std::optional<std::uint8_t> ch2_sequence{};
   std::optional<std::uint8_t> page{};
   std::optional<std::uint8_t> memory_address{};
   std::optional<bool> busy{};
@@ -74,216 +82,152 @@ struct Values {
   std::optional<std::uint8_t> page_left{};
 };
 
-using Kind = FieldInfo::Kind;
-inline constexpr auto fields = author::fields_of<Values>(
-    author::field<&Values::data_id>({"data_id", Kind::number, "", "which data was asked for (Table 3)"}),
-    author::field<&Values::control_field>({"control_field", Kind::number, "", "CF: encoder address, data id, parity"}),
-    author::field<&Values::encoder_address>(
-        {"encoder_address", Kind::number, "", "EAD: which encoder on the line", {}, Role::encoder}),
-    author::field<&Values::clash>(
-        {"clash",
-         Kind::boolean,
-         "",
-         "yes: its answer is damaged every time; two encoders share the address, or the line is bad",
-         {},
-         Role::clash}),
-    author::field<&Values::ch1_status>({"ch1_status", Kind::flags, "", "SF of channel 1", status_flags}),
-    author::field<&Values::ch1_alarms>({"ch1_alarms", Kind::flags, "", "ALM of channel 1", alarm_flags}),
-    author::field<&Values::singleturn>(
-        {"singleturn", Kind::number, "counts", "ABS: position within the turn", {}, Role::position}),
-    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Role::turns}),
-    author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID: D8 multi-turn, 98 single-turn"}),
-    author::field<&Values::safety>({"safety", Kind::number, "", "1: a safety encoder (ENID bit 7)"}),
-    author::field<&Values::multiturn_bytes>({"multiturn_bytes", Kind::number, "", "of turns (ENID bits 6 and 5)"}),
-    author::field<&Values::singleturn_bits>(
-        {"singleturn_bits", Kind::number, "", "of the position within the turn (ENID bits 4 to 0)"}),
-    author::field<&Values::ch1_sequence>(
-        {"ch1_sequence", Kind::number, "", "SC1: counts the replies, 0 to 255", {}, Role::sequence}),
-    author::field<&Values::temperature>({"temperature_c", Kind::number, "degC", "inside the encoder"}),
-    author::field<&Values::ch2_status>({"ch2_status", Kind::flags, "", "SF of channel 2", status_flags}),
-    author::field<&Values::ch2_alarms>({"ch2_alarms", Kind::flags, "", "ALM of channel 2", alarm_flags}),
-    author::field<&Values::redundant>({"redundant_singleturn",
-                                       Kind::number,
-                                       "counts",
-                                       "RS: the position of channel 2, 9 bits (ID 6: 16)",
-                                       {},
-                                       Role::of_position}),
-    author::field<&Values::ch2_sequence>(
-        {"ch2_sequence", Kind::number, "", "SC2: counts the replies, 0 to 127", {}, Role::sequence}),
-    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
-    author::field<&Values::memory_address>({"memory_address", Kind::number, "", "ADF: 0 to 126; 127 selects the page"}),
-    author::field<&Values::busy>(
-        {"busy", Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
-    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory", {}, Role::value}),
-    author::field<&Values::data>(
-        {"data", Kind::bytes, "", "the bytes in memory from `memory_address` on", {}, Role::data}),
-    author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
-    author::field<&Values::led_error>({"led_error", Kind::boolean, "", "the LED current is out of its range"}),
-    author::field<&Values::lissajous_error>(
-        {"lissajous_error", Kind::boolean, "", "the signals of the disc are out of their range"}),
-    author::field<&Values::safe_singleturn>(
-        {"safe_singleturn", Kind::number, "counts", "the position, every check of a safety reader passed"}),
-    author::field<&Values::page_left>(
-        {"page_left", Kind::number, "",
-         "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
-
-/// Every field that the request carries.
-[[nodiscard]] constexpr Values values_of(const Profile& profile, const Request& request) {
-  Values values{.data_id = request.id,
-                .control_field = control_field(profile, request.encoder_address, request.id),
-                .encoder_address = request.encoder_address};
-  if (is_memory_access(request.id)) values.memory_address = request.memory_address;
-  if (request.id == DataId::write_memory) values.value = request.value;
-  return values;
-}
-
 namespace detail {
-
-constexpr void put_part(Values& values, Part part, const Reply& reply, bool first) {
-  const ChannelReply& channel = first ? reply.one : reply.two;
-  switch (part) {
-    case Part::status:
-      (first ? values.ch1_status : values.ch2_status) = channel.status;
-      break;
-    case Part::alarms:
-      (first ? values.ch1_alarms : values.ch2_alarms) = channel.alarms;
-      break;
-    case Part::singleturn:
-      values.singleturn = reply.singleturn;
-      break;
-    case Part::multiturn:
-      values.multiturn = reply.multiturn;
-      break;
-    case Part::sequence:
-      values.ch1_sequence = channel.sequence;
-      break;
-    case Part::encoder_id:  // the same in both channels
-      values.encoder_id = channel.encoder_id;
-      values.safety = channel.encoder_id >> 7;
-      values.multiturn_bytes = channel.encoder_id >> 5 & 3;
-      values.singleturn_bits = channel.encoder_id & 0x1F;
-      break;
-    case Part::temperature:
-      values.temperature = static_cast<std::int8_t>(reply.temperature);
-      break;
-    case Part::redundant_sequence:
-      values.redundant = reply.redundant;
-      [[fallthrough]];
-    case Part::zero_sequence:
-      values.ch2_sequence = channel.sequence;
-      break;
-    case Part::redundant_alone:
-    case Part::redundant_calibration:
-      values.redundant = reply.redundant;
-      break;
-    case Part::memory_address:
-      values.memory_address = reply.memory_address;
-      values.busy = reply.busy;
-      break;
-    case Part::value:
-      values.value = reply.value;
-      break;
+// What stands in this part of a reply, where its id carries it in that channel.
+template <Channel channel, unsigned part, auto member>
+constexpr auto in(const Shown& all) {
+  const Reply reply = all.reply.value_or(Reply{});
+  const unsigned parts = channel == Channel::one ? layout_of(reply.id).one : layout_of(reply.id).two;
+  const bool is_there = all.reply && (parts & part) != 0;
+  if constexpr (requires { reply.*member; }) {
+    return is_there ? std::optional(reply.*member) : std::nullopt;
+  } else {
+    return is_there ? std::optional((channel == Channel::one ? reply.one : reply.two).*member) : std::nullopt;
   }
 }
-
+// Bits of ENID, which is the same in both channels.
+template <unsigned shift, unsigned mask>
+constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
+  const auto id = in<Channel::one, part::encoder_id, &ChannelReply::encoder_id>(all);
+  return id ? std::optional(unsigned{*id} >> shift & mask) : std::nullopt;
+}
 }  // namespace detail
 
-/// Every field that a reply of this id carries.
-[[nodiscard]] constexpr Values values_of(const Reply& reply) {
-  Values values{.data_id = reply.id, .encoder_address = reply.encoder_address};
-  for (const Part part : layout_of(reply.id).one()) detail::put_part(values, part, reply, true);
-  for (const Part part : layout_of(reply.id).two()) detail::put_part(values, part, reply, false);
-  return values;
-}
+inline constexpr auto fields = [] {
+  using author::field;
+  using detail::in;
+  using enum Channel;
+  return author::fields_of<Shown>(
+      field<&Shown::data_id>("data_id", "", "which data was asked for (Table 3)"),
+      field<&Shown::control_field>("control_field", "", "CF: encoder address, data id, parity"),
+      field<&Shown::encoder_address>("encoder_address", "", "EAD: which encoder on the line", Role::encoder),
+      field<&Shown::clash>("clash", "",
+                           "yes: its answer is damaged every time; two encoders share the address, or the line is bad",
+                           Role::clash),
+      field<in<one, part::status, &ChannelReply::status>>("ch1_status", "SF of channel 1", status_flags),
+      field<in<one, part::alarms, &ChannelReply::alarms>>("ch1_alarms", "ALM of channel 1", alarm_flags),
+      field<in<one, part::singleturn, &Reply::singleturn>>("singleturn", "counts", "ABS: position within the turn",
+                                                           Role::position),
+      field<in<one, part::multiturn, &Reply::multiturn>>("multiturn", "revolutions", "ABM", Role::turns),
+      field<in<one, part::encoder_id, &ChannelReply::encoder_id>>("encoder_id", "",
+                                                                  "ENID: D8 multi-turn, 98 single-turn"),
+      field<detail::of_encoder_id<7, 1>>("safety", "", "1: a safety encoder (ENID bit 7)"),
+      field<detail::of_encoder_id<5, 3>>("multiturn_bytes", "", "of turns (ENID bits 6 and 5)"),
+      field<detail::of_encoder_id<0, 0x1F>>("singleturn_bits", "",
+                                            "of the position within the turn (ENID bits 4 to 0)"),
+      field<in<one, part::sequence, &ChannelReply::sequence>>("ch1_sequence", "", "SC1: counts the replies, 0 to 255",
+                                                              Role::sequence),
+      field<in<one, part::temperature, &Reply::temperature>>("temperature_c", "degC", "inside the encoder"),
+      field<in<two, part::status, &ChannelReply::status>>("ch2_status", "SF of channel 2", status_flags),
+      field<in<two, part::alarms, &ChannelReply::alarms>>("ch2_alarms", "ALM of channel 2", alarm_flags),
+      field<in<two, part::redundant, &Reply::redundant>>(
+          "redundant_singleturn", "counts", "RS: the position of channel 2, 9 bits (ID 6: 16)", Role::of_position),
+      field<in<two, part::zero_sequence | part::redundant_sequence, &ChannelReply::sequence>>(
+          "ch2_sequence", "", "SC2: counts the replies, 0 to 127", Role::sequence),
+      field<&Shown::page>("page", "", "memory page"),
+      field<&Shown::memory_address>("memory_address", "", "ADF: 0 to 126; 127 selects the page"),
+      field<&Shown::busy>("busy", "", "1 while the memory is read or written: the request was not executed"),
+      field<&Shown::value>("value", "", "EDF: the byte in memory", Role::value),
+      field<&Shown::data>("data", "", "the bytes in memory from `memory_address` on", Role::data),
+      field<&Shown::written>("written", "", "false when the value was there already"),
+      field<&Shown::led_error>("led_error", "", "the LED current is out of its range"),
+      field<&Shown::lissajous_error>("lissajous_error", "", "the signals of the disc are out of their range"),
+      field<&Shown::safe_singleturn>("safe_singleturn", "counts",
+                                     "the position, every check of a safety reader passed"),
+      field<&Shown::page_left>(
+          "page_left", "",
+          "memory page that is left selected, also for whoever reads next: which one was before is not known"));
+}();
 
 namespace detail {
-
-// Where a part that begins at this byte has a field; no place: it is not one of its own.
-constexpr BitRanges place_in(const Profile& profile, Part part, std::size_t byte, bool first, const FieldInfo& field) {
+// As decode_parts walks through it; `byte` is the place of CF.
+template <Channel channel>
+constexpr BitRanges place_in(const Profile& profile, unsigned parts, std::size_t byte, const FieldInfo& field) {
   using author::bits_of;
+  ++byte;
+  std::size_t here = 0;
+  const auto has = [&](unsigned one, std::size_t size) {
+    if ((parts & one) == 0) return false;
+    here = std::exchange(byte, byte + size);
+    return true;
+  };
   const auto is = [&field](const FieldInfo* one) { return one == &field; };
-  // RS: its low bit stands beside or behind SC2, those above in a byte before.
-  const auto redundant = [&](std::size_t low_bit) {
-    BitRanges ranges = bits_of(byte + 1, low_bit, 1);
-    ranges.push_back({8 * byte, 8});
+  // RS: its low bit in the second byte, the others in the first.
+  const auto redundant = [&](RedundantBit low) {
+    BitRanges ranges = bits_of(here + 1, low == RedundantBit::b7 ? 7 : 0, 1);
+    ranges.push_back({8 * here, 8});
     return ranges;
   };
-  const bool low_at_7 = profile.rs1_sc2 == RedundantBit::b7;
-  const bool as_document = profile.memory_address_order == FieldOrder::document;
-  switch (part) {
-    case Part::status: {
-      if (!is(first ? fields.of<&Values::ch1_status>() : fields.of<&Values::ch2_status>())) return {};
-      if (profile.status_order == FieldOrder::document) return bits_of(byte, 0, 8);
-      BitRanges ranges = bits_of(byte, 6, 2);
-      ranges.push_back({8 * byte + 4, 2});
-      ranges.push_back({8 * byte, 4});
-      return ranges;
+  if (has(part::status, 1) && is(fields.of<in<channel, part::status, &ChannelReply::status>>())) {
+    if (profile.status_order == FieldOrder::document) return bits_of(here, 0, 8);
+    BitRanges ranges = bits_of(here, 6, 2);
+    ranges.push_back({8 * here + 4, 2});
+    ranges.push_back({8 * here, 4});
+    return ranges;
+  }
+  const FieldInfo* const raised = fields.of<in<channel, part::alarms, &ChannelReply::alarms>>();
+  if (has(part::alarms, 1) && is(raised)) return bits_of(here, 0, 8);
+  if constexpr (channel == Channel::one) {
+    const FieldInfo* const position = fields.of<in<channel, part::singleturn, &Reply::singleturn>>();
+    if (has(part::singleturn, 3) && is(position)) return bits_of(here, 0, singleturn_bits);
+    const FieldInfo* const turns = fields.of<in<channel, part::multiturn, &Reply::multiturn>>();
+    if (has(part::multiturn, 2) && is(turns)) return bits_of(here, 0, multiturn_bits);
+    if (has(part::encoder_id, 1)) {
+      if (is(fields.of<in<channel, part::encoder_id, &ChannelReply::encoder_id>>())) return bits_of(here, 0, 8);
+      if (is(fields.of<of_encoder_id<7, 1>>())) return bits_of(here, 7, 1);
+      if (is(fields.of<of_encoder_id<5, 3>>())) return bits_of(here, 5, 2);
+      if (is(fields.of<of_encoder_id<0, 0x1F>>())) return bits_of(here, 0, 5);
     }
-    case Part::alarms:
-      return bits_of(byte, 0, is(first ? fields.of<&Values::ch1_alarms>() : fields.of<&Values::ch2_alarms>()) ? 8 : 0);
-    case Part::singleturn:
-      return bits_of(byte, 0, is(fields.of<&Values::singleturn>()) ? singleturn_bits : 0);
-    case Part::multiturn:
-      return bits_of(byte, 0, is(fields.of<&Values::multiturn>()) ? multiturn_bits : 0);
-    case Part::sequence:
-      return bits_of(byte, 0, is(fields.of<&Values::ch1_sequence>()) ? 8 : 0);
-    case Part::encoder_id:
-      if (is(fields.of<&Values::encoder_id>())) return bits_of(byte, 0, 8);
-      if (is(fields.of<&Values::safety>())) return bits_of(byte, 7, 1);
-      if (is(fields.of<&Values::multiturn_bytes>())) return bits_of(byte, 5, 2);
-      return bits_of(byte, 0, is(fields.of<&Values::singleturn_bits>()) ? 5 : 0);
-    case Part::temperature:
-      return bits_of(byte, 0, is(fields.of<&Values::temperature>()) ? 8 : 0);
-    case Part::redundant_sequence:
-      if (is(fields.of<&Values::redundant>())) return redundant(low_at_7 ? 7 : 0);
-      return bits_of(byte + 1, low_at_7 ? 0 : 1, is(fields.of<&Values::ch2_sequence>()) ? 7 : 0);
-    case Part::zero_sequence:
-      return bits_of(byte, low_at_7 ? 0 : 1, is(fields.of<&Values::ch2_sequence>()) ? 7 : 0);
-    case Part::redundant_alone:
-      return is(fields.of<&Values::redundant>()) ? redundant(profile.idc_rs1 == RedundantBit::b7 ? 7 : 0) : BitRanges{};
-    case Part::redundant_calibration:
-      if (!is(fields.of<&Values::redundant>())) return {};
-      return profile.id6_rs == Id6Redundant::bits_16 ? author::big_endian_bits(byte, 2, 16) : redundant(0);
-    case Part::memory_address:
-      if (is(fields.of<&Values::busy>())) return bits_of(byte, as_document ? 0 : 7, 1);
-      return bits_of(byte, as_document ? 1 : 0, is(fields.of<&Values::memory_address>()) ? 7 : 0);
-    case Part::value:
-      return bits_of(byte, 0, is(fields.of<&Values::value>()) ? 8 : 0);
+    const FieldInfo* const temperature = fields.of<in<channel, part::temperature, &Reply::temperature>>();
+    if (has(part::temperature, 1) && is(temperature)) return bits_of(here, 0, 8);
+    const FieldInfo* const sequence = fields.of<in<channel, part::sequence, &ChannelReply::sequence>>();
+    if (has(part::sequence, 1) && is(sequence)) return bits_of(here, 0, 8);
+    const bool as_document = profile.memory_address_order == FieldOrder::document;
+    if (has(part::memory_address, 1)) {
+      if (is(fields.of<&Shown::busy>())) return bits_of(here, as_document ? 0 : 7, 1);
+      if (is(fields.of<&Shown::memory_address>())) return bits_of(here, as_document ? 1 : 0, 7);
+    }
+    if (has(part::value, 1) && is(fields.of<&Shown::value>())) return bits_of(here, 0, 8);
+  } else {
+    has(part::encoder_id, 1);
+    const bool is_sequence =
+        is(fields.of<in<channel, part::zero_sequence | part::redundant_sequence, &ChannelReply::sequence>>());
+    const bool is_redundant = is(fields.of<in<channel, part::redundant, &Reply::redundant>>());
+    const std::size_t lowest = profile.rs1_sc2 == RedundantBit::b7 ? 0 : 1;
+    if (has(part::zero_sequence, 1) && is_sequence) return bits_of(here, lowest, 7);
+    if (has(part::redundant_sequence, 2)) {
+      if (is_sequence) return bits_of(here + 1, lowest, 7);
+      if (is_redundant) return redundant(profile.rs1_sc2);
+    }
+    if (has(part::redundant_alone, 2) && is_redundant) return redundant(profile.idc_rs1);
+    if (has(part::redundant_calibration, 2) && is_redundant) {
+      return profile.id6_rs == Id6Redundant::bits_16 ? author::big_endian_bits(here, 2, 16)
+                                                     : redundant(RedundantBit::b0);
+    }
   }
   return {};
 }
-
 }  // namespace detail
 
 /// Where a good reply has a field that it carries.
 [[nodiscard]] constexpr BitRanges place_of(const Profile& profile, Bytes reply, const FieldInfo& field) {
-  if (&field == fields.of<&Values::encoder_address>()) return author::bits_of(0, 0, 3);
-  if (&field == fields.of<&Values::data_id>()) return author::bits_of(0, 3, 4);
+  if (&field == fields.of<&Shown::encoder_address>()) return author::bits_of(0, 0, 3);
+  if (&field == fields.of<&Shown::data_id>()) return author::bits_of(0, 3, 4);
   const Layout& layout = layout_of(data_id(reply[0]).value_or(DataId::position));
-  for (const bool first : {true, false}) {
-    std::size_t byte = first ? 1 : layout.length_one + 1;
-    for (const Part part : first ? layout.one() : layout.two()) {
-      const BitRanges place = detail::place_in(profile, part, byte, first, field);
-      if (!place.empty()) return place;
-      byte += size_of(part);
-    }
-  }
-  return {};
-}
-
-/// What was asked: the request, or without one what the reply's own control field says; the address of a memory access
-/// is then taken as it comes.
-constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes reply) {
-  if (!request.empty()) return decode_request(profile, request);
-  if (reply.empty()) return Error::wrong_length;
-  const auto id = data_id(reply[0]);
-  if (!id) return Error::unexpected_reply;
-  Request asked{*id, address_of(reply[0])};
-  if (is_memory_access(asked.id) && reply.size() == reply_length(asked.id)) {
-    asked.memory_address = detail::address_from_wire(profile, reply[1]);
-    asked.value = reply[2];
-  }
-  return asked;
+  const BitRanges place = detail::place_in<Channel::one>(profile, layout.one, 0, field);
+  return !place.empty() || !layout.has_two()
+             ? place
+             : detail::place_in<Channel::two>(profile, layout.two, layout.length_one, field);
 }
 
 }  // namespace absenc::esl

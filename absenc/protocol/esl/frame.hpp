@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// QS35 ESL frames (RS-485, 10 Mbps, 8N1, LSB first): encode, decode and every check a frame allows.
-// Table numbers are those of the ESL Protocol Specification, rev 1.5; README.md draws the frames.
+// QS35 ESL frames (RS-485, 10 Mbps, 8N1, LSB first): what they are made of, and how they are encoded. reply.hpp
+// decodes. Table numbers are those of the ESL Protocol Specification, rev 1.5; README.md draws the frames.
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 
-#include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
+#include "absenc/core/crc.hpp"
 #include "absenc/core/result.hpp"
-#include "absenc/protocol/esl/check.hpp"
-#include "absenc/protocol/esl/checksum.hpp"
-#include "absenc/protocol/esl/layout.hpp"
 #include "absenc/protocol/esl/profile.hpp"
 
 namespace absenc::esl {
@@ -51,19 +49,174 @@ inline constexpr std::uint8_t unsafe = led_or_lissajous_error | memory_error | s
 inline constexpr unsigned singleturn_bits = 24;
 inline constexpr unsigned multiturn_bits = 16;
 inline constexpr unsigned redundant_bits = 9;
-inline constexpr std::uint8_t page_select_address = 0x7F;
 inline constexpr std::size_t request_capacity = 4;
 inline constexpr std::size_t reply_capacity = 18;
 using RequestBytes = ByteBuffer<request_capacity>;
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// EAD, the id, its parity bit, which makes the number of ones odd.
-[[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, std::uint8_t id) {
-  const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
-  return static_cast<std::uint8_t>((address & 7) | (id & 0xFu) << 3 | (odd_parity(covered) ? 0 : 0x80));
+// ---- Checksums. The document prints the polynomials in Koopman notation: 16'hAC9A is normal 5935, 8'h97 is 2F.
+
+enum class Channel : std::uint8_t { one, two };
+
+inline constexpr CrcParameters crc16_lsb{16, 0x5935, 0, true, true, 0};
+inline constexpr CrcParameters crc16_msb{16, 0x5935, 0, false, false, 0};
+inline constexpr CrcParameters crc8_lsb{8, 0x2F, 0, true, true, 0};
+inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};
+
+[[nodiscard]] constexpr std::uint16_t initial_value(Channel channel) { return channel == Channel::two ? 0xFFFF : 0; }
+
+namespace detail {
+// One 00 byte is appended where the number of bytes is odd. `swapped`: the second byte of each two comes first.
+template <CrcParameters parameters>
+constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped) {
+  Crc<parameters, CrcTable::nibble> crc(initial_value(channel));
+  for (std::size_t i = 0; i < bytes.size(); i += 2) {
+    const std::uint8_t second = i + 1 < bytes.size() ? bytes[i + 1] : std::uint8_t{0};
+    crc.update(swapped ? second : bytes[i]);
+    crc.update(swapped ? bytes[i] : second);
+  }
+  return crc.value();
 }
-[[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId id) {
-  return control_field(profile, address, static_cast<std::uint8_t>(id));
+}  // namespace detail
+
+[[nodiscard]] constexpr std::uint16_t checksum16(CrcBitOrder order, Channel channel, Bytes bytes) {
+  return order == CrcBitOrder::lsb ? detail::crc_of_pairs<crc16_lsb>(channel, bytes, false)
+                                   : detail::crc_of_pairs<crc16_msb>(channel, bytes, order == CrcBitOrder::word);
+}
+
+[[nodiscard]] constexpr std::uint8_t checksum8(CrcBitOrder order, Bytes bytes) {
+  return order == CrcBitOrder::lsb ? Crc<crc8_lsb, CrcTable::nibble>::of(bytes)
+                                   : Crc<crc8_msb, CrcTable::nibble>::of(bytes);
+}
+
+/// Whether the first of the two CRC bytes of this channel is the low one.
+[[nodiscard]] constexpr bool low_byte_first(CrcByteOrder order, Channel channel) {
+  if (order == CrcByteOrder::table12) return channel == Channel::one;
+  return order == CrcByteOrder::low;
+}
+
+// ---- Tables 3 and 12 as data: the command ids, and which parts each channel of their replies is made of
+
+/// Data ID codes of Table 3, and 6 of Tables 6 and 12.
+enum class DataId : std::uint8_t {
+  position = 1,          // safety
+  singleturn = 2,        // safety
+  position_short = 4,    // non-safety
+  singleturn_short = 5,  // non-safety
+  calibration = 6,       // non-safety
+  encoder_id = 8,        // never eight times in a row: "dynamic addressing", which nothing describes
+  temperature = 9,
+  alarms = 0xA,
+  zero = 0xB,             // eight times
+  clear_alarms = 0xC,     // eight times
+  reset_multiturn = 0xD,  // eight times
+  read_memory = 0xE,
+  write_memory = 0xF,
+};
+
+/// What stands behind CF and before the CRC, in the order of the wire. One byte where no other number is given.
+namespace part {
+inline constexpr unsigned status = 0x0001;
+inline constexpr unsigned alarms = 0x0002;
+inline constexpr unsigned singleturn = 0x0004;  // 3 bytes
+inline constexpr unsigned multiturn = 0x0008;   // 2 bytes
+inline constexpr unsigned encoder_id = 0x0010;
+inline constexpr unsigned temperature = 0x0020;
+inline constexpr unsigned sequence = 0x0040;
+inline constexpr unsigned zero_sequence = 0x0080;          // {0, SC2}
+inline constexpr unsigned redundant_sequence = 0x0100;     // 2 bytes: RS0 {RS1, SC2}
+inline constexpr unsigned redundant_alone = 0x0200;        // 2 bytes: RS0 RS1 of ID C
+inline constexpr unsigned redundant_calibration = 0x0400;  // 2 bytes: RS0 RS1 of ID 6
+inline constexpr unsigned memory_address = 0x0800;
+inline constexpr unsigned value = 0x1000;
+inline constexpr unsigned redundant = redundant_sequence | redundant_alone | redundant_calibration;
+}  // namespace part
+
+struct Layout {
+  constexpr Layout() = default;
+  constexpr Layout(std::uint8_t crc, unsigned parts_one, unsigned parts_two = 0)
+      : one(static_cast<std::uint16_t>(parts_one)),
+        two(static_cast<std::uint16_t>(parts_two)),
+        crc_bytes(crc),
+        length_one(length(crc, parts_one)),
+        length_two(has_two() ? length(crc, parts_two) : std::uint8_t{0}) {}
+
+  [[nodiscard]] constexpr bool has_two() const { return two != 0; }
+  [[nodiscard]] constexpr bool has(unsigned any_of) const { return ((one | two) & any_of) != 0; }
+
+  std::uint16_t one = 0;
+  std::uint16_t two = 0;
+  std::uint8_t crc_bytes = 1;
+  std::uint8_t length_one = 0;  // with CF and CRC
+  std::uint8_t length_two = 0;
+
+ private:
+  static constexpr std::uint8_t length(unsigned crc, unsigned parts) {
+    constexpr unsigned longer = part::singleturn | part::multiturn | part::redundant;
+    return static_cast<std::uint8_t>(1 + crc + static_cast<unsigned>(std::popcount(parts)) +
+                                     static_cast<unsigned>(std::popcount(parts & longer)) +
+                                     ((parts & part::singleturn) != 0 ? 1u : 0u));
+  }
+};
+
+namespace detail {
+// Indexed by the id; empty for an id that does not exist.
+inline constexpr std::array<Layout, 16> layouts = [] {
+  using part::status, part::alarms, part::singleturn, part::multiturn, part::encoder_id, part::temperature;
+  using part::sequence, part::zero_sequence, part::redundant_sequence, part::redundant_alone;
+  std::array<Layout, 16> table{};
+  table[0x1] = {2, status | alarms | singleturn | multiturn | sequence, status | alarms | redundant_sequence};
+  table[0x2] = {2, status | alarms | singleturn | sequence, status | alarms | redundant_sequence};
+  table[0x4] = {1, status | singleturn | multiturn};
+  table[0x5] = {1, status | singleturn};
+  table[0x6] = {1, status | singleturn, status | part::redundant_calibration};
+  table[0x8] = {2, status | encoder_id | sequence, status | encoder_id | zero_sequence};
+  table[0x9] = {1, status | temperature};
+  table[0xA] = {1, status | alarms, status | alarms};
+  table[0xB] = table[0x2];
+  table[0xC] = {1, status | alarms | singleturn, status | alarms | redundant_alone};
+  table[0xD] = {1, status | alarms | multiturn};
+  table[0xE] = {1, part::memory_address | part::value};
+  table[0xF] = table[0xE];
+  return table;
+}();
+}  // namespace detail
+
+[[nodiscard]] constexpr const Layout& layout_of(DataId id) { return detail::layouts[static_cast<std::size_t>(id)]; }
+
+/// The id of a control field, whatever its parity; nothing for one that the tables do not list.
+[[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
+  const std::uint8_t id = (field >> 3) & 0xF;
+  if (detail::layouts[id].length_one == 0) return std::nullopt;
+  return static_cast<DataId>(id);
+}
+
+[[nodiscard]] constexpr bool is_memory_access(DataId id) {
+  return id == DataId::read_memory || id == DataId::write_memory;
+}
+[[nodiscard]] constexpr bool is_reset(DataId id) {
+  return id == DataId::zero || id == DataId::clear_alarms || id == DataId::reset_multiturn;
+}
+[[nodiscard]] constexpr bool is_safety_position(DataId id) {
+  return id == DataId::position || id == DataId::singleturn;
+}
+/// Ids whose replies carry the sequence counter (and count it, with sequence_step=safety).
+[[nodiscard]] constexpr bool has_sequence(DataId id) { return layout_of(id).crc_bytes == 2; }
+
+[[nodiscard]] constexpr std::size_t reply_length(DataId id) {
+  return std::size_t{layout_of(id).length_one} + layout_of(id).length_two;
+}
+[[nodiscard]] constexpr std::size_t request_length(const Profile& profile, DataId id) {
+  if (id == DataId::write_memory) return 4;
+  if (id == DataId::read_memory) return 3;
+  return profile.request_crc ? 2 : 1;
+}
+
+/// EAD, the id, its parity bit, which makes the number of ones odd.
+[[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId data) {
+  const auto id = static_cast<unsigned>(data);
+  const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
+  return static_cast<std::uint8_t>((address & 7) | id << 3 | (odd_parity(covered) ? 0 : 0x80));
 }
 [[nodiscard]] constexpr std::uint8_t address_of(std::uint8_t field) { return field & 7; }
 
@@ -90,12 +243,14 @@ struct Reply {
   std::uint32_t singleturn = 0;
   std::uint16_t multiturn = 0;
   std::uint16_t redundant = 0;  // 9 bits; 16 of ID 6 where the profile says so
-  std::uint8_t temperature = 0;
+  std::int8_t temperature = 0;  // its sign is assumed
   std::uint8_t memory_address = 0;
   bool busy = false;
   std::uint8_t value = 0;
   bool unused_bits = false;  // decoded: a bit that is always 0 was set
 };
+
+// ---- Bits whose place the document leaves open
 
 namespace detail {
 
@@ -109,111 +264,56 @@ namespace detail {
   return static_cast<std::uint8_t>(value << 4 | (value >> 2 & 0x0C) | value >> 6);
 }
 
-[[nodiscard]] constexpr std::uint8_t address_to_wire(const Profile& profile, std::uint8_t address, bool busy) {
-  if (profile.memory_address_order == FieldOrder::document) {
-    return static_cast<std::uint8_t>(address << 1 | (busy ? 1 : 0));
-  }
-  return static_cast<std::uint8_t>((address & 0x7F) | (busy ? 0x80 : 0));
+// A byte whose b7 stands at b0 where `at_b0`: {busy, ADF}, {RS1, SC2}, {0, SC2}, or RS1 alone.
+[[nodiscard]] constexpr std::uint8_t to_wire(bool at_b0, unsigned byte) {
+  return std::rotl(static_cast<std::uint8_t>(byte), at_b0 ? 1 : 0);
 }
-[[nodiscard]] constexpr std::uint8_t address_from_wire(const Profile& profile, std::uint8_t field) {
-  return profile.memory_address_order == FieldOrder::document ? static_cast<std::uint8_t>(field >> 1) : field & 0x7F;
-}
-[[nodiscard]] constexpr bool busy_from_wire(const Profile& profile, std::uint8_t field) {
-  return (field & (profile.memory_address_order == FieldOrder::document ? 0x01 : 0x80)) != 0;
-}
+[[nodiscard]] constexpr std::uint8_t from_wire(bool at_b0, std::uint8_t byte) { return std::rotr(byte, at_b0 ? 1 : 0); }
 
 }  // namespace detail
 
-[[nodiscard]] constexpr std::size_t request_length(const Profile& profile, DataId id) {
-  if (id == DataId::write_memory) return 4;
-  if (id == DataId::read_memory) return 3;
-  return profile.request_crc ? 2 : 1;
-}
+// ---- Encoding
 
 [[nodiscard]] constexpr RequestBytes encode_request(const Profile& profile, const Request& request) {
   RequestBytes bytes;
   bytes.push_back(control_field(profile, request.encoder_address, request.id));
   if (is_memory_access(request.id)) {
-    bytes.push_back(detail::address_to_wire(profile, request.memory_address, false));
+    bytes.push_back(detail::to_wire(profile.memory_address_order == FieldOrder::document, request.memory_address));
     if (request.id == DataId::write_memory) bytes.push_back(request.value);
   }
   if (bytes.size() < request_length(profile, request.id)) bytes.push_back(checksum8(profile.crc_bit_order, bytes));
   return bytes;
 }
 
-/// Errors: wrong_length; unsupported (an id that Table 3 does not list); bad_checksum (parity or CRC); out_of_range
-/// (the busy bit is 0 in requests).
-[[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
-  if (bytes.empty()) return Error::wrong_length;
-  const std::optional<DataId> id = data_id(bytes[0]);
-  if (!id) return Error::unsupported;
-  if (bytes.size() != request_length(profile, *id)) return Error::wrong_length;
-  if (bytes.size() > 1 && checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back()) {
-    return Error::bad_checksum;
-  }
-  Request request{*id, address_of(bytes[0])};
-  if (bytes[0] != control_field(profile, request.encoder_address, *id)) return Error::bad_checksum;
-  if (!is_memory_access(*id)) return request;
-  if (detail::busy_from_wire(profile, bytes[1])) return Error::out_of_range;
-  request.memory_address = detail::address_from_wire(profile, bytes[1]);
-  if (*id == DataId::write_memory) request.value = bytes[2];
-  return request;
-}
-
 namespace detail {
 
-// {RS1, SC2}, or {0, SC2}.
-constexpr std::uint8_t join(RedundantBit order, unsigned bit, unsigned counter) {
-  counter &= 0x7F;
-  return static_cast<std::uint8_t>(order == RedundantBit::b7 ? bit << 7 | counter : counter << 1 | bit);
-}
-constexpr unsigned redundant_bit(RedundantBit order, std::uint8_t byte) {
-  return order == RedundantBit::b7 ? byte >> 7 : byte & 1u;
-}
-constexpr std::uint8_t counter_bits(RedundantBit order, std::uint8_t byte) {
-  return order == RedundantBit::b7 ? byte & 0x7F : static_cast<std::uint8_t>(byte >> 1);
-}
-
-constexpr void encode_part(const Profile& profile, Part part, const Reply& reply, const ChannelReply& channel,
-                           ReplyBytes& bytes) {
-  const auto put = [&bytes](std::uint64_t value) { bytes.push_back(static_cast<std::uint8_t>(value)); };
-  switch (part) {
-    case Part::status:
-      return put(status_to_wire(profile, channel.status));
-    case Part::alarms:
-      return put(channel.alarms);
-    case Part::singleturn:
-      for (unsigned i = 0; i < 24; i += 8) put(reply.singleturn >> i);
-      return;
-    case Part::multiturn:
-      put(reply.multiturn);
-      return put(reply.multiturn >> 8);
-    case Part::sequence:
-      return put(channel.sequence);
-    case Part::encoder_id:
-      return put(channel.encoder_id);
-    case Part::temperature:
-      return put(reply.temperature);
-    case Part::redundant_sequence:
-      put(reply.redundant >> 1);
-      return put(join(profile.rs1_sc2, reply.redundant & 1, channel.sequence));
-    case Part::zero_sequence:
-      return put(join(profile.rs1_sc2, 0, channel.sequence));
-    case Part::redundant_alone:
-      put(reply.redundant >> 1);
-      return put((reply.redundant & 1u) << (profile.idc_rs1 == RedundantBit::b7 ? 7 : 0));
-    case Part::redundant_calibration:
-      if (profile.id6_rs == Id6Redundant::bits_16) {
-        put(reply.redundant >> 8);
-        return put(reply.redundant);
-      }
-      put(reply.redundant >> 1);
-      return put(reply.redundant & 1u);
-    case Part::memory_address:
-      return put(address_to_wire(profile, reply.memory_address, reply.busy));
-    case Part::value:
-      return put(reply.value);
-  }
+constexpr void encode_parts(const Profile& profile, unsigned parts, const Reply& reply, const ChannelReply& channel,
+                            ReplyBytes& bytes) {
+  const auto put = [&](unsigned one, std::size_t size, std::uint32_t value) {
+    for (; (parts & one) != 0 && size > 0; --size, value >>= 8) bytes.push_back(static_cast<std::uint8_t>(value));
+  };
+  // In two bytes: its upper bits, and {RS1, SC2}.
+  const auto redundant = [&reply](RedundantBit order, unsigned counter) {
+    const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | counter);
+    return reply.redundant >> 1 | second << 8;
+  };
+  const unsigned counter = channel.sequence & 0x7Fu;
+  const bool wide = profile.id6_rs == Id6Redundant::bits_16;
+  put(part::status, 1, status_to_wire(profile, channel.status));
+  put(part::alarms, 1, channel.alarms);
+  put(part::singleturn, 3, reply.singleturn);
+  put(part::multiturn, 2, reply.multiturn);
+  put(part::encoder_id, 1, channel.encoder_id);
+  put(part::temperature, 1, static_cast<std::uint8_t>(reply.temperature));
+  put(part::sequence, 1, channel.sequence);
+  put(part::zero_sequence, 1, to_wire(profile.rs1_sc2 == RedundantBit::b0, counter));
+  put(part::redundant_sequence, 2, redundant(profile.rs1_sc2, counter));
+  put(part::redundant_alone, 2, redundant(profile.idc_rs1, 0));
+  put(part::redundant_calibration, 2,
+      wide ? reply.redundant >> 8 | (reply.redundant & 0xFFu) << 8 : redundant(RedundantBit::b0, 0));
+  put(part::memory_address, 1,
+      to_wire(profile.memory_address_order == FieldOrder::document, reply.memory_address | (reply.busy ? 0x80u : 0u)));
+  put(part::value, 1, reply.value);
 }
 
 constexpr void encode_channel(const Profile& profile, const Reply& reply, std::uint8_t field, Channel number,
@@ -222,9 +322,7 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
   const bool first = number == Channel::one;
   const std::size_t begin = bytes.size();
   bytes.push_back(field);
-  for (const Part part : first ? layout.one() : layout.two()) {
-    encode_part(profile, part, reply, first ? reply.one : reply.two, bytes);
-  }
+  encode_parts(profile, first ? layout.one : layout.two, reply, first ? reply.one : reply.two, bytes);
   const Bytes covered = bytes.view().subspan(begin);
   if (layout.crc_bytes == 1) {
     bytes.push_back(checksum8(profile.crc_bit_order, covered));

@@ -2,7 +2,7 @@
 #include "absenc/protocol/esl/host.hpp"
 
 #include "absenc/protocol/author/standstill.hpp"
-#include "absenc/protocol/esl/words.hpp"
+#include "absenc/protocol/esl/safety.hpp"
 
 namespace absenc::esl {
 
@@ -16,32 +16,31 @@ constexpr unsigned safe_attempts = 6;
 
 Request request_of(const Line& line, DataId id) { return {id, line.format().address}; }
 
-Reading reading_of(const Line& line, const Reply& reply) {
-  Reading reading = to_reading(reply);
-  reading.latched = latch_time(line.format(), line.sent_at());
-  reading.received = line.received_at();
-  return reading;
+// What the last exchange brought, with its times.
+void show_last(const Line& line, Found& found) {
+  found.show(line.last());
+  found.reading = line.last_reading();
 }
 
 }  // namespace
 
-Procedure read_encoder_id(Line& line, Identity& found) {
+Procedure read_encoder_id(Line& line, Found& found) {
   co_await line.ask(request_of(line, DataId::singleturn_short));
-  found.reply = co_await line.ask(request_of(line, DataId::encoder_id));
+  found.show(co_await line.ask(request_of(line, DataId::encoder_id)));
   co_return done;
 }
 
-Procedure read_safely(Line& line, Safe& found) {
+Procedure read_safely(Line& line, Found& found) {
   SafetyMonitor monitor(line.format());
-  for (unsigned i = 0; i < safe_attempts && found.failed == Check::sequence_unknown; ++i) {
+  SafetyVerdict verdict{.failed = Check::sequence_unknown};
+  for (unsigned i = 0; i < safe_attempts && verdict.failed == Check::sequence_unknown; ++i) {
     const Request request = request_of(line, monitor.next_id());
-    found.reply = co_await line.ask(request);
-    found.reading = reading_of(line, found.reply);
-    const SafetyVerdict verdict = monitor.judge(request, line.reply(), line.sent_at());
-    found.position = verdict.position;
-    found.failed = verdict.failed;
+    co_await line.ask(request);
+    show_last(line, found);
+    verdict = monitor.judge(request, line.reply(), line.sent_at());
   }
-  co_return {error_of(found.failed), text_of(found.failed).sentence};
+  if (verdict.position) found.safe_singleturn = verdict.position->singleturn();
+  co_return {error_of(verdict.failed), text_of(verdict.failed).sentence};
 }
 
 // ---- Resets (Table 4)
@@ -54,30 +53,36 @@ Time pause_between_resets(const Line& line, DataId id) {
   return line.sent_at() - duration + reset_interval - line.received_at();
 }
 
-author::Outcome judge(AfterReset& found, DataId id, std::uint32_t before) {
-  const Reply& reply = found.reply;
-  const auto remaining = static_cast<std::uint8_t>(reply.one.alarms | reply.two.alarms);
-  if (id == DataId::zero && !author::is_near(reply.singleturn, 0, singleturn_bits)) {
-    return {Error::cross_check_failed, "the position is still not zero"};
+// The alarms that an ID C left, and what clears them (Table 8).
+std::string_view what_remains(Sentence& words, unsigned remaining) {
+  constexpr unsigned until_power_off =
+      alarms::led_or_lissajous_error | alarms::overspeed | alarms::memory_error | alarms::singleturn_error;
+  for (unsigned bit = 0; bit < 8; ++bit) {
+    if ((remaining >> bit & 1) != 0) words.add(words.empty() ? "" : ", ").add(alarm_flags[bit].name);
   }
-  if (id == DataId::reset_multiturn && reply.multiturn != 0) {
-    return {Error::cross_check_failed, "the turns are still not zero"};
+  words.add((remaining & (remaining - 1)) == 0 ? " remains" : " remain");
+  if ((remaining & alarms::multiturn_error) != 0) words.add("; multiturn_error: reset-multiturn first");
+  if ((remaining & until_power_off) != 0) words.add("; switch the encoder off and on");
+  if ((remaining & alarms::voltage) != 0) words.add("; the supply voltage is wrong");
+  return words.view();
+}
+
+// What the encoder did not do; empty: it did all.
+std::string_view missed(Sentence& words, DataId id, const Reply& before, const Reply& now) {
+  const unsigned remaining = now.one.alarms | now.two.alarms;
+  if (id == DataId::clear_alarms) return remaining != 0 ? what_remains(words, remaining) : "";
+  if (id == DataId::zero) {
+    return author::is_near(now.singleturn, 0, singleturn_bits) ? "" : "the position is still not zero";
   }
+  if (now.multiturn != 0) return "the turns are still not zero";
   // Rev 1.4 of the document added a single-turn clear to ID D and left it out elsewhere.
-  if (id == DataId::reset_multiturn && !author::is_near(reply.singleturn, before, singleturn_bits)) {
-    return {Error::cross_check_failed,
-            "the turns are zero, but the encoder has moved its single-turn zero too: find the origin again"};
-  }
-  if (id == DataId::clear_alarms && remaining != 0) {
-    name_what_remains(found.words, remaining);
-    return {Error::cross_check_failed, found.words.view()};
-  }
-  return done;
+  if (author::is_near(now.singleturn, before.singleturn, singleturn_bits)) return "";
+  return "the turns are zero, but the encoder has moved its single-turn zero too: find the origin again";
 }
 
 }  // namespace
 
-Procedure reset(Line& line, AfterReset& found, DataId id) {
+Procedure reset(Line& line, Found& found, DataId id) {
   const Request look = request_of(line, DataId::position);
   const Reply first = co_await line.ask(look).repeated(attempts);
   const Reply before = co_await line.ask(look).repeated(attempts).after(author::between_looks);
@@ -98,10 +103,12 @@ Procedure reset(Line& line, AfterReset& found, DataId id) {
   }
   // B saves the zero in the EEPROM; D may do the same.
   const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
-  found.reply = co_await line.ask(look).repeated(attempts).after(pause).or_say(
+  const Reply now = co_await line.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
-  found.reading = reading_of(line, found.reply);
-  co_return judge(found, id, before.singleturn);
+  show_last(line, found);
+  const std::string_view what = missed(found.words, id, before, now);
+  if (!what.empty()) co_return {Error::cross_check_failed, what};
+  co_return done;
 }
 
 // ---- Memory
@@ -112,20 +119,14 @@ constexpr Time busy_limit = 2 * page_time;  // the document gives no maximum
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// Nothing in the temporary register stands between such a byte and its reader.
-bool is_immediate(std::uint8_t page, std::uint8_t address) {
-  const MemoryArea* area = find_area(page, address);
-  return address == page_select_address || (area != nullptr && area->kind == MemoryArea::Kind::registers);
-}
-
 // What comes when the memory is no longer busy. A busy encoder has not executed the request, so even a write may be
 // sent again. `after_busy`: only what follows a busy answer is believed, because the temporary register may hold what
 // somebody else once asked for.
-author::Part<Result<Reply>> settled(Line& line, Request request, Time pause, bool after_busy) {
+author::Part<Result<Reply>> settled(Line& line, Request request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   const Time busy_pause = Protocol::manner(line.format(), request).pause;
   Time limit = never;
-  for (;;) {
+  for (Time pause{};;) {
     const Result<Reply> reply = co_await line.attempt(request).repeated(writes ? 1 : attempts).after(pause);
     if (!reply || (!reply->busy && !after_busy)) co_return reply;
     if (reply->busy) after_busy = false;
@@ -140,91 +141,98 @@ author::Part<Result<Reply>> settled(Line& line, Request request, Time pause, boo
   }
 }
 
-// `words`: what the error says where the procedure ends here.
+// When the page is ready. `words`: what the error says where the procedure ends here.
 author::Part<std::uint8_t> select(Line& line, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, line.format().address, page_select_address, page};
-  const Result<Reply> reply = co_await settled(line, request, {}, false);
+  const Result<Reply> reply = co_await settled(line, request);
   if (!reply) co_await line.stop({reply.error(), words, {}, page_time});
+  co_await line.rest(page_time);
   co_return page;
 }
 
-author::Part<std::uint8_t> read_byte(Line& line, std::uint8_t page, std::uint8_t address, Time pause,
-                                     std::string_view words) {
+author::Part<std::uint8_t> read_byte(Line& line, std::uint8_t page, std::uint8_t address, std::string_view words) {
   const Request request{DataId::read_memory, line.format().address, address};
-  const Result<Reply> reply = co_await settled(line, request, pause, !is_immediate(page, address));
+  const Result<Reply> reply = co_await settled(line, request, !is_immediate(page, address));
   if (!reply) co_await line.stop({reply.error(), words, {}, eeprom_read_pause});
   co_return reply->value;
 }
 
 }  // namespace
 
-Procedure read_memory(Line& line, MemoryBytes& found, Arguments arguments) {
-  found.address = static_cast<std::uint8_t>(arguments[0]);
-  found.page = static_cast<std::uint8_t>(arguments[1]);
-  const auto end = static_cast<unsigned>(found.address + arguments[2]);
-  for (unsigned i = found.address; i < end; ++i) {
-    if (find_area(found.page, i) == nullptr) co_return {Error::invalid_argument, unknown_area};
+Procedure read_memory(Line& line, Found& found, Arguments arguments) {
+  const auto page = static_cast<std::uint8_t>(arguments[1]);
+  const auto begin = static_cast<std::uint8_t>(arguments[0]);
+  const auto end = static_cast<unsigned>(begin + arguments[2]);
+  for (unsigned i = begin; i < end; ++i) {
+    if (find_area(page, i) == nullptr) co_return {Error::invalid_argument, unknown_area};
   }
-  co_await select(line, found.page, {});
-  for (unsigned i = found.address; i < end; ++i) {
-    const Time pause = i == found.address ? page_time : Time{};
-    const std::uint8_t value = co_await read_byte(line, found.page, static_cast<std::uint8_t>(i), pause, {});
-    found.data.push_back(value);
+  co_await select(line, page, {});
+  for (unsigned i = begin; i < end; ++i) {
+    const std::uint8_t value = co_await read_byte(line, page, static_cast<std::uint8_t>(i), {});
+    found.bytes.push_back(value);
   }
+  found.page = page;
+  found.memory_address = begin;
+  found.value = found.bytes[0];
+  if (found.bytes.size() > 1) found.data = found.bytes.view();
   co_return done;
 }
 
-Procedure write_memory(Line& line, Written& found, Arguments arguments) {
-  found.address = static_cast<std::uint8_t>(arguments[0]);
-  found.value = static_cast<std::uint8_t>(arguments[1]);
-  found.page = static_cast<std::uint8_t>(arguments[2]);
-  const bool force = arguments[3] != 0;
+Procedure write_memory(Line& line, Found& found, Arguments arguments) {
+  const auto address = static_cast<std::uint8_t>(arguments[0]);
+  const auto value = static_cast<std::uint8_t>(arguments[1]);
+  const auto page = static_cast<std::uint8_t>(arguments[2]);
   constexpr std::string_view nothing_written = "nothing was written";
-  const MemoryArea* const area = find_area(found.page, found.address);
+  const MemoryArea* const area = find_area(page, address);
   if (area == nullptr) co_return {Error::invalid_argument, unknown_area};
-  if (!area->user && !force) {
+  if (!area->protection.empty() && arguments[3] == 0) {
     found.words.add("this page is not for the user: it holds ").add(area->meaning);
     found.words.add_part("writing there can spoil the encoder and needs force; nothing was sent");
     co_return {Error::invalid_argument, found.words.view()};
   }
-  co_await select(line, found.page, nothing_written);
-  const std::uint8_t before = co_await read_byte(line, found.page, found.address, page_time, nothing_written);
-  if (before == found.value) co_return done;
-  found.sent = true;
+  found.page = page;
+  found.memory_address = address;
+  found.value = value;
+  co_await select(line, page, nothing_written);
+  const std::uint8_t before = co_await read_byte(line, page, address, nothing_written);
+  found.written = before != value;
+  if (before == value) co_return done;
   // A lost reply does not tell whether the write was done: reading back does.
-  const Request write{DataId::write_memory, line.format().address, found.address, found.value};
-  static_cast<void>(co_await settled(line, write, {}, false));
-  const Time pause = is_immediate(found.page, found.address) ? Time{} : eeprom_write_pause;
-  const std::uint8_t now =
-      co_await read_byte(line, found.page, found.address, pause, "the byte was written, but could not be read back");
-  if (now == found.value) co_return done;
+  const Request write{DataId::write_memory, line.format().address, address, value};
+  static_cast<void>(co_await settled(line, write));
+  if (!is_immediate(page, address)) co_await line.rest(eeprom_write_pause);
+  const std::uint8_t now = co_await read_byte(line, page, address, "the byte was written, but could not be read back");
+  if (now == value) co_return done;
   co_return {Error::cross_check_failed, "reading back gave another value: the write has failed", {}, eeprom_read_pause};
 }
 
-Procedure select_page(Line& line, Selected& found, Arguments arguments) {
-  found.page = static_cast<std::uint8_t>(arguments[0]);
-  if (!is_page(found.page)) co_return {Error::invalid_argument, "Table 11 lists no such page; nothing was sent"};
-  co_await select(line, found.page, {});
-  const std::uint8_t now = co_await read_byte(line, found.page, page_select_address, page_time, {});
-  if (now == found.page) co_return done;
+Procedure select_page(Line& line, Found& found, Arguments arguments) {
+  const auto page = static_cast<std::uint8_t>(arguments[0]);
+  if (!is_page(page)) co_return {Error::invalid_argument, "Table 11 lists no such page; nothing was sent"};
+  co_await select(line, page, {});
+  found.page = co_await read_byte(line, page, page_select_address, {});
+  if (found.page == page) co_return done;
   co_return {Error::cross_check_failed, "another page is selected", {}, eeprom_read_pause};
 }
 
-Procedure read_error_info(Line& line, ErrorInfo& found) {
+Procedure read_error_info(Line& line, Found& found) {
   constexpr std::string_view page_may_be_left = "page 8 may be left selected, where it was another before";
   const Request which{DataId::read_memory, line.format().address, page_select_address};
-  const Result<Reply> before = co_await settled(line, which, {}, false);
+  const Result<Reply> before = co_await settled(line, which);
   const bool known = before && is_page(before->value);
-  const std::uint8_t page = known ? before->value : register_page;
   co_await select(line, register_page, page_may_be_left);
-  found.flags = co_await read_byte(line, register_page, error_info_address, page_time, page_may_be_left);
-  found.page_left = !known;
-  if (page == register_page) co_return done;
+  const std::uint8_t flags = co_await read_byte(line, register_page, error_info_address, page_may_be_left);
+  found.led_error = (flags & error_info_led) != 0;
+  found.lissajous_error = (flags & error_info_lissajous) != 0;
+  if (known && before->value == register_page) co_return done;
+  found.page_left = register_page;
+  if (!known) co_return done;
   // What was asked for is known, whatever becomes of this: reading it back tells what the next user finds.
-  const Request restore{DataId::write_memory, line.format().address, page_select_address, page};
-  static_cast<void>(co_await settled(line, restore, {}, false));
-  const Result<Reply> after = co_await settled(line, which, page_time, false);
-  found.page_left = !after || after->value != page;
+  const Request restore{DataId::write_memory, line.format().address, page_select_address, before->value};
+  static_cast<void>(co_await settled(line, restore));
+  co_await line.rest(page_time);
+  const Result<Reply> after = co_await settled(line, which);
+  if (after && after->value == before->value) found.page_left.reset();
   co_return done;
 }
 

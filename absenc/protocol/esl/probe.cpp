@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/esl/probe.hpp"
 
+#include <algorithm>
+#include <array>
+
+#include "absenc/protocol/esl/reply.hpp"
+
 namespace absenc::esl {
 
 namespace {
+
+constexpr std::size_t option_sequence_step = options.find("sequence_step");
+constexpr std::size_t option_parity_scope = options.find("parity_scope");
 
 constexpr std::size_t choice_count(std::size_t option) { return options.infos[option].choices.size(); }
 
@@ -28,30 +36,30 @@ Profile nth_profile(const Profile& base, std::size_t number) {
   return profile;
 }
 
+Profile with_other_parity(Profile profile) {
+  profile.parity_scope = profile.parity_scope == ParityScope::all ? ParityScope::command : ParityScope::all;
+  return profile;
+}
+
 // What was asked, as far as the bytes of the request tell under this profile.
 struct Asked {
   Request request{};
   bool parity_wrong = false;
-  bool accepted = true;
+  bool accepted = false;
 };
 
 Asked asked_by(const Profile& profile, const Capture& capture) {
   const Bytes bytes = capture.request.empty() ? capture.reply : capture.request;
-  Asked asked;
   const std::optional<DataId> id = data_id(bytes[0]);
-  if (!id) return {.accepted = false};
-  asked.request = {*id, address_of(bytes[0])};
-  asked.parity_wrong = bytes[0] != control_field(profile, asked.request.encoder_address, *id);
-  if (is_memory_access(*id) && bytes.size() >= 3) {
-    asked.request.memory_address = detail::address_from_wire(profile, bytes[1]);
-    asked.request.value = bytes[2];
-  }
-  if (capture.request.empty()) return asked;
-  const bool busy = is_memory_access(*id) && bytes.size() >= 3 && detail::busy_from_wire(profile, bytes[1]);
-  asked.accepted =
+  if (!id) return {};
+  bool busy = false;
+  const Request request = detail::split_request(profile, *id, bytes, busy);
+  const bool good =
       !busy && bytes.size() == request_length(profile, *id) &&
       (bytes.size() == 1 || checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) == bytes.back());
-  return asked;
+  return {.request = request,
+          .parity_wrong = bytes[0] != control_field(profile, request.encoder_address, *id),
+          .accepted = good || capture.request.empty()};
 }
 
 // An encoder answers only what it accepts, and reports a wrong parity bit only where there is one.
@@ -59,10 +67,7 @@ Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
   const Asked asked = asked_by(profile, capture);
   if (!asked.accepted) return capture.request.empty() ? Check::other_command : Check::request_not_accepted;
-  Profile as_sent = profile;
-  if (asked.parity_wrong) {
-    as_sent.parity_scope = profile.parity_scope == ParityScope::all ? ParityScope::command : ParityScope::all;
-  }
+  const Profile as_sent = asked.parity_wrong ? with_other_parity(profile) : profile;
   Reply reply;
   const Check check = check_reply(as_sent, asked.request, capture.reply, reply);
   if (!asked.parity_wrong) return check;
@@ -98,9 +103,12 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-void judge_sequence(ProbeResult& result, std::span<const Capture> captures) {
-  auto& values = result.values[option_sequence_step];
-  for (Evidence& evidence : values) evidence.possible = true;
+// By the index of the option and of its value: how far the best profile with this value comes.
+using Reached = std::array<std::array<Progress, 3>, open_options>;
+
+// Each step of the counter against what `best` makes of the replies.
+void judge_sequence(Profile& best, std::span<const Capture> captures, std::array<Progress, 3>& values) {
+  values.fill({});
   bool known = false;
   std::uint8_t last = 0;
   std::uint8_t safety = 0;   // replies with a counter since the last one seen
@@ -111,113 +119,123 @@ void judge_sequence(ProbeResult& result, std::span<const Capture> captures) {
       known = false;
       continue;
     }
-    const Asked asked = asked_by(result.best, captures[i]);
+    const Asked asked = asked_by(best, captures[i]);
     if (!has_sequence(asked.request.id)) continue;
     ++safety;
     Reply reply;
-    static_cast<void>(check_reply(result.best, asked.request, captures[i].reply, reply));
+    static_cast<void>(check_reply(best, asked.request, captures[i].reply, reply));
     const auto moved = static_cast<std::uint8_t>(reply.one.sequence - last);
-    if (known) {
-      const auto exclude = [&values, i](SequenceStep step, Check why) {
-        Evidence& evidence = values[static_cast<std::size_t>(step)];
-        if (evidence.possible) evidence = {false, i, why};
-      };
-      if (moved == 0) exclude(SequenceStep::change, Check::sequence_still);
-      if (moved != safety) exclude(SequenceStep::safety, Check::sequence_jumped);
-      if (moved != request) exclude(SequenceStep::request, Check::sequence_jumped);
-    }
+    const auto exclude_if = [&](bool wrong, SequenceStep step, Check why) {
+      Progress& progress = values[static_cast<std::size_t>(step)];
+      if (known && wrong && progress.fits()) progress = {i, why};
+    };
+    exclude_if(moved == 0, SequenceStep::change, Check::sequence_still);
+    exclude_if(moved != safety, SequenceStep::safety, Check::sequence_jumped);
+    exclude_if(moved != request, SequenceStep::request, Check::sequence_jumped);
     known = true;
     last = reply.one.sequence;
     safety = request = 0;
   }
   for (std::size_t i = values.size(); i-- > 0;) {
-    if (values[i].possible) options.put(result.best, option_sequence_step, static_cast<std::int64_t>(i));
+    if (values[i].fits()) best.sequence_step = static_cast<SequenceStep>(i);
+  }
+}
+
+void put_evidence(EvidenceSink& sink, const Reached& reached) {
+  for (std::size_t option = 0; option < open_options; ++option) {
+    const std::span<const Progress> values = std::span(reached[option]).first(choice_count(option));
+    const bool only_one =
+        std::count_if(values.begin(), values.end(), [](const Progress& one) { return one.fits(); }) == 1;
+    const std::string_view fits = only_one ? "only this value explains all frames" : "these frames do not tell";
+    for (std::size_t value = 0; value < values.size(); ++value) {
+      const Progress& one = values[value];
+      sink.put({option, static_cast<std::int64_t>(value), one.fits(), one.capture,
+                one.fits() ? fits : text_of(one.failed).sentence});
+    }
   }
 }
 
 }  // namespace
 
-ProbeResult probe(const Profile& base, std::span<const Capture> captures) {
-  ProbeResult result;
-  result.best = nth_profile(base, 0);
-  std::array<std::array<Progress, 3>, open_options> best{};
-  for (auto& option : best) option.fill({0, Check::request_not_accepted});  // explains least
+bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
+  const Profile base = options.format(values);
+  Profile best = nth_profile(base, 0);
+  bool any = false;
+  Reached reached;
+  for (auto& option : reached) option.fill({0, Check::request_not_accepted});  // explains least
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);
     const Progress progress = progress_of(profile, captures);
-    if (progress.fits() && result.profiles++ == 0) result.best = profile;
+    if (progress.fits() && !any) best = profile;
+    any = any || progress.fits();
     for (std::size_t i = 0; i < open_options; ++i) {
-      Progress& so_far = best[i][static_cast<std::size_t>(options.get(profile, i))];
+      Progress& so_far = reached[i][static_cast<std::size_t>(options.get(profile, i))];
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
   // Of one frame it changes nothing.
-  best[option_sequence_step].fill(
-      best[option_sequence_step][static_cast<std::size_t>(options.get(result.best, option_sequence_step))]);
-  for (std::size_t i = 0; i < open_options; ++i) {
-    for (std::size_t value = 0; value < choice_count(i); ++value) {
-      const Progress& progress = best[i][value];
-      result.values[i][value] = {progress.fits(), progress.capture, progress.failed};
-    }
-  }
-  if (result.profiles != 0) judge_sequence(result, captures);
-  return result;
-}
-
-std::string_view sentence(const ProbeResult& result, std::size_t option, std::size_t value) {
-  const Evidence& evidence = result.values[option][value];
-  if (!evidence.possible) return text_of(evidence.why).sentence;
-  return result.possible(option) == 1 ? "only this value explains all frames" : "these frames do not tell";
+  auto& sequence = reached[option_sequence_step];
+  sequence.fill(sequence[static_cast<std::size_t>(best.sequence_step)]);
+  if (any) judge_sequence(best, captures, sequence);
+  put_evidence(sink, reached);
+  for (std::size_t i = 0; any && i < open_options; ++i) values.values[i] = options.get(best, i);
+  return any;
 }
 
 namespace {
 
-// Whether the reply alone is good: the request went out under the profile in use.
-bool explains(const Profile& profile, Bytes reply) { return explain(profile, {.reply = reply}) == Check::passed; }
-
 // The request's parity bit was wrong only if the other scope makes another one.
 bool parity_is_it(const Profile& profile, const Capture& capture) {
-  const Asked asked = asked_by(profile, {.reply = capture.reply});
+  const Asked asked = asked_by(profile, capture);
   Reply reply;
-  if (!asked.accepted || check_reply(profile, asked.request, capture.reply, reply) != Check::parity_reported) {
-    return false;
-  }
-  Profile other = profile;
-  other.parity_scope = profile.parity_scope == ParityScope::all ? ParityScope::command : ParityScope::all;
-  return asked_by(other, {.reply = capture.reply}).parity_wrong;
+  return asked.accepted && check_reply(profile, asked.request, capture.reply, reply) == Check::parity_reported &&
+         asked_by(with_other_parity(profile), capture).parity_wrong;
 }
 
-constexpr bool changes_replies(std::size_t option) {
-  return option != option_sequence_step && option != option_request_crc && option != option_parity_scope;
+// Each value of each option that changes replies.
+constexpr auto changes = [] {
+  Buffer<OptionValue, 3 * open_options> all;
+  for (std::size_t option = 0; option < open_options; ++option) {
+    if (option == option_sequence_step || option == option_parity_scope || option == options.find("request_crc"))
+      continue;
+    for (std::size_t value = 0; value < choice_count(option); ++value) {
+      all.push_back({option, static_cast<std::int64_t>(value)});
+    }
+  }
+  return all;
+}();
+
+Profile changed(Profile profile, const OptionValue& change) {
+  options.put(profile, change.option, change.value);
+  return profile;
 }
 
 }  // namespace
 
-Change find_change(const Profile& profile, const Capture& capture) {
-  if (capture.reply.empty()) return {};
+// The request went out under the profile in use: the reply alone tells.
+Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
+  const Capture capture{.reply = reply};
+  Buffer<OptionValue, 2> found;
+  if (reply.empty()) return found;
   if (parity_is_it(profile, capture)) {
-    return {{{{option_parity_scope, profile.parity_scope == ParityScope::all ? 0 : 1}}}, 1};
+    found.push_back({option_parity_scope, profile.parity_scope == ParityScope::all ? 0 : 1});
+    return found;
   }
-  if (explains(profile, capture.reply)) return {};  // something else is wrong with it
-  Change pair;
-  for (std::size_t first = 0; first < open_options; ++first) {
-    for (std::size_t a = 0; changes_replies(first) && a < choice_count(first); ++a) {
-      Profile one = profile;
-      const OptionValue change{first, static_cast<std::int64_t>(a)};
-      options.put(one, first, change.value);
-      if (change.value == options.get(profile, first)) continue;
-      if (explains(one, capture.reply)) return {{change}, 1};
-      for (std::size_t second = first + 1; pair.count == 0 && second < open_options; ++second) {
-        for (std::size_t b = 0; changes_replies(second) && b < choice_count(second); ++b) {
-          Profile two = one;
-          const OptionValue also{second, static_cast<std::int64_t>(b)};
-          options.put(two, second, also.value);
-          if (also.value != options.get(profile, second) && explains(two, capture.reply)) pair = {{change, also}, 2};
-        }
-      }
+  if (explain(profile, capture) == Check::passed) return found;  // something else is wrong with it
+  for (const OptionValue& one : changes.view()) {
+    if (explain(changed(profile, one), capture) != Check::passed) continue;
+    found.push_back(one);
+    return found;
+  }
+  for (const OptionValue& one : changes.view()) {
+    for (const OptionValue& two : changes.view()) {
+      if (two.option <= one.option || explain(changed(changed(profile, one), two), capture) != Check::passed) continue;
+      found.push_back(one);
+      found.push_back(two);
+      return found;
     }
   }
-  return pair;
+  return found;
 }
 
 }  // namespace absenc::esl

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the QS35 document leaves open, and how one encoder is addressed and judged: every assumption in one place.
-// README.md says how hardware tells each alternative; probe.hpp finds them in captured frames.
+// What the QS35 document leaves open, and how one encoder is addressed and judged: every assumption in one place, each
+// an option. README.md says how hardware tells each alternative; probe.hpp finds them in captured frames.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <string_view>
 
-#include "absenc/protocol/options.hpp"
+#include "absenc/protocol/author/option.hpp"
 
 namespace absenc::esl {
 
@@ -53,5 +55,70 @@ struct Profile {
   std::uint8_t redundant_tolerance = 1;  // RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
   BadRequest bad_request = BadRequest::report;
 };
+
+namespace choices {
+template <std::size_t count>
+using Names = std::array<std::string_view, count>;
+inline constexpr Names<3> crc_bit_order{"lsb", "msb", "word"};
+inline constexpr Names<3> crc16_byte_order{"low", "high", "table12"};
+inline constexpr Names<2> redundant_bit{"b7", "b0"};
+inline constexpr Names<3> sequence_step{"change", "safety", "request"};
+inline constexpr Names<2> parity_scope{"command", "all"};
+inline constexpr Names<2> field_order{"document", "tformat"};
+inline constexpr Names<2> id6_rs{"16", "9"};
+inline constexpr Names<2> bad_request{"report", "silent"};
+}  // namespace choices
+
+namespace detail {
+// What the document leaves open and captured frames can tell.
+template <auto member, class... Choices>
+constexpr auto open_option(std::string_view name, std::string_view meaning, const Choices&... choices) {
+  return author::probeable(author::option<member>(name, meaning, choices...));
+}
+}  // namespace detail
+
+/// First those that the document leaves open.
+inline constexpr author::OptionsOf options{
+    detail::open_option<&Profile::crc_bit_order>(
+        "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",
+        choices::crc_bit_order),
+    detail::open_option<&Profile::crc16_byte_order>(
+        "crc16_byte_order", "which byte of a 16-bit CRC comes first; table12: low in channel 1, high in channel 2",
+        choices::crc16_byte_order),
+    detail::open_option<&Profile::rs1_sc2>("rs1_sc2", "where RS1 stands in the byte {RS1, SC2}",
+                                           choices::redundant_bit),
+    detail::open_option<&Profile::sequence_step>(
+        "sequence_step",
+        "how the sequence counter moves: change: somehow; safety: by 1 for each reply to IDs 1, 2, 8, B; "
+        "request: by 1 for each request",
+        choices::sequence_step),
+    detail::open_option<&Profile::parity_scope>(
+        "parity_scope", "what the parity bit of CF covers; all: the address too", choices::parity_scope),
+    detail::open_option<&Profile::status_order>(
+        "status_order", "the order of bits in SF; tformat: information, errors, communication errors",
+        choices::field_order),
+    detail::open_option<&Profile::memory_address_order>(
+        "memory_address_order", "the order of bits in ADF; tformat: busy is b7", choices::field_order),
+    detail::open_option<&Profile::request_crc>("request_crc",
+                                               "whether every request ends in a CRC; memory requests always do"),
+    detail::open_option<&Profile::idc_rs1>("idc_rs1", "where RS1 stands in its byte in a reply to ID C",
+                                           choices::redundant_bit),
+    detail::open_option<&Profile::id6_rs>("id6_rs", "bits of the redundant position in a reply to ID 6",
+                                          choices::id6_rs),
+    author::with_role<Role::encoder>(author::option<&Profile::address>("address", "EAD of the encoder", 0, 7)),
+    author::option<&Profile::bus>(
+        "bus",
+        "several encoders share the line: memory cannot be read or written then; auto: where it is known, as on "
+        "a bus of absenc.toml with more than one, in monitor, and of emulate --also",
+        sharing_choices),
+    author::option<&Profile::require_forced_test>("require_forced_test",
+                                                  "a safe position also needs forced_test_passed in both channels"),
+    author::option<&Profile::redundant_tolerance>("redundant_tolerance",
+                                                  "how far the two channels may differ, in 1/512 turn", 0, 255),
+    author::option<&Profile::bad_request>(
+        "bad_request", "what the virtual encoder does with a request whose parity or stop bit is wrong",
+        choices::bad_request),
+};
+inline constexpr std::size_t open_options = options.find("address");
 
 }  // namespace absenc::esl

@@ -1,74 +1,183 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding an ESL reply: every check that the frame allows, in the order of check.hpp; and the reading it makes.
+// Decoding ESL: everything that can be wrong with a reply, in the order in which it is looked at, and what to say about
+// it; the reading that a good one makes; and all of it as the author's layer takes it.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/protocol/author/line.hpp"
 #include "absenc/protocol/esl/frame.hpp"
+#include "absenc/protocol/esl/timing.hpp"
 
 namespace absenc::esl {
 
-namespace detail {
+/// The first check that failed. `passed` comes first, then the checks of a frame, then those of a safe position.
+enum class Check : std::uint8_t {
+  passed,
+  // of every frame
+  length,
+  channel_2_missing,
+  ch1_checksum,
+  ch2_checksum,
+  both_checksums,
+  channels_swapped,
+  other_address,
+  other_command,
+  ch2_other_request,
+  other_memory_address,
+  parity_reported,
+  stop_reported,
+  ch1_channel_bit,
+  ch2_channel_bit,
+  unused_bits,
+  busy_with_data,
+  other_value,
+  sequences_differ,
+  redundant_position,
+  encoder_ids_differ,
+  // of a safe position
+  not_a_safety_reply,
+  ch1_not_ready,
+  ch2_not_ready,
+  forced_test_missing,
+  safety_error,
+  alarm,
+  sequence_unknown,
+  sequence_still,
+  sequence_jumped,
+  // of a probe
+  request_not_accepted,
+};
 
-constexpr void decode_part(const Profile& profile, Part part, Bytes bytes, Reply& reply, ChannelReply& channel) {
-  const std::uint8_t first = bytes[0];
-  switch (part) {
-    case Part::status:
-      channel.status = status_from_wire(profile, first);
-      break;
-    case Part::alarms:
-      channel.alarms = first;
-      break;
-    case Part::singleturn:
-      reply.singleturn = first | static_cast<std::uint32_t>(bytes[1]) << 8 | static_cast<std::uint32_t>(bytes[2]) << 16;
-      break;
-    case Part::multiturn:
-      reply.multiturn = static_cast<std::uint16_t>(first | bytes[1] << 8);
-      break;
-    case Part::sequence:
-      channel.sequence = first;
-      break;
-    case Part::encoder_id:
-      channel.encoder_id = first;
-      break;
-    case Part::temperature:
-      reply.temperature = first;
-      break;
-    case Part::redundant_sequence:
-      reply.redundant = static_cast<std::uint16_t>(unsigned{first} << 1 | redundant_bit(profile.rs1_sc2, bytes[1]));
-      channel.sequence = counter_bits(profile.rs1_sc2, bytes[1]);
-      break;
-    case Part::zero_sequence:
-      reply.unused_bits |= redundant_bit(profile.rs1_sc2, first) != 0;
-      channel.sequence = counter_bits(profile.rs1_sc2, first);
-      break;
-    case Part::redundant_alone:
-      reply.redundant = static_cast<std::uint16_t>(unsigned{first} << 1 | redundant_bit(profile.idc_rs1, bytes[1]));
-      reply.unused_bits |= counter_bits(profile.idc_rs1, bytes[1]) != 0;
-      break;
-    case Part::redundant_calibration:
-      if (profile.id6_rs == Id6Redundant::bits_16) {
-        reply.redundant = static_cast<std::uint16_t>(first << 8 | bytes[1]);
-      } else {
-        reply.redundant = static_cast<std::uint16_t>(first << 1 | (bytes[1] & 1));
-        reply.unused_bits |= bytes[1] > 1;
-      }
-      break;
-    case Part::memory_address:
-      reply.memory_address = address_from_wire(profile, first);
-      reply.busy = busy_from_wire(profile, first);
-      break;
-    case Part::value:
-      reply.value = first;
-      break;
+struct CheckText {
+  Error error;
+  std::string_view sentence;
+};
+
+/// Indexed by the enumerator.
+inline constexpr std::array<CheckText, 31> check_texts{{
+    {Error::none, ""},
+    {Error::wrong_length, "the number of bytes is not that of this reply"},
+    {Error::wrong_length, "channel 2 is missing: the reply ends after channel 1"},
+    {Error::bad_checksum, "the CRC of channel 1 is wrong, channel 2 is good: nothing of the reply is used"},
+    {Error::bad_checksum, "the CRC of channel 2 is wrong, channel 1 is good: nothing of the reply is used"},
+    {Error::bad_checksum, "the CRC of the reply is wrong"},
+    {Error::bad_checksum, "the channels are swapped: channel 2 came first"},
+    {Error::unexpected_reply, "the control field carries the address of another encoder"},
+    {Error::unexpected_reply, "the control field is that of another request"},
+    {Error::unexpected_reply, "the control field of channel 2 is not that of the request"},
+    {Error::unexpected_reply, "the reply is for another memory address"},
+    {Error::request_rejected, "the encoder saw a wrong parity bit in the request and did not execute it"},
+    {Error::request_rejected, "the encoder saw a wrong stop bit in the request and did not execute it"},
+    {Error::unexpected_reply, "channel 1 says that it is channel 2"},
+    {Error::unexpected_reply, "channel 2 says that it is channel 1"},
+    {Error::out_of_range, "a bit that is always 0 is set"},
+    {Error::unexpected_reply, "the encoder is busy but sends data (Table 10: 00)"},
+    {Error::unexpected_reply, "the encoder accepted another value than was sent"},
+    {Error::sequence_mismatch, "the sequence counters of the two channels differ"},
+    {Error::cross_check_failed, "the redundant position of channel 2 does not agree with channel 1"},
+    {Error::cross_check_failed, "the two channels send different encoder ids"},
+    {Error::unsupported, "only replies to IDs 1 and 2 can make a safe position"},
+    {Error::busy, "channel 1 is not ready"},
+    {Error::busy, "channel 2 is not ready"},
+    {Error::request_rejected, "the forced test has not passed in both channels"},
+    {Error::request_rejected, "a channel reports a safety error"},
+    {Error::request_rejected, "a channel raises an alarm that makes the position unsafe"},
+    {Error::sequence_mismatch, "no earlier reply to another ID is known, so the sequence counter proves nothing yet"},
+    {Error::sequence_mismatch, "the sequence counter stands still: this reply was seen before"},
+    {Error::sequence_mismatch, "the sequence counter did not move as it should: a reply was repeated, lost or delayed"},
+    {Error::unexpected_reply, "an encoder of this profile would not have answered the request as it did"},
+}};
+static_assert(check_texts.size() == static_cast<std::size_t>(Check::request_not_accepted) + 1);
+
+/// The errors alone, so that firmware does not link the sentences.
+inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
+  std::array<Error, check_texts.size()> errors{};
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = check_texts[i].error;
+  return errors;
+}();
+
+[[nodiscard]] constexpr const CheckText& text_of(Check check) { return check_texts[static_cast<std::size_t>(check)]; }
+[[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
+
+namespace detail {
+// What a request of this id says, or what the reply to it says of it: unchecked, and of memory only as far as it goes.
+constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
+  Request request{id, address_of(bytes[0])};
+  if (!is_memory_access(id) || bytes.size() < 3) return request;
+  const std::uint8_t field = from_wire(profile.memory_address_order == FieldOrder::document, bytes[1]);
+  busy = (field & 0x80) != 0;
+  request.memory_address = field & 0x7F;
+  if (id == DataId::write_memory) request.value = bytes[2];
+  return request;
+}
+}  // namespace detail
+
+/// Errors: wrong_length; unsupported (an id that Table 3 does not list); bad_checksum (parity or CRC); out_of_range
+/// (the busy bit is 0 in requests).
+[[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
+  if (bytes.empty()) return Error::wrong_length;
+  const std::optional<DataId> id = data_id(bytes[0]);
+  if (!id) return Error::unsupported;
+  if (bytes.size() != request_length(profile, *id)) return Error::wrong_length;
+  if (bytes.size() > 1 && checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back()) {
+    return Error::bad_checksum;
   }
+  if (bytes[0] != control_field(profile, address_of(bytes[0]), *id)) return Error::bad_checksum;
+  bool busy = false;
+  const Request request = detail::split_request(profile, *id, bytes, busy);
+  return busy ? Result<Request>(Error::out_of_range) : request;
 }
 
-constexpr void decode_channel(const Profile& profile, std::span<const Part> parts, Bytes bytes, Reply& reply,
-                              ChannelReply& channel) {
-  std::size_t at = 1;
-  for (const Part part : parts) {
-    decode_part(profile, part, bytes.subspan(at), reply, channel);
-    at += size_of(part);
+namespace detail {
+
+// RS in two bytes, the lowest bit in the second; the other bits of that.
+constexpr std::uint8_t split_redundant(RedundantBit order, Bytes bytes, Reply& reply) {
+  const std::uint8_t second = from_wire(order == RedundantBit::b0, bytes[1]);
+  reply.redundant = static_cast<std::uint16_t>(bytes[0] << 1 | second >> 7);
+  return second & 0x7F;
+}
+
+constexpr void decode_parts(const Profile& profile, unsigned parts, Bytes bytes, Reply& reply, ChannelReply& channel) {
+  std::size_t at = 1;  // behind CF
+  Bytes here{};
+  const auto has = [&](unsigned one, std::size_t size) {
+    if ((parts & one) == 0) return false;
+    here = bytes.subspan(at, size);
+    at += size;
+    return true;
+  };
+  if (has(part::status, 1)) channel.status = status_from_wire(profile, here[0]);
+  if (has(part::alarms, 1)) channel.alarms = here[0];
+  if (has(part::singleturn, 3)) reply.singleturn = static_cast<std::uint32_t>(load_little_endian(here));
+  if (has(part::multiturn, 2)) reply.multiturn = static_cast<std::uint16_t>(here[0] | here[1] << 8);
+  if (has(part::encoder_id, 1)) channel.encoder_id = here[0];
+  if (has(part::temperature, 1)) reply.temperature = static_cast<std::int8_t>(here[0]);
+  if (has(part::sequence, 1)) channel.sequence = here[0];
+  if (has(part::zero_sequence, 1)) {
+    const std::uint8_t byte = from_wire(profile.rs1_sc2 == RedundantBit::b0, here[0]);
+    reply.unused_bits |= (byte & 0x80) != 0;
+    channel.sequence = byte & 0x7F;
   }
+  if (has(part::redundant_sequence, 2)) channel.sequence = split_redundant(profile.rs1_sc2, here, reply);
+  if (has(part::redundant_alone, 2)) reply.unused_bits |= split_redundant(profile.idc_rs1, here, reply) != 0;
+  if (has(part::redundant_calibration, 2)) {
+    if (profile.id6_rs == Id6Redundant::bits_16) {
+      reply.redundant = static_cast<std::uint16_t>(here[0] << 8 | here[1]);
+    } else {
+      reply.unused_bits |= split_redundant(RedundantBit::b0, here, reply) != 0;
+    }
+  }
+  if (has(part::memory_address, 1)) {
+    const std::uint8_t field = from_wire(profile.memory_address_order == FieldOrder::document, here[0]);
+    reply.memory_address = field & 0x7F;
+    reply.busy = (field & 0x80) != 0;
+  }
+  if (has(part::value, 1)) reply.value = here[0];
 }
 
 constexpr bool checksum_holds(const Profile& profile, std::size_t crc_bytes, Channel channel, Bytes bytes) {
@@ -123,8 +232,10 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
   if (reply.unused_bits) return Check::unused_bits;
   if (layout.crc_bytes == 2 && (reply.one.sequence & 0x7F) != reply.two.sequence) return Check::sequences_differ;
   if (reply.one.encoder_id != reply.two.encoder_id) return Check::encoder_ids_differ;
-  if (layout.parts_two[layout.count_two - 1] == Part::alarms || reply.id == DataId::encoder_id) return Check::passed;
-  const std::int64_t off = wrapped_difference(redundant_9(profile, reply), reply.singleturn >> 15, redundant_bits);
+  if (!layout.has(part::redundant)) return Check::passed;
+  const bool wide = layout.has(part::redundant_calibration) && profile.id6_rs == Id6Redundant::bits_16;
+  const unsigned redundant = wide ? reply.redundant >> 7 : reply.redundant;
+  const std::int64_t off = wrapped_difference(redundant, reply.singleturn >> 15, redundant_bits);
   return (off < 0 ? -off : off) <= profile.redundant_tolerance ? Check::passed : Check::redundant_position;
 }
 
@@ -134,7 +245,7 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 /// as the checksums hold, and to be used only when the result is `passed`. A busy memory reply passes.
 [[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
   const Layout& layout = layout_of(request.id);
-  if (bytes.size() != layout.length_one + layout.length_two) {
+  if (bytes.size() != reply_length(request.id)) {
     const bool first_only = layout.has_two() && bytes.size() == layout.length_one;
     return first_only && detail::checksum_holds(profile, layout.crc_bytes, Channel::one, bytes)
                ? Check::channel_2_missing
@@ -146,8 +257,8 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
   if (sums != Check::passed) return sums;
   reply.id = request.id;
   reply.encoder_address = address_of(one[0]);
-  detail::decode_channel(profile, layout.one(), one, reply, reply.one);
-  if (layout.has_two()) detail::decode_channel(profile, layout.two(), two, reply, reply.two);
+  detail::decode_parts(profile, layout.one, one, reply, reply.one);
+  if (layout.has_two()) detail::decode_parts(profile, layout.two, two, reply, reply.two);
   const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
   const Check echo = detail::check_echo(asked, one[0], layout.has_two() ? two[0] : asked);
   if (echo != Check::passed) return echo;
@@ -156,6 +267,7 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 }
 
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Profile& profile, const Request& request, Bytes bytes) {
+  if (bytes.empty()) return Error::timeout;
   Reply reply;
   const Check check = check_reply(profile, request, bytes, reply);
   if (check != Check::passed) return error_of(check);
@@ -166,27 +278,59 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 /// carry no alarms: SF alone tells then. This is not a safe position (safety.hpp).
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) {
   const Layout& layout = layout_of(reply.id);
-  const auto status = static_cast<std::uint8_t>(reply.one.status | (layout.has_two() ? reply.two.status : 0));
-  const auto raised = static_cast<std::uint8_t>(reply.one.alarms | reply.two.alarms);
+  const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
+  const unsigned either = reply.one.status | second;
+  const unsigned raised = reply.one.alarms | reply.two.alarms;
   Reading reading;
-  reading.status = reply.one.status | (layout.has_two() ? static_cast<std::uint32_t>(reply.two.status) << 8 : 0);
-  reading.alarms = reply.one.alarms | static_cast<std::uint32_t>(reply.two.alarms) << 8;
-  reading.ready =
-      (reply.one.status & status::ready) != 0 && (!layout.has_two() || (reply.two.status & status::ready) != 0);
-  if (layout.has(Part::singleturn)) {
-    const bool valid = reading.ready && (status & status::safety_error) == 0 && (raised & alarms::unsafe) == 0;
+  reading.status = reply.one.status | (layout.has_two() ? std::uint32_t{second} << 8 : 0);
+  reading.alarms = reply.one.alarms | std::uint32_t{reply.two.alarms} << 8;
+  reading.ready = (reply.one.status & second & status::ready) != 0;
+  if (layout.has(part::singleturn)) {
+    const bool valid = reading.ready && (either & status::safety_error) == 0 && (raised & alarms::unsafe) == 0;
     reading.singleturn = reply.singleturn;
     reading.singleturn_bits = singleturn_bits;
     reading.singleturn_valid_bits = valid ? singleturn_bits : 0;
   }
-  if (layout.has(Part::multiturn)) {
+  if (layout.has(part::multiturn)) {
     const bool wrong =
-        layout.has(Part::alarms) ? (raised & alarms::turns_wrong) != 0 : (status & status::non_safety_error) != 0;
+        layout.has(part::alarms) ? (raised & alarms::turns_wrong) != 0 : (either & status::non_safety_error) != 0;
     reading.multiturn = reply.multiturn;
     reading.multiturn_bits = multiturn_bits;
     reading.multiturn_valid = reading.ready && !wrong;
   }
   return reading;
 }
+
+// ---- As the author's layer takes it
+
+[[nodiscard]] constexpr bool selects_page(const Request& request) {
+  return request.id == DataId::write_memory && request.memory_address == page_select_address;
+}
+
+struct Protocol {
+  using Format = Profile;
+  using Request = esl::Request;
+  using Reply = esl::Reply;
+  static constexpr std::size_t longest_reply = reply_capacity;
+
+  static constexpr author::Wire wire(const Profile&) { return {.answer_limit = answer_limit, .gap_limit = gap_limit}; }
+  /// A page change that was not answered well may be going on all the same, and so may the reading of an EEPROM byte:
+  /// neither a repetition nor whoever comes next may meet it.
+  static constexpr author::Manner manner(const Profile&, const Request& request) {
+    const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
+    return {.pause = busy, .hold = busy};
+  }
+  static constexpr std::size_t request_size(const Profile& profile, Bytes begin) {
+    const std::optional<DataId> id = data_id(begin[0]);
+    if (!id || begin[0] != control_field(profile, address_of(begin[0]), *id)) return 0;
+    return request_length(profile, *id);
+  }
+  static constexpr std::size_t reply_size(const Profile&, const Request& request) { return reply_length(request.id); }
+  static constexpr auto encode = encode_request;
+  static constexpr auto decode_request = esl::decode_request;
+  static constexpr auto decode = decode_reply;
+  static constexpr Reading reading(const Profile&, const Request&, const Reply& reply) { return to_reading(reply); }
+  static constexpr auto latched = latch_time;
+};
 
 }  // namespace absenc::esl

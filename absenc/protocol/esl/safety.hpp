@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "absenc/protocol/esl/reply.hpp"
-#include "absenc/protocol/esl/timing.hpp"
 
 namespace absenc::esl {
 

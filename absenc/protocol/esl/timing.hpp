@@ -3,13 +3,14 @@
 // demands.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
 #include "absenc/protocol/esl/profile.hpp"
+#include "absenc/protocol/unit.hpp"
 
 namespace absenc::esl {
 
@@ -39,57 +40,69 @@ inline constexpr Time request_pause = line_settings.bits(2);
   return sent_at - (profile.request_crc ? line_settings.character() : Time{}) + position_time;
 }
 
-/// Table 11. `kind` tells how the bytes are reached.
-struct MemoryArea {
-  enum class Kind : std::uint8_t {
-    eeprom,     // two requests read, 6 ms write
-    mtp,        // reached like the EEPROM (assumed); 100 000 writes
-    registers,  // immediate, lost at power off
-  };
-  std::uint8_t page;
-  std::uint8_t first;
-  std::uint8_t last;
-  Kind kind;
-  bool user;  // may be written without force: all others hold calibration, lock bits or undescribed commands
-  const char* meaning;
-};
-
-/// The document gives the user area 512 bytes and one page of 127: pages 1 to 3 are assumed.
-inline constexpr std::array<MemoryArea, 12> memory_map{{
-    {0, 0x00, 0x7E, MemoryArea::Kind::eeprom, true, "user area"},
-    {1, 0x00, 0x7E, MemoryArea::Kind::eeprom, true, "user area (assumed)"},
-    {2, 0x00, 0x7E, MemoryArea::Kind::eeprom, true, "user area (assumed)"},
-    {3, 0x00, 0x7E, MemoryArea::Kind::eeprom, true, "user area (assumed)"},
-    {4, 0x00, 0x7E, MemoryArea::Kind::eeprom, false, "IEC table"},
-    {5, 0x00, 0x7E, MemoryArea::Kind::eeprom, false, "OAC table"},
-    {6, 0x00, 0x0B, MemoryArea::Kind::eeprom, false, "remaining tables, channel 2 offset, temperature offset"},
-    {8, 0x00, 0x2F, MemoryArea::Kind::registers, false, "frames of both channels, error info, forced tests"},
-    {14, 0x00, 0x0F, MemoryArea::Kind::mtp, false, "MTP 1"},
-    {14, 0x10, 0x1F, MemoryArea::Kind::mtp, false, "MTP 2"},
-    {14, 0x20, 0x2F, MemoryArea::Kind::registers, false, "calibration and test"},
-    {14, 0x30, 0x3F, MemoryArea::Kind::registers, false, "lock bits"},
-}};
-
-/// Null for an address that Table 11 does not list.
-[[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
-  for (const MemoryArea& area : memory_map) {
-    if (area.page == page && address >= area.first && address <= area.last) return &area;
-  }
-  return nullptr;
-}
-
-[[nodiscard]] constexpr bool is_page(unsigned page) {
-  for (const MemoryArea& area : memory_map) {
-    if (area.page == page) return true;
-  }
-  return false;
-}
-
+inline constexpr std::uint8_t page_select_address = 0x7F;
 inline constexpr std::uint8_t last_page = 14;
 inline constexpr std::uint8_t last_address = 0x7E;
 inline constexpr std::uint8_t register_page = 8;          // selected after power on (Table 9)
 inline constexpr std::uint8_t error_info_address = 0x1A;  // on the register page (Table 8)
 inline constexpr std::uint8_t error_info_led = 0x02;
 inline constexpr std::uint8_t error_info_lissajous = 0x08;
+
+/// Permissible writing cycles (notes 6 and 7 of Table 11), which do not say of what. They tell how bytes are reached,
+/// too: in the EEPROM by two requests and a write of 6 ms, in the MTP alike (assumed), in registers, which are lost at
+/// power off, at once.
+namespace life {
+inline constexpr std::uint32_t eeprom = 1'000'000;
+inline constexpr std::uint32_t mtp = 100'000;
+inline constexpr std::uint32_t registers = 0;
+}  // namespace life
+
+/// Table 11 in the order of pages. The document gives the user area 512 bytes and one page of 127: pages 1 to 3 are
+/// assumed. All others hold calibration, lock bits or undescribed commands.
+inline constexpr std::array<MemoryArea, 12> memory_map = [] {
+  const auto area = [](unsigned page, unsigned first, unsigned last, std::uint32_t life, std::string_view meaning) {
+    return MemoryArea{.page = page,
+                      .first = first,
+                      .count = last - first + 1,
+                      .meaning = meaning,
+                      .in_dump = page == 0,
+                      .write_life = life,
+                      .protection = page <= 3 ? "" : "what is written there can spoil the encoder"};
+  };
+  return std::array<MemoryArea, 12>{
+      area(0, 0x00, 0x7E, life::eeprom, "user area"),
+      area(1, 0x00, 0x7E, life::eeprom, "user area (assumed)"),
+      area(2, 0x00, 0x7E, life::eeprom, "user area (assumed)"),
+      area(3, 0x00, 0x7E, life::eeprom, "user area (assumed)"),
+      area(4, 0x00, 0x7E, life::eeprom, "IEC table"),
+      area(5, 0x00, 0x7E, life::eeprom, "OAC table"),
+      area(6, 0x00, 0x0B, life::eeprom, "remaining tables, channel 2 offset, temperature offset"),
+      area(8, 0x00, 0x2F, life::registers, "frames of both channels, error info, forced tests"),
+      area(14, 0x00, 0x0F, life::mtp, "MTP 1"),
+      area(14, 0x10, 0x1F, life::mtp, "MTP 2"),
+      area(14, 0x20, 0x2F, life::registers, "calibration and test"),
+      area(14, 0x30, 0x3F, life::registers, "lock bits"),
+  };
+}();
+
+/// Bytes of the registers, or of all the rest.
+[[nodiscard]] constexpr std::size_t memory_size(bool registers) {
+  std::size_t size = 0;
+  for (const MemoryArea& area : memory_map) size += (area.write_life == life::registers) == registers ? area.count : 0;
+  return size;
+}
+
+/// Null for an address that Table 11 does not list.
+[[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
+  const auto* const found =
+      std::find_if(memory_map.begin(), memory_map.end(), [&](const MemoryArea& one) { return one.has(page, address); });
+  return found == memory_map.end() ? nullptr : found;
+}
+[[nodiscard]] constexpr bool is_page(unsigned page) { return find_area(page, 0) != nullptr; }
+/// Nothing in the temporary register stands between such a byte and its reader.
+[[nodiscard]] constexpr bool is_immediate(unsigned page, unsigned address) {
+  const MemoryArea* const area = find_area(page, address);
+  return address == page_select_address || (area != nullptr && area->write_life == life::registers);
+}
 
 }  // namespace absenc::esl

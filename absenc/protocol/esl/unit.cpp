@@ -5,12 +5,9 @@
 
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/esl/device.hpp"
-#include "absenc/protocol/esl/fields.hpp"
 #include "absenc/protocol/esl/host.hpp"
-#include "absenc/protocol/esl/options.hpp"
 #include "absenc/protocol/esl/probe.hpp"
 #include "absenc/protocol/esl/vectors.hpp"
-#include "absenc/protocol/esl/words.hpp"
 
 namespace absenc::esl {
 
@@ -34,11 +31,7 @@ constexpr std::uint8_t byte_of(std::int64_t argument) { return static_cast<std::
 // ---- Commands: the one request that does the work of each; procedures send more (page select, repetitions)
 
 template <DataId data>
-constexpr Request ask(const Profile& profile) {
-  return {data, profile.address};
-}
-template <DataId data>
-constexpr Request ask_by(const Profile& profile, Arguments) {
+constexpr Request ask(const Profile& profile, Arguments) {
   return {data, profile.address};
 }
 constexpr Request read_at(const Profile& profile, Arguments arguments) {
@@ -56,9 +49,37 @@ constexpr Request select(const Profile& profile, Arguments arguments) {
 constexpr std::string_view no_memory(const Profile& profile) {
   if (profile.bus != sharing_yes) return {};
   return "memory cannot be reached by broadcast or with several encoders on the line (Figure 18): connect this one "
-         "alone "
-         "and say bus=false; nothing was sent";
+         "alone and say bus=false; nothing was sent";
 }
+
+// ---- What is said of errors
+
+// Without the request the reply's own control field says what was asked; the address of a memory access is taken as it
+// comes.
+constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes reply) {
+  if (!request.empty()) return decode_request(profile, request);
+  const auto id = data_id(reply[0]);
+  if (!id) return Error::unexpected_reply;
+  bool busy = false;
+  return detail::split_request(profile, *id, reply, busy);
+}
+
+// The check behind `error`; `passed` where the error is none of the frame's.
+Check check_behind(const Profile& profile, Error error, Bytes request, Bytes reply) {
+  if (reply.empty()) return Check::passed;
+  const Result<Request> asked = asked_by(profile, request, reply);
+  if (!asked) return Check::passed;
+  Reply ignored;
+  const Check check = check_reply(profile, *asked, reply, ignored);
+  return error_of(check) == error ? check : Check::passed;
+}
+
+// ---- What is declared
+
+template <Channel channel>
+constexpr const FieldInfo* status_of = fields.of<detail::in<channel, part::status, &ChannelReply::status>>();
+template <Channel channel>
+constexpr const FieldInfo* alarms_of = fields.of<detail::in<channel, part::alarms, &ChannelReply::alarms>>();
 
 struct Definition;
 
@@ -66,13 +87,13 @@ template <DataId data>
 constexpr CommandOf<Protocol> read(std::string_view name, Verb verb, std::string_view meaning) {
   return reading<Definition, Protocol, ask<data>>({name, verb, 0, meaning});
 }
-template <class Found, auto procedure, auto request, auto... bound>
+template <auto procedure, auto request, auto... bound>
 constexpr CommandOf<Protocol> run(const Command& info) {
   return command<Definition, Protocol, Found, procedure, request, bound...>(info);
 }
 template <DataId data>
 constexpr CommandOf<Protocol> reset_by(std::string_view name, Verb verb, std::string_view meaning) {
-  return run<AfterReset, reset, ask_by<data>, data>({name, verb, 0, meaning, {}, true, false});
+  return run<reset, ask<data>, data>({name, verb, 0, meaning, {}, true, false});
 }
 
 struct Definition {
@@ -88,8 +109,8 @@ struct Definition {
   static constexpr std::array models{
       ModelText{"QS35-M40M-E12F", "24 bits, 65536 turns, two channels (SIL3)", 10'000, ""}};
   static constexpr const auto& fields = esl::fields;
-  static constexpr const FieldInfo* status = fields.of<&Values::ch1_status>();
-  static constexpr const FieldInfo* alarms = fields.of<&Values::ch1_alarms>();
+  static constexpr const FieldInfo* status = status_of<Channel::one>;
+  static constexpr const FieldInfo* alarms = alarms_of<Channel::one>;
   static constexpr const auto& vectors = esl::vectors;
   static constexpr const auto& conditions = esl::conditions;
   static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
@@ -105,29 +126,26 @@ struct Definition {
       read<DataId::singleturn_short>("singleturn-short", Verb::read_part,
                                      "position within the turn, one channel, no alarms"),
       read<DataId::calibration>("calibration", Verb::read_part, "position within the turn as each channel sees it"),
-      run<Safe, read_safely, ask_by<DataId::position>>(
+      run<read_safely, ask<DataId::position>>(
           {"safe-position", Verb::run, 0,
            "a position that passed every check of a safety reader (not a certified safety function)"}),
-      run<Identity, read_encoder_id, ask_by<DataId::encoder_id>>(
-          {"encoder-id", Verb::info, 0, "encoder id", {}, false, false}),
+      run<read_encoder_id, ask<DataId::encoder_id>>({"encoder-id", Verb::info, 0, "encoder id", {}, false, false}),
       read<DataId::alarms>("alarms", Verb::info, "alarms of both channels"),
       read<DataId::temperature>("temperature", Verb::temperature, "temperature inside the encoder"),
-      run<ErrorInfo, read_error_info, read_info>(
+      run<read_error_info, read_info>(
           {"led-or-lissajous", Verb::run, 0, "which of the two is behind led_or_lissajous_error"})
           .unless(no_memory),
-      run<Nodes, scan, ask_by<DataId::singleturn_short>>(
+      author::command<Definition, Protocol, Nodes, scan, ask<DataId::singleturn_short>>(
           {"scan", Verb::scan, 0, "who answers on the line", {}, false, false}),
       reset_by<DataId::zero>("zero", Verb::zero, "make this the zero of the turn"),
       reset_by<DataId::clear_alarms>("clear-alarms", Verb::clear_alarms, "clear the alarms that can be cleared"),
       reset_by<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn, "set the turns to zero"),
-      run<MemoryBytes, read_memory, read_at>(
-          {"memory-read", Verb::memory_read, 0, "read EEPROM, MTP or registers", read_arguments})
+      run<read_memory, read_at>({"memory-read", Verb::memory_read, 0, "read EEPROM, MTP or registers", read_arguments})
           .unless(no_memory),
-      run<Written, write_memory, write_at>(
+      run<write_memory, write_at>(
           {"memory-write", Verb::memory_write, 0, "write a byte of the memory", write_arguments, true, false})
           .unless(no_memory),
-      run<Selected, select_page, select>(
-          {"select-page", Verb::run, 0, "select a memory page", page_arguments, true, true})
+      run<select_page, select>({"select-page", Verb::run, 0, "select a memory page", page_arguments, true, true})
           .unless(no_memory),
   };
 
@@ -139,99 +157,58 @@ struct Definition {
   static constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) {
     return asked_by(profile, {}, reply);
   }
-  static constexpr void put(FieldSink& sink, const Profile& profile, const Request& request) {
-    fields.put(sink, values_of(profile, request));
-  }
-  static constexpr void put(FieldSink& sink, const Profile&, const Request&, const Reply& reply) {
-    fields.put(sink, values_of(reply));
-  }
-  static void put(FieldSink& sink, const Profile&, const Identity& found) { fields.put(sink, values_of(found.reply)); }
-  static void put(FieldSink& sink, const Profile&, const AfterReset& found) {
-    fields.put(sink, values_of(found.reply));
-  }
-  static void put(FieldSink& sink, const Profile&, const Safe& found) {
-    Values values = values_of(found.reply);
-    values.safe_singleturn = found.position->singleturn();
-    fields.put(sink, values);
-  }
-  static void put(FieldSink& sink, const Profile&, const MemoryBytes& found) {
-    Values values{.page = found.page, .memory_address = found.address, .value = found.data[0]};
-    if (found.data.size() > 1) values.data = found.data.view();
-    fields.put(sink, values);
-  }
-  static void put(FieldSink& sink, const Profile&, const Written& found) {
-    fields.put(sink,
-               {.page = found.page, .memory_address = found.address, .value = found.value, .written = found.sent});
-  }
-  static void put(FieldSink& sink, const Profile&, const Selected& found) { fields.put(sink, {.page = found.page}); }
-  static void put(FieldSink& sink, const Profile&, const ErrorInfo& found) {
-    Values values{.led_error = (found.flags & error_info_led) != 0,
-                  .lissajous_error = (found.flags & error_info_lissajous) != 0};
-    if (found.page_left) values.page_left = register_page;
-    fields.put(sink, values);
-  }
+  static constexpr Shown values(const Profile& profile, const Request& request) { return {profile, request}; }
+  static constexpr Shown values(const Profile&, const Request&, const Reply& reply) { return Shown(reply); }
+  static const Shown& values(const Profile&, const Found& found) { return found; }
   static void put(FieldSink& sink, const Profile&, const Nodes& found) {
     for (std::uint8_t node = 0; node < most_encoders; ++node) {
       const std::optional<Reply>& reply = found.answers[node];
       if (!reply && !found.disturbed[node]) continue;
-      Values values{.encoder_address = node, .clash = !reply};
-      if (reply) values.ch1_status = reply->one.status;
-      if (reply) values.singleturn = reply->singleturn;
-      fields.put(sink, values);
+      Shown node_shown;
+      node_shown.encoder_address = node;
+      node_shown.clash = !reply;
+      node_shown.reply = reply;
+      fields.put(sink, node_shown);
       if (reply) sink.put_reading(to_reading(*reply));
     }
   }
-  static void tell(Sentence& words, const Profile& profile, const Engine& host) { esl::tell(words, profile, host); }
+  // Of the last exchange, and which profile would make its reply good.
+  static void tell(Sentence& words, const Profile& profile, const Engine& host) {
+    const Bytes request = host.exchange().sent;
+    if (host.error() == Error::timeout) {
+      words.add("it is also silent when request_crc, crc_bit_order or address is another");
+      const std::optional<DataId> asked = request.empty() ? std::nullopt : data_id(request[0]);
+      if (asked && is_memory_access(*asked)) {
+        words.add_part("and to memory requests when others share its line (Figure 18)");
+      }
+      return;
+    }
+    if (host.is_disturbed()) return;
+    const Check check = check_behind(profile, host.error(), request, host.reply());
+    if (check == Check::passed) return;
+    words.add(text_of(check).sentence);
+    std::string_view before = "; the reply is good with the profile ";
+    for (const OptionValue& one : find_change(profile, host.reply()).view()) {
+      const Option& option = options.infos[one.option];
+      words.add(before).add(option.name).add("=").add(option.choices[static_cast<std::size_t>(one.value)]);
+      before = " ";
+    }
+  }
   static Explanation explain(const Profile& profile, Error error, Bytes request, Bytes reply) {
-    return esl::explain(profile, error, request, reply);
+    const Check check = check_behind(profile, error, request, reply);
+    if (check == Check::length) return {};  // the error says all of it
+    return {.found = text_of(check).sentence};
   }
 };
-
-// ---- What few units have
-
-// Permissible writing cycles (notes 6 and 7 of Table 11), which do not say of what.
-constexpr std::uint32_t write_life(MemoryArea::Kind kind) {
-  if (kind == MemoryArea::Kind::registers) return 0;
-  return kind == MemoryArea::Kind::eeprom ? 1'000'000 : 100'000;
-}
-
-// Table 11 in the order of pages.
-constexpr std::array<absenc::MemoryArea, memory_map.size()> memory_areas = [] {
-  std::array<absenc::MemoryArea, memory_map.size()> areas{};
-  for (std::size_t i = 0; i < areas.size(); ++i) {
-    const MemoryArea& area = memory_map[i];
-    areas[i] = {.page = area.page,
-                .first = area.first,
-                .count = area.last - area.first + 1u,
-                .meaning = area.meaning,
-                .in_dump = area.page == 0,
-                .write_life = write_life(area.kind),
-                .protection = area.user ? "" : "what is written there can spoil the encoder"};
-  }
-  return areas;
-}();
-
-bool probe_captures(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
-  const ProbeResult result = probe(options.format(values), captures);
-  for (std::size_t option = 0; option < open_options; ++option) {
-    for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
-      const Evidence& evidence = result.values[option][value];
-      sink.put({option, static_cast<std::int64_t>(value), evidence.possible, evidence.capture,
-                sentence(result, option, value)});
-    }
-    if (result.profiles != 0) values.values[option] = options.get(result.best, option);
-  }
-  return result.profiles != 0;
-}
 
 }  // namespace
 
 constinit const Unit unit = [] {
   Unit made = UnitOf<Definition>::make();
-  made.memory = memory_areas;
-  made.second_status = fields.of<&Values::ch2_status>();
-  made.second_alarms = fields.of<&Values::ch2_alarms>();
-  made.probe = probe_captures;
+  made.memory = memory_map;
+  made.second_status = status_of<Channel::two>;
+  made.second_alarms = alarms_of<Channel::two>;
+  made.probe = probe;
   return made;
 }();
 

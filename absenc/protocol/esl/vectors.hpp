@@ -79,6 +79,8 @@ inline constexpr std::array vectors{
     author::VectorText{"esl-130", "IDC with bits that are always 0", "derived", "", "e0b3", "e04000efcdabd5e06000ab81dd", "out_of_range"},
     author::VectorText{"esl-131", "request with a wrong parity bit", "derived", "", "8881", "", "bad_checksum"},
     author::VectorText{"esl-132", "request with a wrong CRC", "derived", "", "0874", "", "bad_checksum"},
+    author::VectorText{"esl-134", "request with the busy bit", "derived", "", "70356b", "", "out_of_range"},
+    author::VectorText{"esl-135", "ID2 answered as ID B", "derived", "", "10ea", "584000efcdab56675d586000abd6c4a3", "unexpected_reply"},
     author::VectorText{"esl-133", "request with an id that Table 3 lacks", "derived", "", "189f", "", "unsupported"},
 };
 // clang-format on

@@ -61,35 +61,29 @@ struct Values {
   std::optional<std::uint8_t> page_left{};
 };
 
-using Kind = FieldInfo::Kind;
-inline constexpr auto fields = author::fields_of<Values>(
-    author::field<&Values::data_id>({"data_id", Kind::number, "", "which data was asked for (Table 1)"}),
-    author::field<&Values::control_field>(
-        {"control_field", Kind::number, "", "first byte of the request: sync code, data id, parity"}),
-    author::field<&Values::status>({"status", Kind::flags, "", "SF", status_flags}),
-    author::field<&Values::singleturn>({"singleturn",
-                                        Kind::number,
-                                        "counts",
-                                        "ABS: position within the turn, rising counter-clockwise",
-                                        {},
-                                        Role::position}),
-    author::field<&Values::encoder_id>({"encoder_id", Kind::number, "", "ENID"}),
-    author::field<&Values::multiturn>({"multiturn", Kind::number, "revolutions", "ABM", {}, Role::turns}),
-    author::field<&Values::alarms>({"alarms", Kind::flags, "", "ALMC", alarm_flags}),
-    author::field<&Values::page>({"page", Kind::number, "", "memory page"}),
-    author::field<&Values::address>({"address", Kind::number, "", "ADF: memory address; 127 selects the page"}),
-    author::field<&Values::busy>(
-        {"busy", Kind::number, "", "1 while the encoder writes: the request was not executed"}),
-    author::field<&Values::value>({"value", Kind::number, "", "EDF: the byte in memory", {}, Role::value}),
-    author::field<&Values::data>({"data", Kind::bytes, "", "the bytes in memory from `address` on", {}, Role::data}),
-    author::field<&Values::temperature>(
-        {"temperature_c", Kind::number, "degC", "of the encoder's board, within 3 degC"}),
-    author::field<&Values::overheat_enabled>({"overheat_enabled", Kind::boolean, "", "whether over_heat is watched"}),
-    author::field<&Values::overheat_threshold>({"overheat_threshold_c", Kind::number, "degC", "over_heat above this"}),
-    author::field<&Values::written>({"written", Kind::boolean, "", "false when the value was there already"}),
-    author::field<&Values::page_left>(
-        {"page_left", Kind::number, "",
-         "memory page that is left selected, also for whoever reads next: which one was before is not known"}));
+inline constexpr auto fields = [] {
+  using author::field;
+  return author::fields_of<Values>(
+      field<&Values::data_id>("data_id", "", "which data was asked for (Table 1)"),
+      field<&Values::control_field>("control_field", "", "first byte of the request: sync code, data id, parity"),
+      field<&Values::status>("status", "SF", status_flags),
+      field<&Values::singleturn>("singleturn", "counts", "ABS: position within the turn, rising counter-clockwise",
+                                 Role::position),
+      field<&Values::encoder_id>("encoder_id", "", "ENID"),
+      field<&Values::multiturn>("multiturn", "revolutions", "ABM", Role::turns),
+      field<&Values::alarms>("alarms", "ALMC", alarm_flags), field<&Values::page>("page", "", "memory page"),
+      field<&Values::address>("address", "", "ADF: memory address; 127 selects the page"),
+      field<&Values::busy>("busy", "", "1 while the encoder writes: the request was not executed"),
+      field<&Values::value>("value", "", "EDF: the byte in memory", Role::value),
+      field<&Values::data>("data", "", "the bytes in memory from `address` on", Role::data),
+      field<&Values::temperature>("temperature_c", "degC", "of the encoder's board, within 3 degC"),
+      field<&Values::overheat_enabled>("overheat_enabled", "", "whether over_heat is watched"),
+      field<&Values::overheat_threshold>("overheat_threshold_c", "degC", "over_heat above this"),
+      field<&Values::written>("written", "", "false when the value was there already"),
+      field<&Values::page_left>(
+          "page_left", "",
+          "memory page that is left selected, also for whoever reads next: which one was before is not known"));
+}();
 
 [[nodiscard]] constexpr Values values_of(const Request& request) {
   Values all{.data_id = request.id, .control_field = control_field(request.id)};

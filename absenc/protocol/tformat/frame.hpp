@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tamagawa T-format frames (RS-485, 2.5 Mbps, 8N1, LSB first): encode, decode and every check a frame allows.
-// Paragraph numbers are those of the TS5700N8500 specification; README.md draws the frames.
+// Tamagawa T-format (RS-485, 2.5 Mbps, 8N1, LSB first): its times and memory; frames: encode, decode and every check
+// that they allow. Paragraph numbers are those of the TS5700N8500 specification; README.md draws the frames.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 
 #include "absenc/core/angle.hpp"
@@ -13,8 +15,53 @@
 #include "absenc/core/bytes.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/core/result.hpp"
+#include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/line.hpp"
 
 namespace absenc::tformat {
+
+using namespace std::chrono_literals;
+
+inline constexpr LineSettings line_settings{.rate = 2'500'000};  // 6.1
+
+inline constexpr Time answer_time = 3us;        // from the request's delimiter to the reply's start bit, typical (8.1)
+inline constexpr unsigned reset_requests = 10;  // of one kind in one sequence make a reset (10)
+inline constexpr Time reset_interval = 40us;    // at least, between them (10)
+inline constexpr std::uint32_t zero_tolerance_millidegrees = 349;  // 0.35 degrees (10): 127 counts of 17 bits
+inline constexpr Time memory_time = 18ms;          // at most, for a write, a page change or the zero position (9.1, 10)
+inline constexpr Time start_up_with_battery = 1s;  // no request is accepted (5.4)
+inline constexpr Time start_up_without_battery = 1500ms;
+
+/// Limits the host waits for; the document gives only the typical answer time.
+inline constexpr Time answer_limit = 100us;
+inline constexpr Time gap_limit = 3 * line_settings.character();
+
+inline constexpr std::uint8_t user_pages = 6;        // 0 to 5 (6.1.1)
+inline constexpr std::uint8_t page_addresses = 127;  // 0 to 126
+inline constexpr std::uint8_t page_select_address = 127;
+inline constexpr std::uint8_t service_page = 7;
+inline constexpr std::uint32_t write_life = 100'000;    // of all bytes together (6.1.1)
+inline constexpr std::uint8_t overheat_address = 4;     // on the service page (7.2)
+inline constexpr std::uint8_t temperature_address = 5;  // on the service page (7.3)
+inline constexpr std::uint8_t overheat_at_shipping = 0xDA;
+
+/// The area open to the user; page select is not part of it.
+inline constexpr std::array<MemoryArea, user_pages + 2> memory_areas = [] {
+  std::array<MemoryArea, user_pages + 2> areas{};
+  for (std::uint8_t page = 0; page < user_pages; ++page) {
+    areas[page] = {page, 0, page_addresses, "the user's EEPROM", true, true, write_life, {}, true};
+  }
+  areas[user_pages] = {service_page, overheat_address, 1, "over-heat threshold", true, false, write_life, {}, true};
+  areas[user_pages + 1] = {service_page, temperature_address, 1, "temperature", false, false};
+  return areas;
+}();
+/// Null for what is closed.
+[[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
+  const auto* const found = std::find_if(memory_areas.begin(), memory_areas.end(),
+                                         [&](const MemoryArea& one) { return one.has(page, address); });
+  return found == memory_areas.end() ? nullptr : found;
+}
+[[nodiscard]] constexpr bool is_page(unsigned page) { return page < user_pages || page == service_page; }
 
 /// Data ID codes of Table 1.
 enum class DataId : std::uint8_t {
@@ -61,9 +108,11 @@ struct Format {
   unsigned multiturn_bits = 16;   // 0 to 24
   int encoder_id = -1;            // ENID, 0 to 255; -1: any
   bool strict = true;             // also the checks that only a specification-true encoder passes
+
+  [[nodiscard]] static constexpr LineSettings line() { return line_settings; }
+  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits}; }
 };
 
-inline constexpr std::uint8_t page_select_address = 127;
 inline constexpr std::uint8_t busy_bit = 0x80;     // of ADF, in replies
 inline constexpr unsigned full_absolute_bits = 5;  // of the position hold with full_absolute_status (5.4.1)
 inline constexpr std::size_t request_capacity = 4;
@@ -71,13 +120,13 @@ inline constexpr std::size_t reply_capacity = 11;
 using RequestBytes = ByteBuffer<request_capacity>;
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// G(X) = X^8 + 1 (6.3.4): the same as the exclusive OR of all bytes, which is how `checksum` computes it.
+/// G(X) = X^8 + 1 (6.3.4): the same as the exclusive OR of all bytes, which is how `checksum` computes it: by `reduce`,
+/// whose order is free, because a loop waits for each byte in turn.
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
-  std::uint8_t sum = 0;
-  for (const std::uint8_t byte : bytes) sum ^= byte;
-  return sum;
+  return std::reduce(bytes.begin(), bytes.end(), std::uint8_t{0},
+                     [](std::uint8_t one, std::uint8_t other) -> std::uint8_t { return one ^ other; });
 }
 
 /// Sync code 010, the id, its even parity (6.3.1).
@@ -95,41 +144,34 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
   return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;
 }
 
+namespace detail {
+// Of requests and replies, by the id; 0: Table 1 does not list it.
+struct Lengths {
+  std::uint8_t request = 0;
+  std::uint8_t reply = 0;
+};
+inline constexpr std::array<Lengths, 16> lengths = [] {
+  std::array<Lengths, 16> table{};
+  for (const std::size_t id : {0x0u, 0x1u, 0x7u, 0x8u, 0xCu}) table[id] = {1, 6};
+  table[0x2] = {1, 4};
+  table[0x3] = {1, 11};
+  table[0x6] = {4, 4};
+  table[0xD] = {3, 4};
+  return table;
+}();
+}  // namespace detail
+
+[[nodiscard]] constexpr std::size_t request_length(DataId id) {
+  return detail::lengths[static_cast<std::size_t>(id)].request;
+}
+[[nodiscard]] constexpr std::size_t reply_length(DataId id) {
+  return detail::lengths[static_cast<std::size_t>(id)].reply;
+}
+
 /// The id of a control field, whatever its parity; nothing for an id that Table 1 does not list.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const auto id = static_cast<DataId>((field >> 3) & 0xF);
-  switch (id) {
-    case DataId::singleturn:
-    case DataId::multiturn:
-    case DataId::encoder_id:
-    case DataId::everything:
-    case DataId::write_memory:
-    case DataId::clear_alarms:
-    case DataId::zero:
-    case DataId::reset_multiturn:
-    case DataId::read_memory:
-      return id;
-  }
-  return std::nullopt;
-}
-
-[[nodiscard]] constexpr std::size_t request_length(DataId id) {
-  if (id == DataId::write_memory) return 4;
-  if (id == DataId::read_memory) return 3;
-  return 1;
-}
-
-[[nodiscard]] constexpr std::size_t reply_length(DataId id) {
-  switch (id) {
-    case DataId::everything:
-      return 11;
-    case DataId::encoder_id:
-    case DataId::write_memory:
-    case DataId::read_memory:
-      return 4;
-    default:
-      return 6;
-  }
+  return request_length(id) != 0 ? std::optional(id) : std::nullopt;
 }
 
 struct Request {
@@ -271,14 +313,10 @@ namespace detail {
   return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
 }
 
-/// How many bytes the reply to `asked` has, as far as the bytes that came so far tell.
-[[nodiscard]] constexpr std::size_t expected_length(DataId asked, Bytes so_far) {
-  return reply_length(begins_rejection(asked, so_far) ? DataId::everything : asked);
-}
-
 /// Checks in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the first that fails
 /// names the error. A busy memory reply is no error: `busy` is set.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+  if (bytes.empty()) return Error::timeout;
   const bool rejection = begins_rejection(request.id, bytes);
   if (bytes.size() != reply_length(rejection ? DataId::everything : request.id)) return Error::wrong_length;
   if (checksum(bytes) != 0) return Error::bad_checksum;
@@ -325,5 +363,44 @@ namespace detail {
   }
   return reading;
 }
+
+// ---- As the engine and the virtual encoder use it
+
+struct Protocol {
+  using Format = tformat::Format;
+  using Request = tformat::Request;
+  using Reply = tformat::Reply;
+  static constexpr std::size_t longest_reply = reply_capacity;
+
+  static constexpr author::Wire wire(const Format&) { return {.answer_limit = answer_limit, .gap_limit = gap_limit}; }
+  /// What reads or selects a page is repeated, resets and writes never. A page change that was not answered well may be
+  /// going on all the same, and must not be disturbed.
+  static constexpr author::Manner manner(const Format&, const Request& request) {
+    if (selects_page(request)) return {.attempts = 3, .pause = memory_time, .hold = memory_time};
+    return {.attempts = request.id == DataId::write_memory || is_reset(request.id) ? 1u : 3u};
+  }
+  static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
+  static constexpr std::size_t expected(const Format&, const Request& request, Bytes so_far) {
+    return reply_length(begins_rejection(request.id, so_far) ? DataId::everything : request.id);
+  }
+  static constexpr auto decode = decode_reply;
+  /// A refusal may be followed by the same request at once. After anything else that is wrong more may be coming, and
+  /// sending while the encoder sends can destroy its driver (11).
+  static constexpr bool is_whole(Error error) { return error == Error::request_rejected; }
+  static constexpr Reading reading(const Format& format, const Request&, const Reply& reply) {
+    return to_reading(format, reply);
+  }
+
+  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
+  static constexpr std::size_t request_size(Bytes begin) {
+    const std::optional<DataId> id = data_id(begin[0]);
+    return id && begin[0] == control_field(*id) ? request_length(*id) : 0;
+  }
+  static constexpr std::size_t reply_size(const Format&, const Request& request) { return reply_length(request.id); }
+  static constexpr author::DeviceTimes device_times(const Format&) {
+    const Time character = line_settings.character();
+    return {character, answer_time, start_up_with_battery, character};  // a missing start bit ends a frame (9.2)
+  }
+};
 
 }  // namespace absenc::tformat

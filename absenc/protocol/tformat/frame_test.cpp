@@ -78,33 +78,6 @@ TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
   EXPECT_EQ(strict_passes, 102u);
 }
 
-TEST(TformatFrame, RepliesComeBackAsTheyWereMade) {
-  for (const DataId id : all_ids) {
-    Reply reply{.id = id};
-    if (is_memory_access(id)) {
-      reply.address = 0x55;
-      reply.value = 0xA7;
-    } else {
-      if (id != DataId::encoder_id && id != DataId::multiturn) reply.singleturn = 0x1F00F;
-      if (id == DataId::multiturn || id == DataId::everything) reply.multiturn = 0xABCD;
-      if (id == DataId::encoder_id || id == DataId::everything) reply.encoder_id = 0x11;
-      if (id == DataId::everything) reply.alarms = alarms::battery_alarm | alarms::over_speed;
-      reply.status = status_for(reply.alarms);
-    }
-    const ReplyBytes bytes = encode_reply(reply);
-    ASSERT_EQ(bytes.size(), reply_length(id));
-    const Result<Reply> back = decode_reply({}, {id, 0x55, 0xA7}, bytes);
-    ASSERT_TRUE(back.has_value()) << static_cast<int>(id) << text_of(back.error()).name;
-    EXPECT_EQ(encode_reply(*back).view().size(), bytes.size());
-    EXPECT_EQ(back->singleturn, reply.singleturn);
-    EXPECT_EQ(back->multiturn, reply.multiturn);
-    EXPECT_EQ(back->status, reply.status);
-    EXPECT_EQ(back->alarms, reply.alarms);
-    EXPECT_EQ(back->value, reply.value);
-    EXPECT_EQ(back->address, reply.address);
-  }
-}
-
 TEST(TformatFrame, ARefusalIsToldApartFromAWrongLength) {
   const ReplyBytes refusal = encode_reply({.status = status::parity_error, .encoder_id = 0x11});
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, refusal).error(), Error::request_rejected);

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads positions of T-format encoders: a plain machine without port, clock, heap or texts, for drives that do it ten
-// thousand times a second. link/step.hpp says how to run it; procedures.hpp has what takes several steps.
+// thousand times a second. link/step.hpp says how to run it; unit.cpp has what takes several steps.
 #pragma once
 
 #include <optional>
 
-#include "absenc/protocol/author/line.hpp"
-#include "absenc/protocol/tformat/protocol.hpp"
+#include "absenc/protocol/tformat/frame.hpp"
 
 namespace absenc::tformat {
 
@@ -16,7 +15,11 @@ namespace absenc::tformat {
 class ReadPosition : public author::HostOf<Protocol> {
  public:
   explicit ReadPosition(const Format& format, DataId id = DataId::everything,
-                        std::optional<std::uint8_t> known_alarms = std::nullopt);
+                        std::optional<std::uint8_t> known_alarms = std::nullopt)
+      : HostOf(format), id_(id), known_alarms_(known_alarms) {
+    const bool alarms_first = (id == DataId::singleturn || id == DataId::multiturn) && !known_alarms;
+    ask_for(alarms_first ? DataId::everything : id);
+  }
   ReadPosition(const Format& format, const Request& request) : ReadPosition(format, request.id) {}
 
   [[nodiscard]] const Reading* reading() const final {
@@ -26,7 +29,22 @@ class ReadPosition : public author::HostOf<Protocol> {
   [[nodiscard]] const Reply& reply() const { return last(); }
 
  private:
-  void answered(Error error) final;
+  void answered(Error error) final {
+    if (error != Error::none) return finish({.error = error});
+    if (reply().id == DataId::everything) {
+      known_alarms_ = reply().alarms;
+      if (id_ != DataId::everything && !part_read_) return ask_for(id_);
+    } else if (id_ != DataId::encoder_id) {
+      part_read_ = true;
+      const int unknown = reply().status & ~status_for(known_alarms_.value_or(0));
+      if (unknown != 0) return ask_for(DataId::everything);
+    }
+    reading_ = to_reading(format(), reply(), known_alarms_);
+    // The document does not say when the position is taken; the end of the request is the latest it can be.
+    reading_.latched = sent_at();
+    reading_.received = received_at();
+    finish({});
+  }
   void ask_for(DataId id) { ask({id}, {.attempts = 1}); }
 
   DataId id_;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+// What of a T-format encoder takes several steps, and what is declared of it.
 #include "absenc/protocol/tformat/unit.hpp"
 
-#include <algorithm>
 #include <array>
+#include <optional>
 
+#include "absenc/protocol/author/standstill.hpp"
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/tformat/device.hpp"
 #include "absenc/protocol/tformat/fields.hpp"
 #include "absenc/protocol/tformat/host.hpp"
-#include "absenc/protocol/tformat/procedures.hpp"
 #include "absenc/protocol/tformat/vectors.hpp"
 
 namespace absenc::tformat {
@@ -17,71 +18,253 @@ namespace {
 
 using namespace author;
 
-// ---- Procedures with what they are asked for
+using Line = LineOf<Protocol>;
+
+// What a procedure found.
+struct Found : Values {
+  Reading reading{};
+  ByteBuffer<page_addresses> bytes{};  // of `data`
+  std::optional<std::uint8_t> selected{};
+};
+
+// ---- Resets (10)
+
+// Why this reset must not be sent; empty: it may.
+std::string_view objection(DataId id, const Reply& first, const Reply& second, unsigned bits) {
+  if (!is_near(second.singleturn, first.singleturn, bits)) {
+    return "the shaft is turning: a reset needs it standing still; nothing was sent";
+  }
+  // The position is too coarse then to show a movement.
+  if ((second.alarms & alarms::full_absolute_status) != 0) {
+    return "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
+           "since; nothing was sent";
+  }
+  if (id == DataId::clear_alarms && (second.alarms & alarms::battery_error) != 0) {
+    return "battery_error says that the turns are lost, and clearing it alone would hide that: replace the battery, "
+           "then reset the turns (reset-multiturn); nothing was sent";
+  }
+  return {};
+}
+
+// What the encoder did not do; empty: it did all.
+std::string_view missed(DataId id, const Reply& now, unsigned bits) {
+  if (id == DataId::zero) {
+    return is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees) ? "" : "the position is still not zero";
+  }
+  if (id == DataId::reset_multiturn && now.multiturn != 0) return "the turns are still not zero";
+  if ((now.alarms & alarms::over_heat) != 0) return "over_heat remains: the encoder must cool down first";
+  if ((now.alarms & alarms::latched) != 0) {
+    return "latched alarms remain: read them, mend their cause and try again";
+  }
+  return {};
+}
+
+// Data IDs 7 (latched alarms), 8 (single-turn zero here) and C (turns and latched alarms): makes sure that the shaft
+// stands still, sends ten requests, reads back what became of it.
+Procedure reset(Line& line, Found& found, DataId id) {
+  const unsigned bits = line.format().singleturn_bits;
+  const Reply first = co_await line.ask({DataId::everything});
+  const Reply second = co_await line.ask({DataId::everything}).after(between_looks);
+  const std::string_view why_not = objection(id, first, second, bits);
+  if (!why_not.empty()) co_return {Error::invalid_argument, why_not};
+
+  // Intervals are counted from the end of the reply: that is 40 us or more however the document means it.
+  for (unsigned sent = 1; sent <= reset_requests; ++sent) {
+    const Result<Reply> reply = co_await line.attempt({id}).after(reset_interval);
+    // When the tenth reply is lost, the reset may have been done all the same: reading tells.
+    if (!reply && sent < reset_requests) {
+      co_return {reply.error(),
+                 "one of the ten requests was not answered well, so the encoder has most likely done nothing; read the "
+                 "position before you try again"};
+    }
+  }
+  // Only ID 8 writes the EEPROM; the tenth reply still shows the old errors.
+  const Reply now = co_await line.ask({DataId::everything})
+                        .after(id == DataId::zero ? memory_time : reset_interval)
+                        .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
+  static_cast<Values&>(found) = values_of(now);
+  found.reading = line.last_reading();
+  const std::string_view what = missed(id, now, bits);
+  if (!what.empty()) co_return {Error::cross_check_failed, what};
+  co_return done;
+}
+
+// ---- Memory (6.3.5, 9.1)
+
+constexpr Time busy_limit = 2 * memory_time;  // the document's maximum is memory_time
+constexpr Time busy_pause = 1ms;              // between two looks at a busy encoder
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// Of arguments and bytes found: what they mean.
-struct Temperature : Memory {};
-struct Threshold : Memory {};
+// A busy encoder has not executed the request, so even a write may be sent again. A page change must not be disturbed
+// by asking whether it is over.
+Part<Result<Reply>> persist(Line& line, Request request) {
+  const Time pause = selects_page(request) ? memory_time : busy_pause;
+  Result<Reply> reply = co_await line.attempt(request);
+  const Time give_up = line.received_at() + busy_limit;
+  while (reply && reply->busy) {
+    if (line.received_at() > give_up) co_return Error::busy;
+    reply = co_await line.attempt(request).after(pause);
+  }
+  co_return reply;
+}
 
-/// The byte in memory (7.2).
+Outcome failure(const Line& line, Error error, std::string_view step) {
+  return {error,
+          error == Error::busy ? "the encoder stays busy longer than a write may take" : step,
+          {},
+          Protocol::manner(line.format(), line.request()).hold};
+}
+
+// The procedure ends, at this step, where the encoder does not do it.
+Part<std::uint8_t> insist(Line& line, Request request, std::string_view step) {
+  const Result<Reply> reply = co_await persist(line, request);
+  if (!reply) co_await line.stop(failure(line, reply.error(), step));
+  if (selects_page(request)) co_await line.rest(memory_time);
+  co_return reply->value;
+}
+
+Part<std::uint8_t> select_page(Line& line, Found& found, std::uint8_t page, std::string_view step) {
+  found.selected = page;
+  const std::uint8_t selected = co_await insist(line, {DataId::write_memory, page_select_address, page}, step);
+  co_return selected;
+}
+
+Procedure read_memory(Line& line, Found& found, Arguments arguments) {
+  const auto address = byte(arguments[0]);
+  const auto page = byte(arguments[1]);
+  for (std::int64_t i = 0; i < arguments[2]; ++i) {
+    if (find_area(page, static_cast<unsigned>(address + i)) != nullptr) continue;
+    co_return {Error::invalid_argument,
+               "this area is closed: pages 0 to 5 have addresses 0 to 126, page 7 has 4 (over-heat threshold) and 5 "
+               "(temperature)"};
+  }
+  co_await select_page(line, found, page, "");
+  for (std::int64_t i = 0; i < arguments[2]; ++i) {
+    const std::uint8_t value = co_await insist(line, {DataId::read_memory, byte(address + i)}, "");
+    found.bytes.push_back(value);
+  }
+  found.page = page;
+  found.address = address;
+  found.value = found.bytes[0];
+  if (found.bytes.size() > 1) found.data = found.bytes.view();
+  co_return done;
+}
+
+// On the selected page: reads, writes what differs (100 000 writes are permitted in total), waits, selects the page
+// again so that the EEPROM itself is read, and compares.
+Part<bool> write_byte(Line& line, Found& found, std::uint8_t address, std::uint8_t value) {
+  const Request look{DataId::read_memory, address};
+  const std::uint8_t before = co_await insist(line, look, "nothing was written");
+  found.written = before != value;
+  if (before == value) co_return false;
+  const Result<Reply> reply = co_await persist(line, {DataId::write_memory, address, value});
+  if (reply.error() == Error::busy) co_await line.stop(failure(line, Error::busy, ""));
+  // A lost reply does not tell whether the write was done: reading back does, of the EEPROM itself.
+  co_await line.rest(memory_time);
+  constexpr std::string_view lost = "the byte was written, but could not be read back";
+  co_await select_page(line, found, *found.selected, lost);
+  const std::uint8_t now = co_await insist(line, look, lost);
+  if (now != value) {
+    co_await line.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
+  }
+  co_return true;
+}
+
+Procedure write_memory(Line& line, Found& found, Arguments arguments) {
+  const auto address = byte(arguments[0]);
+  const auto page = byte(arguments[2]);
+  const MemoryArea* const area = find_area(page, address);
+  if (area == nullptr || !area->writable) {
+    co_return {Error::invalid_argument,
+               "this address cannot be written: pages 0 to 5 have addresses 0 to 126, page 7 has 4 (over-heat "
+               "threshold)"};
+  }
+  co_await select_page(line, found, page, "nothing was written");
+  co_await write_byte(line, found, address, byte(arguments[1]));
+  found.page = page;
+  found.address = address;
+  found.value = byte(arguments[1]);
+  co_return done;
+}
+
+// ---- The service page (7.2, 7.3), after which the page before is selected again where it is known
+
+// The document shows the page as the content of address 127, but does not say that it can be read: an encoder that
+// refuses is one of those whose page is not known.
+Part<std::optional<std::uint8_t>> open_service_page(Line& line, Found& found, std::string_view step) {
+  const Result<Reply> before = co_await persist(line, {DataId::read_memory, page_select_address});
+  found.page_left = service_page;
+  co_await select_page(line, found, service_page, step);
+  co_return before&& is_page(before->value) ? std::optional(before->value) : std::nullopt;
+}
+
+// When that fails, what was asked for is known all the same. Reading it back is what the encoder's next user finds.
+Part<bool> restore(Line& line, Found& found, std::optional<std::uint8_t> before) {
+  if (!before) co_return false;
+  if (*before != service_page) {
+    const Result<Reply> selected = co_await persist(line, {DataId::write_memory, page_select_address, *before});
+    co_await line.rest(memory_time);  // without a good reply it may be going on all the same
+    if (!selected) co_return false;
+    const Result<Reply> now = co_await persist(line, {DataId::read_memory, page_select_address});
+    if (!now || now->value != *before) co_return false;
+  }
+  found.page_left.reset();
+  co_return true;
+}
+
+Procedure read_temperature(Line& line, Found& found) {
+  const std::optional<std::uint8_t> before = co_await open_service_page(line, found, "");
+  const std::uint8_t value = co_await insist(line, {DataId::read_memory, temperature_address}, "");
+  found.temperature = static_cast<std::int8_t>(value);
+  co_await restore(line, found, before);
+  co_return done;
+}
+
+// The byte in memory.
 constexpr std::uint8_t threshold_of(std::int64_t degrees) { return degrees == 0 ? 0 : byte(0x80 | degrees); }
 
-Procedure read_bytes(Line& line, Memory& memory, Arguments arguments) {
-  memory.page = byte(arguments[1]);
-  memory.address = byte(arguments[0]);
-  memory.count = byte(arguments[2]);
-  return read_memory(line, memory);
-}
-Procedure write_byte(Line& line, Memory& memory, Arguments arguments) {
-  memory.page = byte(arguments[2]);
-  memory.address = byte(arguments[0]);
-  memory.value = byte(arguments[1]);
-  return write_memory(line, memory);
-}
-void use_service_page(Memory& memory, std::uint8_t address) {
-  memory.page = service_page;
-  memory.address = address;
-  memory.restores = true;
-}
-Procedure read_service(Line& line, Memory& memory, std::uint8_t address) {
-  use_service_page(memory, address);
-  return read_memory(line, memory);
-}
-Procedure write_threshold(Line& line, Memory& memory, Arguments arguments) {
-  use_service_page(memory, overheat_address);
-  memory.value = threshold_of(arguments[0]);
-  return write_memory(line, memory);
+void show_threshold(Found& found, std::uint8_t value) {
+  found.overheat_enabled = (value & 0x80) != 0;
+  if (*found.overheat_enabled) found.overheat_threshold = value & 0x7F;
 }
 
-// ---- Memory
-
-constexpr MemoryArea user_page(std::uint32_t number) {
-  return {number, 0, page_addresses, "the user's EEPROM", true, true, write_life, {}, true};
+Procedure read_threshold(Line& line, Found& found) {
+  const std::optional<std::uint8_t> before = co_await open_service_page(line, found, "");
+  const std::uint8_t value = co_await insist(line, {DataId::read_memory, overheat_address}, "");
+  show_threshold(found, value);
+  co_await restore(line, found, before);
+  co_return done;
 }
-constexpr std::array<MemoryArea, user_pages + 2> areas{{
-    user_page(0),
-    user_page(1),
-    user_page(2),
-    user_page(3),
-    user_page(4),
-    user_page(5),
-    {service_page, overheat_address, 1, "over-heat threshold", true, false, write_life, {}, true},
-    {service_page, temperature_address, 1, "temperature", false, false},
-}};
 
-constexpr bool areas_are_what_is_open() {
-  for (unsigned on_page = 0; on_page <= service_page; ++on_page) {
-    for (unsigned at = 0; at <= page_select_address; ++at) {
-      const bool has =
-          std::any_of(areas.begin(), areas.end(), [&](const MemoryArea& area) { return area.has(on_page, at); });
-      if (has != is_open(on_page, at)) return false;
-    }
-  }
-  return true;
+Procedure write_threshold(Line& line, Found& found, Arguments arguments) {
+  const std::optional<std::uint8_t> before = co_await open_service_page(line, found, "nothing was written");
+  co_await write_byte(line, found, overheat_address, threshold_of(arguments[0]));
+  show_threshold(found, threshold_of(arguments[0]));
+  co_await restore(line, found, before);
+  co_return done;
 }
-static_assert(areas_are_what_is_open());
+
+// ---- Refusals: the communication alarms of SF (6.3.2), or what else is answered like data ID 3 (8.4, 9.4)
+
+constexpr Explanation explain_refusal(Bytes reply) {
+  constexpr std::array<std::string_view, 4> found{
+      // by ca1 and ca0
+      "it answered as to data ID 3, without a communication alarm: a data ID that it does not have, a CRC that is "
+      "wrong, or an address that is closed",
+      "ca0: it received the request with a parity error of the data ID",
+      "ca1: it received a damaged character of the request (a wrong delimiter)",
+      "ca0 and ca1: it received the request with a parity error of the data ID, and with a damaged character (a wrong "
+      "delimiter)"};
+  const unsigned alarm = reply.size() > 1 ? reply[1] >> 6 : 0;
+  return {found[alarm],
+          alarm == 0
+              ? ""
+              : "send the same request again, and use nothing of what came (6.3.2); if it stays, check baud rate, "
+                "termination and shielding"};
+}
+
+// ---- Commands
 
 constexpr Argument address{"address", "of the byte", 0, page_addresses - 1, 0, true, Role::address};
 constexpr Argument page{"page", "0 to 5, or 7", 0, service_page, 0, false, Role::page};
@@ -90,39 +273,10 @@ constexpr std::array<Argument, 3> read_arguments{
 constexpr std::array<Argument, 3> write_arguments{{address, {"value", "the byte", 0, 255, 0, true, Role::value}, page}};
 constexpr std::array<Argument, 1> threshold_arguments{{{"degrees", "degC, 1 to 127; 0: never", 0, 127}}};
 
-// ---- Refusals: the communication alarms of SF (6.3.2), or what else is answered like data ID 3 (8.4, 9.4)
-
-constexpr Explanation explain_refusal(Bytes reply) {
-  constexpr std::string_view again =
-      "send the same request again, and use nothing of what came (6.3.2); if it stays, check baud rate, termination "
-      "and shielding";
-  switch (reply.size() > 1 ? reply[1] & status::rejected : 0) {
-    case status::rejected:
-      return {
-          "ca0 and ca1: it received the request with a parity error of the data ID, and with a damaged character "
-          "(a wrong delimiter)",
-          again};
-    case status::parity_error:
-      return {"ca0: it received the request with a parity error of the data ID", again};
-    case status::delimiter_error:
-      return {"ca1: it received a damaged character of the request (a wrong delimiter)", again};
-    default:
-      return {
-          "it answered as to data ID 3, without a communication alarm: a data ID that it does not have, a CRC that "
-          "is wrong, or an address that is closed"};
-  }
-}
-
-// ---- Commands
-
 struct Definition;
 
 template <DataId id>
-constexpr Request ask_for(const Format&) {
-  return {id};
-}
-template <DataId id>
-constexpr Request reset_by(const Format&, Arguments) {
+constexpr Request ask_for(const Format&, Arguments) {
   return {id};
 }
 template <std::uint8_t at>
@@ -141,13 +295,13 @@ template <DataId id>
 constexpr CommandOf<Protocol> position(const Command& info) {
   return reading<Definition, Protocol, ask_for<id>, ReadPosition>(info);
 }
-template <DataId id>
-constexpr CommandOf<Protocol> reset_of(const Command& info) {
-  return command<Definition, Protocol, AfterReset, reset, reset_by<id>, id>(info);
+template <auto procedure, auto request, auto... bound>
+constexpr CommandOf<Protocol> run(const Command& info) {
+  return command<Definition, Protocol, Found, procedure, request, bound...>(info);
 }
-template <class Found, std::uint8_t at>
-constexpr CommandOf<Protocol> service(const Command& info) {
-  return command<Definition, Protocol, Found, read_service, read_service_at<at>, at>(info);
+template <DataId id>
+constexpr CommandOf<Protocol> reset_of(std::string_view name, Verb verb, std::string_view meaning) {
+  return run<reset, ask_for<id>, id>({name, verb, 0, meaning, {}, true, false});
 }
 
 // ---- What is declared
@@ -158,7 +312,7 @@ struct Definition {
   static constexpr std::string_view id = "tformat", name = "Tamagawa T-format (Smart-Abs)",
                                     document = "Specification of Smart-Abs TS5700N8500";
   static constexpr LinkKind link = LinkKind::half_duplex;
-  static constexpr std::size_t frames_size = 900;
+  static constexpr std::size_t frames_size = 1400;
   // Any pause ends a frame; some encoders may forgive one that is shorter than their own answer time.
   static constexpr LineTiming timing{.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit};
 
@@ -179,7 +333,7 @@ struct Definition {
   static constexpr const auto& fields = tformat::fields;
   static constexpr const FieldInfo* status = fields.of<&Values::status>();
   static constexpr const FieldInfo* alarms = fields.of<&Values::alarms>();
-  static constexpr const auto& memory = areas;
+  static constexpr const auto& memory = memory_areas;
   static constexpr const auto& conditions = tformat::conditions;
   static constexpr const auto& vectors = tformat::vectors;
   static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
@@ -190,33 +344,23 @@ struct Definition {
       position<DataId::singleturn>({"singleturn", Verb::read_part, 0, "position within the turn"}),
       position<DataId::multiturn>({"multiturn", Verb::read_part, 0, "turns"}),
       position<DataId::encoder_id>({"encoder-id", Verb::info, 0, "encoder id"}),
-      reset_of<DataId::clear_alarms>(
-          {"clear-alarms", Verb::clear_alarms, 0, "clear all latched alarms", {}, true, false}),
-      reset_of<DataId::zero>({"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
-      reset_of<DataId::reset_multiturn>({"reset-multiturn",
-                                         Verb::reset_multiturn,
-                                         0,
-                                         "set the turns to zero and clear all latched alarms",
-                                         {},
-                                         true,
-                                         false}),
-      command<Definition, Protocol, Memory, read_bytes, read_at>(
+      reset_of<DataId::clear_alarms>("clear-alarms", Verb::clear_alarms, "clear all latched alarms"),
+      reset_of<DataId::zero>("zero", Verb::zero, "make this the zero of the turn"),
+      reset_of<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn,
+                                        "set the turns to zero and clear all latched alarms"),
+      run<read_memory, read_at>(
           {"memory-read", Verb::memory_read, 0, "read the user's EEPROM; the page stays selected", read_arguments}),
-      command<Definition, Protocol, Memory, write_byte, write_at>(
-          {"memory-write", Verb::memory_write, 0, "write a byte of the user's EEPROM; the page stays selected",
-           write_arguments, true, false}),
-      service<Temperature, temperature_address>({"temperature", Verb::temperature, 0, "temperature of the board"}),
-      service<Threshold, overheat_address>(
+      run<write_memory, write_at>({"memory-write", Verb::memory_write, 0,
+                                   "write a byte of the user's EEPROM; the page stays selected", write_arguments, true,
+                                   false}),
+      run<read_temperature, read_service_at<temperature_address>>(
+          {"temperature", Verb::temperature, 0, "temperature of the board"}),
+      run<read_threshold, read_service_at<overheat_address>>(
           {"overheat-threshold", Verb::config_get, 0, "temperature above which over_heat is raised"}),
-      command<Definition, Protocol, Threshold, write_threshold, set_threshold>(
-          {"set-overheat-threshold", Verb::config_set, 0, "set that temperature", threshold_arguments, true, false,
-           "overheat-threshold"}),
+      run<write_threshold, set_threshold>({"set-overheat-threshold", Verb::config_set, 0, "set that temperature",
+                                           threshold_arguments, true, false, "overheat-threshold"}),
   };
 
-  static constexpr LineSettings line(const Format&) { return line_settings; }
-  static constexpr Resolution resolution(const Format& format) {
-    return {format.singleturn_bits, format.multiturn_bits};
-  }
   static constexpr std::size_t reply_size(const Format&, Bytes begin) {
     const std::optional<DataId> of = data_id(begin[0]);
     return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
@@ -242,35 +386,14 @@ struct Definition {
     return error == Error::request_rejected ? explain_refusal(reply) : Explanation{};
   }
 
-  static constexpr void put(FieldSink& sink, const Format&, const Request& request) {
-    fields.put(sink, values_of(request));
+  static constexpr Values values(const Format&, const Request& request) { return values_of(request); }
+  static constexpr Values values(const Format&, const Request&, const Reply& reply) { return values_of(reply); }
+  static const Values& values(const Format&, const Found& found) { return found; }
+  static void put_left(FieldSink& sink, const Format&, const Found& found) {
+    fields.put(sink, {.page_left = found.selected});
   }
-  static constexpr void put(FieldSink& sink, const Format&, const Request&, const Reply& reply) {
-    fields.put(sink, values_of(reply));
-  }
-  static void put(FieldSink& sink, const Format&, const AfterReset& after) { fields.put(sink, values_of(after.reply)); }
-  static void put(FieldSink& sink, const Format&, const Memory& found) {
-    Values all{.page = found.page, .address = found.address, .value = found.value, .written = found.written};
-    if (found.count > 1) all.data = found.data;
-    fields.put(sink, all);
-  }
-  static void put(FieldSink& sink, const Format&, const Temperature& found) {
-    fields.put(sink, {.temperature = static_cast<std::int8_t>(found.value), .page_left = page_left(found)});
-  }
-  static void put(FieldSink& sink, const Format&, const Threshold& found) {
-    Values all{.overheat_enabled = (found.value & 0x80) != 0, .written = found.written, .page_left = page_left(found)};
-    if (*all.overheat_enabled) all.overheat_threshold = found.value & 0x7F;
-    fields.put(sink, all);
-  }
-  static std::optional<std::uint8_t> page_left(const Memory& found) {
-    if (!found.restores || found.restored) return std::nullopt;
-    return found.page;
-  }
-  static void put_left(FieldSink& sink, const Format&, const Memory& found) {
-    if (found.selected) fields.put(sink, {.page_left = found.page});
-  }
-  static std::string_view left(const Memory& found) {
-    return found.restores && found.selected ? "page 7 may be left selected, where it was another before" : "";
+  static std::string_view left(const Found& found) {
+    return found.page_left ? "page 7 may be left selected, where it was another before" : "";
   }
 };
 
