@@ -6,7 +6,7 @@
 
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/conversation.hpp"
-#include "absenc/protocol/raa38/can/fields.hpp"
+#include "absenc/protocol/raa38/can/frame.hpp"
 
 namespace absenc::raa38::can {
 
@@ -42,15 +42,12 @@ class VirtualNode final : public Device<CanFrame> {
   };
 
   void hear(const CanFrame& frame, Time at);
-  void hear_command(const CanFrame& frame, Time at);
-  void hear_configuration(const CanFrame& frame, Time at);
-  void set_node(std::uint8_t node, Time at);
-  void set_rate(const CanFrame& frame, Time at);
-  void set_zero(Time at);
+  void obey(const OrderInfo& info, std::uint8_t value, Time at);
+  void configure(const OrderInfo& info, std::uint8_t value, Time at);
   void set_direction(std::uint8_t value, Time at);
+  void send_by_itself(std::uint8_t readings_per_s, Time from);
   void answer(const CanFrame& frame, Time at);
   void write(std::size_t first, Bytes bytes, Time at);
-  void check_silence(Time at);
   void violate(std::string_view rule, Time at);
   [[nodiscard]] std::uint32_t zero() const;
   [[nodiscard]] std::uint32_t raw(Time at) const;
