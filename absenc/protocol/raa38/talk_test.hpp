@@ -110,10 +110,15 @@ struct Bench {
   template <class Machine>
   Machine& run(Machine& machine, const std::function<bool()>& on_emit = {}) {
     const Time start = line.now();
-    const std::size_t host = line.attach(sim::Role::host, machine, [on_emit] { return !on_emit || on_emit(); });
-    EXPECT_TRUE(line.run(host, start + std::chrono::seconds(60)) || on_emit);
+    emitted = on_emit;
+    if (host_end) {
+      line.replace(*host_end, machine);  // at the rate to which the one before has set this end
+    } else {
+      host_end = line.attach(sim::Role::host, machine, [this] { return !emitted || emitted(); });
+    }
+    EXPECT_TRUE(line.run(*host_end, start + std::chrono::seconds(60)) || on_emit);
     took = line.now() - start;
-    line.replace(host, idle);
+    line.replace(*host_end, idle);
     return machine;
   }
   /// A command, and how it ends.
@@ -137,6 +142,8 @@ struct Bench {
   sim::testing::TestShaft<21> shaft;  // what the finest of these encoders sees
   sim::Line<Item> line;
   std::list<Encoder> encoders;
+  std::optional<std::size_t> host_end{};
+  std::function<bool()> emitted{};
   Idle idle;
   Time took{};
 };
