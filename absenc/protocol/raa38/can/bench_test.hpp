@@ -62,7 +62,7 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
   void add_twin() {
     add({.positive = 1, .negative = 0, .cyclic = 0});
     static_cast<void>(raw(encode(Order::direction, 0x20, 0)));
-    ASSERT_NE(encoders.front().position(line.now()), encoders.back().position(line.now()));
+    ASSERT_NE(encoders.front().settings().position(line.now()), encoders.back().settings().position(line.now()));
   }
   /// `counts` of the encoder's own bits.
   void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }

@@ -32,7 +32,7 @@ TEST(CanDevice, AnswersAsTheDocumentShows) {
   EXPECT_EQ(bench.raw(frame(0x221, {0x80, 0x21})), Frames{frame(0x121, {})});
   EXPECT_EQ(bench.raw(frame(0x221, {0x31, 0x21, 0x00})), Frames{frame(0x121, {0x31, 0x00})});
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
-  EXPECT_EQ(bench.encoder().wear(), 3u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 3u);
 }
 
 TEST(CanDevice, SettingsSurvivePowerOff) {
@@ -48,8 +48,8 @@ TEST(CanDevice, SettingsSurvivePowerOff) {
   std::copy(bench.encoder().memory().begin(), bench.encoder().memory().end(), again.memory().begin());
   again.power_on(Time{}, Device<CanFrame>::PowerOn::skip);
   EXPECT_EQ(again.node(), 0x42);
-  EXPECT_EQ(again.position(Time{}), (1u << 14) - 10);
-  EXPECT_EQ(again.wear(), 4u);
+  EXPECT_EQ(again.settings().position(Time{}), (1u << 14) - 10);
+  EXPECT_EQ(again.settings().writes(), 4u);
   const Step<CanFrame> step = again.next(Time{});
   EXPECT_EQ(step.kind, Step<CanFrame>::Kind::configure);
   EXPECT_EQ(step.settings.rate, 500'000u);

@@ -144,7 +144,7 @@ TEST(CanZero, IsZeroAndSendsAgainAsBefore) {
     EXPECT_EQ(zero.fields, "node=32 written=1 answered=1 before=9799 after=0 ");
     EXPECT_EQ(bench.position(), 0u);
     EXPECT_TRUE(bench.does("zero").has("written=0")) << "it is zero already";
-    EXPECT_EQ(bench.encoder().wear(), 1u);
+    EXPECT_EQ(bench.encoder().settings().writes(), 1u);
     EXPECT_EQ(bench.encoder().violation_count(), 0u);
     EXPECT_NEAR(static_cast<double>(bench.count(2s)), 2.0 * rate, 1.0 + 0.005 * rate);
   }
@@ -155,7 +155,7 @@ TEST(CanZero, AShaftThatTurns) {
   bench.put(5000);
   bench.shaft.spin(600, bench.line.now());
   EXPECT_TRUE(ended(bench.does("zero"), Error::invalid_argument, "turns"));
-  EXPECT_EQ(bench.encoder().wear(), 0u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
 // A node that has another meaning for command 20, or none: its answer looks right, its position does not move.
@@ -209,7 +209,7 @@ TEST(CanDirection, IsMirrored) {
   EXPECT_EQ(bench.position(), (1u << 14) - 1000);
   EXPECT_TRUE(ended(bench.does("direction", {0}), Error::none));
   EXPECT_EQ(bench.position(), 1000u);
-  EXPECT_EQ(bench.encoder().wear(), 2u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 2u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
   EXPECT_TRUE(bench.does("direction", {0}).has("mirrored=0"));
   EXPECT_EQ(bench.encoder().violation_count(), 1u) << "nobody can know before that it wears the memory";
@@ -228,7 +228,7 @@ TEST(CanDirection, OtherValues) {
   Bench bench({.positive = 0x10, .negative = 0x11});
   bench.put(1000);
   EXPECT_TRUE(bench.does("direction", {1}).has("value=17"));
-  EXPECT_TRUE(bench.encoder().is_negative());
+  EXPECT_TRUE(bench.encoder().settings().counts_down());
 }
 
 }  // namespace

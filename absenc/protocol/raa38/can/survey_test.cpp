@@ -88,7 +88,7 @@ TEST(CanSetNode, AnswersUnderTheNewNumber) {
     Bench bench({.answers_on_7e4 = on_7e4});
     EXPECT_EQ(bench.does("set-node", {0x42}).fields, "node=66 written=1 answered=1 ");
     EXPECT_EQ(bench.encoder().node(), 0x42);
-    EXPECT_EQ(bench.encoder().wear(), 1u);
+    EXPECT_EQ(bench.encoder().settings().writes(), 1u);
     EXPECT_EQ(bench.encoder().violation_count(), 0u);
   }
 }
@@ -97,9 +97,9 @@ TEST(CanSetNode, WritesNothingTwice) {
   Bench bench;
   EXPECT_EQ(bench.does("set-node", {0x20}).fields, "node=32 written=0 ");
   EXPECT_EQ(bench.does("bitrate", {250'000}).fields, "bit_rate=250000 written=0 ");
-  EXPECT_EQ(bench.encoder().wear(), 0u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 0u);
   EXPECT_EQ(bench.does("set-node", {0x20, 1}).fields, "node=32 written=1 answered=1 ");
-  EXPECT_EQ(bench.encoder().wear(), 1u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 1u) << "it wears out";
 }
 
@@ -108,7 +108,7 @@ TEST(CanSetNode, NotWithOthersOnTheBus) {
   const VirtualNode& other = bench.add({.node = 0x21, .cyclic = 0});
   EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::invalid_argument, "7E5"));
   EXPECT_TRUE(ended(bench.does(Format{.node = 0x77}, "set-node", {0x42}), Error::unexpected_reply, "not this one"));
-  EXPECT_EQ(bench.encoder().wear() + other.wear(), 0u);
+  EXPECT_EQ(bench.encoder().settings().writes() + other.settings().writes(), 0u);
 }
 
 /// A node that may answer a setting, but does not do it.

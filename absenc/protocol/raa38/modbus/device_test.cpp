@@ -59,7 +59,7 @@ TEST(Raa38ModbusDevice, IsSilentToWhatIsNotForIt) {
   }
   EXPECT_EQ(bench.raw({0x01, 0x03, 0x00, 0x00, 0x00, 0x01, 0x0A, 0x84}), Wire{}) << "CRC the other way round";
   EXPECT_EQ(bench.encoder().answered(), 0u);
-  EXPECT_EQ(bench.encoder().writes() + bench.encoder().violation_count(), 0u);
+  EXPECT_EQ(bench.encoder().settings().writes() + bench.encoder().violation_count(), 0u);
 }
 
 TEST(Raa38ModbusDevice, SettingsSurvivePowerOff) {
@@ -71,7 +71,7 @@ TEST(Raa38ModbusDevice, SettingsSurvivePowerOff) {
   bench.put(1010);
   const Wire ten_backwards{9, 3, 2, 0x3F, 0xF6};
   EXPECT_EQ(bench.body({9, 3, 0, 0, 0, 1}), ten_backwards);
-  EXPECT_EQ(bench.encoder().writes(), 3u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 3u);
   bench.encoder().power_off(bench.line.now());
   EXPECT_EQ(bench.body({9, 3, 0, 0, 0, 1}), Wire{});
   bench.encoder().power_on(bench.line.now(), PowerOn::real);
@@ -102,7 +102,7 @@ TEST(Raa38ModbusDevice, TellsTheRulesThatAreBroken) {
   bench.body({1, 0xCC, 0x02});
   ASSERT_EQ(bench.encoder().violation_count(), 1u);
   EXPECT_TRUE(says(bench.encoder().violations()[0].rule, "has already"));
-  EXPECT_EQ(bench.encoder().writes(), 2u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 2u);
   for (unsigned i = 0; i < 12; ++i) bench.body({1, 0xCC, static_cast<std::uint8_t>(1 + i % 2)});
   ASSERT_EQ(bench.encoder().violation_count(), 2u);
   EXPECT_TRUE(says(bench.encoder().violations()[1].rule, "again and again"));
@@ -110,7 +110,7 @@ TEST(Raa38ModbusDevice, TellsTheRulesThatAreBroken) {
     EXPECT_EQ(bench.body(request), Wire{}) << "what cannot be set";
   }
   EXPECT_EQ(bench.encoder().violation_count(), 5u);
-  EXPECT_EQ(bench.encoder().writes(), 14u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 14u);
 }
 
 TEST(Raa38ModbusDevice, AMemoryOfRubbishIsNotTakenOver) {

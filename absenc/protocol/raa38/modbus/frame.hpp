@@ -178,13 +178,18 @@ constexpr bool length_is_right(const Request& request, Bytes reply) {
   return reply.size() == (request.function == function::set_address ? 4u : 5u);
 }
 
-// Who answers what.
 constexpr bool is_answer(const Request& request, Bytes reply) {
-  const std::uint8_t address = request.function == function::ask_address   ? any_address
-                               : request.function == function::set_address ? request.value
-                                                                           : request.address;
-  const bool echoes = request.function != function::set_parameter || reply[2] == request.value;
-  return reply[1] == request.function && reply[0] == address && echoes;
+  if (reply[1] != request.function) return false;
+  switch (request.function) {
+    case function::ask_address:
+      return reply[0] == any_address;
+    case function::set_address:
+      return reply[0] == request.value;
+    case function::set_parameter:
+      return reply[0] == request.address && reply[2] == request.value;
+    default:
+      return reply[0] == request.address;
+  }
 }
 
 }  // namespace detail

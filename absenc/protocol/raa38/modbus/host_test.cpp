@@ -176,10 +176,10 @@ TEST(Raa38ModbusSettings, AnAddressIsSetAndAsked) {
   EXPECT_EQ(bench.encoder().address(), 5);
   const Format moved{.address = 5};
   EXPECT_EQ(bench.does(moved, "set-address", {5}).fields, "address=5 written=0 ");
-  EXPECT_EQ(bench.encoder().writes(), 1u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
   EXPECT_EQ(bench.does(moved, "set-address", {5, 1}).fields, "address=5 written=1 ");
-  EXPECT_EQ(bench.encoder().writes(), 2u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 2u);
   EXPECT_EQ(bench.encoder().violation_count(), 1u);
 }
 
@@ -187,7 +187,7 @@ TEST(Raa38ModbusSettings, AnAddressThatIsTakenIsRefused) {
   Bench bench;
   const VirtualEncoder& other = bench.add({.address = 2});
   EXPECT_TRUE(ended(bench.does("set-address", {2}), Error::invalid_argument, "already"));
-  EXPECT_EQ(bench.encoder().writes() + other.writes(), 0u);
+  EXPECT_EQ(bench.encoder().settings().writes() + other.settings().writes(), 0u);
   const auto damaged = [](Bytes request, unsigned) {
     EXPECT_EQ(request[1], function::read);
     return request[0] == 1 ? position_of_1 : Wire{2, 3, 2, 0, 9, 0, 0};
@@ -266,7 +266,7 @@ TEST(Raa38ModbusSettings, ADirectionShowsInThePosition) {
   const auto set = [&](std::uint8_t value) { return bench.does("set-direction", {value}).fields; };
   EXPECT_EQ(set(parameter::negative),
             "parameter=2 setting=negative direction effect=mirrored: the direction has changed written=1 ");
-  EXPECT_TRUE(bench.encoder().counts_backwards());
+  EXPECT_TRUE(bench.encoder().settings().counts_down());
   EXPECT_TRUE(says(set(parameter::negative), "counted so already"));
   bench.shaft.spin(60, bench.line.now());
   EXPECT_TRUE(says(set(parameter::positive), "neither"));
@@ -285,7 +285,7 @@ TEST(Raa38ModbusSettings, ZeroIsHere) {
   EXPECT_EQ(bench.does("zero").fields, "singleturn=0 written=0 ");
   bench.shaft.spin(60, bench.line.now());
   EXPECT_TRUE(ended(bench.does("zero"), Error::invalid_argument, "turning"));
-  EXPECT_EQ(bench.encoder().writes(), 1u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
@@ -296,7 +296,7 @@ TEST(Raa38ModbusSettings, NothingIsSentToAnEncoderThatIsNotThere) {
   for (const auto& [command, value] : commands) {
     EXPECT_TRUE(ended(bench.does(Format{}, command, {value}), Error::timeout));
   }
-  EXPECT_EQ(bench.encoder().writes(), 0u);
+  EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
 }  // namespace
