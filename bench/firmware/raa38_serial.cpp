@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/serial/protocol.hpp"
+#include "absenc/protocol/raa38/serial/frame.hpp"
 #include "bench/firmware/reader.hpp"
 
 int main() {

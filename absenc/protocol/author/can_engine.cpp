@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/author/can_engine.hpp"
 
-#include <algorithm>
-
 namespace absenc::author {
 
 using FrameStep = Step<CanFrame>;
@@ -10,29 +8,26 @@ using FrameEvent = Event<CanFrame>;
 
 // ---- For the subclass
 
-void CanEngine::ask(const CanFrame& frame, Time pause) {
-  request_ = frame;
-  has_request_ = true;
-  has_relevant_ = false;
-  exact_ = false;
-  duration_ = wire_.busy_limit;
-  pause_ = pause;
-  state_ = State::ready;
+void CanEngine::ask(const CanFrame& frame, const CanWire& wire, Time pause) {
+  ask_for(frame, wire.busy_limit);
+  silence_ = wire.answer_limit;
+  until_ = relevant_at_ + pause;
 }
 
 void CanEngine::ask_for(const CanFrame& frame, Time duration) {
-  ask(frame);
-  exact_ = true;
+  request_ = frame;
+  has_request_ = true;
+  has_relevant_ = false;
+  silence_ = until_ = {};
   duration_ = duration;
+  state_ = State::ready;
 }
 
 void CanEngine::listen(Time duration) {
-  exact_ = true;
+  silence_ = {};
   duration_ = duration;
   disturbed_ = false;
-  since_ = now_;
-  until_ = now_ + duration;
-  state_ = State::hearing;
+  state_ = State::beginning;
 }
 
 void CanEngine::configure(std::uint32_t rate, Time duration) {
@@ -61,7 +56,6 @@ void CanEngine::end() {
 
 void CanEngine::feed(const FrameEvent& event) {
   using Kind = FrameEvent::Kind;
-  now_ = std::max(now_, event.at);
   switch (event.kind) {
     case Kind::sent:
       if (state_ != State::sending) break;
@@ -71,17 +65,17 @@ void CanEngine::feed(const FrameEvent& event) {
       state_ = State::hearing;
       break;
     case Kind::received:
-      // A frame that was complete before the request cannot answer it: it may have waited in a queue for long.
-      if (state_ != State::hearing || event.at < since_) break;
       for (const CanFrame& frame : event.items) {
-        if (state_ == State::hearing) heard(frame, event.at);
+        // A frame that was complete before the request cannot answer it: it may have waited in a queue for long.
+        early_ = state_ < State::hearing || event.at < since_;
+        if (state_ <= State::hearing && (overhears_ || !early_)) heard(frame, event.at);
       }
       break;
     case Kind::line_error:
       disturbed_ = true;
       break;
     case Kind::silence:
-      if (state_ == State::hearing && !exact_) end();
+      if (state_ == State::hearing && silence_ != Time{}) end();
       break;
     default:
       break;
@@ -89,14 +83,8 @@ void CanEngine::feed(const FrameEvent& event) {
 }
 
 FrameStep CanEngine::next(Time now) {
-  now_ = std::max(now_, now);
-  if (!started_) {
-    started_ = true;
-    if (state_ == State::hearing) listen(duration_);  // from now on
-  }
   if (state_ == State::hearing && now >= until_) end();
   FrameStep step{.at = never};
-  if (!exact_) step.answer = step.gap = wire_.answer_limit;
   switch (state_) {
     case State::ready:
       state_ = State::sending;
@@ -104,13 +92,19 @@ FrameStep CanEngine::next(Time now) {
       step.kind = FrameStep::Kind::transfer;
       step.out = {&request_, 1};
       step.expect = 1;
-      step.answer = exact_ ? duration_ : wire_.answer_limit;
-      step.at = pause_ > Time{} ? now_ + pause_ : Time{};
-      break;
-    case State::sending:
-      break;
-    case State::hearing:
+      step.answer = silence_ != Time{} ? silence_ : duration_;
+      step.gap = silence_;
       step.at = until_;
+      break;
+    case State::beginning:
+      since_ = now;
+      until_ = now + duration_;
+      state_ = State::hearing;
+      [[fallthrough]];
+    case State::sending:
+    case State::hearing:
+      step.answer = step.gap = silence_;
+      if (state_ == State::hearing) step.at = until_;
       break;
     case State::configuring:
       listen(duration_);

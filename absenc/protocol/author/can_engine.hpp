@@ -42,13 +42,17 @@ class CanEngine : public Conversation<CanFrame> {
   [[nodiscard]] bool is_noisy() const { return false; }
 
  protected:
-  explicit CanEngine(const CanWire& wire) : wire_(wire) {}
+  CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sends `frame`, `pause` after what came last, and hears until nothing has come for the answer limit.
-  void ask(const CanFrame& frame, Time pause = {});
+  /// Sends `frame`, `pause` after the last answer or request, and hears until nothing has come for the answer limit.
+  void ask(const CanFrame& frame, const CanWire& wire, Time pause = {});
   /// Sends `frame` and hears for exactly so long.
   void ask_for(const CanFrame& frame, Time duration);
+  /// From here on what comes before a frame that is asked has left is told too: answers to those before it.
+  void overhear(bool yes = true) { overhears_ = yes; }
+  /// Whether the frame that is being told is such a one.
+  [[nodiscard]] bool came_early() const { return early_; }
   /// Hears what is sent unasked.
   void listen(Time duration);
   /// Switches this end of the line, then hears for `duration`.
@@ -64,24 +68,22 @@ class CanEngine : public Conversation<CanFrame> {
   virtual void over() = 0;
 
  private:
-  enum class State : std::uint8_t { ready, sending, hearing, configuring, over };
+  enum class State : std::uint8_t { ready, sending, beginning, hearing, configuring, over };
   void end();
 
-  CanWire wire_;
   State state_ = State::over;
-  CanFrame request_{};
-  CanFrame relevant_{};
   bool has_request_ = false;
   bool has_relevant_ = false;
-  bool exact_ = false;  // hears for exactly `duration_`
   bool disturbed_ = false;
-  bool started_ = false;
-  Time pause_{};
-  Time duration_{};
+  bool overhears_ = false;
+  bool early_ = false;
   std::uint32_t rate_ = 0;
-  Time now_{};
-  Time since_{};  // what was complete before is not told
-  Time until_{};
+  CanFrame request_{};
+  CanFrame relevant_{};
+  Time silence_{};   // without any frame, that ends hearing; 0: it is heard for exactly `duration_`
+  Time duration_{};  // of hearing, at the most
+  Time since_{};     // what was complete before is not told
+  Time until_{};     // of hearing its end; before that when to send
   Time sent_at_{};
   Time relevant_at_{};
   Outcome outcome_{};

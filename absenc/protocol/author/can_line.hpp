@@ -29,10 +29,11 @@ class LineOf<P> : public CanEngine, public Routine {
   [[nodiscard]] const Format& format() const { return format_; }
 
   // What is heard begins with one of these.
-  using CanEngine::ask;
+  void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::wire(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;
+  using CanEngine::overhear;
 
   /// The next frame, anybody's; none when the time is over: `const std::optional<CanFrame> frame = co_await
   /// line.heard()`.
@@ -47,12 +48,13 @@ class LineOf<P> : public CanEngine, public Routine {
   }
   /// When that frame was complete.
   [[nodiscard]] Time heard_at() const { return heard_at_; }
+  /// Whether it came before what was asked had left: see `overhear`.
+  using CanEngine::came_early;
   /// That frame is the answer.
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 
  protected:
-  LineOf(const Format& format, std::span<std::byte> arena)
-      : CanEngine(P::wire(format)), Routine(arena), format_(format) {}
+  LineOf(const Format& format, std::span<std::byte> arena) : Routine(arena), format_(format) {}
   ~LineOf() = default;
 
  private:

@@ -104,7 +104,9 @@ void Responder::hear(std::uint8_t byte, Time at) {
   const std::size_t size = request_size(request_);
   if (size == 0) {
     refusing_ = is_refused(Flaw::unknown, request_);
-    return request_.clear();
+    const bool may_begin_one = !refusing_ && request_.size() > 1;
+    request_.clear();
+    return may_begin_one ? hear(byte, at) : void();
   }
   if (request_.size() < size) return;
   reply_.clear();

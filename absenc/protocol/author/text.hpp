@@ -31,15 +31,18 @@ void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_96_bytes();
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
-/// Calls `take(name, value)` for each "name=value" of a text until it returns false; whether all were taken.
+/// Calls `take(name, value)` for each "name=value" of a text until it returns false; whether all were taken. A value
+/// may have spaces inside, but no equals sign.
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t end = text.find(' ') < text.size() ? text.find(' ') : text.size();
-    const std::string_view one = text.substr(0, end);
+    const std::size_t equals = text.find('=');
+    if (equals == std::string_view::npos) return false;
+    const std::size_t next = text.find('=', equals + 1);
+    const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
+    if (end < equals || end > text.size()) return false;
+    if (!take(text.substr(0, equals), text.substr(equals + 1, end - equals - 1))) return false;
     text.remove_prefix(end < text.size() ? end + 1 : end);
-    const std::size_t equals = one.find('=');
-    if (equals == std::string_view::npos || !take(one.substr(0, equals), one.substr(equals + 1))) return false;
   }
   return true;
 }

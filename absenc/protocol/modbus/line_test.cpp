@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <optional>
+#include <tuple>
 #include <vector>
 
 #include "absenc/core/hex.hpp"
@@ -51,7 +53,6 @@ class ToyClient final : public author::Engine {
     send(frame_, {}, {});
   }
   void report(FieldSink&) const override {}
-  [[nodiscard]] Wire taken() const { return {reply().begin(), reply().end()}; }
 
  private:
   std::size_t expected(Bytes) const override { return 7; }
@@ -82,27 +83,36 @@ struct Bench {
   }
   template <class Machine>
   Machine& run(Machine& machine) {
-    if (host == none) {
-      host = line.attach(sim::Role::host, machine);
-    } else {
-      line.replace(host, machine);
-    }
-    EXPECT_TRUE(line.run(host, line.now() + 10s));
+    if (host) line.replace(*host, machine);
+    if (!host) host = line.attach(sim::Role::host, machine);
+    EXPECT_TRUE(line.run(*host, line.now() + 10s));
     return machine;
   }
+  Error ask(Bytes body, unsigned count = 1, std::uint32_t rate = line_settings.rate) {
+    ToyClient client(body, count, rate);
+    const Error error = run(client).error();
+    taken = {client.reply().begin(), client.reply().end()};
+    return error;
+  }
   /// Sends raw characters and returns the reply.
-  Wire raw(Wire bytes, Time pause = 5ms) {
-    sim::testing::RawHost raw_host(std::move(bytes), 50ms, 3ms, line.now() + pause);
+  Wire raw(Wire bytes, Time pause = 5ms, Time answer = 50ms, Time gap = 3ms) {
+    sim::testing::RawHost raw_host(std::move(bytes), answer, gap, line.now() + pause);
     return run(raw_host).reply;
   }
+  /// The one rule that was broken so far.
+  [[nodiscard]] std::string_view broken() const {
+    return server.violation_count() == 1 ? server.violations()[0].rule : std::string_view{};
+  }
 
-  static constexpr std::size_t none = ~std::size_t{0};
   ToyServer server;
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
-  std::size_t host = none;
+  std::optional<std::size_t> host;
+  Wire taken;                  // the last reply to `ask`
   std::vector<Time> silences;  // longer than a character
   Time last_end{};
 };
+
+bool says(std::string_view text, std::string_view words) { return text.find(words) != std::string_view::npos; }
 
 constexpr auto request_body = hex<"070300000001">;
 const Wire good_request{0x07, 0x03, 0x00, 0x00, 0x00, 0x01, 0x84, 0x6C};
@@ -110,8 +120,7 @@ const Wire good_reply{0x07, 0x03, 0x02, 0x12, 0x34, 0x3D, 0x33};
 
 TEST(ModbusLine, FramesAreFurtherApartThanThreeAndAHalfCharacters) {
   Bench bench;
-  ToyClient client(request_body, 20);
-  EXPECT_EQ(bench.run(client).error(), Error::none);
+  EXPECT_EQ(bench.ask(request_body, 20), Error::none);
   EXPECT_EQ(bench.silences.size(), 40u);
   for (const Time silence : bench.silences) EXPECT_GE(silence, frame_silence(line_settings));
   EXPECT_EQ(bench.server.violation_count(), 0u);
@@ -120,120 +129,99 @@ TEST(ModbusLine, FramesAreFurtherApartThanThreeAndAHalfCharacters) {
 TEST(ModbusLine, TheClientWaitsAlsoBeforeItsFirstFrame) {
   Bench bench;
   bench.line.run_until(1s);
-  ToyClient client(request_body);
-  bench.run(client);
+  EXPECT_EQ(bench.ask(request_body), Error::none);
   EXPECT_GE(bench.silences.front(), 1s + request_silence(line_settings));
 }
 
 TEST(ModbusLine, ARefusalAndAnUnfinishedReplyEndBySilence) {
   Bench bench;
-  ToyClient refused(hex<"070400000001">);
-  EXPECT_EQ(bench.run(refused).error(), Error::wrong_length);
-  EXPECT_EQ(refused.taken().size(), 5u);
-  EXPECT_EQ(refused.taken()[1], 0x84);
-  ToyClient silent(hex<"080300000001">);
-  EXPECT_EQ(bench.run(silent).error(), Error::timeout);
+  EXPECT_EQ(bench.ask(hex<"070400000001">), Error::wrong_length);
+  EXPECT_EQ(bench.taken.size(), 5u);
+  EXPECT_EQ(bench.taken[1], 0x84);
+  EXPECT_EQ(bench.ask(hex<"080300000001">), Error::timeout);
 }
 
 TEST(ModbusLine, TheServerAnswersWhatStandsAloneOnly) {
   Bench bench;
-  EXPECT_EQ(bench.raw(good_request).size(), 7u);
+  EXPECT_EQ(bench.raw(good_request), good_reply);
   Wire behind = good_request;
   behind.push_back(0x55);
-  EXPECT_TRUE(bench.raw(behind).empty());
   Wire before = good_request;
   before.insert(before.begin(), 0x00);
-  EXPECT_TRUE(bench.raw(before).empty());
-  EXPECT_TRUE(bench.raw(Wire(300, 0x55)).empty()) << "longer than any frame";
-  EXPECT_EQ(bench.raw(good_request).size(), 7u);
+  for (const Wire& none : {behind, before, Wire(300, 0x55)}) EXPECT_EQ(bench.raw(none), Wire{}) << none.size();
+  bench.server.power_off(bench.line.now());
+  EXPECT_EQ(bench.raw(good_request), Wire{});
+  bench.server.power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::real);
+  EXPECT_EQ(bench.raw(good_request), good_reply);
   EXPECT_EQ(bench.server.frames, 2u);
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-/// Sends characters with a pause before one of them, as a machine that ends with the last.
+/// Sends characters with a pause before one of them, and keeps what comes.
 class Halting final : public Machine<std::uint8_t> {
  public:
-  Halting(Wire bytes, std::size_t before, Time pause) : bytes_(std::move(bytes)), before_(before), pause_(pause) {}
+  Halting(const Wire& bytes, std::ptrdiff_t before, Time pause)
+      : parts_{Wire(bytes.begin(), bytes.begin() + before), Wire(bytes.begin() + before, bytes.end())}, pause_(pause) {}
   void feed(const Event<std::uint8_t>& event) override {
-    if (event.kind == Event<std::uint8_t>::Kind::sent) sent_at_ = event.at;
-    if (event.kind == Event<std::uint8_t>::Kind::received)
-      reply.insert(reply.end(), event.items.begin(), event.items.end());
-    if (event.kind == Event<std::uint8_t>::Kind::silence) done_ = true;
-    waiting_ = waiting_ && event.kind != Event<std::uint8_t>::Kind::sent;
+    using Kind = Event<std::uint8_t>::Kind;
+    if (event.kind == Kind::sent) next_at_ = event.at + pause_;
+    if (event.kind == Kind::sent) sending_ = false;
+    if (event.kind == Kind::received) reply.insert(reply.end(), event.items.begin(), event.items.end());
+    done_ = done_ || event.kind == Kind::silence;
   }
   Step<std::uint8_t> next(Time now) override {
     using Kind = Step<std::uint8_t>::Kind;
     if (done_) return {.kind = Kind::done};
-    if (waiting_ || next_ == 2) return {.at = never, .answer = next_ == 2 ? Time(50ms) : Time{}, .gap = 3ms};
-    waiting_ = true;
-    const Bytes all(bytes_);
-    const Bytes part = next_++ == 0 ? all.first(before_) : all.subspan(before_);
-    return {.kind = Kind::transfer, .out = part, .at = next_ == 1 ? now + 5ms : sent_at_ + pause_};
+    if (sending_ || part_ == 2) return {.at = never, .answer = part_ == 2 ? Time(50ms) : Time{}, .gap = 3ms};
+    sending_ = true;
+    return {.kind = Kind::transfer, .out = parts_[part_++], .at = part_ == 1 ? now + 5ms : next_at_};
   }
   Wire reply;
 
  private:
-  Wire bytes_;
-  std::size_t before_;
+  std::array<Wire, 2> parts_;
   Time pause_;
-  unsigned next_ = 0;
-  bool waiting_ = false;
+  std::size_t part_ = 0;
+  bool sending_ = false;
   bool done_ = false;
-  Time sent_at_{};
+  Time next_at_{};
 };
 
 TEST(ModbusLine, GapsInsideAFrameAreTold) {
-  Bench bench;
-  Halting hurried(good_request, 4, character);
-  EXPECT_EQ(bench.run(hurried).reply, good_reply);
-  EXPECT_EQ(bench.server.violation_count(), 0u);
-  Halting slow(good_request, 4, character * 2);
-  EXPECT_EQ(bench.run(slow).reply, good_reply);
-  ASSERT_EQ(bench.server.violation_count(), 1u);
-  EXPECT_NE(bench.server.violations()[0].rule.find("1.5 characters"), std::string_view::npos);
-  Halting cut(good_request, 4, character * 4);
-  EXPECT_TRUE(bench.run(cut).reply.empty()) << "two frames, and none of them is one";
+  const std::tuple<int, Wire, std::string_view> rows[]{
+      {1, good_reply, ""}, {2, good_reply, "1.5 characters"}, {4, {}, ""}};  // of two frames none is one
+  for (const auto& [characters, reply, rule] : rows) {
+    Bench bench;
+    Halting halting(good_request, 4, character * characters);
+    EXPECT_EQ(bench.run(halting).reply, reply) << characters;
+    EXPECT_EQ(bench.broken().empty(), rule.empty());
+    EXPECT_TRUE(says(bench.broken(), rule)) << bench.broken();
+  }
 }
 
 TEST(ModbusLine, ARequestThatComesTooSoonIsTold) {
   Bench bench;
   bench.raw(good_request);
-  sim::testing::RawHost hasty(good_request, 50ms, 1us, bench.line.now());  // ends as soon as the reply is there
-  bench.run(hasty);
-  EXPECT_EQ(bench.server.violation_count(), 0u) << "the raw host before waited 3 ms";
-  sim::testing::RawHost too_soon(good_request, 50ms, 3ms, bench.line.now() + character);
-  EXPECT_FALSE(bench.run(too_soon).reply.empty());
-  ASSERT_EQ(bench.server.violation_count(), 1u);
-  EXPECT_NE(bench.server.violations()[0].rule.find("3.5 characters"), std::string_view::npos);
+  bench.raw(good_request, {}, 50ms, 1us);  // ends as soon as the reply is there
+  EXPECT_EQ(bench.server.violation_count(), 0u) << "the one before waited 3 ms";
+  EXPECT_EQ(bench.raw(good_request, character), good_reply);
+  EXPECT_TRUE(says(bench.broken(), "3.5 characters"));
 }
 
 TEST(ModbusLine, WhoeverTalksIntoAReplyIsTold) {
   Bench bench;
-  sim::testing::RawHost impatient(good_request, 1us, 1us, bench.line.now() + 5ms);
-  EXPECT_TRUE(bench.run(impatient).reply.empty());
-  sim::testing::RawHost second(good_request, 50ms, 3ms, bench.line.now() + 5 * character);
-  bench.run(second);
-  EXPECT_GT(bench.server.violation_count(), 0u);
-  EXPECT_NE(bench.server.violations()[0].rule.find("transmission"), std::string_view::npos);
+  EXPECT_EQ(bench.raw(good_request, 5ms, 1us, 1us), Wire{});
+  bench.raw(good_request, 5 * character);
+  ASSERT_GT(bench.server.violation_count(), 0u);
+  EXPECT_TRUE(says(bench.server.violations()[0].rule, "transmission"));
 }
 
 TEST(ModbusLine, ARateIsChangedAfterTheReply) {
   Bench bench;
-  ToyClient changing(hex<"0741">);
-  EXPECT_EQ(bench.run(changing).error(), Error::none);
-  ToyClient as_before(request_body);
-  EXPECT_EQ(bench.run(as_before).error(), Error::timeout);
-  ToyClient at_9600(request_body, 2, 9600);
-  EXPECT_EQ(bench.run(at_9600).error(), Error::none);
+  EXPECT_EQ(bench.ask(hex<"0741">), Error::none);
+  EXPECT_EQ(bench.ask(request_body), Error::timeout);
+  EXPECT_EQ(bench.ask(request_body, 2, 9600), Error::none);
   EXPECT_EQ(bench.server.violation_count(), 0u);
-}
-
-TEST(ModbusLine, PowerOffAndOn) {
-  Bench bench;
-  bench.server.power_off(bench.line.now());
-  EXPECT_TRUE(bench.raw(good_request).empty());
-  bench.server.power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::real);
-  EXPECT_EQ(bench.raw(good_request), good_reply);
 }
 
 // A line on which something sends without a pause is given up, whatever comes.
@@ -252,7 +240,7 @@ TEST(ModbusLine, NoiseWithoutEnd) {
   }
   EXPECT_LT(characters, 2'500u);
   EXPECT_EQ(client.error(), Error::wrong_length);
-  EXPECT_NE(client.detail().find("without a pause"), std::string_view::npos);
+  EXPECT_TRUE(says(client.detail(), "without a pause"));
 }
 
 TEST(ModbusLine, WhatIsHeardBeforeTheRequestPutsItOff) {
@@ -266,27 +254,22 @@ TEST(ModbusLine, WhatIsHeardBeforeTheRequestPutsItOff) {
   EXPECT_EQ(client.next(2ms + request_silence(line_settings)).kind, Step<std::uint8_t>::Kind::transfer);
   client.feed({.kind = Kind::sent, .at = 9ms});
   client.feed({.kind = Kind::received, .at = 13ms, .items = good_reply});
-  EXPECT_EQ(client.taken(), good_reply);
+  EXPECT_EQ(Wire(client.reply().begin(), client.reply().end()), good_reply);
   EXPECT_EQ(client.error(), Error::none);
 }
 
 TEST(ModbusLine, ADamagedCharacterOrOneOutOfTurnIsNoReply) {
   using Kind = Event<std::uint8_t>::Kind;
-  ToyClient damaged(request_body);
-  static_cast<void>(damaged.next(Time{}));
-  ASSERT_EQ(damaged.next(5ms).kind, Step<std::uint8_t>::Kind::transfer);
-  damaged.feed({.kind = Kind::sent, .at = 9ms});
-  damaged.feed({.kind = Kind::line_error, .at = 12ms});
-  damaged.feed({.kind = Kind::silence, .at = 19ms});
-  EXPECT_EQ(damaged.error(), Error::bad_framing);
-
-  ToyClient early(request_body);
-  static_cast<void>(early.next(Time{}));
-  ASSERT_EQ(early.next(5ms).kind, Step<std::uint8_t>::Kind::transfer);
-  early.feed({.kind = Kind::received, .at = 8ms, .items = good_reply});
-  early.feed({.kind = Kind::sent, .at = 9ms});
-  early.feed({.kind = Kind::silence, .at = 19ms});
-  EXPECT_EQ(early.error(), Error::wrong_length);
+  for (const bool early : {false, true}) {
+    ToyClient client(request_body);
+    static_cast<void>(client.next(Time{}));
+    ASSERT_EQ(client.next(5ms).kind, Step<std::uint8_t>::Kind::transfer);
+    if (early) client.feed({.kind = Kind::received, .at = 8ms, .items = good_reply});
+    client.feed({.kind = Kind::sent, .at = 9ms});
+    if (!early) client.feed({.kind = Kind::line_error, .at = 12ms});
+    client.feed({.kind = Kind::silence, .at = 19ms});
+    EXPECT_EQ(client.error(), early ? Error::wrong_length : Error::bad_framing);
+  }
 }
 
 }  // namespace

@@ -1,22 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a conversation as the unit makes it, by the name of its command.
+// For tests: encoders and a host on one line in virtual time, and how a conversation ended, as the unit makes it.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
+#include <list>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/raa38/unit.hpp"
+#include "absenc/sim/bench_test.hpp"
+#include "absenc/sim/line.hpp"
 
 namespace absenc::raa38::testing {
 
+/// A command of the unit, which is made by its name.
 template <class Item>
-class Talk : public Conversation<Item> {
+class Talk {
  public:
   /// Arguments that are not given have their defaults.
-  Talk(const Unit& unit, const Options& options, std::string_view name, std::vector<std::int64_t> arguments)
+  Talk(const Unit& unit, const Options& options, std::string_view name, std::vector<std::int64_t> arguments = {})
       : storage_(unit.host_storage), arguments_(std::move(arguments)) {
     const Command& command = *find_command(unit, name);
     for (std::size_t i = arguments_.size(); i < command.arguments.size(); ++i) {
@@ -29,23 +37,115 @@ class Talk : public Conversation<Item> {
       made_ = made.bytes;
     }
   }
-  Talk(Talk&&) noexcept = default;  // the storage stays where it is
-
-  void feed(const Event<Item>& event) override { made_->feed(event); }
-  Step<Item> next(Time now) override { return made_->next(now); }
-  [[nodiscard]] Error error() const override { return made_->error(); }
-  [[nodiscard]] std::string_view detail() const override { return made_->detail(); }
-  [[nodiscard]] std::string_view advice() const override { return made_->advice(); }
-  [[nodiscard]] const Reading* reading() const override { return made_->reading(); }
-  [[nodiscard]] bool streams() const override { return made_->streams(); }
-  void report(FieldSink& sink) const override { made_->report(sink); }
-  [[nodiscard]] Exchange<Item> exchange() const override { return made_->exchange(); }
-  void report_left(FieldSink& sink) const override { made_->report_left(sink); }
+  Conversation<Item>& operator*() { return *made_; }
+  Conversation<Item>* operator->() { return made_; }
 
  private:
   std::vector<std::byte> storage_;
   std::vector<std::int64_t> arguments_;
   Conversation<Item>* made_ = nullptr;
+};
+
+struct Collector final : FieldSink {
+  void put(const FieldValue& value) override {
+    const bool is_text = value.info->kind == FieldInfo::Kind::text;
+    if (value.info->kind == FieldInfo::Kind::real) return;
+    text += std::string(value.info->name) + "=" +
+            (is_text ? std::string(value.bytes.begin(), value.bytes.end()) : std::to_string(value.number)) + " ";
+  }
+  std::string text;
+};
+
+[[nodiscard]] inline bool says(std::string_view text, std::string_view words) {
+  return text.find(words) != std::string_view::npos;
+}
+
+/// How a conversation ended.
+struct End {
+  Error error = Error::none;
+  std::string words{};   // what was found, and what to do
+  std::string fields{};  // "name=value name=value ", real ones left out
+  std::string left{};    // the same of what it leaves when it is broken off
+  std::optional<Reading> reading{};
+  Time took{};
+
+  [[nodiscard]] bool has(std::string_view field) const { return says(" " + fields, " " + std::string(field) + " "); }
+};
+
+template <class Item>
+[[nodiscard]] End end_of(const Conversation<Item>& conversation) {
+  Collector fields;
+  Collector left;
+  conversation.report(fields);
+  conversation.report_left(left);
+  End end{.error = conversation.error(), .fields = fields.text, .left = left.text};
+  end.words = std::string(conversation.detail()) + "; " + std::string(conversation.advice());
+  if (conversation.reading() != nullptr) end.reading = *conversation.reading();
+  return end;
+}
+
+/// With an error nothing may be shown.
+[[nodiscard]] inline ::testing::AssertionResult ended(const End& end, Error error, std::string_view words = {}) {
+  const bool good = end.error == error && says(end.words, words);
+  const bool silent = error == Error::none || (end.fields.empty() && !end.reading);
+  return (good && silent ? ::testing::AssertionSuccess() : ::testing::AssertionFailure())
+         << text_of(end.error).name << ": " << end.words << ": " << end.fields;
+}
+
+/// `options_of(format)` makes the unit's options of a format.
+template <class Item, class Encoder, class Format, const Unit& unit>
+struct Bench {
+  Bench(const Format& own, LinkKind kind, const LineSettings& settings) : format(own), line(kind, settings) {}
+
+  /// One more encoder on the line, on the same shaft.
+  Encoder& add(const Format& of_it) {
+    encoders.emplace_back(of_it, shaft);
+    encoders.back().power_on(line.now(), Device<Item>::PowerOn::skip);
+    line.attach(sim::Role::device, encoders.back());
+    return encoders.back();
+  }
+  Encoder& encoder() { return encoders.front(); }
+
+  /// To its end, or until `on_emit` returns false.
+  template <class Machine>
+  Machine& run(Machine& machine, const std::function<bool()>& on_emit = {}) {
+    const Time start = line.now();
+    emitted = on_emit;
+    if (host_end) {
+      line.replace(*host_end, machine);  // at the rate to which the one before has set this end
+    } else {
+      host_end = line.attach(sim::Role::host, machine, [this] { return !emitted || emitted(); });
+    }
+    EXPECT_TRUE(line.run(*host_end, start + std::chrono::seconds(60)) || on_emit);
+    took = line.now() - start;
+    line.replace(*host_end, idle);
+    return machine;
+  }
+  /// A command, and how it ends.
+  End does(const Format& told, std::string_view command, std::vector<std::int64_t> arguments = {}) {
+    Talk<Item> talk(unit, options_of(told), command, std::move(arguments));
+    End end = end_of<Item>(run(*talk));
+    end.took = took;
+    return end;
+  }
+  End does(std::string_view command, std::vector<std::int64_t> arguments = {}) {
+    return does(format, command, std::move(arguments));
+  }
+  [[nodiscard]] std::uint64_t position() { return does("position").reading.value_or(Reading{}).singleturn; }
+
+  struct Idle final : Machine<Item> {
+    void feed(const Event<Item>&) override {}
+    Step<Item> next(Time) override { return {.at = never}; }
+  };
+
+  Format format;
+  sim::testing::TestShaft<21> shaft;  // what the finest of these encoders sees
+  sim::Line<Item> line;
+  std::list<Encoder> encoders;
+  std::optional<std::size_t> host_end{};
+  std::function<bool()> emitted{};
+  Idle idle;
+  Time took{};
 };
 
 /// How long a conversation takes with a line on which something sends without a pause from its first request on.

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// The RAA38S6 as the neutral layers see it: one unit for each of its protocols.
 // The RAA38S6 as the neutral layers see it: a unit for each line it is made for.
 #pragma once
 

@@ -1,23 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual nodes and a host on one CAN bus in virtual time.
+// For tests: virtual nodes, nodes that do as a test says, and a host on one CAN bus in virtual time.
 #pragma once
 
-#include <map>
-#include <memory>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "absenc/protocol/raa38/can/device.hpp"
-#include "absenc/protocol/raa38/can/protocol.hpp"
+#include "absenc/protocol/raa38/can/host.hpp"
 #include "absenc/protocol/raa38/talk_test.hpp"
-#include "absenc/protocol/raa38/unit.hpp"
-#include "absenc/sim/bench_test.hpp"
-#include "absenc/sim/line.hpp"
 
-namespace absenc::raa38::can::testing {
-
-using TestShaft = sim::testing::TestShaft<14>;
+namespace absenc::raa38::can {
 
 [[nodiscard]] inline Options options_of(const Format& format) {
   Options options;
@@ -26,37 +15,19 @@ using TestShaft = sim::testing::TestShaft<14>;
   return options;
 }
 
-/// A command to an encoder of this format.
+namespace testing {
+
+using raa38::testing::End;
+using raa38::testing::ended;
+using raa38::testing::says;
+using Frames = std::vector<CanFrame>;
+
+inline constexpr Format quiet{.cyclic = 0};
+
 struct Talk final : raa38::testing::Talk<CanFrame> {
-  Talk(const Format& format, std::string_view name, std::vector<std::int64_t> arguments = {})
-      : raa38::testing::Talk<CanFrame>(can_unit, options_of(format), name, std::move(arguments)) {}
+  explicit Talk(std::string_view name, std::vector<std::int64_t> arguments = {})
+      : raa38::testing::Talk<CanFrame>(can_unit, options_of({}), name, std::move(arguments)) {}
 };
-
-struct Fields final : FieldSink {
-  void put(const FieldValue& value) override { all.emplace_back(value.info->name, value.number); }
-  /// The last with this name; -1 when there is none.
-  [[nodiscard]] std::int64_t operator[](std::string_view name) const {
-    std::int64_t found = -1;
-    for (const auto& [field, number] : all) {
-      if (field == name) found = number;
-    }
-    return found;
-  }
-  [[nodiscard]] std::vector<std::int64_t> every(std::string_view name) const {
-    std::vector<std::int64_t> found;
-    for (const auto& [field, number] : all) {
-      if (field == name) found.push_back(number);
-    }
-    return found;
-  }
-  std::vector<std::pair<std::string, std::int64_t>> all;
-};
-
-inline Fields report(const Conversation<CanFrame>& conversation) {
-  Fields fields;
-  conversation.report(fields);
-  return fields;
-}
 
 /// Sends one frame and keeps what comes until `until`.
 class RawHost final : public Machine<CanFrame> {
@@ -73,7 +44,7 @@ class RawHost final : public Machine<CanFrame> {
     if (std::exchange(sent_, true)) return {.at = until_};
     return {.kind = Kind::transfer, .out = {&request_, 1}};
   }
-  std::vector<CanFrame> heard;
+  Frames heard;
 
  private:
   CanFrame request_;
@@ -82,42 +53,86 @@ class RawHost final : public Machine<CanFrame> {
   bool done_ = false;
 };
 
-struct Bench {
-  explicit Bench(const Format& bench_format = {}) : format(bench_format) { add(bench_format); }
-
-  VirtualNode& add(const Format& node_format) {
-    nodes.push_back(std::make_unique<VirtualNode>(node_format, shaft));
-    nodes.back()->power_on(line.now(), Device<CanFrame>::PowerOn::skip);
-    line.attach(sim::Role::device, *nodes.back());
-    return *nodes.back();
+struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
+  explicit Bench(const Format& own = {})
+      : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit>(own, LinkKind::can, {.rate = own.bit_rate()}) {
+    add(own);
   }
-  VirtualNode& node() { return *nodes.front(); }
-
-  template <class Conversation>
-  Conversation& run(Conversation& conversation) {
-    const std::size_t host = line.attach(sim::Role::host, conversation);
-    finished = line.run(host, line.now() + std::chrono::seconds(60));
-    line.run_until(line.now());
-    return conversation;
+  /// A second node of the same number that answers otherwise: it counts the other way.
+  void add_twin() {
+    add({.positive = 1, .negative = 0, .cyclic = 0});
+    static_cast<void>(raw(encode(Order::direction, 0x20, 0)));
+    ASSERT_NE(encoders.front().settings().position(line.now()), encoders.back().settings().position(line.now()));
   }
+  /// `counts` of the encoder's own bits.
+  void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
   /// What comes within 20 ms of a request.
-  std::vector<CanFrame> raw(const CanFrame& request) {
+  Frames raw(const CanFrame& request) {
     RawHost host(request, line.now() + 20ms);
     return run(host).heard;
   }
-  [[nodiscard]] std::uint64_t read() {
-    Talk reading(format, "position");
-    run(reading);
-    return reading.reading() != nullptr ? reading.reading()->singleturn : ~std::uint64_t{0};
+  /// How many frames come by themselves.
+  std::size_t count(Time duration) {
+    RawHost host(CanFrame{.id = 0x7FF}, line.now() + duration);
+    return run(host).heard.size();
   }
-
-  Format format;
-  TestShaft shaft;
-  std::vector<std::unique_ptr<VirtualNode>> nodes;
-  sim::Line<CanFrame> line{LinkKind::can, {.rate = format.bit_rate()}};
-  bool finished = true;
 };
 
-inline constexpr Format silent{.cyclic = 0};
+/// Answers what it is sent by a function of it, and may send by itself.
+struct Scripted final : Machine<CanFrame> {
+  using Script = std::function<Frames(const CanFrame& heard)>;
+  explicit Scripted(Script says_what) : script(std::move(says_what)) {}
+  void feed(const Event<CanFrame>& event) override {
+    if (event.kind == Event<CanFrame>::Kind::sent) sending = false;
+    if (event.kind != Event<CanFrame>::Kind::received) return;
+    const Frames answers = script(event.items[0]);
+    queue.insert(queue.end(), answers.begin(), answers.end());
+  }
+  Step<CanFrame> next(Time now) override {
+    if (std::exchange(tell_rate, false)) {
+      return {.kind = Step<CanFrame>::Kind::configure, .settings = {.rate = rate}};
+    }
+    if (sending) return {.at = never};
+    const bool by_itself = queue.empty() && period != Time{} && (silent == nullptr || !*silent);
+    if (queue.empty() && (!by_itself || now < due)) return {.at = by_itself ? due : never};
+    if (by_itself) due = now + period;
+    out = by_itself ? unasked : queue.front();
+    if (!by_itself) queue.erase(queue.begin());
+    sending = true;
+    return {.kind = Step<CanFrame>::Kind::transfer, .out = {&out, 1}};
+  }
 
-}  // namespace absenc::raa38::can::testing
+  Script script;
+  CanFrame unasked = encode_position(0x20, 49);
+  Time period{};                 // 0: it sends nothing by itself
+  const bool* silent = nullptr;  // when it no longer does
+  std::uint32_t rate = 250'000;
+  bool tell_rate = true;
+
+ private:
+  Frames queue;
+  Time due{};
+  CanFrame out{};
+  bool sending = false;
+};
+
+/// How a command ends with such a node, on a bus of `rate`.
+inline End with(Scripted node, std::string_view command, std::vector<std::int64_t> arguments = {},
+                const Format& format = {}, std::uint32_t rate = 250'000) {
+  sim::Line<CanFrame> line(LinkKind::can, {.rate = rate});
+  line.attach(sim::Role::device, node);
+  raa38::testing::Talk<CanFrame> talk(can_unit, options_of(format), command, std::move(arguments));
+  EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 20s));
+  return raa38::testing::end_of<CanFrame>(*talk);
+}
+
+/// A node that answers each order as it should, and stands at a place.
+[[nodiscard]] inline Frames obedient(const CanFrame& heard, std::uint64_t counts) {
+  const OrderInfo& info = *order_of(heard);
+  if (info.answer == Answer::position) return {encode_position(0x20, counts)};
+  if (info.answer == Answer::code) return {encode_answer(0x20, info.order)};
+  return {};
+}
+
+}  // namespace testing
+}  // namespace absenc::raa38::can

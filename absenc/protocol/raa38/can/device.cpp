@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/raa38/can/device.hpp"
 
-#include <algorithm>
+#include <utility>
 
 namespace absenc::raa38::can {
 
@@ -15,49 +15,25 @@ using FrameEvent = Event<CanFrame>;
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 
-constexpr std::size_t memory_node = 0;
-constexpr std::size_t memory_rate = 1;
-constexpr std::size_t memory_direction = 2;
-constexpr std::size_t memory_zero = 3;
-constexpr std::size_t memory_wear = 7;
 constexpr std::uint8_t refused = 1;  // CiA 305: value not supported
 
 }  // namespace
 
-VirtualNode::VirtualNode(const Format& format, const Shaft& shaft) : format_(format), shaft_(&shaft) {
-  memory_[memory_node] = format.node;
-  memory_[memory_rate] = rates[format.rate].index;
-}
-
-std::uint32_t VirtualNode::wear() const {
-  return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(memory_wear)));
-}
-
-std::uint32_t VirtualNode::zero() const {
-  return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(memory_zero, 4)));
-}
-
-// As it would be without a zero.
-std::uint32_t VirtualNode::raw(Time at) const {
-  const auto turn = static_cast<std::uint32_t>(shaft_->at(at).position);
-  const std::uint32_t counts = turn >> (32 - format_.bits);
-  return static_cast<std::uint32_t>((is_negative() ? 0 - counts : counts) & low_mask(format_.bits));
-}
-
-std::uint32_t VirtualNode::position(Time at) const {
-  return static_cast<std::uint32_t>((raw(at) - zero()) & low_mask(format_.bits));
-}
-
 Time VirtualNode::period() const { return Time(1s) / readings_per_s_; }
+
+void VirtualNode::send_by_itself(std::uint8_t readings_per_s, Time from) {
+  readings_per_s_ = readings_per_s;
+  next_cyclic_ = readings_per_s == 0 ? never : from + period();
+}
 
 void VirtualNode::power_on(Time now, PowerOn kind) {
   // What a file of another encoder may have brought.
-  if (memory_[memory_node] == 0) memory_[memory_node] = format_.node;
-  if (rate_of_index(memory_[memory_rate]) == nullptr) memory_[memory_rate] = rates[format_.rate].index;
+  if (node() == 0) memory()[Settings::number_at] = format_.node;
+  if (rate_of_index(settings_.rate()) == nullptr) memory()[Settings::rate_at] = rates[format_.rate].index;
   powered_ = true;
   configuring_ = false;
-  readings_per_s_ = format_.cyclic;
-  next_cyclic_ = readings_per_s_ == 0 ? never : now + (kind == PowerOn::real ? start_up_time : period());
+  send_by_itself(format_.cyclic, now);
+  if (kind == PowerOn::real && format_.cyclic != 0) next_cyclic_ = now + start_up_time;
   tell_rate_ = rate() != format_.bit_rate();
 }
 
@@ -72,12 +48,7 @@ void VirtualNode::power_off(Time) {
 FrameStep VirtualNode::next(Time now) {
   FrameStep step{.at = never};
   if (sending_) return step;
-  if (tell_rate_) {
-    tell_rate_ = false;
-    step.kind = FrameStep::Kind::configure;
-    step.settings = {.rate = rate()};
-    return step;
-  }
+  if (std::exchange(tell_rate_, false)) return {.kind = FrameStep::Kind::configure, .settings = {.rate = rate()}};
   if (!pending_.empty()) {
     out_ = pending_[0].frame;
     step.at = pending_[0].at;
@@ -87,7 +58,7 @@ FrameStep VirtualNode::next(Time now) {
   } else if (now >= next_cyclic_) {
     // Skips what it could not send: it never sends two at once.
     next_cyclic_ += period() * (1 + (now - next_cyclic_) / period());
-    out_ = encode_position(node(), position(now));
+    out_ = encode_position(node(), settings_.position(now));
     step.at = now;
   } else {
     step.at = next_cyclic_;
@@ -113,18 +84,21 @@ void VirtualNode::feed(const FrameEvent& event) {
 
 void VirtualNode::hear(const CanFrame& frame, Time at) {
   const Function function = function_of(frame);
-  const bool for_us =
-      function == Function::configuration || (function == Function::command && node_of(frame) == node());
-  if (!for_us) return;
+  const OrderInfo* const info = order_of(frame);
+  const bool for_all = function == Function::configuration;
+  if (!for_all && (function != Function::command || node_of(frame) != node())) return;
+  const bool sets = for_all && info != nullptr && info->answer == Answer::error;
   // What nodes answer on 7E5 is heard there by the others.
-  if (function == Function::configuration &&
-      (frame.data[0] == configuration::node || frame.data[0] == configuration::rate) &&
-      detail::is_zero_from(frame, 1) && !configuring_) {
-    return;
-  }
+  if (sets && is_zero_from(frame, 1) && !configuring_) return;
   if (frame.remote || frame.size != frame_size) return violate("a frame without its 8 bytes of data", at);
-  if (function == Function::configuration) return hear_configuration(frame, at);
-  hear_command(frame, at);
+  if (!for_all && frame.data[1] != node()) return violate("the second byte is not the node's number", at);
+  if (for_all && !configuring_ && (info == nullptr || sets)) return violate("a setting without configuration mode", at);
+  if (info == nullptr) return violate(for_all ? "an unknown configuration command" : "an unknown command", at);
+  // The rate's first byte is another table of rates, which the document does not have.
+  const bool is_other_table = info->order == Order::rate && frame.data[1] != 0;
+  const std::uint8_t value = frame.data[info->value_at];
+  if (sets) return configure(*info, is_other_table ? std::uint8_t{0xFF} : value, at);
+  obey(*info, value, at);
 }
 
 void VirtualNode::answer(const CanFrame& frame, Time at) {
@@ -132,104 +106,36 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
   ++answered_;
 }
 
-// ---- Commands
-
-void VirtualNode::hear_command(const CanFrame& frame, Time at) {
-  if (frame.data[1] != node()) return violate("the second byte is not the node's number", at);
-  switch (frame.data[0]) {
-    case command::start:
-      if (readings_per_s_ == 0 && format_.cyclic != 0) {
-        readings_per_s_ = format_.cyclic;
-        next_cyclic_ = at + period();
-      }
-      return answer(encode_position(node(), position(at)), at);
-    case command::read:
-      return answer(encode_position(node(), position(at)), at);
-    case command::cyclic:
-      readings_per_s_ = frame.data[2];
-      next_cyclic_ = readings_per_s_ == 0 ? never : at + period();
-      return answer(encode_answer(node(), command::cyclic), at);
-    case command::zero:
-      check_silence(at);
-      set_zero(at);
-      return answer(encode_answer(node(), command::zero), at);
-    case command::direction:
-      check_silence(at);
-      set_direction(frame.data[2], at);
-      return answer(encode_answer(node(), command::direction), at);
-    default:
-      violate("an unknown command", at);
+void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {
+  const bool changes = info.order == Order::zero || info.order == Order::direction;
+  // Its answer could be taken for a position, and the other way round.
+  if (changes && readings_per_s_ != 0) violate("a setting changed while the node sends by itself", at);
+  if (info.order == Order::enter) configuring_ = value == 1;
+  if (info.order == Order::start && readings_per_s_ == 0) send_by_itself(format_.cyclic, at);
+  if (info.order == Order::cyclic) send_by_itself(value, at);
+  if (info.order == Order::zero) wrote(settings_.write_zero(at), at);
+  if (info.order == Order::direction) {
+    const std::uint8_t negative = value == format_.negative ? 1 : 0;
+    const bool known = negative != 0 || value == format_.positive;
+    if (!known) violate("an unknown counting direction", at);
+    if (known) wrote(settings_.write(Settings::direction_at, {&negative, 1}), at);
   }
+  if (info.answer == Answer::position) answer(encode_position(node(), settings_.position(at)), at);
+  if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// Its answer could be taken for a position, and the other way round.
-void VirtualNode::check_silence(Time at) {
-  if (readings_per_s_ != 0) violate("a setting changed while the node sends by itself", at);
+// A new rate holds when the answer is out.
+void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
+  const bool known = meaning_of(info, value).has_value();
+  const bool is_rate = info.order == Order::rate;
+  if (!known) violate(is_rate ? "an unknown bit rate" : "a node number of 0", at);
+  if (known) wrote(settings_.write(is_rate ? Settings::rate_at : Settings::number_at, {&value, 1}), at);
+  switch_rate_ = switch_rate_ || (known && is_rate);
+  answer(encode_configuration_answer(format_.answer_id(), info.order, known ? std::uint8_t{0} : refused), at);
 }
 
-void VirtualNode::set_zero(Time at) {
-  std::array<std::uint8_t, 4> bytes{};
-  store_little_endian(bytes, raw(at));
-  write(memory_zero, bytes, at);
-}
-
-// The zero stays where it is: the position becomes its mirror image.
-void VirtualNode::set_direction(std::uint8_t value, Time at) {
-  if (value != format_.positive && value != format_.negative) return violate("an unknown counting direction", at);
-  const std::uint8_t negative = value == format_.negative ? 1 : 0;
-  if (negative == memory_[memory_direction]) return write(memory_direction, {&negative, 1}, at);
-  std::array<std::uint8_t, 5> bytes{negative};
-  store_little_endian(MutableBytes(bytes).subspan(1), (0 - std::uint64_t{zero()}) & low_mask(format_.bits));
-  write(memory_direction, bytes, at);
-}
-
-// ---- Configuration
-
-void VirtualNode::hear_configuration(const CanFrame& frame, Time at) {
-  if (frame.data[0] == configuration::enter) {
-    configuring_ = frame.data[1] == 1;
-    return;
-  }
-  if (!configuring_) return violate("a setting without configuration mode", at);
-  if (frame.data[0] == configuration::node) {
-    set_node(frame.data[1], at);
-  } else if (frame.data[0] == configuration::rate) {
-    set_rate(frame, at);
-  } else {
-    violate("an unknown configuration command", at);
-  }
-}
-
-void VirtualNode::set_node(std::uint8_t node, Time at) {
-  const std::uint32_t id = format_.answer_id();
-  if (node == 0) {
-    violate("a node number of 0", at);
-    return answer(encode_configuration_answer(id, configuration::node, refused), at);
-  }
-  write(memory_node, {&node, 1}, at);
-  answer(encode_configuration_answer(id, configuration::node, 0), at);
-}
-
-// It changes when the answer is out.
-void VirtualNode::set_rate(const CanFrame& frame, Time at) {
-  const std::uint32_t id = format_.answer_id();
-  const std::uint8_t index = frame.data[2];
-  if (frame.data[1] != 0 || rate_of_index(index) == nullptr) {
-    violate("an unknown bit rate", at);
-    return answer(encode_configuration_answer(id, configuration::rate, refused), at);
-  }
-  write(memory_rate, {&index, 1}, at);
-  switch_rate_ = true;
-  answer(encode_configuration_answer(id, configuration::rate, 0), at);
-}
-
-void VirtualNode::write(std::size_t first, Bytes bytes, Time at) {
-  const auto place = memory_.begin() + static_cast<std::ptrdiff_t>(first);
-  if (std::equal(bytes.begin(), bytes.end(), place))
-    violate("a setting written that was set already: it wears out", at);
-  std::copy(bytes.begin(), bytes.end(), place);
-  store_little_endian(MutableBytes(memory_).subspan(memory_wear), std::uint64_t{wear()} + 1);
-  ++memory_version_;
+void VirtualNode::wrote(bool changed, Time at) {
+  if (!changed) violate("a setting written that was set already: it wears out", at);
 }
 
 void VirtualNode::violate(std::string_view rule, Time at) {

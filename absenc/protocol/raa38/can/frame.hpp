@@ -4,31 +4,18 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 
+#include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/link/can.hpp"
-#include "absenc/link/line.hpp"
 
 namespace absenc::raa38::can {
 
 inline constexpr std::uint8_t frame_size = 8;
-
-/// What a node is told, in byte 0.
-namespace command {
-inline constexpr std::uint8_t start = 0x01;
-inline constexpr std::uint8_t zero = 0x20;
-inline constexpr std::uint8_t direction = 0x22;
-inline constexpr std::uint8_t cyclic = 0x31;
-inline constexpr std::uint8_t read = 0x80;
-}  // namespace command
-
-/// What all nodes are told on 7E5, in byte 0.
-namespace configuration {
-inline constexpr std::uint8_t enter = 0x04;
-inline constexpr std::uint8_t node = 0x11;
-inline constexpr std::uint8_t rate = 0x13;
-}  // namespace configuration
 
 /// Who a frame is for, by its identifier (the table of COB-IDs, its two wrong figures put right).
 enum class Function : std::uint8_t {
@@ -67,10 +54,15 @@ enum class Function : std::uint8_t {
   return static_cast<std::uint8_t>(frame.id & (has_eight_bits ? 0xFF : 0x7F));
 }
 
-/// Those that CANopen has and this encoder only lists.
+/// Names of those that CANopen has and this encoder only lists; of the others empty.
+inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
 [[nodiscard]] constexpr bool is_only_named(Function function) {
-  return function == Function::nmt || function == Function::sync || function == Function::emergency ||
-         function == Function::sdo_reply || function == Function::sdo_request;
+  return !function_names[static_cast<std::size_t>(function)].empty();
+}
+
+/// Those of the settings, from either side.
+[[nodiscard]] constexpr bool configures(Function function) {
+  return function == Function::configuration || function == Function::configuration_reply;
 }
 
 /// The bit rates of the document, by their numbers in the table of CiA 305.
@@ -108,14 +100,91 @@ struct Format {
   [[nodiscard]] constexpr std::uint32_t answer_id() const { return answers_on_7e4 ? 0x7E4 : 0x7E5; }
 };
 
-// ---- Frames
+/// What frames and commands are shown as, in this order.
+struct Values {
+  using Number = std::optional<std::int64_t>;
+  Number node{};
+  std::optional<std::string_view> function{};
+  std::optional<Bytes> data{};
+  std::optional<std::string_view> command{};
+  Number value{};
+  Number new_node{};
+  Number bit_rate{};
+  std::optional<bool> clash{};
+  Number readings_per_s{};
+  Number singleturn{};
+  std::optional<double> angle{};
+  std::optional<bool> written{};
+  std::optional<bool> answered{};
+  std::optional<bool> mirrored{};
+  Number before{};
+  Number after{};
+};
 
-[[nodiscard]] constexpr CanFrame encode_command(std::uint8_t node, std::uint8_t code, std::uint8_t value = 0) {
-  return {.id = 0x200u | node, .size = frame_size, .data = {code, node, value}};
+// ---- What nodes are told
+
+enum class Order : std::uint8_t { start, zero, direction, cyclic, read, enter, node, rate };
+
+/// What a node answers.
+enum class Answer : std::uint8_t { none, position, code, error };
+
+/// A row of the document's tables.
+struct OrderInfo {
+  Order order;
+  std::uint8_t code;  // byte 0
+  std::string_view name;
+  bool for_all;  // on 7E5, to all nodes; else on 2NN with the node in byte 1
+  Answer answer;
+  std::uint8_t value_at = 0;  // byte of its value; 0: it has none
+  std::uint8_t least = 0;
+  std::uint8_t most = 255;
+  Values::Number Values::*shown = nullptr;
+};
+inline constexpr std::array<OrderInfo, 8> orders{{
+    {Order::start, 0x01, "start", false, Answer::position},
+    {Order::zero, 0x20, "zero", false, Answer::code},
+    {Order::direction, 0x22, "direction", false, Answer::code, 2, 0, 255, &Values::value},
+    {Order::cyclic, 0x31, "cyclic", false, Answer::code, 2, 0, 255, &Values::readings_per_s},
+    {Order::read, 0x80, "read", false, Answer::position},
+    {Order::enter, 0x04, "enter-configuration", true, Answer::none, 1, 0, 1},
+    {Order::node, 0x11, "set-node", true, Answer::error, 1, 1, 255, &Values::new_node},
+    {Order::rate, 0x13, "bitrate", true, Answer::error, 2, 0, 255, &Values::bit_rate},
+}};
+[[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
+
+/// The order in a frame, or the one that it answers on 7E5 or 7E4; null for none.
+[[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
+  const bool for_all = configures(function_of(frame));
+  for (const OrderInfo& info : orders) {
+    if (info.code == frame.data[0] && info.for_all == for_all) return &info;
+  }
+  return nullptr;
 }
 
-[[nodiscard]] constexpr CanFrame encode_configuration(std::uint8_t code, std::uint8_t first, std::uint8_t second = 0) {
-  return {.id = 0x7E5, .size = frame_size, .data = {code, first, second}};
+/// What the value of an order stands for; none: the document does not have it.
+[[nodiscard]] constexpr Values::Number meaning_of(const OrderInfo& info, std::uint8_t value) {
+  if (info.order != Order::rate) return value < info.least || value > info.most ? Values::Number{} : value;
+  const Rate* const rate = rate_of_index(value);
+  return rate != nullptr ? Values::Number(rate->bits_per_second) : Values::Number{};
+}
+
+/// The value that carries what a command was given; none: the document does not have it.
+[[nodiscard]] constexpr std::optional<std::uint8_t> value_of(const Format& format, Order order, std::int64_t argument) {
+  if (order == Order::direction) return argument == 0 ? format.positive : format.negative;
+  if (order != Order::rate) return static_cast<std::uint8_t>(argument);
+  const Rate* const rate = rate_of_bits(argument);
+  return rate != nullptr ? std::optional(rate->index) : std::nullopt;
+}
+
+// ---- Frames
+
+/// To `node`, or to all.
+[[nodiscard]] constexpr CanFrame encode(Order order, std::uint8_t node, std::uint8_t value = 0) {
+  const OrderInfo& info = info_of(order);
+  CanFrame frame{.id = info.for_all ? 0x7E5u : 0x200u | node, .size = frame_size, .data = {info.code}};
+  if (!info.for_all) frame.data[1] = node;
+  if (info.value_at != 0) frame.data[info.value_at] = value;
+  return frame;
 }
 
 /// `counts` least significant byte first.
@@ -125,14 +194,14 @@ struct Format {
   return frame;
 }
 
-/// The answer to zero, direction and cyclic. It is bit for bit the position `code`.
-[[nodiscard]] constexpr CanFrame encode_answer(std::uint8_t node, std::uint8_t code) {
-  return encode_position(node, code);
+/// The answer to zero, direction and cyclic. It is bit for bit the position that its code is.
+[[nodiscard]] constexpr CanFrame encode_answer(std::uint8_t node, Order order) {
+  return encode_position(node, info_of(order).code);
 }
 
 /// `error`: 0 for success.
-[[nodiscard]] constexpr CanFrame encode_configuration_answer(std::uint32_t id, std::uint8_t code, std::uint8_t error) {
-  return {.id = id, .size = frame_size, .data = {code, error}};
+[[nodiscard]] constexpr CanFrame encode_configuration_answer(std::uint32_t id, Order order, std::uint8_t error) {
+  return {.id = id, .size = frame_size, .data = {info_of(order).code, error}};
 }
 
 /// What every frame must be before it is looked at. Errors: bad_framing (a remote frame), wrong_length,
@@ -141,6 +210,13 @@ struct Format {
   if (frame.remote) return Error::bad_framing;
   if (frame.size != frame_size) return Error::wrong_length;
   return frame.extended ? Error::unexpected_reply : Error::none;
+}
+
+[[nodiscard]] constexpr bool is_zero_from(const CanFrame& frame, std::size_t first) {
+  for (std::size_t i = first; i < frame_size; ++i) {
+    if (frame.data[i] != 0) return false;
+  }
+  return true;
 }
 
 /// The position of a reply, in counts. Errors: those of `check_shape`, unexpected_reply, out_of_range (more bits than
@@ -153,22 +229,102 @@ struct Format {
   return static_cast<std::uint32_t>(counts);
 }
 
-/// The error code (0: success) in the answer to a configuration command. Errors: those of `check_shape`,
-/// unexpected_reply (an answer to something else), out_of_range.
-[[nodiscard]] constexpr Result<std::uint8_t> decode_configuration_answer(std::uint8_t code, const CanFrame& frame) {
+/// The answer to a configuration. Errors: those of `check_shape`, unexpected_reply (an answer to something else),
+/// out_of_range, request_rejected.
+[[nodiscard]] constexpr Error check_configuration_answer(Order order, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
-  const Function function = function_of(frame);
-  if (function != Function::configuration && function != Function::configuration_reply) return Error::unexpected_reply;
-  if (frame.data[0] != code) return Error::unexpected_reply;
-  for (std::size_t i = 2; i < frame_size; ++i) {
-    if (frame.data[i] != 0) return Error::out_of_range;
+  if (const OrderInfo* const info = order_of(frame); info == nullptr || info->order != order || !info->for_all) {
+    return Error::unexpected_reply;
   }
-  return frame.data[1];
+  if (!is_zero_from(frame, 2)) return Error::out_of_range;
+  return frame.data[1] == 0 ? Error::none : Error::request_rejected;
 }
 
 /// Whether the frame has the identifier of this node's replies.
 [[nodiscard]] constexpr bool is_from(const CanFrame& frame, std::uint8_t node) {
   return function_of(frame) == Function::reply && node_of(frame) == node;
+}
+
+// ---- What is shown of them
+
+[[nodiscard]] constexpr Values values_of(const Format& format, std::uint8_t node, std::uint64_t counts) {
+  return {.node = node, .singleturn = static_cast<std::int64_t>(counts), .angle = degrees(counts, format.bits)};
+}
+
+namespace detail {
+
+constexpr Values named(const CanFrame& frame) {
+  const Function function = function_of(frame);
+  Values values{.function = function_names[static_cast<std::size_t>(function)], .data = frame.bytes()};
+  if (function != Function::nmt && function != Function::sync) values.node = node_of(frame);
+  return values;
+}
+
+constexpr Result<Values> decode_request(const CanFrame& frame) {
+  if (frame.remote) return Error::bad_framing;
+  const Function function = function_of(frame);
+  if (is_only_named(function)) return named(frame);
+  if (const Error error = check_shape(frame); error != Error::none) return error;
+  if (function != Function::command && function != Function::configuration) return Error::unexpected_reply;
+  const OrderInfo* const info = order_of(frame);
+  if (info == nullptr) return Error::unsupported;
+  Values values{.command = info->name};
+  CanFrame rest = frame;
+  if (!info->for_all) rest.data[1] = 0;
+  if (info->value_at != 0) {
+    rest.data[info->value_at] = 0;
+    const Values::Number meaning = meaning_of(*info, frame.data[info->value_at]);
+    if (!meaning) return Error::out_of_range;
+    if (info->shown != nullptr) values.*info->shown = meaning;
+  }
+  if (!is_zero_from(rest, 1)) return Error::out_of_range;
+  if (info->for_all) return values;
+  values.node = node_of(frame);
+  return frame.data[1] == node_of(frame) ? Result<Values>(values) : Error::cross_check_failed;
+}
+
+// To an order, of this node.
+constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& info, std::uint8_t node,
+                                       const CanFrame& frame) {
+  switch (info.answer) {
+    case Answer::none:
+      break;
+    case Answer::position: {
+      if (!is_from(frame, node)) break;
+      const Result<std::uint32_t> counts = decode_position(format, frame);
+      return counts ? Result<Values>(values_of(format, node, *counts)) : counts.error();
+    }
+    case Answer::code:
+      if (!(frame == encode_answer(node, info.order))) break;
+      return Values{.node = node, .command = info.name};
+    case Answer::error:
+      const Error error = check_configuration_answer(info.order, frame);
+      return error == Error::none ? Result<Values>(Values{.command = info.name}) : error;
+  }
+  return Error::unexpected_reply;
+}
+
+}  // namespace detail
+
+/// A reply to `request`, or `request` alone when there is no reply; either may be null. Without a request, a frame that
+/// a node sends is a position.
+[[nodiscard]] constexpr Result<Values> decode(const Format& format, const CanFrame* request, const CanFrame* reply) {
+  if (reply == nullptr) return request == nullptr ? Error::wrong_length : detail::decode_request(*request);
+  if (reply->remote) return Error::bad_framing;
+  const Function function = function_of(*reply);
+  if (request != nullptr) {
+    if (const auto asked = detail::decode_request(*request); !asked) return asked.error();
+  }
+  const Function asked = request != nullptr ? function_of(*request) : Function::unknown;
+  const bool answers =
+      asked == Function::sdo_request && function == Function::sdo_reply && node_of(*request) == node_of(*reply);
+  if (request == nullptr ? is_only_named(function) : answers) return detail::named(*reply);
+  if (const Error error = check_shape(*reply); error != Error::none) return error;
+  if (is_only_named(asked)) return Error::unexpected_reply;
+  const OrderInfo* info = &info_of(Order::read);
+  if (request != nullptr || configures(function)) info = order_of(request != nullptr ? *request : *reply);
+  if (info == nullptr) return Error::unexpected_reply;
+  return detail::decode_answer(format, *info, node_of(request != nullptr ? *request : *reply), *reply);
 }
 
 }  // namespace absenc::raa38::can

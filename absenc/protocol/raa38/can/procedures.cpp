@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/can/procedures.hpp"
-
+// What a host does that has several steps: first with one node, then with all of the bus.
 #include <algorithm>
 
 #include "absenc/core/bits.hpp"
 #include "absenc/protocol/author/standstill.hpp"
-#include "absenc/protocol/raa38/can/explain.hpp"
+#include "absenc/protocol/raa38/can/host.hpp"
 
 namespace absenc::raa38::can {
 
@@ -59,18 +58,28 @@ Part<Cadence> hear_node(Bus& bus, bool until_enough = false) {
   co_return cadence;
 }
 
-// Whether the answer to a command comes.
-Part<bool> command_node(Bus& bus, std::uint8_t code, std::uint8_t value) {
+// Whether the answer to an order comes.
+Part<bool> is_answered(Bus& bus, Order order, std::uint8_t value) {
+  const std::uint8_t node = bus.format().node;
   bool answered = false;
-  bus.ask_for(encode_command(bus.format().node, code, value), command_window);
-  for (;;) {
-    const Frame frame = co_await bus.heard();
-    if (!frame) break;
-    if (!(*frame == encode_answer(bus.format().node, code))) continue;
+  bus.ask_for(encode(order, node, value), command_window);
+  while (const Frame frame = co_await bus.heard()) {
+    if (!(*frame == encode_answer(node, order))) continue;
     answered = true;
     bus.keep();
   }
   co_return answered;
+}
+
+// What this node answers with to the question where it is.
+Part<Frame> read(Bus& bus, std::uint8_t node, Time pause = {}) {
+  bus.ask(encode(Order::read, node), pause);
+  Frame frame;
+  do {
+    frame = co_await bus.heard();
+  } while (frame && !is_from(*frame, node));
+  if (frame) bus.keep();
+  co_return frame;
 }
 
 // The position, or why there is none.
@@ -80,17 +89,11 @@ struct Look {
 };
 
 Part<Look> look(Bus& bus, Time pause = {}) {
-  const CanFrame request = encode_command(bus.format().node, command::read);
-  bus.ask(request, pause);
-  Result<std::uint32_t> counts = Error::timeout;
-  Frame frame;
-  do {
-    frame = co_await bus.heard();
-  } while (frame && !is_from(*frame, bus.format().node));
-  if (frame) bus.keep();
-  counts = frame ? decode_position(bus.format(), *frame) : Result<std::uint32_t>(bus.missing());
+  const Frame frame = co_await read(bus, bus.format().node, pause);
+  const Result<std::uint32_t> counts = frame ? decode_position(bus.format(), *frame) : bus.missing();
   // Other frames follow before the end is told.
-  const Explanation words = explain_frame(counts.error(), &request, frame ? &*frame : nullptr);
+  const Exchange<CanFrame> exchange = bus.exchange();
+  const Explanation words = explain(bus.format(), counts.error(), exchange.sent, exchange.received);
   co_return Look{counts ? done : only(counts.error(), words.found, words.advice), *counts};
 }
 
@@ -101,17 +104,17 @@ Part<Cadence> hush(Bus& bus) {
   bus.listen(listening_time);
   const Cadence before = co_await hear_node(bus, true);
   if (before.count != 0) {
-    static_cast<void>(co_await command_node(bus, command::cyclic, 0));
+    co_await is_answered(bus, Order::cyclic, 0);
     bus.listen(before.pause());
     // A node that cannot be stopped is dealt with all the same.
-    static_cast<void>(co_await hear_node(bus));
+    co_await hear_node(bus);
   }
   co_return before;
 }
 
 Part<Outcome> let_send_again(Bus& bus, Cadence before, Outcome outcome) {
   if (before.count == 0) co_return outcome;
-  static_cast<void>(co_await command_node(bus, command::cyclic, static_cast<std::uint8_t>(before.per_second())));
+  co_await is_answered(bus, Order::cyclic, static_cast<std::uint8_t>(before.per_second()));
   bus.listen(before.pause());
   const Cadence now = co_await hear_node(bus);
   if (now.count == 0 && outcome.error == Error::none) {
@@ -132,85 +135,266 @@ Part<Look> look_twice(Bus& bus) {
   co_return second;
 }
 
-Part<Outcome> zero_quietly(Bus& bus, Changed& found) {
-  const unsigned bits = bus.format().bits;
+// Looked at twice afterwards, in case that a late answer was taken for the position 32.
+Outcome judge_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
+  if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
+    return done;
+  }
+  return only(Error::cross_check_failed,
+              *found.answered ? "the node answered, but its position is not near 0 afterwards"
+                              : "the node did not answer, and its position is not near 0 afterwards",
+              "the document only lets one guess that command 20 sets the zero: this node may not have it");
+}
+
+Outcome judge_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
+  // It may have trembled before and after.
+  const auto is_at = [&](std::uint64_t place) {
+    return is_near(second, place, format.bits, 2 * standstill_millidegrees);
+  };
+  const auto before = static_cast<std::uint64_t>(*found.before);
+  const bool same = is_at(before);
+  found.mirrored = !same && is_at((0 - before) & low_mask(format.bits));
+  if (!is_near(second, first, format.bits) || (!same && !*found.mirrored)) {
+    return only(Error::cross_check_failed, "the position afterwards is neither the one before nor its mirror image",
+                "turn the shaft and see which way the node counts");
+  }
+  if (*found.answered || !same) return done;
+  return only(Error::timeout, "the node did not answer the command, and its position is the same");
+}
+
+Part<Outcome> change_quietly(Bus& bus, Values& found, Order order, std::uint8_t value) {
+  const bool zeroing = order == Order::zero;
   const Look before = co_await look_twice(bus);
   if (before.outcome.error != Error::none) co_return before.outcome;
   found.before = found.after = before.counts;
-  if (is_near(before.counts, 0, bits)) co_return done;
-  found.written = true;
-  found.answered = co_await command_node(bus, command::zero, 0);
-  // Twice, in case that a late answer was taken for the position 32.
-  for (const Time pause : {Time{}, between_looks}) {
-    const Look now = co_await look(bus, pause);
-    if (now.outcome.error != Error::none) co_return now.outcome;
-    found.after = now.counts;
-    if (is_near(now.counts, 0, bits, zero_millidegrees)) continue;
-    co_return only(Error::cross_check_failed,
-                   found.answered ? "the node answered, but its position is not near 0 afterwards"
-                                  : "the node did not answer, and its position is not near 0 afterwards",
-                   "the document only lets one guess that command 20 sets the zero: this node may not have it");
+  if (zeroing) {
+    found.written = !is_near(before.counts, 0, bus.format().bits);
+    if (!*found.written) co_return done;
   }
-  co_return done;
-}
-
-Part<Outcome> direct_quietly(Bus& bus, Changed& found) {
-  const unsigned bits = bus.format().bits;
-  const Look before = co_await look_twice(bus);
-  if (before.outcome.error != Error::none) co_return before.outcome;
-  found.before = before.counts;
-  found.answered = co_await command_node(bus, command::direction, found.value);
+  found.answered = co_await is_answered(bus, order, value);
   const Look first = co_await look(bus);
   if (first.outcome.error != Error::none) co_return first.outcome;
   const Look second = co_await look(bus, between_looks);
   if (second.outcome.error != Error::none) co_return second.outcome;
-  found.after = first.counts;
-  // It may have trembled before and after.
-  const std::uint64_t mirror = (std::uint64_t{0} - before.counts) & low_mask(bits);
-  const bool same = is_near(second.counts, before.counts, bits, 2 * standstill_millidegrees);
-  found.mirrored = !same && is_near(second.counts, mirror, bits, 2 * standstill_millidegrees);
-  if (!is_near(second.counts, first.counts, bits) || (!same && !found.mirrored)) {
-    co_return only(Error::cross_check_failed, "the position afterwards is neither the one before nor its mirror image",
-                   "turn the shaft and see which way the node counts");
-  }
-  if (!found.answered && same) {
-    co_return only(Error::timeout, "the node did not answer the command, and its position is the same");
-  }
-  co_return done;
+  found.after = zeroing ? second.counts : first.counts;
+  co_return zeroing ? judge_zero(bus.format(), found, first.counts, second.counts)
+                    : judge_direction(bus.format(), found, first.counts, second.counts);
 }
 
 }  // namespace
 
 // ---- One node
 
-Procedure set_cyclic(Bus& bus, Cyclic& found, Arguments arguments) {
-  found.readings_per_s = arguments.empty() ? std::uint8_t{0} : static_cast<std::uint8_t>(arguments[0]);
-  const unsigned wanted = found.readings_per_s;
-  found.answered = co_await command_node(bus, command::cyclic, found.readings_per_s);
+Procedure set_cyclic(Bus& bus, Values& found, Arguments arguments) {
+  const unsigned wanted = arguments.empty() ? 0 : static_cast<unsigned>(arguments[0]);
+  found.node = bus.format().node;
+  found.readings_per_s = wanted;
+  found.answered = co_await is_answered(bus, Order::cyclic, static_cast<std::uint8_t>(wanted));
   bus.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
   const Cadence cadence = co_await hear_node(bus);
   if (wanted == 0 && cadence.count == 0) co_return done;
   if (wanted == 0) co_return only(Error::cross_check_failed, "the node goes on sending by itself", "try again");
-  if (cadence.count == 0 && !found.answered) co_return {bus.missing()};
+  if (cadence.count == 0 && !*found.answered) co_return {bus.missing()};
   // By the number of frames: a carrier may hand them out in bunches.
   const unsigned rate = cadence.per_second();
   if (cadence.count >= 2 && 4 * rate >= 3 * wanted && 4 * rate <= 5 * wanted + 4) co_return done;
   co_return only(Error::cross_check_failed, "the node sends more or fewer readings a second than it was told");
 }
 
-Procedure set_zero(Bus& bus, Changed& found) {
+Procedure change(Bus& bus, Values& found, Order order, Arguments arguments) {
+  const std::uint8_t value = order == Order::zero ? 0 : *value_of(bus.format(), order, arguments[0]);
+  found.node = bus.format().node;
+  if (order == Order::direction) found.value = value;
   const Cadence before = co_await hush(bus);
-  const Outcome outcome = co_await zero_quietly(bus, found);
+  const Outcome outcome = co_await change_quietly(bus, found, order, value);
   const Outcome end = co_await let_send_again(bus, before, outcome);
   co_return end;
 }
 
-Procedure set_direction(Bus& bus, Changed& found, Arguments arguments) {
-  found.value = arguments[0] != 0 ? bus.format().negative : bus.format().positive;
-  const Cadence before = co_await hush(bus);
-  const Outcome outcome = co_await direct_quietly(bus, found);
-  const Outcome end = co_await let_send_again(bus, before, outcome);
-  co_return end;
+// ---- Every node of the bus
+
+namespace {
+
+constexpr Time between_requests = 2ms;  // the request and one answer take 1 ms at 250 kbit/s
+constexpr unsigned answering = 10;      // so many requests later a frame is no answer any more, but sent by itself
+constexpr Time last_answers = 100ms;
+constexpr Time entering_time = 20ms;  // nothing is answered to "enter configuration"
+constexpr Time answer_window = 100ms;
+constexpr Time switching_time = 50ms;  // until a controller is on the bus again with another bit rate
+constexpr int rate_attempts = 3;
+constexpr auto most_clashes = 16;  // more numbers that are shared are a line on which nothing goes well
+
+constexpr std::string_view alone = "connect this one alone: 7E5 reaches every node on the bus";
+constexpr std::string_view shared = "two nodes share the number, or the line is bad";
+constexpr std::string_view which = "`scan` shows which: set node=";
+
+// Nobody was asked yet, or all were.
+constexpr unsigned nobody = 0;
+constexpr unsigned everybody = 256;
+
+// Until the time is over. `asked`: the last number that was asked.
+Part<bool> hear_nodes(Bus& bus, Nodes& nodes, unsigned asked) {
+  Time from = never;
+  while (const Frame frame = co_await bus.heard()) {
+    if (function_of(*frame) != Function::reply) continue;
+    bus.keep();
+    const unsigned number = node_of(*frame);
+    Heard& node = nodes.at[number];
+    if (from == never) from = bus.heard_at();
+    if (asked == nobody && bus.heard_at() - from < 1s) ++node.per_second;
+    // Where answers are late, they come while the next numbers are asked; but none comes before its own request.
+    const unsigned early = bus.came_early() && node.damaged == 0 ? 1 : 0;
+    const bool was_asked = asked == everybody || (number + early <= asked && number + answering > asked);
+    if (!was_asked) {
+      ++node.unasked;
+    } else if (node.answers < 255) {
+      ++node.answers;
+    }
+    const Result<std::uint32_t> counts = decode_position(bus.format(), *frame);
+    node.readable = counts.has_value();
+    node.counts = counts.value_or(0);
+  }
+  co_return true;
+}
+
+Part<bool> survey(Bus& bus, Nodes& nodes, bool listen_first) {
+  bus.overhear();
+  if (listen_first) {
+    bus.listen(listening_time);
+    co_await hear_nodes(bus, nodes, nobody);
+  }
+  for (unsigned number = 1; number < nodes.at.size(); ++number) {
+    bool once_more = true;
+    while (once_more) {
+      bus.ask_for(encode(Order::read, static_cast<std::uint8_t>(number)), between_requests);
+      co_await hear_nodes(bus, nodes, number);
+      once_more = bus.is_disturbed() && ++nodes.at[number].damaged < 2;
+    }
+  }
+  bus.listen(last_answers);
+  co_await hear_nodes(bus, nodes, everybody);
+  bus.overhear(false);
+  co_return true;
+}
+
+// 7E5 reaches every node: goes on when this one is the only one.
+Part<bool> be_alone(Bus& bus, Nodes& nodes) {
+  co_await survey(bus, nodes, true);
+  const Heard& node = nodes.at[bus.format().node];
+  if (nodes.count() == 0) co_await bus.stop(only(Error::timeout, "no node answers"));
+  if (!node.is_there()) {
+    co_await bus.stop(only(Error::unexpected_reply, "other nodes answer, but not this one", which));
+  }
+  if (nodes.count() > 1) co_await bus.stop(only(Error::invalid_argument, "other nodes are on this bus", alone));
+  if (node.clash()) co_await bus.stop(only(Error::invalid_argument, shared, alone));
+  co_return true;
+}
+
+Part<bool> hear_out(Bus& bus) {
+  Frame frame;
+  do {
+    frame = co_await bus.heard();
+  } while (frame);
+  co_return true;
+}
+
+// Without an answer perhaps not without effect.
+Part<bool> write(Bus& bus, Surveyed& found, Order order, std::uint8_t value) {
+  bus.ask_for(encode(Order::enter, 0, 1), entering_time);
+  co_await hear_out(bus);
+  found.written = true;
+  found.answered = false;
+  bus.ask_for(encode(order, 0, value), answer_window);
+  while (const Frame frame = co_await bus.heard()) {
+    const Error error = check_configuration_answer(order, *frame);
+    if (error != Error::none && error != Error::request_rejected) continue;
+    bus.keep();
+    if (error != Error::none) co_await bus.stop({error});
+    found.answered = true;
+    break;
+  }
+  co_return true;
+}
+
+Part<Outcome> verify_node(Bus& bus, std::uint8_t before, std::uint8_t node) {
+  constexpr std::string_view supply = "switch its supply off and on, then `scan`";
+  const Frame there = co_await read(bus, node);
+  if (node == before) co_return Outcome{there ? Error::none : bus.missing()};
+  const Frame still = co_await read(bus, before);
+  if (still && there) {
+    co_return only(Error::cross_check_failed, "it answers under its old number as well: another node was there",
+                   "connect it alone and try again");
+  }
+  if (still) co_return only(Error::cross_check_failed, "it keeps its old number", supply);
+  if (there) co_return done;
+  co_return only(Error::timeout, "it answers neither under its old number nor under the new one", supply);
+}
+
+// This end of the line goes to the rate too, which takes a moment.
+Part<Outcome> verify_rate(Bus& bus, std::uint32_t bits_per_second) {
+  const Format& format = bus.format();
+  bus.configure(bits_per_second, switching_time);
+  co_await hear_out(bus);
+  for (int attempt = 0; attempt < rate_attempts; ++attempt) {
+    const Frame there = co_await read(bus, format.node);
+    if (there) co_return done;
+  }
+  bus.configure(format.bit_rate(), switching_time);
+  co_await hear_out(bus);
+  const Frame back = co_await read(bus, format.node);
+  if (back) {
+    co_return only(Error::cross_check_failed, "it keeps its old bit rate",
+                   "switch its supply off and on, then try the new one");
+  }
+  co_return only(Error::timeout, "it answers neither at its old bit rate nor at the new one",
+                 "switch its supply off and on, then try both");
+}
+
+}  // namespace
+
+Procedure scan(Bus& bus, Nodes& nodes) {
+  co_await survey(bus, nodes, true);
+  const auto damaged =
+      std::count_if(nodes.at.begin(), nodes.at.end(), [](const Heard& node) { return node.damaged > 1; });
+  if (damaged > most_clashes) co_return {Error::bad_framing};
+  if (nodes.count() == 0) co_return only(Error::timeout, {});
+  co_return done;
+}
+
+Procedure find_node(Bus& bus, Surveyed& found) {
+  const std::uint8_t meant = bus.format().node;
+  const Nodes& nodes = found.nodes;
+  co_await survey(bus, found.nodes, false);
+  if (nodes.count() == 0) co_return only(Error::timeout, "no node answers");
+  const std::uint8_t node = nodes.at[meant].is_there() ? meant : nodes.first();
+  found.node = node;
+  if (node != meant && nodes.count() > 1) {
+    co_return only(Error::unexpected_reply, "several nodes answer, but not this one", which);
+  }
+  if (!nodes.at[node].clash()) co_return done;
+  co_return only(Error::bad_framing, shared, "connect the nodes one by one");
+}
+
+Procedure configure(Bus& bus, Surveyed& found, Order order, Arguments arguments) {
+  const Format& format = bus.format();
+  const std::optional<std::uint8_t> value = value_of(format, order, arguments[0]);
+  if (!value) {
+    co_return only(Error::invalid_argument, "the document has no such bit rate", "give 1000000, 500000 or 250000");
+  }
+  const std::int64_t before = order == Order::rate ? format.bit_rate() : format.node;
+  (order == Order::rate ? found.bit_rate : found.node) = arguments[0];
+  found.written = false;
+  co_await be_alone(bus, found.nodes);
+  if (arguments[0] == before && arguments[1] == 0) co_return done;
+  co_await write(bus, found, order, *value);
+  Outcome outcome;
+  if (order == Order::rate) {
+    outcome = co_await verify_rate(bus, static_cast<std::uint32_t>(arguments[0]));
+  } else {
+    outcome = co_await verify_node(bus, format.node, *value);
+  }
+  found.verified = outcome.error == Error::none;
+  co_return outcome;
 }
 
 }  // namespace absenc::raa38::can

@@ -1,23 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual RAA38S6 slaves and a host on one Modbus line in virtual time.
+// For tests: virtual RAA38S6 slaves, slaves that do as a test says, and a host on one Modbus line in virtual time.
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include "absenc/protocol/raa38/modbus/device.hpp"
-#include "absenc/protocol/raa38/modbus/options.hpp"
 #include "absenc/protocol/raa38/talk_test.hpp"
-#include "absenc/protocol/raa38/unit.hpp"
-#include "absenc/sim/bench_test.hpp"
-#include "absenc/sim/line.hpp"
 
-namespace absenc::raa38::rtu::testing {
-
-using PowerOn = Device<std::uint8_t>::PowerOn;
-
-/// The top 21 bits of a turn: what the finest of these encoders sees.
-using TestShaft = sim::testing::TestShaft<21>;
+namespace absenc::raa38::rtu {
 
 [[nodiscard]] inline Options options_of(const Format& format) {
   Options options;
@@ -26,56 +14,91 @@ using TestShaft = sim::testing::TestShaft<21>;
   return options;
 }
 
-/// A command of an encoder of this format.
+namespace testing {
+
+using raa38::testing::End;
+using raa38::testing::ended;
+using raa38::testing::says;
+using PowerOn = Device<std::uint8_t>::PowerOn;
+using Wire = std::vector<std::uint8_t>;
+
 struct Talk final : raa38::testing::Talk<std::uint8_t> {
   Talk(const Format& format, std::string_view name, std::vector<std::int64_t> arguments = {})
       : raa38::testing::Talk<std::uint8_t>(modbus_unit, options_of(format), name, std::move(arguments)) {}
 };
 
-struct Bench {
-  explicit Bench(const Format& bench_format = {}) : format(bench_format), encoder(bench_format, shaft) {
-    put_on_line(encoder);
-  }
+/// With its CRC.
+[[nodiscard]] inline Wire framed(const Wire& body) {
+  modbus::FrameBytes frame;
+  frame.append(body);
+  modbus::append_crc(frame);
+  return {frame.view().begin(), frame.view().end()};
+}
 
-  void put_on_line(VirtualEncoder& another) {
-    another.power_on(line.now(), PowerOn::skip);
-    line.attach(sim::Role::device, another);
+struct Bench : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbus_unit> {
+  explicit Bench(const Format& own = {})
+      : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbus_unit>(own, LinkKind::half_duplex,
+                                                                                 own.line()) {
+    add(own);
   }
-
   /// `counts` of the encoder's own bits.
-  void put_shaft(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
-
-  /// Runs a conversation to its end and returns it.
-  template <class Conversation>
-  Conversation& run(Conversation& conversation) {
-    if (host == none) {
-      host = line.attach(sim::Role::host, conversation);
-    } else {
-      line.replace(host, conversation);
-    }
-    finished = line.run(host, line.now() + std::chrono::seconds(60));
-    return conversation;
-  }
+  void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
   /// Sends any bytes, CRC included, after 20 ms of silence.
-  std::vector<std::uint8_t> raw(std::vector<std::uint8_t> request) {
-    sim::testing::RawHost raw_host(std::move(request), 100ms, 20ms, line.now() + 20ms);
-    return run(raw_host).reply;
+  Wire raw(const Wire& request) {
+    sim::testing::RawHost host(request, 100ms, 20ms, line.now() + 20ms);
+    return run(host).reply;
   }
-  /// The same with the CRC appended.
-  std::vector<std::uint8_t> raw_body(std::initializer_list<std::uint8_t> body) {
-    modbus::FrameBytes frame;
-    for (const std::uint8_t byte : body) frame.push_back(byte);
-    modbus::append_crc(frame);
-    return raw({frame.view().begin(), frame.view().end()});
+  /// The same with the CRC appended, and of what comes, which must be good, without.
+  Wire body(const Wire& request) {
+    const Wire reply = raw(framed(request));
+    if (reply.empty()) return {};
+    EXPECT_EQ(modbus::crc_order(reply), CrcOrder::low_first);
+    return {reply.begin(), reply.end() - 2};
   }
-
-  static constexpr std::size_t none = ~std::size_t{0};
-  Format format;
-  TestShaft shaft;
-  VirtualEncoder encoder;
-  sim::Line<std::uint8_t> line{LinkKind::half_duplex, format.line()};
-  std::size_t host = none;
-  bool finished = true;
 };
 
-}  // namespace absenc::raa38::rtu::testing
+/// Answers each request by a function of it and of how many came before, instead of an encoder.
+class Scripted final : public Machine<std::uint8_t> {
+ public:
+  using Script = std::function<Wire(Bytes request, unsigned before)>;
+  explicit Scripted(Script script) : script_(std::move(script)) {}
+
+  void feed(const Event<std::uint8_t>& event) override {
+    if (event.kind == Event<std::uint8_t>::Kind::received)
+      heard_.insert(heard_.end(), event.items.begin(), event.items.end());
+    if (event.kind != Event<std::uint8_t>::Kind::silence || heard_.empty()) return;
+    reply_ = script_(heard_, requests++);
+    heard_.clear();
+    pending_ = !reply_.empty();
+  }
+  Step<std::uint8_t> next(Time) override {
+    if (!std::exchange(pending_, false)) return {.at = never, .gap = 2ms};
+    return {.kind = Step<std::uint8_t>::Kind::transfer, .out = reply_};
+  }
+
+  unsigned requests = 0;
+
+ private:
+  Script script_;
+  Wire heard_;
+  Wire reply_;
+  bool pending_ = false;
+};
+
+struct Conversed : End {
+  unsigned requests = 0;
+};
+
+/// How a command ends with such a slave.
+[[nodiscard]] inline Conversed with(const Scripted::Script& script, std::string_view command,
+                                    std::vector<std::int64_t> arguments = {}, const Format& format = {}) {
+  sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
+  Scripted scripted(script);
+  Talk talk(format, command, std::move(arguments));
+  line.attach(sim::Role::device, scripted);
+  EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 60s));
+  return {raa38::testing::end_of<std::uint8_t>(*talk), scripted.requests};
+}
+
+}  // namespace testing
+}  // namespace absenc::raa38::rtu

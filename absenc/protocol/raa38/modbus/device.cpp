@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "absenc/core/bits.hpp"
-
 namespace absenc::raa38::rtu {
 
 namespace {
@@ -23,32 +21,11 @@ constexpr bool is_address(std::uint8_t address) {
 
 }  // namespace
 
-VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
-    : Server(format.line()), format_(format), shaft_(&shaft) {
-  memory_[address_at] = format.address;
-  memory_[baud_at] = static_cast<std::uint8_t>(format.baud);
-}
-
 // A memory that came from outside may hold anything.
 void VirtualEncoder::started() {
-  if (!is_address(address())) memory_[address_at] = format_.address;
-  if (memory_[baud_at] >= bauds.size()) memory_[baud_at] = static_cast<std::uint8_t>(format_.baud);
+  if (!is_address(address())) memory()[Settings::number_at] = format_.address;
+  if (settings_.rate() >= bauds.size()) memory()[Settings::rate_at] = static_cast<std::uint8_t>(format_.baud);
   set_rate(baud());
-}
-
-std::uint32_t VirtualEncoder::writes() const {
-  return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(writes_at, 4)));
-}
-
-std::uint32_t VirtualEncoder::counts(Time now) const {
-  return static_cast<std::uint32_t>(shaft_->at(now).position) >> (32 - format_.bits);
-}
-
-// The direction mirrors the position at the zero.
-std::uint32_t VirtualEncoder::singleturn(Time now) const {
-  const auto zero = static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(zero_at, 4)));
-  const std::uint32_t forward = counts(now) - zero;
-  return static_cast<std::uint32_t>((counts_backwards() ? 0u - forward : forward) & low_mask(format_.bits));
 }
 
 void VirtualEncoder::request(Bytes body, Time at, FrameBytes& reply) {
@@ -93,7 +70,7 @@ void VirtualEncoder::append_position(std::uint16_t registers, Time at, FrameByte
   reply.push_back(address());
   reply.push_back(function::read);
   reply.push_back(static_cast<std::uint8_t>(counted_as_four ? 4 : size));
-  const std::uint32_t position = singleturn(at);
+  const std::uint32_t position = settings_.position(at);
   for (unsigned i = size; i-- > 0;) reply.push_back(static_cast<std::uint8_t>(position >> 8 * i));
 }
 
@@ -101,7 +78,7 @@ void VirtualEncoder::set_address(Bytes body, Time at, FrameBytes& reply) {
   if (body.size() != 3) return;
   const std::uint8_t address = body[2];
   if (!is_address(address)) return violate("an address was set that no slave can have", at);
-  write(address_at, {&address, 1}, at);
+  wrote(settings_.write(Settings::number_at, {&address, 1}), at);
   reply.push_back(address);
   reply.push_back(function::set_address);
 }
@@ -113,30 +90,24 @@ void VirtualEncoder::set_parameter(Bytes body, Time at, FrameBytes& reply) {
 }
 
 bool VirtualEncoder::apply(std::uint8_t value, Time at) {
+  const auto baud_found = std::find(baud_parameters.begin(), baud_parameters.end(), value);
   if (value == parameter::zero) {
-    std::array<std::uint8_t, 4> zero{};
-    store_little_endian(zero, counts(at));
-    write(zero_at, zero, at);
-    return true;
+    wrote(settings_.write_zero(at), at);
+  } else if (value == parameter::positive || value == parameter::negative) {
+    const std::uint8_t down = value == parameter::negative ? 1 : 0;
+    wrote(settings_.write(Settings::direction_at, {&down, 1}), at);
+  } else if (baud_found != baud_parameters.end()) {
+    const auto index = static_cast<std::uint8_t>(baud_found - baud_parameters.begin());
+    wrote(settings_.write(Settings::rate_at, {&index, 1}), at);
+    set_rate(baud());  // the reply goes out at the old one
+  } else {
+    return false;
   }
-  if (value == parameter::positive || value == parameter::negative) {
-    const std::uint8_t backwards = value == parameter::negative ? 1 : 0;
-    write(direction_at, {&backwards, 1}, at);
-    return true;
-  }
-  const auto found = std::find(baud_parameters.begin(), baud_parameters.end(), value);
-  if (found == baud_parameters.end()) return false;
-  const auto index = static_cast<std::uint8_t>(found - baud_parameters.begin());
-  write(baud_at, {&index, 1}, at);
-  set_rate(baud());  // the reply goes out at the old one
   return true;
 }
 
-void VirtualEncoder::write(std::size_t at, Bytes value, Time now) {
-  const MutableBytes kept = MutableBytes(memory_).subspan(at, value.size());
-  if (std::equal(value.begin(), value.end(), kept.begin())) {
-    violate("a setting was sent that the encoder has already: its memory wears out", now);
-  }
+void VirtualEncoder::wrote(bool changed, Time now) {
+  if (!changed) violate("a setting was sent that the encoder has already: its memory wears out", now);
   if (now - recent_since_ > settings_window) {
     recent_since_ = now;
     recent_settings_ = 0;
@@ -144,9 +115,6 @@ void VirtualEncoder::write(std::size_t at, Bytes value, Time now) {
   if (++recent_settings_ == most_settings + 1) {
     violate("settings are sent again and again: the memory wears out", now);
   }
-  std::copy(value.begin(), value.end(), kept.begin());
-  store_little_endian(MutableBytes(memory_).subspan(writes_at, 4), writes() + 1u);
-  ++memory_version_;
 }
 
 }  // namespace absenc::raa38::rtu

@@ -3,39 +3,32 @@
 // wears, and it lists the rules its host breaks. Several of them share a line.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
-#include "absenc/core/shaft.hpp"
 #include "absenc/protocol/modbus/server.hpp"
 #include "absenc/protocol/raa38/modbus/frame.hpp"
+#include "absenc/protocol/raa38/settings.hpp"
 
 namespace absenc::raa38::rtu {
 
 class VirtualEncoder final : public modbus::Server {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
-  VirtualEncoder(const Format& format, const Shaft& shaft);
+  VirtualEncoder(const Format& format, const Shaft& shaft)
+      : Server(format.line()),
+        format_(format),
+        settings_(format.address, static_cast<std::uint8_t>(format.baud), format.bits, shaft) {}
 
   void raise_alarms(std::uint32_t) override {}
   void lower_alarms(std::uint32_t) override {}
-  [[nodiscard]] MutableBytes memory() override { return memory_; }
-  [[nodiscard]] std::uint32_t memory_version() const override { return memory_version_; }
+  [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
+  [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
 
-  [[nodiscard]] std::uint8_t address() const { return memory_[address_at]; }
-  [[nodiscard]] std::uint32_t baud() const { return bauds[memory_[baud_at]]; }
-  [[nodiscard]] bool counts_backwards() const { return memory_[direction_at] != 0; }
-  /// Settings written since it was made.
-  [[nodiscard]] std::uint32_t writes() const;
-  [[nodiscard]] std::uint32_t singleturn(Time now) const;
+  [[nodiscard]] const Settings& settings() const { return settings_; }
+  [[nodiscard]] std::uint8_t address() const { return settings_.number(); }
+  [[nodiscard]] std::uint32_t baud() const { return bauds[settings_.rate()]; }
 
  private:
-  static constexpr std::size_t address_at = 0;
-  static constexpr std::size_t baud_at = 1;
-  static constexpr std::size_t direction_at = 2;
-  static constexpr std::size_t zero_at = 3;    // counts of the shaft, 4 bytes, little endian
-  static constexpr std::size_t writes_at = 7;  // 4 bytes, little endian
-
   void started() override;
   void request(Bytes body, Time at, modbus::FrameBytes& reply) override;
   void read(Bytes body, Time at, modbus::FrameBytes& reply);
@@ -43,13 +36,10 @@ class VirtualEncoder final : public modbus::Server {
   void set_address(Bytes body, Time at, modbus::FrameBytes& reply);
   void set_parameter(Bytes body, Time at, modbus::FrameBytes& reply);
   bool apply(std::uint8_t parameter, Time at);
-  void write(std::size_t at, Bytes value, Time now);
-  [[nodiscard]] std::uint32_t counts(Time now) const;
+  void wrote(bool changed, Time now);
 
   Format format_;
-  const Shaft* shaft_;
-  std::array<std::uint8_t, writes_at + 4> memory_{};
-  std::uint32_t memory_version_ = 0;
+  Settings settings_;
   std::uint32_t recent_settings_ = 0;  // within a minute
   Time recent_since_{};
 };

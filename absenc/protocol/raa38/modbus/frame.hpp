@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an RAA38S6 says over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encoded, decoded, checked.
+// What an RAA38S6 says over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encoded, decoded, checked, and shown.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "absenc/core/angle.hpp"
-#include "absenc/core/result.hpp"
+#include "absenc/protocol/author/confirm.hpp"
+#include "absenc/protocol/author/look.hpp"
 #include "absenc/protocol/modbus/frame.hpp"
 #include "absenc/protocol/modbus/timing.hpp"
 
@@ -38,6 +40,18 @@ inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
 inline constexpr std::size_t baud_at_shipping = 3;
 
+/// What function CC sets, in words.
+[[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
+  constexpr std::array<std::string_view, bauds.size()> baud_names{"2400 baud", "4800 baud", "9600 baud", "19200 baud",
+                                                                  "57600 baud"};
+  constexpr std::array<std::string_view, 3> names{"zero here", "positive direction", "negative direction"};
+  if (value < names.size()) return names[value];
+  for (std::size_t i = 0; i < bauds.size(); ++i) {
+    if (baud_parameters[i] == value) return baud_names[i];
+  }
+  return "unknown";
+}
+
 /// The index of a baud rate; empty when the encoder does not have it.
 [[nodiscard]] constexpr std::optional<std::size_t> baud_index(std::uint64_t baud) {
   for (std::size_t i = 0; i < bauds.size(); ++i) {
@@ -64,6 +78,7 @@ struct Format {
 
   [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
+  [[nodiscard]] constexpr Resolution resolution() const { return {.singleturn_bits = bits}; }
 };
 
 struct Request {
@@ -159,27 +174,21 @@ constexpr bool read_length_is_right(const Request& request, Bytes reply) {
 }
 
 constexpr bool length_is_right(const Request& request, Bytes reply) {
-  switch (request.function) {
-    case function::read:
-      return read_length_is_right(request, reply);
-    case function::set_address:
-      return reply.size() == 4;
-    default:
-      return reply.size() == 5;
-  }
+  if (request.function == function::read) return read_length_is_right(request, reply);
+  return reply.size() == (request.function == function::set_address ? 4u : 5u);
 }
 
-constexpr Error check_header(const Request& request, Bytes reply) {
-  if (reply[1] != request.function) return Error::unexpected_reply;
+constexpr bool is_answer(const Request& request, Bytes reply) {
+  if (reply[1] != request.function) return false;
   switch (request.function) {
     case function::ask_address:
-      return reply[0] == any_address ? Error::none : Error::unexpected_reply;
+      return reply[0] == any_address;
     case function::set_address:
-      return reply[0] == request.value ? Error::none : Error::unexpected_reply;
+      return reply[0] == request.value;
     case function::set_parameter:
-      return reply[0] == request.address && reply[2] == request.value ? Error::none : Error::unexpected_reply;
+      return reply[0] == request.address && reply[2] == request.value;
     default:
-      return reply[0] == request.address ? Error::none : Error::unexpected_reply;
+      return reply[0] == request.address;
   }
 }
 
@@ -194,7 +203,7 @@ constexpr Error check_header(const Request& request, Bytes reply) {
   const bool either = request.function == function::ask_address;  // labelled "MSB first", unlike all others
   if (reply.order == CrcOrder::wrong || (reply.order == CrcOrder::high_first && !either)) return Error::bad_checksum;
   if (refusal) return bytes[0] == request.address ? Error::request_rejected : Error::unexpected_reply;
-  if (const Error error = detail::check_header(request, bytes); error != Error::none) return error;
+  if (!detail::is_answer(request, bytes)) return Error::unexpected_reply;
   if (request.function == function::read) {
     if (request.first_register != 0 || request.registers == 0 || request.registers > 2) return Error::unsupported;
     const Bytes data = bytes.subspan(3, bytes.size() - 3 - modbus::crc_size);
@@ -229,5 +238,44 @@ constexpr Error check_header(const Request& request, Bytes reply) {
   if (request.registers != 2) return 5u + 2u * request.registers;
   return begun.size() > 2 && begun[2] == 3 ? 8 : 9;
 }
+
+// ---- How a host speaks
+
+/// The document gives no time; slaves of this kind need a few milliseconds.
+inline constexpr Time answer_limit = std::chrono::milliseconds(50);
+
+struct Protocol {
+  using Format = rtu::Format;
+  using Request = rtu::Request;
+  using Reply = rtu::Reply;
+  static constexpr std::size_t longest_reply = 9;
+
+  static constexpr author::Wire wire(const Format&, std::uint32_t rate) {
+    return modbus::client_wire({.rate = rate}, answer_limit);
+  }
+  static constexpr author::Wire wire(const Format& format) { return wire(format, format.line().rate); }
+  /// Settings wear the memory: nothing is repeated by itself.
+  static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
+  static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
+  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
+  static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
+    return reply_length(request, reply);
+  }
+  static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
+    if (bytes.empty()) return Error::timeout;
+    return decode_reply(format, request, bytes);
+  }
+  static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
+    if (request.function != function::read) return {};
+    return author::position_reading(reply.singleturn, format.bits);
+  }
+  static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
+  static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {
+    return differ_doubtfully(first, second) ? Error::wrong_length : Error::none;
+  }
+};
+
+/// Function 03. A reply whose length the CRC cannot vouch for is confirmed by a second one.
+using ReadPosition = author::ReadConfirmed<Protocol>;
 
 }  // namespace absenc::raa38::rtu

@@ -1,122 +1,83 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/modbus/frame.hpp"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <string>
-#include <vector>
-
 #include "absenc/core/hex.hpp"
-#include "absenc/protocol/raa38/modbus/explain.hpp"
-#include "absenc/protocol/raa38/modbus/options.hpp"
-#include "absenc/protocol/raa38/unit.hpp"
+#include "absenc/protocol/raa38/modbus/bench_test.hpp"
+#include "absenc/protocol/raa38/modbus/host.hpp"
 
 namespace absenc::raa38::rtu {
 namespace {
 
+using testing::framed;
+using testing::says;
+using testing::Wire;
+
+constexpr Format fine{.bits = 21};
 constexpr Request one_register{};
 constexpr Request two_registers{.registers = 2};
+constexpr Request ask{.function = function::ask_address, .address = any_address};
 
-modbus::FrameBytes frame(std::initializer_list<int> body) {
-  modbus::FrameBytes bytes;
-  for (const int byte : body) bytes.push_back(static_cast<std::uint8_t>(byte));
-  modbus::append_crc(bytes);
-  return bytes;
+Error error_of(const Format& format, const Request& request, const Wire& body) {
+  return decode_reply(format, request, framed(body)).error();
 }
 
-Error error_of(const Format& format, const Request& request, Bytes reply) {
-  return decode_reply(format, request, reply).error();
-}
+static_assert(Format{.bits = 16}.asked() == 1 && Format{.bits = 17}.asked() == 2);
+static_assert(Format{.bits = 14, .registers = 2}.asked() == 2);
 
-TEST(Raa38ModbusFrame, RequestsOfTheManual) {
-  EXPECT_TRUE(std::ranges::equal(encode_request({}).view(), hex<"010300000001840a">));
-  EXPECT_TRUE(std::ranges::equal(encode_request(two_registers).view(), hex<"010300000002c40b">));
-  EXPECT_TRUE(std::ranges::equal(encode_request({.function = function::ask_address, .address = any_address}).view(),
-                                 hex<"ffa04038">));
-  EXPECT_TRUE(
-      std::ranges::equal(encode_request({.function = function::set_address, .value = 2}).view(), hex<"01a102d851">));
-}
-
-TEST(Raa38ModbusFrame, RegistersFollowTheBits) {
-  EXPECT_EQ(Format{.bits = 16}.asked(), 1u);
-  EXPECT_EQ(Format{.bits = 17}.asked(), 2u);
-  EXPECT_EQ((Format{.bits = 14, .registers = 2}.asked()), 2u);
-}
-
-TEST(Raa38ModbusFrame, OneRegisterHasByteCountTwo) {
-  for (int count = 0; count < 256; ++count) {
-    const Error error = error_of({.bits = 14}, one_register, frame({1, 3, count, 0x01, 0x7F}));
-    EXPECT_EQ(error, count == 2 ? Error::none : Error::wrong_length) << count;
+TEST(Raa38ModbusFrame, TheByteCountSaysTheForm) {
+  for (unsigned i = 0; i < 256; ++i) {
+    const auto count = static_cast<std::uint8_t>(i);
+    EXPECT_EQ(error_of({}, one_register, {1, 3, count, 0x01, 0x7F}), i == 2 ? Error::none : Error::wrong_length);
+    const Error nine = error_of(fine, two_registers, {1, 3, count, 0, 0x1F, 0xAB, 0xCD});
+    EXPECT_EQ(nine, i == 4 ? Error::none : Error::wrong_length) << i;
+    const Error eight = error_of(fine, two_registers, {1, 3, count, 0x1F, 0xAB, 0xCD});
+    EXPECT_EQ(eight, i == 3 || i == 4 ? Error::none : Error::wrong_length) << i;
+    const Error ten = error_of(fine, two_registers, {1, 3, count, 0, 0, 0x1F, 0xAB, 0xCD});
+    EXPECT_EQ(ten, Error::wrong_length) << i;
   }
-}
-
-TEST(Raa38ModbusFrame, TwoRegistersComeInThreeForms) {
-  const Format format{.bits = 21};
-  for (int count = 0; count < 256; ++count) {
-    const Error nine = error_of(format, two_registers, frame({1, 3, count, 0, 0x1F, 0xAB, 0xCD}));
-    EXPECT_EQ(nine, count == 4 ? Error::none : Error::wrong_length) << count;
-    const Error eight = error_of(format, two_registers, frame({1, 3, count, 0x1F, 0xAB, 0xCD}));
-    EXPECT_EQ(eight, count == 3 || count == 4 ? Error::none : Error::wrong_length) << count;
-  }
-  EXPECT_EQ(decode_reply(format, two_registers, frame({1, 3, 4, 0x1F, 0xAB, 0xCD}))->singleturn, 0x1FABCDu);
-  EXPECT_EQ(decode_reply(format, two_registers, frame({1, 3, 3, 0x1F, 0xAB, 0xCD}))->singleturn, 0x1FABCDu);
-  EXPECT_EQ(decode_reply(format, two_registers, frame({1, 3, 4, 0, 0x1F, 0xAB, 0xCD}))->singleturn, 0x1FABCDu);
-  EXPECT_EQ(error_of(format, two_registers, frame({1, 3, 4, 0, 0, 0x1F, 0xAB, 0xCD})), Error::wrong_length);
 }
 
 TEST(Raa38ModbusFrame, ThePositionFitsItsBits) {
   for (unsigned bits = 10; bits <= 21; ++bits) {
     const auto most = static_cast<std::uint32_t>(low_mask(bits));
     for (const std::uint32_t position : {most, most + 1}) {
-      const auto byte = [&](unsigned i) { return static_cast<int>(position >> 8 * i & 0xFF); };
-      const Error error = error_of({.bits = bits}, two_registers, frame({1, 3, 4, byte(3), byte(2), byte(1), byte(0)}));
+      const auto byte = [&](unsigned i) { return static_cast<std::uint8_t>(position >> 8 * i); };
+      const Error error = error_of({.bits = bits}, two_registers, {1, 3, 4, byte(3), byte(2), byte(1), byte(0)});
       EXPECT_EQ(error, position == most ? Error::none : Error::out_of_range) << bits;
     }
   }
 }
 
 TEST(Raa38ModbusFrame, OnlyTheAddressMayComeWithTheCrcTheOtherWayRound) {
-  const Request ask{.function = function::ask_address, .address = any_address};
   EXPECT_EQ(decode_reply({}, ask, hex<"ffa00130f8">)->order, CrcOrder::high_first);
   EXPECT_EQ(decode_reply({}, ask, hex<"ffa001f830">)->order, CrcOrder::low_first);
-  EXPECT_EQ(error_of({}, ask, hex<"ffa00130f9">), Error::bad_checksum);
-  EXPECT_EQ(error_of({}, {.function = function::set_address, .value = 2}, hex<"02a168c1">), Error::bad_checksum);
-  EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 1}, hex<"01cc01c0b4">), Error::bad_checksum);
-  EXPECT_EQ(error_of({}, one_register, hex<"0183023f0e">), Error::bad_checksum);
+  const auto error = [](const Request& request, Bytes reply) { return decode_reply({}, request, reply).error(); };
+  EXPECT_EQ(error(ask, hex<"ffa00130f9">), Error::bad_checksum);
+  EXPECT_EQ(error({.function = function::set_address, .value = 2}, hex<"02a168c1">), Error::bad_checksum);
+  EXPECT_EQ(error({.function = function::set_parameter, .value = 1}, hex<"01cc01c0b4">), Error::bad_checksum);
+  EXPECT_EQ(error(one_register, hex<"0183023f0e">), Error::bad_checksum);
   EXPECT_EQ(decode_request(hex<"0103000000010a84">).error(), Error::bad_checksum);
   EXPECT_EQ(decode_request(hex<"ffa03840">).error(), Error::bad_checksum);
 }
 
-TEST(Raa38ModbusFrame, AnAddressIsFrom1To247) {
-  const Request ask{.function = function::ask_address, .address = any_address};
-  for (int address = 0; address < 256; ++address) {
-    const bool good = address >= 1 && address <= 247;
-    EXPECT_EQ(error_of({}, ask, frame({0xFF, 0xA0, address})), good ? Error::none : Error::out_of_range) << address;
+TEST(Raa38ModbusFrame, AnAddressIsFrom1To247AndEveryRefusalHasWords) {
+  for (unsigned i = 0; i < 256; ++i) {
+    const auto byte = static_cast<std::uint8_t>(i);
+    EXPECT_EQ(error_of({}, ask, {0xFF, 0xA0, byte}), i >= 1 && i <= 247 ? Error::none : Error::out_of_range) << i;
+    const Wire refusal = framed({1, 0x83, byte});
+    EXPECT_EQ(decode_reply({}, one_register, refusal).error(), Error::request_rejected) << i;
+    EXPECT_TRUE(says(explain({}, Error::request_rejected, hex<"010300000001840a">, refusal).found, "exception")) << i;
   }
-  EXPECT_EQ(error_of({}, ask, frame({0x01, 0xA0, 0x01})), Error::unexpected_reply);
-}
-
-TEST(Raa38ModbusFrame, EveryRefusalIsOneAndHasWords) {
-  for (int code = 1; code < 256; ++code) {
-    const auto reply = frame({1, 0x83, code});
-    EXPECT_EQ(error_of({}, one_register, reply), Error::request_rejected) << code;
-    const Explanation explanation = explain(one_register, Error::request_rejected, reply);
-    EXPECT_NE(explanation.found.find("exception"), std::string_view::npos);
-  }
-  EXPECT_EQ(error_of({}, one_register, frame({2, 0x83, 2})), Error::unexpected_reply);
-  // To CC it would look like an echo.
-  EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 0x19}, frame({1, 0xCC, 1})),
-            Error::unexpected_reply);
+  EXPECT_EQ(error_of({}, ask, {0x01, 0xA0, 0x01}), Error::unexpected_reply);
+  EXPECT_EQ(error_of({}, one_register, {2, 0x83, 2}), Error::unexpected_reply);
+  // To CC a refusal would look like an echo.
+  EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 0x19}, {1, 0xCC, 1}), Error::unexpected_reply);
 }
 
 TEST(Raa38ModbusFrame, RequestsAreCheckedToo) {
   EXPECT_EQ(decode_request(hex<"0103">).error(), Error::wrong_length);
   EXPECT_EQ(decode_request(hex<"01030000000184">).error(), Error::wrong_length);
-  EXPECT_EQ(decode_request(frame({1, 6, 0, 0, 0, 1})).error(), Error::unsupported);
-  EXPECT_EQ(decode_request(frame({1, 0xA0})).error(), Error::unexpected_reply);
-  EXPECT_EQ(decode_request(frame({9, 3, 0, 5, 0, 2}))->first_register, 5);
-  EXPECT_EQ(error_of({}, {.first_register = 5, .registers = 2}, frame({1, 3, 4, 0, 0, 0, 1})), Error::unsupported);
+  EXPECT_EQ(decode_request(framed({1, 6, 0, 0, 0, 1})).error(), Error::unsupported);
+  EXPECT_EQ(decode_request(framed({1, 0xA0})).error(), Error::unexpected_reply);
+  EXPECT_EQ(error_of({}, {.first_register = 5, .registers = 2}, {1, 3, 4, 0, 0, 0, 1}), Error::unsupported);
 }
 
 TEST(Raa38ModbusFrame, WithoutTheRequestTheReplyTells) {
@@ -129,61 +90,61 @@ TEST(Raa38ModbusFrame, WithoutTheRequestTheReplyTells) {
 
 // A CRC followed by a 00 is a CRC again.
 TEST(Raa38ModbusFrame, ALengthThatTheCrcDoesNotTell) {
-  const Format format{.bits = 21};
-  modbus::FrameBytes followed = frame({1, 3, 4, 0x00, 0x00, 0x05});
+  Wire followed = framed({1, 3, 4, 0x00, 0x00, 0x05});
+  EXPECT_TRUE(decode_reply(fine, two_registers, followed));
+  EXPECT_TRUE(length_is_doubtful(followed));
   followed.push_back(0);
-  EXPECT_EQ(error_of(format, two_registers, followed.view().first(8)), Error::none);
   EXPECT_EQ(modbus::crc_order(followed), CrcOrder::low_first);
   EXPECT_TRUE(length_is_doubtful(followed));
-  EXPECT_TRUE(length_is_doubtful(followed.view().first(8)));
-  EXPECT_FALSE(length_is_doubtful(hex<"010304001fabcd7550">));
-  EXPECT_FALSE(length_is_doubtful(hex<"0103031fabcdcaed">));
-  EXPECT_FALSE(length_is_doubtful(hex<"010302017ff834">));
+  for (const Bytes certain :
+       {Bytes(hex<"010304001fabcd7550">), Bytes(hex<"0103031fabcdcaed">), Bytes(hex<"010302017ff834">)}) {
+    EXPECT_FALSE(length_is_doubtful(certain));
+  }
 }
 
 TEST(Raa38ModbusFrame, EndsAreFoundInARun) {
-  Options options;
-  ASSERT_EQ(resolve_options(modbus_unit, {}, {}, options).kind, OptionError::Kind::none);
-  const auto end = [&](Direction way, std::vector<std::uint8_t> bytes) {
-    return modbus_unit.delimit(options, way, bytes);
+  struct Row {
+    Direction way;
+    Wire bytes;
+    Delimit::Kind kind;
+    std::size_t size = 0;
   };
-  EXPECT_EQ(end(Direction::request, {0x01, 0x03, 0, 0, 0, 1, 0x84, 0x0A, 0x01}).size, 8u);
-  EXPECT_EQ(end(Direction::request, {0xFF, 0xA0, 0x40, 0x38, 0x01}).size, 4u);
-  EXPECT_EQ(end(Direction::request, {0x01, 0x06, 0, 0}).kind, Delimit::Kind::no_frame);
-  EXPECT_EQ(end(Direction::request, {0x01, 0x83, 0, 0}).kind, Delimit::Kind::no_frame);
-  EXPECT_EQ(end(Direction::reply, {0x01, 0x83, 0x02, 0xC0, 0xF1, 0x01}).size, 5u);
-  EXPECT_EQ(end(Direction::reply, {0x09, 0x03, 0x02}).kind, Delimit::Kind::incomplete);
-  EXPECT_EQ(end(Direction::reply, {0x01, 0x03, 0x04, 0x1F, 0xAB, 0xCD, 0xCB, 0x99, 0x01}).size, 8u);
-  EXPECT_EQ(end(Direction::reply, {0x01, 0x03, 0x04, 0x1F, 0xAB, 0xCD, 0xCB, 0x99, 0x00}).size, 8u);
+  using enum Delimit::Kind;
+  const Row rows[]{
+      {Direction::request, {0x01, 0x03, 0, 0, 0, 1, 0x84, 0x0A, 0x01}, complete, 8},
+      {Direction::request, {0xFF, 0xA0, 0x40, 0x38, 0x01}, complete, 4},
+      {Direction::request, {0x01, 0x06, 0, 0}, no_frame},
+      {Direction::request, {0x01, 0x83, 0, 0}, no_frame},
+      {Direction::reply, {0x01, 0x83, 0x02, 0xC0, 0xF1, 0x01}, complete, 5},
+      {Direction::reply, {0x09, 0x03, 0x02}, incomplete, 7},
+      {Direction::reply, {0x01, 0x03, 0x04, 0x1F, 0xAB, 0xCD, 0xCB, 0x99, 0x01}, complete, 8},
+      {Direction::reply, {0x01, 0x03, 0x04, 0x1F, 0xAB, 0xCD, 0xCB, 0x99, 0x00}, complete, 8},
+  };
+  for (const Row& row : rows) {
+    const Delimit end = modbus_unit.delimit(options_of({}), row.way, row.bytes);
+    EXPECT_EQ(end.kind, row.kind);
+    EXPECT_TRUE(row.size == 0 || end.size == row.size) << end.size;
+  }
 }
 
 struct Evidence final : EvidenceSink {
   void put(const OptionEvidence& one) override {
-    if (one.possible) possible.push_back({one.option, one.value});
-    if (!one.possible) reasons.emplace_back(one.why);
+    possible += one.possible ? 1 : 0;
+    reasons += std::string(one.why) + "\n";
   }
-  std::vector<std::pair<std::size_t, std::int64_t>> possible;
-  std::vector<std::string> reasons;
+  unsigned possible = 0;
+  std::string reasons;
 };
 
 TEST(Raa38ModbusProbe, FramesTellRegistersAndHowManyBitsAtLeast) {
-  Options options;
-  ASSERT_EQ(resolve_options(modbus_unit, {}, {}, options).kind, OptionError::Kind::none);
+  Options options = options_of({});
   Evidence evidence;
-  const std::vector<Capture> captures{{{}, hex<"010304001fabcd7550">}};
-  ASSERT_TRUE(modbus_unit.probe(options, captures, evidence));
-  EXPECT_EQ(rtu::options.format(options).bits, 21u);
-  EXPECT_EQ(rtu::options.format(options).asked(), 2u);
-  EXPECT_EQ(evidence.possible.size(), 3u);  // 21 bits; auto and 2 registers
-}
-
-TEST(Raa38ModbusProbe, ADamagedFrameIsExplainedByNothing) {
-  Options options;
-  ASSERT_EQ(resolve_options(modbus_unit, {}, {}, options).kind, OptionError::Kind::none);
-  Evidence evidence;
-  const std::vector<Capture> captures{{{}, hex<"010302017ff834">}, {{}, hex<"010302017ff835">}};
-  EXPECT_FALSE(modbus_unit.probe(options, captures, evidence));
-  EXPECT_TRUE(std::ranges::any_of(evidence.reasons, [](const auto& why) { return why.find("checksum") != why.npos; }));
+  ASSERT_TRUE(modbus_unit.probe(options, std::vector<Capture>{{{}, hex<"010304001fabcd7550">}}, evidence));
+  EXPECT_EQ(options.values, options_of(fine).values) << "two registers are what so many bits need";
+  EXPECT_EQ(evidence.possible, 3u);  // 21 bits; auto and 2 registers
+  const std::vector<Capture> damaged{{{}, hex<"010302017ff834">}, {{}, hex<"010302017ff835">}};
+  EXPECT_FALSE(modbus_unit.probe(options, damaged, evidence));
+  EXPECT_TRUE(says(evidence.reasons, "checksum"));
 }
 
 }  // namespace

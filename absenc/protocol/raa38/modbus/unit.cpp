@@ -5,19 +5,34 @@
 
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/raa38/modbus/device.hpp"
-#include "absenc/protocol/raa38/modbus/explain.hpp"
-#include "absenc/protocol/raa38/modbus/fields.hpp"
-#include "absenc/protocol/raa38/modbus/options.hpp"
-#include "absenc/protocol/raa38/modbus/probe.hpp"
-#include "absenc/protocol/raa38/modbus/procedures.hpp"
+#include "absenc/protocol/raa38/modbus/host.hpp"
 #include "absenc/protocol/raa38/modbus/vectors.hpp"
+#include "absenc/protocol/raa38/probe.hpp"
 
 namespace absenc::raa38 {
 
 namespace rtu {
 namespace {
 
-using author::command;
+using author::field;
+using author::option;
+using author::probeable;
+
+constexpr std::array<std::string_view, 3> register_choices{"auto", "1", "2"};
+constexpr std::array<std::string_view, bauds.size()> baud_choices{"2400", "4800", "9600", "19200", "57600"};
+constexpr std::array<std::string_view, 3> data_choices{"four", "three", "three_as_four"};
+
+constexpr author::OptionsOf options{
+    author::with_role<Role::encoder>(
+        option<&Format::address>("address", "of the encoder", modbus::first_address, modbus::last_address)),
+    probeable(option<&Format::bits>("bits", "of the position within the turn", 10, 21)),
+    probeable(
+        option<&Format::registers>("registers", "to ask for; auto: one up to 16 bits, two above", register_choices)),
+    author::with_role<Role::rate>(option<&Format::baud>("baud", "bits a second", baud_choices)),
+    option<&Format::data>("reply_data",
+                          "virtual encoder: bytes of data for two registers, and how many the byte count says",
+                          data_choices),
+};
 
 constexpr Argument force{"force",    "1: also what is so already (each time wears the memory)", 0, 1, 0, false,
                          Role::force};
@@ -34,7 +49,6 @@ constexpr std::array<Argument, 2> scan_arguments{
 
 // ---- The one request that does the command's work; procedures send more.
 
-constexpr Request to_look(const Format& format) { return read_request(format); }
 constexpr Request to_read(const Format& format, Arguments) { return read_request(format); }
 constexpr Request to_ask_address(const Format&, Arguments) {
   return {.function = function::ask_address, .address = any_address};
@@ -42,11 +56,9 @@ constexpr Request to_ask_address(const Format&, Arguments) {
 constexpr Request to_set(const Format& format, std::uint8_t code, std::int64_t value) {
   return {.function = code, .address = format.address, .value = static_cast<std::uint8_t>(value)};
 }
-constexpr Request to_set_address(const Format& format, Arguments arguments) {
-  return to_set(format, function::set_address, arguments[0]);
-}
-constexpr Request to_set_direction(const Format& format, Arguments arguments) {
-  return to_set(format, function::set_parameter, arguments[0]);
+template <std::uint8_t code>
+constexpr Request to_give(const Format& format, Arguments arguments) {
+  return to_set(format, code, arguments[0]);
 }
 constexpr Request to_set_zero(const Format& format, Arguments) {
   return to_set(format, function::set_parameter, parameter::zero);
@@ -91,102 +103,146 @@ Delimit delimit(const Options& values, Direction way, Bytes bytes) {
   return {bytes.size() < length ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
 }
 
-// ---- What is declared
+// ---- What captured frames tell. Whose address they have does not matter.
 
-// A position beside other things, as several conversations report it.
-constexpr void put_position(FieldSink& sink, const Format& format, const Reading& reading) {
-  const auto singleturn = static_cast<std::uint32_t>(reading.singleturn);
-  fields.put(sink, {.singleturn = singleturn, .angle = degrees(singleturn, format.bits)});
-  sink.put_reading(reading);
+/// What a good capture says; `reply` is empty where there was none. Or what is wrong with it whatever the options.
+struct Judged {
+  Request request{};
+  std::optional<Reply> reply{};
+  std::string_view wrong{};
+};
+
+Judged look_at(const Capture& capture) {
+  Format most{.bits = 21};
+  if (!capture.reply.empty()) most.address = capture.reply[0];
+  const Result<Request> request = capture.request.empty()
+                                      ? assumed_request(Format{.address = most.address}, capture.reply)
+                                      : decode_request(capture.request);
+  if (!request) return {.wrong = text_of(request.error()).description};
+  if (capture.reply.empty()) return {*request};
+  const Result<Reply> reply = decode_reply(most, *request, capture.reply);
+  if (reply) return {*request, *reply};
+  // A refusal is a good frame, which tells nothing of the bits.
+  if (reply.error() == Error::request_rejected) return {*request};
+  return {.wrong = text_of(reply.error()).description};
 }
 
-// How each setting is told.
-struct SetAddress : Set {};
-struct SetBaud : Set {};
-struct SetDirection : Set {};
-struct SetZero : Set {};
+std::string_view against_bits(std::int64_t bits, const Judged& seen) {
+  if (!seen.wrong.empty() || !seen.reply || seen.request.function != function::read) return seen.wrong;
+  if (seen.reply->singleturn >> bits != 0) return "the position has more bits";
+  return seen.request.registers == 1 && bits > 16 ? "one register was answered, and so many bits do not fit" : "";
+}
 
-struct Definition {
-  using Protocol = rtu::Protocol;
+std::string_view against_registers(const Format& format, const Judged& seen) {
+  if (!seen.wrong.empty() || seen.request.function != function::read) return seen.wrong;
+  return seen.request.registers != format.asked() ? "another number of registers was asked for" : "";
+}
+
+bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
+  constexpr std::string_view agrees = "agrees with all frames";
+  constexpr std::size_t bits = options.find("bits");
+  constexpr std::size_t registers = options.find("registers");
+  const Option& range = options.infos[bits];
+  const bool bits_found =
+      judge(sink, bits, range.minimum, range.maximum, captures.size(), values.values[bits], agrees,
+            [&](std::int64_t value, std::size_t i) { return against_bits(value, look_at(captures[i])); });
+  const bool registers_found = judge(sink, registers, 0, 2, captures.size(), values.values[registers], agrees,
+                                     [&](std::int64_t value, std::size_t i) {
+                                       Format format = options.format(values);
+                                       format.registers = static_cast<unsigned>(value);
+                                       return against_registers(format, look_at(captures[i]));
+                                     });
+  return bits_found && registers_found;
+}
+
+// ---- What is declared
+
+struct Definition : author::Declares<Definition, Protocol> {
   using Encoder = VirtualEncoder;
   static constexpr std::string_view id = "raa38-modbus", name = "RAA38S6 over Modbus RTU",
                                     document = "RAA38S6 Operation Manual, 3.1.7";
   static constexpr LinkKind link = LinkKind::half_duplex;
   static constexpr std::size_t frames_size = 1300;
   static constexpr auto options = rtu::options;
-  static constexpr auto fields = rtu::fields;
   static constexpr auto vectors = rtu::vectors;
   static constexpr auto probe = rtu::probe;
   static constexpr auto delimit = rtu::delimit;
+  static constexpr auto explain = rtu::explain;
   static constexpr std::array models{author::ModelText{"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, ""}};
   // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.
   static constexpr LineTiming timing{.pause_bits = 25, .turnaround_limit = answer_limit};
 
+  static constexpr auto fields = author::fields_of<Values>(
+      field<&Values::address>("address", "", "address of the encoder", Role::encoder),
+      field<&Values::function>("function", "", "function code"),
+      field<&Values::first_register>("first_register", "", "where reading begins"),
+      field<&Values::registers>("registers", "", "how many are asked for"),
+      field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
+      field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
+      field<&Values::new_address>("new_address", "", "address from now on"),
+      field<&Values::parameter>("parameter", "", "what function CC sets"),
+      field<&Values::setting>("setting", "", "the same in words"),
+      field<&Values::crc_order>("crc_order", "", "which byte of the CRC comes first"),
+      field<&Values::baud>("baud", "bit/s", "the baud rate at which it answers"),
+      field<&Values::direction>("direction", "", "in which direction it counts"),
+      field<&Values::effect>("effect", "", "what became of the position"),
+      field<&Values::written>("written", "", "whether the setting was sent; it is not where it is so already"),
+      field<&Values::encoder_address>("encoder_address", "", "address that answers", Role::encoder),
+      field<&Values::clash>("clash", "", "the answer is damaged every time", Role::clash),
+      field<&Values::refuses>("refuses", "", "it answers with an exception: another kind of Modbus slave?"));
+
   static constexpr Command position{"position", Verb::read, 0, "position within the turn"};
   static constexpr std::array commands{
-      author::reading<Definition, Protocol, to_look, ReadPosition>(position).or_when(
-          has_too_few_registers, command<Definition, Protocol, Looked, look_once, to_read>(position)),
-      command<Definition, Protocol, Address, ask_address, to_ask_address>(
-          {"address", Verb::config_get, 0, "address of the encoder"}),
-      command<Definition, Protocol, Baud, find_baud, to_read>(
+      author::reading<Definition, Protocol, read_request, ReadPosition>(position).or_when(
+          has_too_few_registers, command<Found, look_once, to_read>(position)),
+      command<Found, ask_address, to_ask_address>({"address", Verb::config_get, 0, "address of the encoder"}),
+      command<Found, find_baud, to_read>(
           {"baud", Verb::config_get, 0, "the baud rate at which it answers", {}, false, false}),
-      command<Definition, Protocol, Seen, look_at_direction, to_read>(
+      command<Found, look_at_direction, to_read>(
           {"direction", Verb::config_get, 0, "in which direction it counts: only the position shows it"}),
-      command<Definition, Protocol, SetAddress, set_address, to_set_address>(
-          {"set-address", Verb::config_set, 0, "give it another address", address_arguments, true, false, "address",
-           "address"}),
-      command<Definition, Protocol, SetBaud, set_baud, to_set_baud>(
+      command<Found, set_address, to_give<function::set_address>>({"set-address", Verb::config_set, 0,
+                                                                   "give it another address", address_arguments, true,
+                                                                   false, "address", "address"}),
+      command<Found, set_baud, to_set_baud>(
           {"set-baud", Verb::config_set, 0, "give it another baud rate", baud_arguments, true, false, "baud", "baud"}),
-      command<Definition, Protocol, SetDirection, set_direction, to_set_direction>(
-          {"set-direction", Verb::config_set, 0, "set in which direction it counts", direction_arguments, true, false,
-           "direction"}),
-      command<Definition, Protocol, SetZero, set_zero, to_set_zero>(
+      command<Found, set_direction, to_give<function::set_parameter>>({"set-direction", Verb::config_set, 0,
+                                                                       "set in which direction it counts",
+                                                                       direction_arguments, true, false, "direction"}),
+      command<Found, set_zero, to_set_zero>(
           {"zero", Verb::zero, 0, "make this the zero of the turn", zero_arguments, true, false}),
-      command<Definition, Protocol, Slaves, scan, to_ask_address>(
+      command<Slaves, scan, to_ask_address>(
           {"scan", Verb::scan, 0, "who answers on the line", scan_arguments, false, false}),
   };
 
-  static constexpr LineSettings line(const Format& format) { return format.line(); }
-  static constexpr Resolution resolution(const Format& format) { return {.singleturn_bits = format.bits}; }
   static constexpr Request guess_request(const Format& format, Bytes reply) { return assumed_request(format, reply); }
-  static Explanation explain(const Format& format, Error error, Bytes asked, Bytes reply) {
-    const Result<Request> request = asked.empty() ? assumed_request(format, reply) : decode_request(asked);
-    return request ? rtu::explain(*request, error, reply) : explain_request(error, asked);
-  }
 
-  static constexpr void put(FieldSink& sink, const Format&, const Request& request) {
-    fields.put(sink, values_of(request));
+  static constexpr Values values(const Format&, const Request& request) {
+    Values values{.function = request.function, .crc_order = "low_first"};
+    if (request.function != function::ask_address) values.address = request.address;
+    if (request.function == function::read) {
+      values.first_register = request.first_register;
+      values.registers = request.registers;
+    }
+    if (request.function == function::set_address) values.new_address = request.value;
+    if (request.function == function::set_parameter) show_setting(values, request.value);
+    return values;
   }
-  static constexpr void put(FieldSink& sink, const Format& format, const Request&, const Reply& reply) {
-    fields.put(sink, values_of(format, reply));
+  static constexpr Values values(const Format& format, const Request&, const Reply& reply) {
+    Values values{.function = reply.function,
+                  .crc_order = reply.order == CrcOrder::high_first ? "high_first" : "low_first"};
+    (reply.function == function::set_address ? values.new_address : values.address) = reply.address;
+    if (reply.function == function::read) {
+      values.singleturn = reply.singleturn;
+      values.angle = degrees(reply.singleturn, format.bits);
+    }
+    if (reply.function == function::set_parameter) show_setting(values, reply.value);
+    return values;
   }
-  static void put(FieldSink& sink, const Format& format, const Looked& found) {
-    put_position(sink, format, found.reading);
+  static constexpr void show_setting(Values& values, std::uint8_t value) {
+    values.parameter = value;
+    values.setting = name_of_setting(value);
   }
-  static void put(FieldSink& sink, const Format&, const Seen& found) {
-    fields.put(sink,
-               {.singleturn = found.singleturn, .direction = "the encoder does not tell: turn the shaft and see"});
-  }
-  static void put(FieldSink& sink, const Format&, const Address& found) {
-    fields.put(sink, {.address = found.address});
-  }
-  static void put(FieldSink& sink, const Format&, const Baud& found) { fields.put(sink, {.baud = bauds[found.index]}); }
-  static void put(FieldSink& sink, const Format&, const SetAddress& found) {
-    fields.put(sink, {.address = static_cast<std::uint16_t>(found.value), .written = found.written});
-  }
-  static void put(FieldSink& sink, const Format&, const SetBaud& found) {
-    fields.put(sink, {.baud = static_cast<std::uint32_t>(found.value), .written = found.written});
-  }
-  static void put(FieldSink& sink, const Format&, const SetDirection& found) {
-    const auto value = static_cast<std::uint8_t>(found.value);
-    fields.put(
-        sink,
-        {.parameter = value, .setting = name_of_setting(value), .effect = found.effect, .written = found.written});
-  }
-  static void put(FieldSink& sink, const Format& format, const SetZero& found) {
-    put_position(sink, format, found.reading);
-    fields.put(sink, {.written = found.written});
-  }
+  static constexpr Values values(const Format&, const Found& found) { return found; }
   static void put(FieldSink& sink, const Format&, const Slaves& found) {
     using Kind = Slaves::Kind;
     for (std::size_t i = 0; i < found.at.size(); ++i) {

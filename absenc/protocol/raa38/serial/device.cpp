@@ -1,144 +1,92 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/raa38/serial/device.hpp"
 
-#include <algorithm>
-
-#include "absenc/protocol/raa38/serial/timing.hpp"
+#include <utility>
 
 namespace absenc::raa38::serial {
 
 using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
-VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
-    : format_(format), period_(format.period() > Time{} ? format.period() : virtual_period), shaft_(&shaft) {
-  if (format_.acquisition == Time{}) format_.acquisition = virtual_acquisition;
-}
-
 ByteStep VirtualEncoder::next(Time now) {
-  if (on_ && format_.mode == Mode::timing && !transmitting_ && now >= due_) stream(now);
-  if (frame_pending_) return transmit();
-  ByteStep step{.expect = 1, .at = never};
-  if (on_ && format_.mode == Mode::timing && !transmitting_) step.at = due_;
-  if (!heard_.empty()) step.gap = request_gap;
+  if (std::exchange(pending_, false)) return character();
+  const bool streams = format().mode == Mode::timing && is_on(now) && !is_transmitting();
+  if (streams && now >= due_) {
+    // What was held up is made up for, so that the rate stays; after a long time there is no use in it.
+    if (now - due_ > most_backlog) due_ = now;
+    transmit(encode_position(format(), position(due_)), due_);
+    due_ += format().period() > Time{} ? format().period() : virtual_period;
+  }
+  ByteStep step = BusDevice::next(now);
+  if (step.kind == ByteStep::Kind::transfer && format().transmission > Time{}) {
+    frame_ = step.out;
+    frame_at_ = step.at;
+    sent_ = 0;
+    return character();
+  }
+  if (step.kind == ByteStep::Kind::wait && streams && !is_transmitting()) step.at = due_;
   return step;
 }
 
-// As long as the frame was ordered to take: character by character.
-ByteStep VirtualEncoder::transmit() {
-  frame_pending_ = false;
-  const Bytes rest = frame_.view().subspan(sent_);
+// As long as the frame was ordered to take.
+ByteStep VirtualEncoder::character() {
   const auto before = static_cast<std::int64_t>(sent_);
-  const Time at = frame_at_ + before * format_.transmission / static_cast<std::int64_t>(frame_.size());
-  const Bytes out = format_.transmission > Time{} ? rest.first(1) : rest;
-  sent_ += out.size();
-  return {.kind = ByteStep::Kind::transfer, .out = out, .at = at};
-}
-
-// What was held up is made up for, so that the rate stays; after a long time there is no use in it.
-void VirtualEncoder::stream(Time now) {
-  if (now - due_ > most_backlog) due_ = now;
-  send(format_.own_second_byte(), due_, due_);
-  due_ += period_;
+  const Time at = frame_at_ + before * format().transmission / static_cast<std::int64_t>(frame_.size());
+  return {.kind = ByteStep::Kind::transfer, .out = frame_.subspan(sent_++, 1), .at = at};
 }
 
 void VirtualEncoder::feed(const ByteEvent& event) {
-  switch (event.kind) {
-    case ByteEvent::Kind::sent:
-      transmitting_ = frame_pending_ = sent_ < frame_.size();
-      break;
-    case ByteEvent::Kind::received:
-      if (on_) received(event.items, event.at);
-      break;
-    case ByteEvent::Kind::triggered:
-      if (on_) triggered(event);
-      break;
-    case ByteEvent::Kind::silence:
-    case ByteEvent::Kind::line_error:
-      heard_.clear();
-      break;
-    default:
-      break;
+  pending_ = pending_ || (event.kind == ByteEvent::Kind::sent && sent_ < frame_.size());
+  if (pending_) return;
+  if (event.kind == ByteEvent::Kind::sent) frame_ = {};
+  if (event.kind == ByteEvent::Kind::triggered && is_on(event.at)) triggered(event);
+  if (event.kind == ByteEvent::Kind::received) {
+    if (format().mode != Mode::bus) return;
+    if (is_transmitting()) return hear_meanwhile(event.items, event.at);
   }
+  BusDevice::feed(event);
+}
+
+void VirtualEncoder::power_off(Time now) {
+  BusDevice::power_off(now);
+  frame_ = {};
+  pending_ = false;
 }
 
 void VirtualEncoder::triggered(const ByteEvent& event) {
   if (event.line == Line::clear) {
-    if (format_.zeroing == Zeroing::line) set_zero(event.at);
+    if (format().zeroing == Zeroing::line) store_zero(event.at, 0);
     return;
   }
-  if (format_.mode != Mode::handshake) return;
+  if (format().mode != Mode::handshake) return;
   if (event.width < trigger_width) return violate("pulse on CLK shorter than 10 us (T2)", event.at);
-  if (transmitting_) return violate("pulse on CLK before the last frame was out (T1)", event.at);
-  send(format_.own_second_byte(), event.at, event.at + format_.acquisition);
+  if (is_transmitting()) return violate("pulse on CLK before the last frame was out (T1)", event.at);
+  transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
-// Others on the bus transmit frames, which may hold the begin of a request; their sums make no whole one of it.
-void VirtualEncoder::received(Bytes bytes, Time at) {
-  if (format_.mode != Mode::bus) return;
+// Two of one number send at the same time: only a request breaks a rule.
+void VirtualEncoder::hear_meanwhile(Bytes bytes, Time at) {
+  const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
   for (const std::uint8_t byte : bytes) {
-    heard_.push_back(byte);
-    const RequestBytes request = encode_request({});
-    const bool begins = heard_[0] == request[0] && (heard_.size() < 2 || heard_[1] == request[1]);
-    if (begins && heard_.size() < request_bytes) continue;
-    const Result<Request> complete = decode_request(heard_);
-    heard_.clear();
-    if (complete) {
-      request_received(*complete, at);
-    } else if (byte == request[0]) {
-      heard_.push_back(byte);
-    }
+    meanwhile_ = (meanwhile_ << 8 | byte) & 0xFFFFFF;
+    if (meanwhile_ == own) violate("request during the encoder's transmission", at);
   }
 }
 
-void VirtualEncoder::request_received(const Request& request, Time at) {
-  if (request.kind == Request::Kind::zero_clear) {
-    if (format_.zeroing == Zeroing::command && request.unit == format_.zeroed_unit()) set_zero(at);
-  } else if (request.unit == format_.unit && transmitting_) {
-    violate("request during the encoder's transmission", at);
-  } else if (request.unit == format_.unit) {
-    send(format_.own_second_byte(), at, at + format_.acquisition);
-  }
+bool VirtualEncoder::is_mine(const Request& request) const {
+  if (request.kind == Request::Kind::read) return request.unit == format().unit;
+  return format().zeroing == Zeroing::command && request.unit == format().zeroed_unit();
 }
 
-void VirtualEncoder::set_zero(Time at) {
-  store_little_endian(memory_, shaft_counts(at));
-  ++memory_version_;
-  ++writes_;
+std::optional<Position> VirtualEncoder::answer(const Request& request, Time at) {
+  if (request.kind == Request::Kind::read) return position(at);
+  store_zero(at, 0);
+  return std::nullopt;
 }
 
-void VirtualEncoder::send(std::uint8_t second_byte, Time latched, Time at) {
-  const auto zero = static_cast<std::uint32_t>(load_little_endian(memory_));
-  const auto mask = static_cast<std::uint32_t>(low_mask(format_.bits));
-  frame_ = encode_position(format_, {(shaft_counts(latched) - zero) & mask, second_byte});
-  frame_at_ = at;
-  sent_ = 0;
-  frame_pending_ = transmitting_ = true;
-  ++answered_;
-}
-
-std::uint32_t VirtualEncoder::shaft_counts(Time at) const {
-  const auto fraction = static_cast<std::uint32_t>(shaft_->at(at).position);
-  return fraction >> (32 - format_.bits);
-}
-
-void VirtualEncoder::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
-}
-
-// No start-up time is stated.
-void VirtualEncoder::power_on(Time now, PowerOn) {
-  if (on_) return;
-  on_ = true;
-  due_ = now;
-  heard_.clear();
-}
-
-void VirtualEncoder::power_off(Time) {
-  on_ = false;
-  frame_pending_ = transmitting_ = false;
-  sent_ = frame_.size();
+Position VirtualEncoder::position(Time at) const {
+  const auto place = static_cast<std::uint64_t>(counts(at, format().bits, 0)) & low_mask(format().bits);
+  return {static_cast<std::uint32_t>(place), format().own_second_byte()};
 }
 
 }  // namespace absenc::raa38::serial

@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of the RAA38S6 on asynchronous lines (RS-485, RS-232, RS-422 carry the same bytes): encode, decode and every
-// check they allow. README.md draws them.
+// The RAA38S6 on asynchronous lines (RS-485, RS-232, RS-422 carry the same bytes): its frames, with every check that
+// they allow, and times. README.md draws them.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
-#include "absenc/core/bytes.hpp"
-#include "absenc/core/result.hpp"
-#include "absenc/core/time.hpp"
+#include "absenc/protocol/author/confirm.hpp"
+#include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/look.hpp"
 
 namespace absenc::raa38::serial {
+
+using namespace std::chrono_literals;
 
 /// What starts a frame.
 enum class Mode : std::uint8_t {
@@ -40,6 +45,27 @@ inline constexpr unsigned least_bits = 10;
 inline constexpr unsigned most_bits = 21;
 inline constexpr std::size_t request_bytes = 3;
 inline constexpr std::size_t frame_capacity = 6;
+
+// ---- Times. The document states T2 and nothing else; the rest is ours.
+
+inline constexpr Time trigger_width = 10us;  // T2, at least (3.1.3)
+inline constexpr Time clear_width = 1ms;     // of the pulse on CLR
+
+// How long a host waits, when the options do not say what was ordered.
+inline constexpr Time answer_limit = 100ms;  // T3, and from a request to its answer
+inline constexpr Time answer_slack = 5ms;    // beyond a T3 that is given
+inline constexpr Time gap_limit = 10ms;      // between characters: 1200 baud
+inline constexpr Time patience = 1s;         // with a line that is never silent: two frames at 1200 baud are 130 ms
+inline constexpr Time listen_limit = 1s;     // without a good frame of an encoder that transmits by itself
+inline constexpr Time scan_silence = 200ms;  // before a scan: longer than most refresh rates take
+inline constexpr Time zero_limit = 500ms;    // until the position must be zero
+inline constexpr Time zero_poll = 10ms;
+
+// The virtual encoder, where the options do not say.
+inline constexpr Time virtual_period = 10ms;        // refresh rate 100 Hz
+inline constexpr Time virtual_acquisition = 100us;  // T3
+inline constexpr Time most_backlog = 50ms;          // a stream that was held up longer leaves frames out
+inline constexpr Time request_gap = 2ms;            // after which the beginning of a request is forgotten
 
 /// How an encoder was ordered.
 struct Format {
@@ -156,13 +182,84 @@ struct Request {
   return static_cast<double>(moved < 0 ? -moved : moved) <= allowed;
 }
 
-[[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position, Time latched,
-                                           Time received) {
+/// What frames and commands are shown as, in this order.
+struct Values {
+  std::optional<std::uint8_t> encoder_address{};
+  std::optional<bool> clash{};
+  std::optional<std::uint32_t> before{};
+  std::optional<std::uint32_t> singleturn{};
+  std::optional<std::uint8_t> second_byte{};
+  std::optional<double> angle{};
+  std::optional<std::string_view> command{};
+  std::optional<std::uint8_t> unit{};
+  std::optional<std::uint64_t> skipped{};
+};
+
+[[nodiscard]] constexpr Values values_of(const Format& format, const Position& position) {
   return {.singleturn = position.singleturn,
-          .singleturn_bits = format.bits,
-          .singleturn_valid_bits = format.bits,
-          .latched = latched,
-          .received = received};
+          .second_byte = position.second_byte,
+          .angle = degrees(position.singleturn, format.bits)};
 }
+
+struct Protocol {
+  using Format = serial::Format;
+  using Request = serial::Request;
+  using Reply = Position;
+  static constexpr std::size_t longest_reply = frame_capacity;
+
+  static constexpr author::Wire wire(const Format& format) {
+    return {.answer_limit = format.acquisition > Time{} ? format.acquisition + answer_slack : answer_limit,
+            .gap_limit = std::max(format.transmission, gap_limit),
+            .patience = patience};
+  }
+  static constexpr author::Manner manner(const Format&, const Request& request) {
+    switch (request.kind) {
+      case Request::Kind::trigger:
+        return {.pulse = trigger_width, .line = Line::trigger};
+      case Request::Kind::clear:
+        return {.answered = false, .pulse = clear_width, .line = Line::clear};
+      default:
+        return {.answered = request.kind == Request::Kind::read};
+    }
+  }
+  static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
+  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
+  static constexpr std::size_t request_size(Bytes begin) {
+    const RequestBytes request = encode_request({});
+    return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
+  }
+  static constexpr std::size_t reply_size(const Format& format, const Request& request) {
+    return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
+  }
+  static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
+  static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
+    return encode_position(format, position);
+  }
+  static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
+    if (bytes.empty()) return Error::timeout;
+    if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;  // nothing answers it
+    return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : anybody);
+  }
+  static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
+    return author::position_reading(position.singleturn, format.bits);
+  }
+  static constexpr author::DeviceTimes device_times(const Format& format) {
+    return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
+  }
+  /// The sum does not see swapped bytes; a speed that no shaft has shows them.
+  static constexpr bool needs_another(const Format& format, const Position&) { return format.maximum_rpm != 0; }
+  static constexpr Error agree(const Format& format, const Position& first, const Position& second, Time between) {
+    const bool possible = is_possible(format, first.singleturn, second.singleturn, between);
+    return possible ? Error::none : Error::cross_check_failed;
+  }
+};
+
+/// What asks this encoder for a position.
+[[nodiscard]] constexpr Request position_request(const Format& format) {
+  return {format.mode == Mode::bus ? Request::Kind::read : Request::Kind::trigger, format.unit};
+}
+
+/// One position of an encoder that is asked.
+using ReadPosition = author::ReadConfirmed<Protocol>;
 
 }  // namespace absenc::raa38::serial

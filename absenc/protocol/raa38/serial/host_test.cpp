@@ -1,60 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 // Host against virtual encoder in virtual time.
-#include <gtest/gtest.h>
-
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
 
 namespace absenc::raa38::serial {
 namespace {
 
 using namespace testing;
-using Wire = std::vector<std::uint8_t>;
 
 constexpr Format timing{.mode = Mode::timing, .zeroing = Zeroing::line};
 constexpr Format handshake{.mode = Mode::handshake, .zeroing = Zeroing::line};
 constexpr Format bus{.mode = Mode::bus, .zeroing = Zeroing::command};
+constexpr Format bus_with_line{.mode = Mode::bus, .zeroing = Zeroing::line};
 
 const auto frame_time = 5 * line_of_tests.character();
 
-Talk converse(Bench& bench, std::string_view command = "position") {
-  Talk talk(bench.settings, command);
-  bench.run(talk);
-  return talk;
+Format with(Format format, auto member, auto value) {
+  format.*member = value;
+  return format;
 }
 
 TEST(RaaHandshake, AFrameForEachPulse) {
   Bench bench(handshake);
-  const Talk read = converse(bench);
-  ASSERT_EQ(read.error(), Error::none);
-  EXPECT_EQ(read.reading()->singleturn, 383u);
-  EXPECT_EQ(read.reading()->latched, Time{}) << "at the edge";
-  EXPECT_EQ(bench.took, virtual_acquisition + frame_time) << "T1";
+  const End read = bench.does("position");
+  EXPECT_EQ(read.reading->singleturn, 383u);
+  EXPECT_EQ(read.reading->latched, Time{}) << "at the edge";
+  EXPECT_EQ(read.took, virtual_acquisition + frame_time) << "T1";
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
+  // T3 may be shorter than the pulse.
+  EXPECT_TRUE(ended(Bench(with(handshake, &Format::acquisition, Time(1))).does("position"), Error::none));
 }
 
 TEST(RaaHandshake, T3IsAsOrdered) {
-  Format slow = handshake;
-  slow.acquisition = 250ms;
-  Bench bench(slow);
-  EXPECT_EQ(converse(bench).error(), Error::none);
-  EXPECT_EQ(bench.took, 250ms + frame_time);
-  Talk unknowing(handshake, "position");
-  bench.run(unknowing);
-  EXPECT_EQ(unknowing.error(), Error::timeout);
-  EXPECT_EQ(unknowing.detail(), "no frame followed the pulse");
-  EXPECT_NE(unknowing.advice().find("CLK"), std::string_view::npos);
+  Bench bench(with(handshake, &Format::acquisition, Time(250ms)));
+  EXPECT_EQ(bench.does("position").took, 250ms + frame_time);
+  const End unknowing = bench.does(handshake, "position");
+  EXPECT_TRUE(ended(unknowing, Error::timeout, "no frame followed the pulse"));
+  EXPECT_TRUE(says(unknowing.words, "CLK"));
 }
 
 TEST(RaaHandshake, AFrameTakesAsLongAsOrdered) {
-  Format slow = handshake;
-  slow.transmission = 60ms;
+  const Format slow = with(handshake, &Format::transmission, Time(60ms));
   Bench bench(slow);
-  EXPECT_EQ(converse(bench).error(), Error::none);
-  EXPECT_GT(bench.took, virtual_acquisition + 4 * slow.transmission / 5) << "T1 - T3";
-  EXPECT_LE(bench.took, virtual_acquisition + slow.transmission);
-  Talk unknowing(handshake, "position");
-  bench.run(unknowing);
-  EXPECT_EQ(unknowing.error(), Error::wrong_length);
+  const End read = bench.does("position");
+  EXPECT_TRUE(ended(read, Error::none));
+  EXPECT_GT(read.took, virtual_acquisition + 4 * slow.transmission / 5) << "T1 - T3";
+  EXPECT_LE(read.took, virtual_acquisition + slow.transmission);
+  EXPECT_TRUE(ended(bench.does(handshake, "position"), Error::wrong_length));
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
@@ -62,27 +53,18 @@ TEST(RaaHandshake, TheWholeFrameMayComeDuringThePulse) {
   using Event = absenc::Event<std::uint8_t>;
   const FrameBytes frame = encode_position(handshake, {383});
   Talk read(handshake, "position");
-  ASSERT_EQ(read.next(Time{}).kind, Step<std::uint8_t>::Kind::pulse);
-  read.feed({.kind = Event::Kind::received, .at = 5us, .items = frame.view()});
-  read.feed({.kind = Event::Kind::sent, .at = trigger_width});
-  ASSERT_NE(read.reading(), nullptr);
-  EXPECT_EQ(read.reading()->singleturn, 383u);
-}
-
-TEST(RaaHandshake, T3MayBeShorterThanThePulse) {
-  Format fast = handshake;
-  fast.acquisition = Time(1);
-  Bench bench(fast);
-  EXPECT_EQ(converse(bench).error(), Error::none);
+  ASSERT_EQ(read->next(Time{}).kind, Step<std::uint8_t>::Kind::pulse);
+  read->feed({.kind = Event::Kind::received, .at = 5us, .items = frame.view()});
+  read->feed({.kind = Event::Kind::sent, .at = trigger_width});
+  ASSERT_NE(read->reading(), nullptr);
+  EXPECT_EQ(read->reading()->singleturn, 383u);
 }
 
 TEST(RaaBus, TheUnitThatIsAskedAnswersInEitherForm) {
   for (const SecondByte form : {SecondByte::automatic, SecondByte::fixed, SecondByte::echo}) {
-    Format settings = bus;
-    settings.second_byte = form;
-    Bench bench(settings);
-    EXPECT_EQ(converse(bench).reading()->singleturn, 383u);
-    EXPECT_EQ(bench.took, (3 + 5) * line_of_tests.character() + virtual_acquisition);
+    const End read = Bench(with(bus, &Format::second_byte, form)).does("position");
+    EXPECT_EQ(read.reading->singleturn, 383u);
+    EXPECT_EQ(read.took, (3 + 5) * line_of_tests.character() + virtual_acquisition);
   }
 }
 
@@ -92,7 +74,7 @@ TEST(RaaBus, AWrongReplyIsAnErrorThatSaysWhy) {
     Error error;
     std::string_view words;
   };
-  const std::vector<Row> rows{
+  const Row rows[]{
       {{}, Error::timeout, "scan"},
       {{0xFF, 0x81, 0x01}, Error::wrong_length, "bits"},
       {{0xFF, 0x81, 0x01, 0xAB, 0xCD, 0xF9}, Error::wrong_length, "bits"},
@@ -103,53 +85,37 @@ TEST(RaaBus, AWrongReplyIsAnErrorThatSaysWhy) {
   };
   for (const Row& row : rows) {
     Bench bench(bus);
-    bench.device().set([&](unsigned, Wire& reply) { reply = row.reply; });
-    const Talk read = converse(bench);
-    EXPECT_EQ(text_of(read.error()).name, text_of(row.error).name);
-    EXPECT_EQ(read.reading(), nullptr);
-    EXPECT_TRUE(report(read).numbers.empty());
-    const std::string words = std::string(read.detail()) + " " + std::string(read.advice());
-    EXPECT_NE(words.find(row.words), std::string::npos) << text_of(row.error).name << ": " << words;
+    bench.encoder().set([&](unsigned, Wire& reply) { reply = row.reply; });
+    EXPECT_TRUE(ended(bench.does("position"), row.error, row.words));
   }
 }
 
 TEST(RaaBus, TwoWithOneNumberAreNeverAPosition) {
   Bench bench(bus);
-  Format other = bus;
-  other.second_byte = SecondByte::echo;
-  bench.add(other).memory()[0] = 1;
-  const Talk read = converse(bench);
-  EXPECT_EQ(read.error(), Error::bad_checksum);  // FF 81 01 7F 00 and FF B1 01 7E 2F
-  EXPECT_EQ(read.reading(), nullptr);
+  bench.add_twin(with(bus, &Format::second_byte, SecondByte::echo));
+  EXPECT_TRUE(ended(bench.does("position"), Error::bad_checksum));  // FF 81 01 7F 00 and FF B1 01 7E 2F
 }
 
 // BC AA may stand in a frame, though no sum makes a request of it.
 TEST(RaaBus, TheBeginOfARequestInsideAFrameOfAnotherIsNone) {
-  Format wide = bus;
-  wide.bits = 16;
-  Bench bench(wide);
-  Format other = wide;
-  other.unit = 2;
-  bench.add(other);
+  Bench bench(with(bus, &Format::bits, 16u));
+  bench.add(with(bench.format, &Format::unit, std::uint8_t{2}));
   bench.shaft.start.position = std::int64_t{0xBCAA} << 16;
-  EXPECT_EQ(converse(bench).reading()->singleturn, 0xBCAAu);
-  EXPECT_EQ(converse(bench).reading()->singleturn, 0xBCAAu);
+  EXPECT_EQ(bench.position(), 0xBCAAu);
+  EXPECT_EQ(bench.position(), 0xBCAAu);
   EXPECT_EQ(bench.encoders.back().answered(), 0u);
 }
 
 TEST(RaaReading, SpeedRefusesSwappedBytes) {
-  for (Format settings : {handshake, bus}) {
-    settings.maximum_rpm = 6000;
-    Bench bench(settings);
-    EXPECT_EQ(converse(bench).error(), Error::none);
+  for (const Format& format : {handshake, bus}) {
+    Bench bench(with(format, &Format::maximum_rpm, 6000u));
+    EXPECT_TRUE(ended(bench.does("position"), Error::none));
     EXPECT_EQ(bench.encoder().answered(), 2u);
-    bench.shaft.put(0, 0x1201);
-    bench.device().set([](unsigned frame, Wire& reply) {
+    bench.put(0x1201);
+    bench.encoder().set([](unsigned frame, Wire& reply) {
       if (frame == 1) std::swap(reply[2], reply[3]);
     });
-    const Talk read = converse(bench);
-    EXPECT_EQ(read.error(), Error::cross_check_failed);
-    EXPECT_EQ(read.reading(), nullptr);
+    EXPECT_TRUE(ended(bench.does("position"), Error::cross_check_failed));
   }
 }
 
@@ -159,206 +125,156 @@ class RaaZero : public ::testing::TestWithParam<Format> {};
 
 TEST_P(RaaZero, IsSetAndReadBack) {
   Bench bench(GetParam());
-  const Talk zero = converse(bench, "zero");
-  ASSERT_EQ(zero.error(), Error::none) << zero.detail();
-  Fields fields = report(zero);
-  EXPECT_EQ(fields.numbers["before"], std::vector<std::int64_t>{383});
-  EXPECT_EQ(fields.numbers["singleturn"], std::vector<std::int64_t>{0});
-  EXPECT_EQ(bench.encoder().writes(), 1u);
+  const End zero = bench.does("zero");
+  EXPECT_TRUE(ended(zero, Error::none));
+  EXPECT_TRUE(zero.has("before=383 singleturn=0")) << zero.fields;
+  EXPECT_EQ(bench.encoder().memory_version(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
   bench.encoder().power_off(bench.line.now());
   bench.encoder().power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::skip);
-  bench.shaft.put(0, 400);
-  Format reads = GetParam();
-  reads.zeroing = Zeroing::none;
-  if (reads.mode == Mode::timing) return;
-  Talk read(reads, "position");
-  EXPECT_EQ(bench.run(read).reading()->singleturn, 17u) << "it survives power off";
+  bench.put(400);
+  if (GetParam().mode == Mode::timing) return;
+  EXPECT_EQ(bench.position(), 17u) << "it survives power off";
 }
 
 TEST_P(RaaZero, ThatHadNoEffectIsTold) {
-  Bench bench(GetParam());
-  Format deaf = GetParam();
-  deaf.zeroing = Zeroing::none;
-  bench.encoders.back() = VirtualEncoder(deaf, bench.shaft);
-  bench.encoder().power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::skip);
-  const Talk zero = converse(bench, "zero");
-  EXPECT_EQ(zero.error(), Error::cross_check_failed);
-  EXPECT_NE(zero.advice().find("CLR"), std::string_view::npos);
-  EXPECT_GE(bench.took, zero_limit);
-  EXPECT_TRUE(report(zero).numbers.empty());
-}
-
-constexpr Format bus_with_line{.mode = Mode::bus, .zeroing = Zeroing::line};
-
-std::string zero_name(const ::testing::TestParamInfo<Format>& info) {
-  constexpr std::array<const char*, 3> modes{"timing", "handshake", "bus"};
-  const std::string mode = modes[static_cast<std::size_t>(info.param.mode)];
-  return mode + (info.param.zeroing == Zeroing::line ? "_line" : "_command");
-}
-INSTANTIATE_TEST_SUITE_P(Modes, RaaZero, ::testing::Values(timing, handshake, bus, bus_with_line), zero_name);
-
-TEST(RaaZeroing, TheNumberBehindCMayBeAnother) {
-  Format settings = bus;
-  settings.zero_unit = 7;
-  Bench bench(settings);
-  EXPECT_EQ(converse(bench, "zero").error(), Error::none);
-  Talk wrong(bus, "zero");
-  bench.shaft.put(0, 5000);
-  EXPECT_EQ(bench.run(wrong).error(), Error::cross_check_failed);
-}
-
-TEST(RaaZeroing, SaysWhatIsMissing) {
-  EXPECT_EQ(Talk({}, "zero").error(), Error::unsupported);
-  const Talk zero({.mode = Mode::handshake, .zeroing = Zeroing::command}, "zero");
-  EXPECT_EQ(zero.error(), Error::invalid_argument);
-  EXPECT_EQ(zero.advice(), "set mode=bus, or zeroing=line for a wire to CLR");
-}
-
-TEST(RaaZeroing, APositionThatCannotBeReadBackIsTold) {
-  Bench bench(bus);
-  bench.device().set([](unsigned frame, Wire& reply) {
-    if (frame > 1) reply.clear();
-  });
-  const Talk zero = converse(bench, "zero");
-  EXPECT_EQ(zero.error(), Error::timeout);
-  EXPECT_NE(zero.detail().find("could not be read back"), std::string_view::npos);
+  Bench bench(with(GetParam(), &Format::zeroing, Zeroing::none));
+  const End zero = bench.does(GetParam(), "zero");
+  EXPECT_TRUE(ended(zero, Error::cross_check_failed, "CLR"));
+  EXPECT_GE(zero.took, zero_limit);
 }
 
 TEST_P(RaaZero, IsNotSetWhileTheShaftTurns) {
   Bench bench(GetParam());
   bench.shaft.spin(60, Time{});
-  const Talk zero = converse(bench, "zero");
-  EXPECT_EQ(zero.error(), Error::invalid_argument);
-  EXPECT_NE(zero.detail().find("turning"), std::string_view::npos);
-  EXPECT_EQ(bench.encoder().writes(), 0u);
+  EXPECT_TRUE(ended(bench.does("zero"), Error::invalid_argument, "turning"));
+  EXPECT_EQ(bench.encoder().memory_version(), 0u);
 }
 
-TEST(RaaZeroing, AStreamWithoutFramesIsNoZero) {
-  struct Row {
-    std::function<void(Wire&)> change;
-    Error error;
-  };
-  const std::vector<Row> rows{
-      {[](Wire&) {}, Error::timeout},
-      {[](Wire& reply) { reply[4] ^= 1; }, Error::bad_framing},
-      {[](Wire& reply) {
-         reply = {0xFF, 0x81, 0x40, 0x01, 0xC1};
-       },
-       Error::out_of_range},
-  };
-  for (const Row& row : rows) {
-    Bench bench(row.error == Error::timeout ? bus : timing);
-    bench.device().set([&](unsigned, Wire& reply) { row.change(reply); });
-    Talk zero(timing, "zero");
-    EXPECT_EQ(text_of(bench.run(zero).error()).name, text_of(row.error).name);
-    EXPECT_EQ(bench.took, listen_limit);
-    EXPECT_EQ(bench.encoder().writes(), 0u);
+INSTANTIATE_TEST_SUITE_P(Modes, RaaZero, ::testing::Values(timing, handshake, bus, bus_with_line));
+
+TEST(RaaZeroing, TheNumberBehindCMayBeAnother) {
+  Bench bench(with(bus, &Format::zero_unit, 7));
+  EXPECT_TRUE(ended(bench.does("zero"), Error::none));
+  bench.put(5000);
+  EXPECT_TRUE(ended(bench.does(bus, "zero"), Error::cross_check_failed));
+}
+
+TEST(RaaZeroing, SaysWhatIsMissing) {
+  EXPECT_TRUE(ended(Bench({}).does("zero"), Error::unsupported, "zero clearing"));
+  EXPECT_TRUE(ended(Bench({.mode = Mode::handshake, .zeroing = Zeroing::command}).does("zero"), Error::invalid_argument,
+                    "set mode=bus, or zeroing=line for a wire to CLR"));
+}
+
+TEST(RaaZeroing, APositionThatCannotBeReadBackIsTold) {
+  for (const Format& format : {bus, timing}) {
+    const bool streams = format.mode == Mode::timing;
+    Bench bench(format);
+    bench.encoder().set([&](unsigned frame, Wire& reply) {
+      if (frame > (streams ? 4 : 1)) reply.assign(streams ? 1 : 0, 0x00);
+    });
+    const Error error = streams ? Error::bad_framing : Error::timeout;
+    EXPECT_TRUE(ended(bench.does("zero"), error, "could not be read back"));
   }
 }
 
-TEST(RaaZeroing, AStreamThatEndsAfterwardsIsTold) {
-  Bench bench(timing);
-  bench.device().set([](unsigned frame, Wire& reply) {
-    if (frame > 4) reply.assign(1, 0x00);
-  });
-  const Talk zero = converse(bench, "zero");
-  EXPECT_TRUE(bench.finished);
-  EXPECT_EQ(zero.error(), Error::bad_framing);
-  EXPECT_NE(zero.detail().find("could not be read back"), std::string_view::npos);
+TEST(RaaZeroing, AStreamWithoutFramesIsNoZero) {
+  const std::pair<Error, std::function<void(Wire&)>> rows[]{
+      {Error::timeout, [](Wire&) {}},
+      {Error::bad_framing, [](Wire& reply) { reply[4] ^= 1; }},
+      {Error::out_of_range,
+       [](Wire& reply) {
+         reply = Wire{0xFF, 0x81, 0x40, 0x01, 0xC1};
+       }},
+  };
+  for (const auto& [error, change] : rows) {
+    Bench bench(error == Error::timeout ? bus : timing);
+    bench.encoder().set([&how = change](unsigned, Wire& reply) { how(reply); });
+    const End zero = bench.does(timing, "zero");
+    EXPECT_TRUE(ended(zero, error));
+    EXPECT_EQ(zero.took, listen_limit);
+    EXPECT_EQ(bench.encoder().memory_version(), 0u);
+  }
 }
 
 // ---- Scan
 
 TEST(RaaScan, FindsEverybodyAndClashes) {
   Bench bench(bus);
-  for (const std::uint8_t unit : std::to_array<std::uint8_t>({3, 9, 9, 15})) {
-    Format settings = bus;
-    settings.unit = unit;
-    settings.second_byte = bench.encoders.size() == 3 ? SecondByte::echo : SecondByte::automatic;
-    bench.add(settings).memory()[0] = bench.encoders.size() == 3 ? 1 : 0;
-  }
-  const Talk scan = converse(bench, "scan");
-  ASSERT_EQ(scan.error(), Error::none);
-  Fields fields = report(scan);
-  EXPECT_EQ(fields.numbers["encoder_address"], (std::vector<std::int64_t>{1, 3, 9, 15}));
-  EXPECT_EQ(fields.numbers["clash"], (std::vector<std::int64_t>{0, 0, 1, 0}));
-  EXPECT_EQ(fields.numbers["singleturn"], (std::vector<std::int64_t>{383, 383, 383}));
-  for (const VirtualEncoder& encoder : bench.encoders) EXPECT_EQ(encoder.violation_count(), 0u);
+  for (const std::uint8_t unit : std::to_array<std::uint8_t>({3, 9, 15})) bench.add(with(bus, &Format::unit, unit));
+  bench.add_twin({.second_byte = SecondByte::echo, .mode = Mode::bus, .unit = 9});
+  EXPECT_EQ(bench.does("scan").fields,
+            "encoder_address=1 clash=0 singleturn=383 second_byte=129 "
+            "encoder_address=3 clash=0 singleturn=383 second_byte=129 encoder_address=9 clash=1 "
+            "encoder_address=15 clash=0 singleturn=383 second_byte=129 ");
+  for (const Tampered& encoder : bench.encoders) EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
 TEST(RaaScan, AsksADamagedAnswerAgain) {
   Bench bench(bus);
-  bench.device().set([](unsigned frame, Wire& reply) {
+  bench.encoder().set([](unsigned frame, Wire& reply) {
     if (frame == 0) reply[4] ^= 1;
   });
-  Fields fields = report(converse(bench, "scan"));
-  EXPECT_EQ(fields.numbers["clash"], std::vector<std::int64_t>{0});
+  EXPECT_TRUE(bench.does("scan").has("clash=0"));
 }
 
 TEST(RaaScan, ALineThatIsNeverSilentIsGivenUpAtOnce) {
   Talk scan(bus, "scan");
-  EXPECT_LT(raa38::testing::time_with_noise(scan), 1500ms);
-  EXPECT_NE(scan.detail().find("without a pause"), std::string_view::npos);
+  EXPECT_LT(raa38::testing::time_with_noise(*scan), 1500ms);
+  EXPECT_TRUE(says(scan->detail(), "without a pause"));
 }
 
 TEST(RaaScan, NobodyAndSomebodyWhoTransmitsByHimself) {
-  Bench handshaking(handshake);
-  EXPECT_EQ(converse(handshaking, "scan").error(), Error::timeout);
-  Bench streaming(timing);
-  const Talk scan = converse(streaming, "scan");
-  EXPECT_EQ(scan.error(), Error::unexpected_reply);
-  EXPECT_EQ(scan.detail(), "something comes although nobody asks");
+  EXPECT_TRUE(ended(Bench(handshake).does("scan"), Error::timeout, "no number from 0 to F"));
+  EXPECT_TRUE(ended(Bench(timing).does("scan"), Error::unexpected_reply, "something comes although nobody asks"));
 }
 
 // ---- The rules of the virtual encoder
 
-/// Two pulses on CLK.
-class Pulser final : public Machine<std::uint8_t> {
- public:
-  Pulser(Time width, Time second) : width_(width), second_(second) {}
+/// Two pulses on CLK, or two requests.
+struct Twice final : Machine<std::uint8_t> {
+  Twice(Time pulse_width, Time second, Wire bytes = {}) : width(pulse_width), due(second), request(std::move(bytes)) {}
   void feed(const Event<std::uint8_t>&) override {}
   Step<std::uint8_t> next(Time now) override {
-    if (now >= second_ && pulses_ == 1) return pulse();
-    if (pulses_ == 0) return pulse();
-    return {.at = pulses_ == 1 ? second_ : never};
+    using Kind = Step<std::uint8_t>::Kind;
+    if (count == 2 || (count == 1 && now < due)) return {.at = count == 1 ? due : never};
+    ++count;
+    if (!request.empty()) return {.kind = Kind::transfer, .out = request};
+    return {.kind = Kind::pulse, .width = width, .line = Line::trigger};
   }
-
- private:
-  Step<std::uint8_t> pulse() {
-    ++pulses_;
-    return {.kind = Step<std::uint8_t>::Kind::pulse, .width = width_, .line = Line::trigger};
-  }
-  Time width_;
-  Time second_;
-  int pulses_ = 0;
+  Time width;
+  Time due;
+  Wire request;
+  int count = 0;
 };
 
 TEST(RaaDevice, ListsTheRulesThatTheHostBreaks) {
-  const auto violation = [](Time width, Time second) -> std::string {
-    Bench bench(handshake);
-    Pulser pulser(width, second);
-    bench.line.attach(sim::Role::host, pulser);
-    bench.line.run_until(50ms);
+  const auto violation = [](const Format& format, Twice host) -> std::string {
+    Bench bench(format);
+    bench.run(host, [] { return true; });
     return bench.encoder().violations().empty() ? "" : std::string(bench.encoder().violations()[0].rule);
   };
-  EXPECT_EQ(violation(10us, 10ms), "");
-  EXPECT_EQ(violation(9us, 10ms), "pulse on CLK shorter than 10 us (T2)");
-  EXPECT_EQ(violation(10us, 300us), "pulse on CLK before the last frame was out (T1)");
+  EXPECT_EQ(violation(handshake, {10us, 10ms}), "");
+  EXPECT_EQ(violation(handshake, {9us, 10ms}), "pulse on CLK shorter than 10 us (T2)");
+  EXPECT_EQ(violation(handshake, {10us, 300us}), "pulse on CLK before the last frame was out (T1)");
+  const Format slow = with(bus, &Format::acquisition, Time(5ms));
+  EXPECT_EQ(violation(slow, {{}, 10ms, {0xBC, 0xAA, 0xB1}}), "");
+  EXPECT_EQ(violation(slow, {{}, 2ms, {0xBC, 0xAA, 0xB2}}), "");
+  EXPECT_EQ(violation(slow, {{}, 2ms, {0xBC, 0xAA, 0xB1}}), "request during the encoder's transmission");
 }
 
 TEST(RaaDevice, AnswersNoRequestThatIsNotItsOwn) {
-  for (const Wire& request : {Wire{0xBC, 0xAA, 0xB2}, Wire{0xBC, 0xAA, 0xD1}, Wire{0xBC, 0xAB, 0xB1}, Wire{0xBC, 0xAA},
-                              Wire{0xAA, 0xB1}, Wire{0xBC, 0xAA, 0xC1}}) {
+  const auto reply_to = [](const Wire& request) {
     Bench bench(bus);
     sim::testing::RawHost host(request, 50ms, 10ms, Time{});
-    bench.run(host);
-    EXPECT_TRUE(host.reply.empty());
+    return bench.run(host).reply;
+  };
+  for (const Wire& request : {Wire{0xBC, 0xAA, 0xB2}, Wire{0xBC, 0xAA, 0xD1}, Wire{0xBC, 0xAB, 0xB1}, Wire{0xBC, 0xAA},
+                              Wire{0xAA, 0xB1}, Wire{0xBC, 0xAA, 0xC1}}) {
+    EXPECT_EQ(reply_to(request), Wire{});
   }
-  Bench bench(bus);
-  sim::testing::RawHost host({0x00, 0xBC, 0xBC, 0xAA, 0xB1}, 50ms, 10ms, Time{});
-  bench.run(host);
-  EXPECT_EQ(host.reply, (Wire{0xFF, 0x81, 0x01, 0x7F, 0x00})) << "garbage before a request is no reason";
+  EXPECT_EQ(reply_to({0x00, 0xBC, 0xBC, 0xAA, 0xB1}), (Wire{0xFF, 0x81, 0x01, 0x7F, 0x00}))
+      << "garbage before a request is no reason";
 }
 
 }  // namespace

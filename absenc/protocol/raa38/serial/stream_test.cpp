@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/serial/stream.hpp"
-
-#include <gtest/gtest.h>
-
 #include <cstdio>
-#include <vector>
 
 #include "absenc/core/hex.hpp"
+#include "absenc/protocol/raa38/serial/bench_test.hpp"
 #include "absenc/sim/random.hpp"
 
 namespace absenc::raa38::serial {
 namespace {
 
-using namespace std::chrono_literals;
-using Wire = std::vector<std::uint8_t>;
+using testing::Wire;
 
 void append(Wire& wire, Bytes bytes) { wire.insert(wire.end(), bytes.begin(), bytes.end()); }
 
@@ -179,122 +174,84 @@ TEST(RaaStream, PiecesThatEndInsideEveryFrameOnlyDelay) {
 
 // ---- A million frames, cut, joined and polluted
 
-/// One stretch of a stream without disturbance, and what disturbs it behind.
 struct Tally {
   std::uint64_t sent = 0;
-  std::uint64_t untouched = 0;  // frames that no disturbance hit
-  std::uint64_t lost = 0;       // of those
-  std::uint64_t wrong = 0;      // positions that were never sent
+  std::uint64_t lost = 0;   // frames that no disturbance hit
+  std::uint64_t wrong = 0;  // positions that were never sent
   std::uint64_t disturbances = 0;
 };
 
-/// Adds a disturbance: garbage, a cut, a flipped or a swapped pair of bits, a join with a later part of the stream.
-class Polluter {
- public:
-  Polluter(const Format& format, std::uint64_t seed) : format_(format), random_(seed) {}
-
-  Tally run(std::uint64_t frames) {
-    StreamDecoder decoder(format_);
-    while (tally_.sent < frames) {
-      wire_.clear();
-      sent_.clear();
-      const std::uint64_t stretches = 50;
-      for (std::uint64_t i = 0; i < stretches; ++i) {
-        stretch(1 + random_.below(60));
-        disturb();
-      }
-      judge(hear(decoder, wire_, 1 + random_.below(300)));
-    }
-    return tally_;
-  }
-
- private:
-  struct Sent {
-    std::uint32_t position;
-    bool hit;
-  };
-
-  void stretch(std::uint64_t frames) {
-    for (std::uint64_t i = 0; i < frames; ++i) {
-      const auto masked = [&](std::uint64_t value) {
-        return static_cast<std::uint32_t>(value & low_mask(format_.bits));
-      };
-      position_ = masked(position_ + 1 + random_.below(6));
-      const std::uint32_t position = random_.chance(0.01) ? masked(0x3F81FF81) : position_;
-      append(wire_, encode_position(format_, {position}));
-      sent_.push_back({position, false});
-      ++tally_.sent;
-    }
-  }
-
-  void disturb() {
-    ++tally_.disturbances;
-    const std::size_t size = format_.frame_bytes();
-    switch (random_.below(4)) {
-      case 0:  // garbage between frames, rich in headers
-        for (std::uint64_t i = 1 + random_.below(20); i > 0; --i) {
-          const std::uint64_t kind = random_.below(4);
-          const auto noise = static_cast<std::uint8_t>(random_.below(256));
-          wire_.push_back(kind == 0 ? header : kind == 1 ? fixed_second_byte : noise);
-        }
-        return;
-      case 1:  // a cut inside the last frame
-        wire_.resize(wire_.size() - 1 - random_.below(size - 1));
-        break;
-      case 2:  // one bit
-        wire_[wire_.size() - 1 - random_.below(size)] ^= static_cast<std::uint8_t>(1u << random_.below(8));
-        break;
-      default:  // a lost byte
-        wire_.erase(wire_.end() - 1 - static_cast<std::ptrdiff_t>(random_.below(size)));
-        break;
-    }
-    sent_.back().hit = true;
-  }
-
-  // Both in the order of the line: what was heard and not sent next is wrong, what was sent and not heard is lost.
-  void judge(const Heard& heard) {
-    constexpr std::size_t most_missing = 12;  // in a row
-    std::size_t next = 0;
-    for (const std::uint32_t position : heard.positions) {
-      const std::size_t end = std::min(sent_.size(), next + most_missing);
-      std::size_t found = next;
-      while (found < end && sent_[found].position != position) ++found;
-      if (found == end) {
-        ++tally_.wrong;
-        continue;
-      }
-      for (; next < found; ++next) count(sent_[next], true);
-      count(sent_[next++], false);
-    }
-    for (; next < sent_.size(); ++next) count(sent_[next], true);
-  }
-
-  void count(const Sent& one, bool lost) {
-    if (one.hit) return;
-    ++tally_.untouched;
-    if (lost) ++tally_.lost;
-  }
-
-  Format format_;
-  sim::Random random_;
-  std::uint32_t position_ = 0;
-  Wire wire_;
-  std::vector<Sent> sent_;
-  Tally tally_;
+struct Sent {
+  std::uint32_t position;
+  bool hit = false;
 };
+
+/// Adds garbage rich in headers behind the last frame, or cuts it, flips one of its bits, takes a byte out; whether
+/// that hit it.
+bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
+  switch (random.below(4)) {
+    case 0:
+      for (std::uint64_t i = 1 + random.below(20); i > 0; --i) {
+        const std::uint64_t kind = random.below(4);
+        const auto noise = static_cast<std::uint8_t>(random.below(256));
+        wire.push_back(kind == 0 ? header : kind == 1 ? fixed_second_byte : noise);
+      }
+      return false;
+    case 1:
+      wire.resize(wire.size() - 1 - random.below(size - 1));
+      return true;
+    case 2:
+      wire[wire.size() - 1 - random.below(size)] ^= static_cast<std::uint8_t>(1u << random.below(8));
+      return true;
+    default:
+      wire.erase(wire.end() - 1 - static_cast<std::ptrdiff_t>(random.below(size)));
+      return true;
+  }
+}
+
+// Both in the order of the line: what was heard and not sent next is wrong, what was sent and not heard is lost.
+void judge(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& heard) {
+  constexpr std::size_t most_missing = 12;  // in a row
+  std::size_t next = 0;
+  for (const std::uint32_t position : heard) {
+    const std::size_t end = std::min(sent.size(), next + most_missing);
+    std::size_t found = next;
+    while (found < end && sent[found].position != position) ++found;
+    if (found == end) {
+      ++tally.wrong;
+      continue;
+    }
+    for (; next < found; ++next) tally.lost += sent[next].hit ? 0 : 1;
+    ++next;
+  }
+  for (; next < sent.size(); ++next) tally.lost += sent[next].hit ? 0 : 1;
+}
+
+void pollute(Tally& tally, const Format& format, std::uint64_t frames) {
+  sim::Random random(format.bits);
+  StreamDecoder decoder(format);
+  const auto masked = [&](std::uint64_t value) { return static_cast<std::uint32_t>(value & low_mask(format.bits)); };
+  std::uint32_t place = 0;
+  for (const std::uint64_t end = tally.sent + frames; tally.sent < end;) {
+    Wire wire;
+    std::vector<Sent> sent;
+    for (int stretch = 0; stretch < 50; ++stretch) {
+      for (std::uint64_t i = 1 + random.below(60); i > 0; --i) {
+        place = masked(place + 1 + random.below(6));
+        sent.push_back({random.chance(0.01) ? masked(0x3F81FF81) : place});
+        append(wire, encode_position(format, {sent.back().position}));
+      }
+      sent.back().hit = disturb(wire, format.frame_bytes(), random);
+    }
+    tally.sent += sent.size();
+    tally.disturbances += 50;
+    judge(tally, sent, hear(decoder, wire, 1 + random.below(300)).positions);
+  }
+}
 
 TEST(RaaStream, AMillionFramesCutJoinedAndPolluted) {
   Tally all;
-  for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
-    const Tally tally = Polluter({.bits = bits}, bits).run(200'000);
-    // One good frame for each disturbance at the most.
-    EXPECT_LE(tally.lost, tally.disturbances) << bits;
-    all.sent += tally.sent;
-    all.untouched += tally.untouched;
-    all.lost += tally.lost;
-    all.wrong += tally.wrong;
-    all.disturbances += tally.disturbances;
-  }
+  for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) pollute(all, {.bits = bits}, 200'000);
   std::printf("%llu frames, %llu disturbances: %llu good frames lost, %llu positions wrong\n",
               static_cast<unsigned long long>(all.sent), static_cast<unsigned long long>(all.disturbances),
               static_cast<unsigned long long>(all.lost), static_cast<unsigned long long>(all.wrong));

@@ -6,11 +6,9 @@
 
 #include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/raa38/probe.hpp"
 #include "absenc/protocol/raa38/serial/device.hpp"
-#include "absenc/protocol/raa38/serial/explain.hpp"
-#include "absenc/protocol/raa38/serial/fields.hpp"
-#include "absenc/protocol/raa38/serial/listen.hpp"
-#include "absenc/protocol/raa38/serial/procedures.hpp"
+#include "absenc/protocol/raa38/serial/host.hpp"
 #include "absenc/protocol/raa38/serial/vectors.hpp"
 
 namespace absenc::raa38 {
@@ -68,60 +66,37 @@ Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
 
 // ---- What captured frames say of bits and second_byte
 
-constexpr std::string_view nothing_against = "every frame fits";
-
-OptionEvidence bits_evidence(unsigned bits, std::span<const Capture> captures) {
-  OptionEvidence evidence{bits_option, bits, true, 0, nothing_against};
-  const Format format{.bits = bits};
-  for (std::size_t i = 0; i < captures.size() && evidence.possible; ++i) {
-    const Bytes reply = captures[i].reply;
-    if (reply.empty()) continue;
-    const Error error = decode_position(format, reply).error();
-    if (error != Error::wrong_length && error != Error::out_of_range) continue;
-    evidence.possible = false;
-    evidence.capture = i;
-    evidence.why = error == Error::wrong_length ? "it has another number of data bytes" : "its position has more bits";
-  }
-  return evidence;
+std::string_view against_bits(std::int64_t bits, Bytes reply) {
+  if (reply.empty()) return {};
+  const Error error = decode_position({.bits = static_cast<unsigned>(bits)}, reply).error();
+  if (error == Error::wrong_length) return "it has another number of data bytes";
+  return error == Error::out_of_range ? "its position has more bits" : "";
 }
 
-OptionEvidence second_byte_evidence(SecondByte form, std::span<const Capture> captures) {
-  OptionEvidence evidence{second_byte_option, static_cast<std::int64_t>(form), true, 0, nothing_against};
-  for (std::size_t i = 0; i < captures.size() && evidence.possible; ++i) {
-    const Result<Request> asked = decode_request(captures[i].request);
-    const Bytes reply = captures[i].reply;
-    const int unit = asked ? asked->unit : anybody;
-    if (reply.size() < 2 || second_byte_fits({.second_byte = form}, unit, reply[1])) continue;
-    evidence.possible = false;
-    evidence.capture = i;
-    evidence.why = form == SecondByte::fixed ? "its second byte is not 81" : "its second byte is not the number";
-  }
-  return evidence;
+int unit_of(const Capture& capture) {
+  const Result<Request> asked = decode_request(capture.request);
+  return asked ? asked->unit : anybody;
 }
 
-// The position of a shaft that was not turned has as many bits as it likes: the fewest possible is no proof, so that
-// the default stays where it fits.
+std::string_view against_second_byte(SecondByte form, const Capture& capture) {
+  const Bytes reply = capture.reply;
+  if (reply.size() < 2 || second_byte_fits({.second_byte = form}, unit_of(capture), reply[1])) return {};
+  return form == SecondByte::fixed ? "its second byte is not 81" : "its second byte is not the number";
+}
+
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
-  const auto settle = [&](std::size_t option, std::int64_t value, bool& any, const OptionEvidence& evidence) {
-    sink.put(evidence);
-    if (!evidence.possible) return;
-    if (!any || value == options.infos[option].default_value) values.values[option] = value;
-    any = true;
-  };
-  bool any_bits = false;
-  for (unsigned bits = least_bits; bits <= most_bits; ++bits) {
-    settle(bits_option, bits, any_bits, bits_evidence(bits, captures));
-  }
-  bool any_form = false;
-  for (std::size_t form = 0; form < second_byte_choices.size(); ++form) {
-    settle(second_byte_option, static_cast<std::int64_t>(form), any_form,
-           second_byte_evidence(static_cast<SecondByte>(form), captures));
-  }
+  constexpr std::string_view fits = "every frame fits";
+  const bool any_bits =
+      judge(sink, bits_option, least_bits, most_bits, captures.size(), values.values[bits_option], fits,
+            [&](std::int64_t bits, std::size_t i) { return against_bits(bits, captures[i].reply); });
+  const bool any_form = judge(sink, second_byte_option, 0, second_byte_choices.size() - 1, captures.size(),
+                              values.values[second_byte_option], fits, [&](std::int64_t form, std::size_t i) {
+                                return against_second_byte(static_cast<SecondByte>(form), captures[i]);
+                              });
   if (!any_bits || !any_form) return false;
   const Format format = options.format(values);
   return std::all_of(captures.begin(), captures.end(), [&](const Capture& capture) {
-    const Result<Request> asked = decode_request(capture.request);
-    return capture.reply.empty() || decode_position(format, capture.reply, asked ? asked->unit : anybody).has_value();
+    return capture.reply.empty() || decode_position(format, capture.reply, unit_of(capture)).has_value();
   });
 }
 
@@ -142,8 +117,7 @@ Any<Conversation> make_listen(const Format& format, Arguments, std::span<std::by
   return make_host<Listen>(storage, format);
 }
 
-struct Definition {
-  using Protocol = serial::Protocol;
+struct Definition : author::Declares<Definition, Protocol> {
   using Encoder = VirtualEncoder;
   static constexpr std::string_view id = "raa38", name = "RAA38S6, RS-485, RS-232 or RS-422",
                                     document = "Absolute Encoder Operation Manual, RAA38S6 series";
@@ -164,10 +138,8 @@ struct Definition {
   static constexpr std::array commands{
       author::reading<Definition, Protocol, position_request, ReadPosition>(position).or_when(
           listens, {.info = position, .request = nullptr, .make = make_listen, .size = sizeof(Listen)}),
-      author::command<Definition, Protocol, Units, scan, to_scan>(
-          {"scan", Verb::scan, 0, "who answers on a bus", {}, false, false}),
-      author::command<Definition, Protocol, Zeroed, set_zero, to_zero>(
-          {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
+      command<Units, scan, to_scan>({"scan", Verb::scan, 0, "who answers on a bus", {}, false, false}),
+      command<Values, set_zero, to_zero>({"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
   };
 
   static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
@@ -176,7 +148,8 @@ struct Definition {
     if (&field != fields.of<&Values::singleturn>()) return {};
     return author::big_endian_bits(2, format.data_bytes(), format.bits);
   }
-  static constexpr LineSettings line(const Format&) { return line_settings; }
+  // "T1: baud rate": not stated, must be given.
+  static constexpr LineSettings line(const Format&) { return {.rate = 0}; }
   static constexpr Resolution resolution(const Format& format) { return {format.bits, 0}; }
   static constexpr Request guess_request(const Format&, Bytes) { return {Request::Kind::trigger}; }
   // A pulse is no byte either.
@@ -190,27 +163,19 @@ struct Definition {
     return {.trigger = format.mode == Mode::handshake, .clear = format.zeroing == Zeroing::line};
   }
 
-  static constexpr void put(FieldSink& sink, const Format&, const Request& request) {
-    fields.put(sink, values_of(request));
+  static constexpr Values values(const Format&, const Request& request) {
+    return {.command = request.kind == Request::Kind::read ? "read" : "zero_clear", .unit = request.unit};
   }
-  static constexpr void put(FieldSink& sink, const Format& format, const Request&, const Position& reply) {
-    fields.put(sink, values_of(format, reply));
+  static constexpr Values values(const Format& format, const Request&, const Position& reply) {
+    return values_of(format, reply);
   }
-  static void put(FieldSink& sink, const Format& format, const Zeroed& found) {
-    Values values = values_of(format, found.now);
-    values.before = found.before.singleturn;
-    fields.put(sink, values);
-    sink.put_reading(to_reading(format, found.now, {}, {}));
+  static void put(FieldSink& sink, const Format& format, const Values& found) {
+    fields.put(sink, found);
+    if (found.singleturn) sink.put_reading(author::position_reading(*found.singleturn, format.bits));
   }
   static void put(FieldSink& sink, const Format& format, const Units& found) {
-    for (std::size_t i = 0; i < found.units.size(); ++i) {
-      const Units::One& unit = found.units[i];
-      if (!unit.answers && !unit.clash) continue;
-      Values values = unit.answers ? values_of(format, unit.position) : Values{};
-      values.encoder_address = static_cast<std::uint8_t>(i);
-      values.clash = unit.clash;
-      fields.put(sink, values);
-      if (unit.answers) sink.put_reading(to_reading(format, unit.position, {}, {}));
+    for (const Values& unit : found) {
+      if (unit.encoder_address) put(sink, format, unit);
     }
   }
 };

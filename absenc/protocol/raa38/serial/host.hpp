@@ -1,17 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-// The conversation with an encoder that transmits by itself: it only listens, and goes on as long as it is driven.
+// What a host does with an RAA38S6 on an asynchronous line beside asking for a position.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string_view>
 
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/raa38/serial/stream.hpp"
 
 namespace absenc::raa38::serial {
 
-/// Emits every frame, and every loss of the frames with its error. Ends only when nothing good comes any more: timeout,
-/// bad_framing, out_of_range. With a maximum speed a position that the shaft cannot have reached is cross_check_failed.
+inline constexpr auto fields = author::fields_of<Values>(
+    author::field<&Values::encoder_address>("encoder_address", "", "the number behind B", Role::encoder),
+    author::field<&Values::clash>("clash", "", "every answer is damaged: two encoders, or a bad line", Role::clash),
+    author::field<&Values::before>("before", "counts", "position before the zero was set"),
+    author::field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
+    author::field<&Values::second_byte>("second_byte", "", "81, or on a bus Bx: the encoder's number"),
+    author::field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
+    author::field<&Values::command>("command", "", "read or zero_clear"),
+    author::field<&Values::unit>("unit", "", "the number behind B or C"),
+    author::field<&Values::skipped>("skipped", "bytes", "so far, that belonged to no good frame"));
+
+/// About a reply to `request`, which may be empty, as to a pulse; with an empty reply about the request, or why none
+/// came.
+[[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
+
+/// Listens to an encoder that transmits by itself, as long as it is driven. Emits every frame, and every loss of the
+/// frames with its error. Ends only when nothing good comes any more: timeout, bad_framing, out_of_range. With a
+/// maximum speed a position that the shaft cannot have reached is cross_check_failed.
 class Listen final : public Conversation<std::uint8_t> {
  public:
   /// `format.maximum_rpm` needs the refresh rate: otherwise invalid_argument, because times of arrival are too rough.
@@ -62,5 +79,18 @@ class Listen final : public Conversation<std::uint8_t> {
   Error error_ = Error::none;
   Explanation words_{};
 };
+
+using HostLine = author::LineOf<Protocol>;
+
+/// Reads, sets the zero, and reads until the position is zero. The shaft must stand still. Errors: unsupported and
+/// invalid_argument when the settings have no way to do it, or it turns; cross_check_failed when it is not zero after
+/// half a second.
+author::Procedure set_zero(HostLine& line, Values& found);
+
+/// Listens whether somebody transmits unasked, then asks every number of a bus, whatever the mode. An answer that is
+/// damaged every time tells of two encoders with one number, or of a bad line. Errors: timeout when nobody answers,
+/// unexpected_reply when somebody transmits unasked.
+using Units = std::array<Values, unit_count>;
+author::Procedure scan(HostLine& line, Units& found);
 
 }  // namespace absenc::raa38::serial

@@ -6,40 +6,59 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
-#include "absenc/protocol/raa38/modbus/protocol.hpp"
+#include "absenc/protocol/raa38/modbus/frame.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::raa38::rtu {
 
+/// What bad frames turn out to be, in words: a reply to `request`, which may be empty, or with an empty one why none
+/// came; or what is wrong with the request.
+[[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
+
+/// What frames and commands are shown as, in this order.
+struct Values {
+  std::optional<std::uint16_t> address{};
+  std::optional<std::uint16_t> function{};
+  std::optional<std::uint16_t> first_register{};
+  std::optional<std::uint16_t> registers{};
+  std::optional<std::uint32_t> singleturn{};
+  std::optional<double> angle{};
+  std::optional<std::uint16_t> new_address{};
+  std::optional<std::uint16_t> parameter{};
+  std::optional<std::string_view> setting{};
+  std::optional<std::string_view> crc_order{};
+  std::optional<std::uint32_t> baud{};
+  std::optional<std::string_view> direction{};
+  std::optional<std::string_view> effect{};
+  std::optional<bool> written{};
+  std::optional<std::uint16_t> encoder_address{};
+  std::optional<bool> clash{};
+  std::optional<bool> refuses{};
+};
+
+/// What became of a command.
+struct Found : Values {
+  Reading reading{};
+};
+
 using Line = author::LineOf<Protocol>;
 
 /// One position.
-struct Looked {
-  Reading reading{};
-};
-author::Procedure look_once(Line& line, Looked& found);
+author::Procedure look_once(Line& line, Found& found);
 
 /// No command reads the direction: the position is all there is to see of it.
-struct Seen {
-  std::uint32_t singleturn = 0;
-};
-author::Procedure look_at_direction(Line& line, Seen& found);
+author::Procedure look_at_direction(Line& line, Found& found);
 
 /// A0. Where that gets no good answer, as with several encoders on the line, the one at the address of the format is
 /// asked for its position.
-struct Address {
-  std::uint8_t address = 0;
-};
-author::Procedure ask_address(Line& line, Address& found);
+author::Procedure ask_address(Line& line, Found& found);
 
 /// Finds the baud rate at which the encoder answers: first that of the format, then the others. Leaves the line as it
 /// was. Error: timeout, or what came at the rate of the format.
-struct Baud {
-  std::size_t index = 0;
-};
-author::Procedure find_baud(Line& line, Baud& found);
+author::Procedure find_baud(Line& line, Found& found);
 
 /// A0 first, which a single encoder answers; otherwise every address from the first argument to the second. An answer
 /// that is damaged every time tells of two encoders with one address, or of a bad line. Error: timeout when nobody
@@ -50,26 +69,18 @@ struct Slaves {
 };
 author::Procedure scan(Line& line, Slaves& found, Arguments arguments);
 
-/// What became of a setting.
-struct Set {
-  std::int64_t value = 0;  // as the argument gave it
-  bool written = false;
-  std::string_view effect{};
-  Reading reading{};
-};
-
 /// A1. Refuses (invalid_argument) an address at which somebody answers. Verified by asking the new address; errors:
 /// cross_check_failed (it has its old one), timeout (it answers at neither).
-author::Procedure set_address(Line& line, Set& found, Arguments arguments);
+author::Procedure set_address(Line& line, Found& found, Arguments arguments);
 
 /// CC with a baud rate; verified at the new rate, to which the line is set. Errors: invalid_argument (the encoder does
 /// not have it), cross_check_failed (it has its old one), timeout (it answers at neither); then the line is as before.
-author::Procedure set_baud(Line& line, Set& found, Arguments arguments);
+author::Procedure set_baud(Line& line, Found& found, Arguments arguments);
 
 /// CC with a direction. Only its echo tells that it was taken; the position before and after is reported.
-author::Procedure set_direction(Line& line, Set& found, Arguments arguments);
+author::Procedure set_direction(Line& line, Found& found, Arguments arguments);
 
 /// CC 00: the position becomes 0 here. The shaft must stand still (invalid_argument); read back (cross_check_failed).
-author::Procedure set_zero(Line& line, Set& found, Arguments arguments);
+author::Procedure set_zero(Line& line, Found& found, Arguments arguments);
 
 }  // namespace absenc::raa38::rtu

@@ -1,11 +1,102 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/protocol/raa38/modbus/procedures.hpp"
+#include "absenc/protocol/raa38/modbus/host.hpp"
 
 #include "absenc/core/bits.hpp"
 #include "absenc/protocol/author/standstill.hpp"
-#include "absenc/protocol/raa38/modbus/explain.hpp"
 
 namespace absenc::raa38::rtu {
+
+// ---- In words
+
+namespace {
+
+constexpr Explanation other_crc_order{
+    "the CRC would be right with its two bytes exchanged: Modbus RTU sends the low byte first",
+    "check what is connected: a slave, gateway or program that sends the high byte first does not speak Modbus RTU"};
+
+Explanation explain_length(const Request& request) {
+  switch (request.function) {
+    case function::ask_address:
+      return {"the reply to A0 is FF A0, the address and the CRC; several encoders on a line answer it all at once",
+              "with several on the line use scan, and name each by its address"};
+    case function::set_address:
+      return {"the reply to A1 is the new address, A1 and the CRC", {}};
+    case function::set_parameter:
+      return {"the reply to CC is the request once more", {}};
+    default:
+      break;
+  }
+  if (request.registers == 1) {
+    return {"one register was asked for: byte count 02 and 7 bytes in all are the answer",
+            "check bits and registers (an encoder with more than 16 bits has two), and that only one slave answers"};
+  }
+  return {"two registers were asked for: byte count 04 or 03 and 8 or 9 bytes in all are the answer",
+          "check bits and registers (registers=1 suits up to 16 bits), and that only one slave answers"};
+}
+
+Explanation explain_other(const Request& request, Bytes reply) {
+  if (reply.size() < modbus::shortest_frame) return {};
+  if (reply[1] != request.function) {
+    return {"it answers another function than was asked for", "check that no other program uses the line"};
+  }
+  if (request.function == function::set_parameter && reply[0] == request.address) {
+    return {"the parameter that came back is another than was sent",
+            "read the position before you send it again: it may be done, or refused"};
+  }
+  return {"it comes from another address than was asked", "check address; `absenc scan` asks every one"};
+}
+
+Explanation explain_reply(const Request& request, Error error, Bytes reply) {
+  switch (error) {
+    case Error::timeout:
+      return {
+          "nobody answers at this address and baud rate",
+          "`absenc scan` asks every address, `absenc config get ... baud` every baud rate; then check supply and A/B"};
+    case Error::wrong_length:
+      return explain_length(request);
+    case Error::bad_checksum:
+      if (modbus::crc_order(reply) == CrcOrder::high_first) return other_crc_order;
+      return {{}, "check shielding, termination and baud rate, and that no two slaves have one address"};
+    case Error::unexpected_reply:
+      return explain_other(request, reply);
+    case Error::request_rejected:
+      return reply.size() < modbus::shortest_frame ? Explanation{} : modbus::explain_refusal(reply[2]);
+    case Error::unsupported:
+      return {"the position is read from register 0 on, one register or two", {}};
+    case Error::out_of_range:
+      if (request.function == function::ask_address) {
+        return {"the address that came is none: they go from 1 to 247", "check that an RAA38S6 is connected"};
+      }
+      return {"the position has more bits than bits says", "set bits to the resolution of the encoder (10 to 21)"};
+    default:
+      return {};
+  }
+}
+
+Explanation explain_request(Error error, Bytes request) {
+  switch (error) {
+    case Error::wrong_length:
+      return {"this is not the length of a request with this function", {}};
+    case Error::bad_checksum:
+      if (modbus::crc_order(request) == CrcOrder::high_first) return other_crc_order;
+      return {"the checksum of the request is wrong", "check whether it was captured as a whole"};
+    case Error::unsupported:
+      return {"the encoder knows functions 03, A0, A1 and CC", "check that the request is for this encoder"};
+    case Error::unexpected_reply:
+      return {"A0 is asked of address FF", {}};
+    default:
+      return {};
+  }
+}
+
+}  // namespace
+
+Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {
+  const Result<Request> asked = request.empty() ? assumed_request(format, reply) : decode_request(request);
+  return asked ? explain_reply(*asked, error, reply) : explain_request(error, request);
+}
+
+// ---- Procedures
 
 namespace {
 
@@ -18,10 +109,6 @@ constexpr Request which_address{.function = function::ask_address, .address = an
 
 constexpr Explanation too_few_registers{"one register has 16 bits, and the position has more",
                                         "set registers=2, or leave it to bits (registers=auto); check bits"};
-constexpr Explanation lost_encoder{
-    "the setting was sent, and now the encoder answers neither as before nor as it should",
-    "switch the encoder off and on, then find it: `absenc config get ... baud`, `absenc scan`; do not send it again "
-    "blindly, its memory wears out"};
 
 constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
@@ -54,49 +141,68 @@ Part<Reply> look_first(Line& line) {
   co_return *reply;
 }
 
-Reading reading_of(const Line& line, const Reply& reply) {
-  Reading reading = Protocol::reading(line.format(), {}, reply);
-  // The document does not say when the position is taken; the end of the request is the earliest it can be known.
-  reading.latched = line.sent_at();
-  reading.received = line.received_at();
-  return reading;
+// The position in the last reply.
+void show_position(const Line& line, Found& found) {
+  found.reading = line.last_reading();
+  found.singleturn = line.last().singleturn;
+  found.angle = degrees(line.last().singleturn, line.format().bits);
+}
+
+// Where a setting put the encoder it must answer, or else, when it did not take it, where it was.
+Part<Outcome> look_for_it(Line& line, std::uint8_t address, std::uint32_t rate, std::string_view at_the_old_one) {
+  const Format& format = line.format();
+  const bool moves_rate = rate != format.line().rate;
+  if (moves_rate) line.set_rate(rate);
+  co_await line.rest(memory_time);
+  const Result<Reply> there = co_await look(line, address, 3);
+  if (there) co_return done;
+  if (moves_rate) line.set_rate(format.line().rate);
+  const Result<Reply> back = co_await look(line, format.address, 3);
+  if (!back) {
+    co_return only(back.error(), "the setting was sent, and now the encoder answers neither as before nor as it should",
+                   "switch the encoder off and on, then find it: `absenc config get ... baud`, `absenc scan`; do not "
+                   "send it again blindly, its memory wears out");
+  }
+  co_return {Error::cross_check_failed, at_the_old_one, "try once more, not often: each time may wear its memory"};
 }
 
 }  // namespace
 
 // ---- Reading
 
-Procedure look_once(Line& line, Looked& found) {
+Procedure look_once(Line& line, Found& found) {
   const Result<Reply> reply = co_await look(line, line.format().address, 1);
   if (!reply) co_return {reply.error()};
-  found.reading = reading_of(line, *reply);
+  show_position(line, found);
   co_return done;
 }
 
-Procedure look_at_direction(Line& line, Seen& found) {
+Procedure look_at_direction(Line& line, Found& found) {
   const Result<Reply> reply = co_await look(line, line.format().address, 1);
   found.singleturn = reply->singleturn;
+  found.direction = "the encoder does not tell: turn the shaft and see";
   co_return {reply.error()};
 }
 
-Procedure ask_address(Line& line, Address& found) {
+Procedure ask_address(Line& line, Found& found) {
   const Result<Reply> reply = co_await line.attempt(which_address).repeated(2);
-  found.address = reply ? reply->address : line.format().address;
+  const std::uint8_t address = reply ? reply->address : line.format().address;
+  found.address = address;
   if (reply || line.is_noisy()) co_return {reply.error()};
-  const Result<Reply> position = co_await look(line, found.address, 2);
+  const Result<Reply> position = co_await look(line, address, 2);
   co_return {position.error()};
 }
 
-Procedure find_baud(Line& line, Baud& found) {
+Procedure find_baud(Line& line, Found& found) {
   const std::size_t own = line.format().baud;
-  found.index = own;
+  found.baud = bauds[own];
   const Result<Reply> first = co_await look(line, line.format().address, 2);
   if (first || first.error() == Error::request_rejected) co_return done;  // a refusal is understood
   if (line.is_noisy()) co_return {first.error()};
-  const Explanation reason = explain(read_request(line.format()), first.error(), line.reply());
+  const Explanation reason = explain_reply(read_request(line.format()), first.error(), line.reply());
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (i == own) continue;
-    found.index = i;
+    found.baud = bauds[i];
     line.set_rate(bauds[i]);
     const Result<Reply> reply = co_await look(line, line.format().address, 2);
     const bool there = reply || reply.error() == Error::request_rejected;
@@ -146,13 +252,14 @@ Procedure scan(Line& line, Slaves& found, Arguments arguments) {
 
 // ---- Settings
 
-Procedure set_address(Line& line, Set& found, Arguments arguments) {
+Procedure set_address(Line& line, Found& found, Arguments arguments) {
   const auto address = static_cast<std::uint8_t>(arguments[0]);
-  const std::uint8_t before = line.format().address;
-  found.value = address;
-  static_cast<void>(co_await look_first(line));
-  if (address == before && arguments[1] == 0) co_return done;
-  if (address != before) {
+  const Format& format = line.format();
+  found.address = address;
+  found.written = false;
+  co_await look_first(line);
+  if (address == format.address && arguments[1] == 0) co_return done;
+  if (address != format.address) {
     const Result<Reply> other = co_await look(line, address, 3);
     const bool is_free = !other && other.error() == Error::timeout;
     if (!is_free) {
@@ -165,49 +272,43 @@ Procedure set_address(Line& line, Set& found, Arguments arguments) {
   }
   found.written = true;
   const Result<Reply> answer =
-      co_await line.attempt({.function = function::set_address, .address = before, .value = address});
+      co_await line.attempt({.function = function::set_address, .address = format.address, .value = address});
   if (!answer && answer.error() == Error::request_rejected) co_return {answer.error()};
   // A lost reply does not tell whether it was done: asking does.
-  co_await line.rest(memory_time);
-  const Result<Reply> there = co_await look(line, address, 3);
-  if (there) co_return done;
-  const Result<Reply> back = co_await look(line, before, 3);
-  if (!back) co_return only(back.error(), lost_encoder.found, lost_encoder.advice);
-  co_return {Error::cross_check_failed, "the encoder answers at its old address still: it did not take the new one",
-             "try once more, not often: each time may wear its memory"};
+  const Outcome end = co_await look_for_it(line, address, format.line().rate,
+                                           "the encoder answers at its old address still: it did not take the new one");
+  co_return end;
 }
 
-Procedure set_baud(Line& line, Set& found, Arguments arguments) {
+Procedure set_baud(Line& line, Found& found, Arguments arguments) {
   const std::optional<std::size_t> baud = baud_index(static_cast<std::uint64_t>(arguments[0]));
+  const Format& format = line.format();
   if (!baud) {
     co_return {Error::invalid_argument, "the encoder does not have this baud rate",
                "it has 2400, 4800, 9600, 19200 and 57600"};
   }
-  const std::uint32_t before = line.format().line().rate;
-  found.value = arguments[0];
-  line.set_rate(before);  // a port that cannot change its rate must say so before the encoder has
-  static_cast<void>(co_await look_first(line));
-  if (*baud == line.format().baud && arguments[1] == 0) co_return done;
+  found.baud = bauds[*baud];
+  found.written = false;
+  line.set_rate(format.line().rate);  // a port that cannot change its rate must say so before the encoder has
+  co_await look_first(line);
+  if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
   // Its reply may come at the new rate.
-  static_cast<void>(co_await line.attempt(setting(line.format(), baud_parameters[*baud])));
-  line.set_rate(bauds[*baud]);
-  co_await line.rest(memory_time);
-  const Result<Reply> there = co_await look(line, line.format().address, 3);
-  if (there) co_return done;
-  line.set_rate(before);
-  const Result<Reply> back = co_await look(line, line.format().address, 3);
-  if (!back) co_return only(back.error(), lost_encoder.found, lost_encoder.advice);
-  co_return {Error::cross_check_failed, "the encoder answers at its old baud rate still: it did not take the new one",
-             "try once more, not often: each time may wear its memory"};
+  co_await line.attempt(setting(format, baud_parameters[*baud]));
+  const Outcome end =
+      co_await look_for_it(line, format.address, bauds[*baud],
+                           "the encoder answers at its old baud rate still: it did not take the new one");
+  co_return end;
 }
 
-Procedure set_direction(Line& line, Set& found, Arguments arguments) {
+Procedure set_direction(Line& line, Found& found, Arguments arguments) {
   const unsigned bits = line.format().bits;
-  found.value = arguments[0];
+  const auto value = static_cast<std::uint8_t>(arguments[0]);
+  found.parameter = value;
+  found.setting = name_of_setting(value);
   const std::uint32_t before = (co_await look_first(line)).singleturn;
   found.written = true;
-  const Result<Reply> echo = co_await line.attempt(setting(line.format(), static_cast<std::uint8_t>(arguments[0])));
+  const Result<Reply> echo = co_await line.attempt(setting(line.format(), value));
   if (!echo) {
     co_return only(echo.error(),
                    "the direction was sent, but its echo did not come, and nothing else tells whether it was taken",
@@ -226,7 +327,7 @@ Procedure set_direction(Line& line, Set& found, Arguments arguments) {
   co_return done;
 }
 
-Procedure set_zero(Line& line, Set& found, Arguments arguments) {
+Procedure set_zero(Line& line, Found& found, Arguments arguments) {
   const unsigned bits = line.format().bits;
   const Reply first = co_await look_first(line);
   co_await line.rest(between_looks);
@@ -235,14 +336,14 @@ Procedure set_zero(Line& line, Set& found, Arguments arguments) {
     co_return {Error::invalid_argument,
                "the shaft is turning: setting the zero needs it standing still; nothing was sent", "stop the shaft"};
   }
-  found.reading = reading_of(line, second);
-  if (second.singleturn == 0 && arguments[0] == 0) co_return done;
-  found.written = true;
-  static_cast<void>(co_await line.attempt(setting(line.format(), parameter::zero)));  // perhaps done without a reply
+  show_position(line, found);
+  found.written = second.singleturn != 0 || arguments[0] != 0;
+  if (!*found.written) co_return done;
+  co_await line.attempt(setting(line.format(), parameter::zero));  // perhaps done without a reply
   co_await line.rest(memory_time);
   const Result<Reply> now = co_await look(line, line.format().address, 3);
   if (!now) co_return {now.error(), "the zero was sent, but then the position could not be read"};
-  found.reading = reading_of(line, *now);
+  show_position(line, found);
   if (is_near(now->singleturn, 0, bits, zero_millidegrees)) co_return done;
   co_return {Error::cross_check_failed, "the position is still not zero",
              "does the shaft turn? Try once more, not often: its memory wears"};

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/raa38/serial/host.hpp"
+
+#include <algorithm>
+
+#include "absenc/protocol/author/standstill.hpp"
+
+namespace absenc::raa38::serial {
+
+// ---- In words
+
+namespace {
+
+Explanation explain_other(const Format& format, Bytes request, Bytes reply) {
+  if (reply.empty()) return {"a request is BC AA Bx or BC AA Cx", {}};
+  const Result<Request> asked = decode_request(request);
+  if (asked && asked->kind == Request::Kind::zero_clear) return {"nothing answers BC AA Cx", {}};
+  if (format.mode != Mode::bus) {
+    return {"it is no frame: FF 81 is missing, or on a bus FF Bx", "check mode, baud and second_byte"};
+  }
+  return {"another unit answered, or no frame came: FF 81 or FF Bx answers BC AA Bx, with the same x",
+          "check unit and second_byte; `scan` shows who answers"};
+}
+
+// Why a stream has no good frame.
+Explanation explain_stream(Error error) {
+  switch (error) {
+    case Error::timeout:
+      return {"nothing comes: the encoder does not transmit by itself, or it was unplugged",
+              "check supply, A/B polarity and baud rate; mode=handshake or mode=bus for an encoder that must be asked"};
+    case Error::out_of_range:
+      return {"the frames carry more bits than the option bits says", "set bits"};
+    default:
+      return {"something comes, but no two frames in a row",
+              "check baud, parity, bits (their number of data bytes) and second_byte"};
+  }
+}
+
+}  // namespace
+
+Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {
+  switch (error) {
+    case Error::wrong_length:
+      if (reply.empty()) return {"a request has three bytes: BC AA Bx or BC AA Cx", {}};
+      return {
+          "the frame has another number of bytes than the option bits makes: up to 16 bits make two data bytes, more "
+          "make three",
+          "check bits and baud"};
+    case Error::bad_checksum:
+      if (format.mode != Mode::bus) return {};
+      return {"two encoders with one number, or a bad line",
+              "`scan` shows who answers; check numbers, termination and baud"};
+    case Error::unexpected_reply:
+      return explain_other(format, request, reply);
+    case Error::out_of_range:
+      return {"the position has more bits than the option bits says", "set bits"};
+    case Error::bad_framing:
+      return format.mode == Mode::timing ? explain_stream(error) : Explanation{};
+    case Error::timeout:
+      if (format.mode == Mode::timing) return explain_stream(error);
+      if (format.mode == Mode::bus) return {{}, "`scan` shows who answers; check supply, A/B polarity and baud"};
+      return {"no frame followed the pulse", "check the wire to CLK, its level, the pulse's width, supply and baud"};
+    case Error::cross_check_failed:
+      return {"two positions in a row are farther apart than max_rpm allows",
+              "the checksum does not see swapped bytes: read again, and check shielding, bits and max_rpm"};
+    default:
+      return {};
+  }
+}
+
+// ---- A stream
+
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
+Listen::Listen(const Format& format) : format_(format), decoder_(format) {
+  if (format.maximum_rpm == 0 || format.period() > Time{}) return;
+  fail(Error::invalid_argument, {"max_rpm needs to know how often the encoder transmits", "set refresh_hz as well"});
+  done_ = true;
+}
+
+ByteStep Listen::next(Time now) {
+  if (taken_ < waiting_.size()) {
+    take(waiting_[taken_++]);
+    arm_ = true;
+    return {.kind = ByteStep::Kind::emit};
+  }
+  // Whoever stops at a result and comes back later has not waited in vain meanwhile.
+  if (arm_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
+  arm_ = false;
+  if (!done_ && now >= deadline_) give_up();  // bytes that are no frames may come before every timer
+  if (done_) return {.kind = ByteStep::Kind::done};
+  return {.at = deadline_};
+}
+
+void Listen::feed(const ByteEvent& event) {
+  if (done_) return;
+  const auto keep = [this](const Found& found) { waiting_.push_back(found); };
+  if (taken_ == waiting_.size()) {
+    waiting_.clear();
+    taken_ = 0;
+  }
+  if (event.kind == ByteEvent::Kind::received) {
+    heard_before_ = good_ == 0 && !heard_ ? event.at : heard_at_;
+    heard_at_ = event.at;
+    heard_ = true;
+    decoder_.feed(event.items, event.at, keep);
+  } else if (event.kind == ByteEvent::Kind::line_error) {
+    heard_ = true;
+    decoder_.disturbed(keep);
+  }
+}
+
+void Listen::take(const Found& found) {
+  error_ = Error::none;
+  words_ = {};
+  frame_.clear();
+  if (found.error != Error::none) {
+    frame_.append(decoder_.bad());
+    return fail(found.error, {"a frame of the stream is damaged", {}});
+  }
+  ++frame_number_;
+  frame_ = encode_position(format_, {found.singleturn, format_.own_second_byte()});
+  const Time latched = std::max(latched_time(found), reading_.latched);
+  if (is_plausible(found.singleturn, latched)) return accept(found, latched);
+  fail(Error::cross_check_failed,
+       {"the position jumped farther than max_rpm allows",
+        "the checksum does not see swapped bytes: read again, and check shielding, bits and max_rpm"});
+}
+
+void Listen::accept(const Found& found, Time latched) {
+  reading_ = author::position_reading(found.singleturn, format_.bits);
+  reading_.latched = latched;
+  reading_.received = found.at;
+  last_good_at_ = latched;
+  last_good_ = found.singleturn;
+  last_number_ = frame_number_;
+  has_suspect_ = false;
+  heard_ = false;
+  ++good_;
+}
+
+// A position is compared with the last good one, or with the last that was refused: when two of these agree, the
+// first one was wrong, or the shaft was turned while nobody could see it.
+bool Listen::is_plausible(std::uint32_t singleturn, Time latched) {
+  if (format_.maximum_rpm == 0 || good_ == 0) return true;
+  // Frames that were lost in between are not counted: the clock knows better, but not by less than a frame.
+  const Time by_frames = format_.period() * static_cast<std::int64_t>(frame_number_ - last_number_);
+  const Time between = std::max(by_frames, latched - last_good_at_);
+  if (is_possible(format_, last_good_, singleturn, between)) return true;
+  if (has_suspect_ && is_possible(format_, suspect_, singleturn, format_.period())) return true;
+  has_suspect_ = true;
+  suspect_ = singleturn;
+  return false;
+}
+
+// The frames that came at once were sent one after the other.
+Time Listen::latched_time(const Found& found) const {
+  if (found.at != heard_at_) return found.at;
+  const auto behind = static_cast<std::int64_t>(waiting_.size() - taken_);
+  const auto together = static_cast<std::int64_t>(std::max<std::size_t>(waiting_.size(), 1));
+  const Time each = format_.period() > Time{} ? format_.period() : (heard_at_ - heard_before_) / together;
+  return heard_at_ - behind * each;
+}
+
+void Listen::give_up() {
+  done_ = true;
+  frame_.clear();
+  const Error error = !heard_                           ? Error::timeout
+                      : decoder_.saw_larger_positions() ? Error::out_of_range
+                                                        : Error::bad_framing;
+  fail(error, explain_stream(error));
+}
+
+void Listen::fail(Error error, const Explanation& words) {
+  error_ = error;
+  words_ = words;
+}
+
+const Reading* Listen::reading() const { return error_ == Error::none && good_ > 0 ? &reading_ : nullptr; }
+
+void Listen::report(FieldSink& sink) const {
+  if (reading() == nullptr) return;
+  Values values = values_of(format_, {static_cast<std::uint32_t>(reading_.singleturn), format_.own_second_byte()});
+  values.skipped = decoder_.skipped();
+  fields.put(sink, values);
+  sink.put_reading(reading_);
+}
+
+Exchange<std::uint8_t> Listen::exchange() const { return {{}, frame_.view(), heard_at_, heard_at_}; }
+
+// ---- Procedures
+
+namespace {
+
+using namespace author;
+
+constexpr unsigned scan_attempts = 2;
+
+// The newest frame of what comes first.
+Part<Result<Position>> hear_one(HostLine& line) {
+  StreamDecoder decoder(line.format());
+  Position position{.second_byte = line.format().own_second_byte()};
+  bool found = false;
+  bool anything = false;
+  const auto keep = [&](const serial::Found& frame) {
+    if (frame.error != Error::none) return;
+    position.singleturn = frame.singleturn;
+    found = true;
+  };
+  line.listen(std::max(listen_limit, 4 * line.format().period()));
+  while (!found) {
+    const HostLine::Heard heard = co_await line.heard();
+    if (heard.over) {
+      if (!anything) co_return Error::timeout;
+      co_return decoder.saw_larger_positions() ? Error::out_of_range : Error::bad_framing;
+    }
+    anything = true;
+    if (heard.bytes.empty()) decoder.disturbed(keep);
+    decoder.feed(heard.bytes, line.received_at(), keep);
+  }
+  co_return position;
+}
+
+// The next position, whatever starts a frame.
+Part<Result<Position>> look(HostLine& line) {
+  Result<Position> position = Error::timeout;
+  if (line.format().mode == Mode::timing) {
+    position = co_await hear_one(line);
+  } else {
+    position = co_await line.attempt(position_request(line.format()));
+  }
+  co_return position;
+}
+
+}  // namespace
+
+Procedure set_zero(HostLine& line, Values& found) {
+  const Format& format = line.format();
+  if (format.zeroing == Zeroing::none) {
+    co_return {
+        Error::unsupported, "nothing is known of a way to set the zero of this encoder",
+        "an encoder that was ordered with zero clearing: zeroing=line (a wire to CLR) or zeroing=command (a bus)"};
+  }
+  if (format.zeroing == Zeroing::command && format.mode != Mode::bus) {
+    co_return {Error::invalid_argument, "BC AA Cx is a command of a bus",
+               "set mode=bus, or zeroing=line for a wire to CLR"};
+  }
+  const Result<Position> first = co_await look(line);
+  if (!first) co_return {first.error()};
+  co_await line.rest(between_looks);
+  const Result<Position> second = co_await look(line);
+  if (!second) co_return {second.error()};
+  if (!is_near(second->singleturn, first->singleturn, format.bits)) {
+    co_return {Error::invalid_argument,
+               "the shaft is turning: setting the zero needs it standing still; nothing was sent", "stop the shaft"};
+  }
+  const Request by_command{Request::Kind::zero_clear, format.zeroed_unit()};
+  co_await line.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command);
+  // It is not told whether that worked.
+  const Time give_up_at = line.received_at() + zero_limit;
+  Result<Position> now = Error::timeout;
+  do {
+    co_await line.rest(zero_poll);
+    now = co_await look(line);
+    found = values_of(format, *now);
+    found.before = second->singleturn;
+    if (now && is_near(now->singleturn, 0, format.bits, zero_millidegrees)) co_return done;
+  } while (line.received_at() < give_up_at);
+  if (!now) {
+    co_return only(now.error(), "the zero was set, but the position could not be read back",
+                   "read the encoder to see what it is now");
+  }
+  co_return only(Error::cross_check_failed, "the position is not zero after the zero was set",
+                 "let the shaft stand still; check the wire to CLR (below 0.5 V), or zero_unit, and that the encoder "
+                 "has it");
+}
+
+Procedure scan(HostLine& line, Units& found) {
+  line.listen(scan_silence);
+  for (HostLine::Heard heard{}; !heard.over;) {
+    heard = co_await line.heard();
+    if (heard.bytes.empty()) continue;
+    co_return only(Error::unexpected_reply, "something comes although nobody asks",
+                   "an encoder that transmits by itself has no number: mode=timing, and nothing to scan for");
+  }
+  bool any = false;
+  for (unsigned i = 0; i < unit_count; ++i) {
+    Result<Position> reply = Error::timeout;
+    for (unsigned attempt = 0; attempt < scan_attempts && !reply; ++attempt) {
+      reply = co_await line.attempt({Request::Kind::read, static_cast<std::uint8_t>(i)});
+      if (line.is_noisy()) co_return {reply.error()};
+      if (reply.error() == Error::timeout) break;
+    }
+    if (reply.error() == Error::timeout) continue;
+    any = true;
+    if (reply) found[i] = values_of(line.format(), *reply);
+    found[i].encoder_address = static_cast<std::uint8_t>(i);
+    found[i].clash = !reply;
+  }
+  if (any) co_return done;
+  co_return only(Error::timeout, "no number from 0 to F is answered",
+                 "check supply, A/B polarity and baud, and that the encoder is one with bus commands");
+}
+
+}  // namespace absenc::raa38::serial

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// The settings that a virtual RAA38S6 keeps over power off on lines where it can be told any. Writing them wears.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/shaft.hpp"
+
+namespace absenc::raa38 {
+
+class Settings {
+ public:
+  // Where each lies in the memory: its number on the line, its rate as the document numbers them, whether it counts
+  // down, counts of the shaft at its zero, how often it was written.
+  static constexpr std::size_t number_at = 0;
+  static constexpr std::size_t rate_at = 1;
+  static constexpr std::size_t direction_at = 2;
+  static constexpr std::size_t zero_at = 3;
+  static constexpr std::size_t writes_at = 7;
+
+  Settings(std::uint8_t number, std::uint8_t rate, unsigned bits, const Shaft& shaft) : bits_(bits), shaft_(&shaft) {
+    memory_[number_at] = number;
+    memory_[rate_at] = rate;
+  }
+
+  [[nodiscard]] MutableBytes memory() { return memory_; }
+  [[nodiscard]] std::uint32_t version() const { return version_; }
+  [[nodiscard]] std::uint8_t number() const { return memory_[number_at]; }
+  [[nodiscard]] std::uint8_t rate() const { return memory_[rate_at]; }
+  [[nodiscard]] bool counts_down() const { return memory_[direction_at] != 0; }
+  [[nodiscard]] std::uint32_t writes() const { return load(writes_at); }
+
+  /// The direction mirrors the position at the zero.
+  [[nodiscard]] std::uint32_t position(Time at) const {
+    const std::uint32_t up = counts(at) - load(zero_at);
+    return static_cast<std::uint32_t>((counts_down() ? 0u - up : up) & low_mask(bits_));
+  }
+  /// False: it was so already.
+  bool write(std::size_t at, Bytes value) {
+    const MutableBytes kept = MutableBytes(memory_).subspan(at, value.size());
+    const bool changes = !std::equal(value.begin(), value.end(), kept.begin());
+    std::copy(value.begin(), value.end(), kept.begin());
+    store_little_endian(MutableBytes(memory_).subspan(writes_at, 4), writes() + 1u);
+    ++version_;
+    return changes;
+  }
+  /// As `write`: the zero is where the shaft stands.
+  bool write_zero(Time at) {
+    std::array<std::uint8_t, 4> zero{};
+    store_little_endian(zero, counts(at));
+    return write(zero_at, zero);
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t load(std::size_t at) const {
+    return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
+  }
+  [[nodiscard]] std::uint32_t counts(Time at) const {
+    return static_cast<std::uint32_t>(shaft_->at(at).position) >> (32 - bits_);
+  }
+
+  unsigned bits_;
+  const Shaft* shaft_;
+  std::array<std::uint8_t, writes_at + 4> memory_{};
+  std::uint32_t version_ = 0;
+};
+
+}  // namespace absenc::raa38
