@@ -147,6 +147,11 @@ class LineOf : public HostOf<P>, public Routine {
       line_.asking_.attempts = attempts;
       return *this;
     }
+    /// Its reply is taken only when silence follows, as Manner::ends_by_silence.
+    Question& until_silence() {
+      line_.asking_.ends_by_silence = true;
+      return *this;
+    }
     /// What the procedure's error says when it ends here: which step failed.
     Question& or_say(std::string_view words) {
       line_.words_ = words;

@@ -20,7 +20,7 @@ namespace absenc::author::testing {
 using namespace std::chrono_literals;
 
 /// How a command ended, and what it told: real numbers rounded among the numbers.
-struct Told final : FieldSink {
+struct Told : FieldSink {
   void put(const FieldValue& value) override {
     const std::string name(value.info->name);
     const bool is_real = value.info->kind == FieldInfo::Kind::real;
