@@ -132,6 +132,20 @@ TEST_P(EncolinkHost, TheIdentityMayHaveAByteBehindIt) {
   }
 }
 
+TEST_P(EncolinkHost, TheIdentityIsAskedForThreeTimes) {
+  for (const auto& [bad, error] :
+       std::to_array<std::pair<unsigned, Error>>({{2, Error::none}, {3, Error::bad_checksum}})) {
+    Bench bench("resolution=20 multiturn_bits=16", wire);
+    unsigned left = bad;
+    bench.tampered.replies([&](unsigned, RawBytes& reply) {
+      if (reply.size() == identity_bytes && left > 0) --left, reply[3] ^= 0x01;
+    });
+    const Told identify = bench.run("identify");
+    EXPECT_EQ(identify.error, error);
+    EXPECT_EQ(identify.frames, 6u);
+  }
+}
+
 TEST_P(EncolinkHost, TheIdentityOfVersion4LeavesRegistersAlone) {
   Bench bench("resolution=20 multiturn_bits=16 protocol_version=4", wire);
   for (const std::string_view told : {std::string_view(""), testing::multi}) {

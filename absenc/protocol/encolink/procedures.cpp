@@ -282,16 +282,9 @@ Procedure read_info(Line& line, Found& found) {
   co_return done;
 }
 
-Procedure read_register(Line& line, Found& found, std::size_t index) {
-  found.emits = true;
-  co_await read(line, found, static_cast<RegisterIndex>(index));
-  found.address = registers[index].address;
-  co_return done;
-}
+namespace {
 
-Procedure read_memory(Line& line, Found& found, Arguments arguments) {
-  const auto address = static_cast<std::uint32_t>(arguments[0]);
-  const std::uint16_t size = size_of(address, arguments[1]);
+Procedure read_at(Line& line, Found& found, std::uint32_t address, std::uint16_t size) {
   if (size == 0 || size > access_capacity) co_return {Error::invalid_argument, size_needed};
   found.emits = true;
   co_await read(line, found, address, size);
@@ -299,19 +292,8 @@ Procedure read_memory(Line& line, Found& found, Arguments arguments) {
   co_return done;
 }
 
-// ---- What is written
-
-Procedure write_register(Line& line, Found& found, std::size_t index, Arguments arguments) {
-  found.emits = true;
-  co_await write(line, found, static_cast<RegisterIndex>(index), static_cast<std::uint64_t>(arguments[0]));
-  found.address = registers[index].address;
-  co_return done;
-}
-
-Procedure write_memory(Line& line, Found& found, Arguments arguments) {
-  const auto address = static_cast<std::uint32_t>(arguments[0]);
-  const auto value = static_cast<std::uint64_t>(arguments[1]);
-  const std::uint16_t size = size_of(address, arguments[2]);
+Procedure write_at(Line& line, Found& found, std::uint32_t address, std::uint16_t size, std::int64_t argument) {
+  const auto value = static_cast<std::uint64_t>(argument);
   if (size == 0 || size > 8) co_return {Error::invalid_argument, size_needed};
   if (value > low_mask(8u * size)) {
     co_return {Error::invalid_argument, "the value does not fit into the register"};
@@ -323,6 +305,28 @@ Procedure write_memory(Line& line, Found& found, Arguments arguments) {
   co_await write(line, found, address, size, value);
   found.address = address;
   co_return done;
+}
+
+}  // namespace
+
+Procedure read_register(Line& line, Found& found, std::size_t index) {
+  return read_at(line, found, registers[index].address, registers[index].size);
+}
+
+Procedure read_memory(Line& line, Found& found, Arguments arguments) {
+  const auto address = static_cast<std::uint32_t>(arguments[0]);
+  return read_at(line, found, address, size_of(address, arguments[1]));
+}
+
+// ---- What is written
+
+Procedure write_register(Line& line, Found& found, std::size_t index, Arguments arguments) {
+  return write_at(line, found, registers[index].address, registers[index].size, arguments[0]);
+}
+
+Procedure write_memory(Line& line, Found& found, Arguments arguments) {
+  const auto address = static_cast<std::uint32_t>(arguments[0]);
+  return write_at(line, found, address, size_of(address, arguments[2]), arguments[1]);
 }
 
 Procedure send_command(Line& line, Found& found, std::uint8_t code) {

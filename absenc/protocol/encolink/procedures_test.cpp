@@ -172,11 +172,17 @@ TEST_P(EncolinkRegister, AnAccessThatIsMisheardIsRepeated) {
 }
 
 TEST_P(EncolinkRegister, DamagedFramesBeginTheAccessAnew) {
-  Bench bench(testing::single, wire);
-  bench.tampered.replies(damaging({9, 60, 130}));
-  const Told read = bench.run("memory-read", {0x4C});
-  ASSERT_EQ(read.error, Error::none) << read.detail;
-  EXPECT_EQ(read.numbers.at("temperature_c"), 35);
+  for (const auto& [frames, error] : std::vector<std::pair<std::vector<unsigned>, Error>>{
+           {{9, 60, 130}, Error::none},
+           {{9, 10, 40, 70}, Error::none},
+           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // the fifth try
+           {{9, 10, 11}, Error::bad_checksum}}) {        // as often as a frame is asked for
+    Bench bench(testing::single, wire);
+    bench.tampered.replies(damaging(frames));
+    const Told read = bench.run("memory-read", {0x4C});
+    EXPECT_EQ(read.error, error) << read.detail;
+    EXPECT_EQ(read.numbers.count("temperature_c"), error == Error::none ? 1u : 0u);
+  }
 }
 
 TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
@@ -222,6 +228,48 @@ TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
   EXPECT_EQ(write.error, Error::none) << write.detail;
   EXPECT_EQ(bench.encoder.offset(), 0x10000u);
   EXPECT_EQ(written, 1u);
+}
+
+// The encoder does not know the operation that it hears: it stays idle, and has the old value.
+TEST_P(EncolinkRegister, AWriteThatWasNotExecutedIsRepeated) {
+  for (const auto& [times, error] :
+       std::to_array<std::pair<int, Error>>({{2, Error::none}, {3, Error::cross_check_failed}})) {
+    Bench bench(testing::single, wire);
+    bench.tampered.requests(mishearing(0x58, 0x5A, times));
+    EXPECT_EQ(bench.run("memory-write", {0, 0x10000}).error, error);
+    EXPECT_EQ(bench.encoder.offset(), error == Error::none ? 0x10000u : 0u);
+  }
+}
+
+// Frames 0 and 1 are for the identity, 2 resets the channels; cycles of 7 follow. The one under way when the access
+// ends says idle as well.
+TEST_P(EncolinkRegister, AnAnswerMayCome8CyclesLate) {
+  for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
+    Bench bench(testing::single, wire);
+    std::vector<std::uint8_t> answer;
+    RawBytes cycle(7);
+    unsigned left = more;
+    bench.tampered.replies([&](unsigned frame, RawBytes& reply) {
+      if (frame < 3) return;
+      const unsigned at = (frame - 3) % 7;
+      if (at == 5) answer.push_back(reply[4]);
+      if (at == 5 && answer[0] == channel3::read_ready && left > 0) {
+        --left;
+        reply[4] = channel3::idle;
+      } else if (at == 5) {
+        reply[4] = answer[0];
+        answer.erase(answer.begin());
+      }
+      if (at == 6) reply[4] = checksum(Bytes(cycle).first(6));
+      cycle[at] = reply[4];
+    });
+    unsigned heard = 0;
+    bench.tampered.requests([&](unsigned, RawBytes& request) {
+      for (const std::uint8_t byte : request) heard += byte == 0x59 ? 1 : 0;
+    });
+    bench.run("memory-read", {0x4C});
+    EXPECT_EQ(heard >= 2, asked == 2) << more;
+  }
 }
 
 TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
