@@ -86,6 +86,21 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
   }
 }
 
+// What was found until then is told, and nothing recommended.
+TEST(E201Sweep, AnAbortedSweepRecommendsNothing) {
+  Bench bench;
+  unsigned emits = 0;
+  const Ended sweep = bench.run("clock-sweep", {2}, [&](Conversation<std::uint8_t>& conversation) {
+    if (++emits == 3) conversation.abort();
+  });
+  EXPECT_EQ(sweep.fields, (Fields{{"frames", 2},
+                                  {"valid_35_khz", 2},
+                                  {"valid_70_khz", 2},
+                                  {"valid_140_khz", 2},
+                                  {"restored_clock", 4},
+                                  {"aborted", 1}}));
+}
+
 TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
   Bench bench;
   bench.raw("M6\r");
