@@ -26,7 +26,7 @@ namespace absenc::author {
 ///     static std::size_t reply_size(const Format&, const Request&);              // 0: it is not answered
 ///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine; left out: reply_size
 ///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of no bytes: Error::timeout
-///     static bool is_whole(Error);                                   // see Engine; left out: never. Or (format, error)
+///     static bool is_whole(Error);                                   // see Engine; or (format, error); else never
 ///   };
 ///
 /// Typed requests and replies; a subclass says what becomes of them.
