@@ -26,7 +26,7 @@ namespace absenc::author {
 ///     static std::size_t reply_size(const Format&, const Request&);              // 0: it is not answered
 ///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine; left out: reply_size
 ///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of no bytes: Error::timeout
-///     static bool is_whole(Error);                                   // see Engine; left out: never
+///     static bool is_whole(Error);                                   // see Engine; or (format, error); else never
 ///   };
 ///
 /// Typed requests and replies; a subclass says what becomes of them.
@@ -58,6 +58,8 @@ class HostOf : public Engine {
   explicit HostOf(const Format& format) : Engine(P::wire(format), storage_), format_(format) {}
   ~HostOf() = default;
 
+  /// What was not known of the encoder it has told.
+  void set_format(const Format& format) { format_ = format; }
   void ask(const Request& request, Time earliest = {}) { ask(request, P::manner(format_, request), earliest); }
   void ask(const Request& request, const Manner& manner, Time earliest = {}) {
     request_ = request;
@@ -79,7 +81,9 @@ class HostOf : public Engine {
     return result.error();
   }
   [[nodiscard]] bool is_whole(Error error) const final {
-    if constexpr (requires { P::is_whole(error); }) {
+    if constexpr (requires { P::is_whole(format_, error); }) {
+      return P::is_whole(format_, error);
+    } else if constexpr (requires { P::is_whole(error); }) {
       return P::is_whole(error);
     } else {
       return false;
@@ -143,6 +147,11 @@ class LineOf : public HostOf<P>, public Routine {
       line_.asking_.attempts = attempts;
       return *this;
     }
+    /// Its reply is taken only when silence follows, as Manner::ends_by_silence.
+    Question& until_silence() {
+      line_.asking_.ends_by_silence = true;
+      return *this;
+    }
     /// What the procedure's error says when it ends here: which step failed.
     Question& or_say(std::string_view words) {
       line_.words_ = words;
@@ -184,6 +193,7 @@ class LineOf : public HostOf<P>, public Routine {
   }
   /// Hands out an intermediate result before what is asked next.
   void emit() { HostOf<P>::emit(); }
+  using HostOf<P>::set_format;
   /// This end of the line speaks at `rate` from here on; where the times of the line follow the rate, the protocol has
   /// `wire(format, rate)`.
   void set_rate(std::uint32_t rate) {

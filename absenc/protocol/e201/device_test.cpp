@@ -9,20 +9,19 @@ namespace absenc::e201 {
 namespace {
 
 using testing::Bench;
-
-constexpr std::int64_t turn = std::int64_t{1} << 32;
-constexpr std::int64_t count = std::int64_t{1} << 13;  // of 19 bits
+using testing::count;
+using testing::turn;
 
 TEST(E201Device, AnswersLikeExample4) {
   // 13 bits of ACK at 280 kHz (3571 ns): more than 12 periods of latency, less than the timeout allows.
   Bench bench("singleturn_bits=19 latency_us=46");
-  bench.shaft.state.position = 275087 * count;
+  bench.shaft.start.position = 275087 * count;
   EXPECT_EQ(bench.raw("4"), "c0014328ff300000\r");
 }
 
 TEST(E201Device, AnswersEveryCommand) {
   Bench bench;
-  bench.shaft.state.position = 2 * turn + 5 * count;
+  bench.shaft.start.position = 2 * turn + 5 * count;
   const auto expect = [&bench](const std::string& request, const std::string& reply) {
     EXPECT_EQ(bench.raw(request), reply) << request;
   };
@@ -36,7 +35,7 @@ TEST(E201Device, AnswersEveryCommand) {
   expect("b", "35\r");
   expect("?", "1048581\r");
   expect("z", "");
-  bench.shaft.state.position -= count;
+  bench.shaft.start.position -= count;
   expect("?", "-1\r");
   bench.device.power_off(bench.line.now());
   expect("?", "");

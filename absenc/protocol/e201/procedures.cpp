@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/e201/procedures.hpp"
 
+#include <span>
+
 #include "absenc/protocol/author/standstill.hpp"
-#include "absenc/protocol/e201/explain.hpp"
 
 namespace absenc::e201 {
 
@@ -26,7 +27,7 @@ bool is_too_old(const Reply& reply) {
 
 }  // namespace
 
-Procedure read(Line& line, Samples& found) {
+Procedure read(Line& line, Found& found) {
   Result<Reply> reply = co_await line.attempt({letter::samples});
   const bool unusable = reply.error() == Error::timeout || reply.error() == Error::wrong_length;
   if (unusable && !line.is_noisy()) {
@@ -46,11 +47,13 @@ Procedure read(Line& line, Samples& found) {
   co_return done;
 }
 
-Procedure inform(Line& line, Info& found) {
-  for (std::size_t i = 0; i < info_letters.size(); ++i) {
-    const Result<Reply> reply = co_await line.attempt({info_letters[i]});
-    if (!reply && (i == 0 || line.is_noisy())) co_return {reply.error()};
-    if (reply) found.replies[i] = *reply;
+// Nothing in a text tells which question it answers: one that comes twice must not be there for the next.
+Procedure inform(Line& line, Found& found) {
+  static constexpr std::array letters{letter::version, letter::serial, letter::supply, letter::clock};
+  for (const std::uint8_t asked : letters) {
+    const Result<Reply> reply = co_await line.attempt({asked}).until_silence();
+    if (!reply && (asked == letter::version || line.is_noisy())) co_return {reply.error()};
+    if (reply) found.take(asked, *reply);
   }
   co_return done;
 }
@@ -70,18 +73,18 @@ Part<Error> switch_clock(Line& line, unsigned clock) {
 
 }  // namespace
 
-Procedure set_clock(Line& line, ReadBack& found, Arguments arguments) {
+Procedure set_clock(Line& line, Found& found, Arguments arguments) {
   const unsigned clock = clock_of(arguments[0]);
   const Error error = co_await switch_clock(line, clock);
   if (error == Error::cross_check_failed) co_return {error, "the interface has another setting than it was given"};
-  found = {{letter::clock}, {.number = clock}};
+  found.clock = clock;
   co_return {error};
 }
 
-Procedure switch_supply(Line& line, ReadBack& found, bool on) {
+Procedure switch_supply(Line& line, Found& found, bool on) {
   co_await line.ask({on ? letter::supply_on : letter::supply_off});
   const Reply reply = co_await line.ask({letter::supply}).after(supply_time);
-  found = {{letter::supply}, reply};
+  found.supply = reply.text;
   const std::optional<unsigned> voltage = find_milli(reply.text, 'V');
   if (voltage && (*voltage > supplied_above) != on) {
     co_return {Error::cross_check_failed, "the voltage that the interface shows contradicts it",
@@ -102,7 +105,7 @@ bool is_near(const Line& line, std::int64_t counts, std::int64_t other) {
 
 }  // namespace
 
-Procedure set_zero(Line& line, ReadBack& found) {
+Procedure set_zero(Line& line, Found& found) {
   const Reply first = co_await line.ask({letter::decimal});
   const Reply second = co_await line.ask({letter::decimal}).after(author::between_looks);
   if (!is_near(line, second.number, first.number)) {
@@ -113,13 +116,13 @@ Procedure set_zero(Line& line, ReadBack& found) {
   if (!is_near(line, now.number, 0)) {
     co_return {Error::cross_check_failed, "the position is not zero afterwards"};
   }
-  found = {{letter::decimal}, now};
+  found.counts = now.number;
   co_return done;
 }
 
 // ---- clock-sweep
 
-unsigned Sweep::recommended() const {
+unsigned Found::recommended() const {
   unsigned best = 0;
   unsigned longest = 0;
   for (unsigned first = 0; first < valid.size(); ++first) {
@@ -142,50 +145,102 @@ Outcome failure(const Line& line, Error error) {
 }
 
 // Ends early when the sweep is aborted, or cannot go on.
-Part<Outcome> try_clocks(Line& line, Sweep& sweep) {
+Part<Outcome> try_clocks(Line& line, Found& found) {
   Outcome bad = done;  // the last frame that was
   if (line.is_aborted()) co_return done;
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
-    sweep.left = clock;
+    found.left = clock;
     const Error error = co_await switch_clock(line, clock);
     if (error == Error::cross_check_failed) co_return {error, "the interface has another clock than it was given"};
     if (error != Error::none) co_return failure(line, error);
-    for (unsigned read = 0; read < sweep.frames && !line.is_aborted(); ++read) {
+    for (unsigned read = 0; read < found.frames && !line.is_aborted(); ++read) {
       const Result<Reply> frame = co_await line.attempt({letter::samples});
       if (!frame) bad = failure(line, frame.error());
       if (!frame && line.is_noisy()) co_return bad;
-      if (frame) ++sweep.valid[clock - 1];
+      if (frame) ++found.valid[clock - 1];
     }
     if (line.is_aborted()) co_return done;
-    ++sweep.measured;
+    ++found.measured;
     line.emit();
   }
-  if (sweep.recommended() != 0) co_return done;
+  if (found.recommended() != 0) co_return done;
   bad.detail = "no MA clock gave good frames only";
   co_return bad;
 }
 
 }  // namespace
 
-Procedure sweep_clocks(Line& line, Sweep& sweep, Arguments arguments) {
+Procedure sweep_clocks(Line& line, Found& found, Arguments arguments) {
   line.restores();
-  sweep.frames = static_cast<unsigned>(arguments[0]);
+  found.frames = static_cast<unsigned>(arguments[0]);
   const Reply version = co_await line.ask({letter::version});
   if (is_too_old(version)) co_return too_old;
   const Reply clock = co_await line.ask({letter::clock}).or_say("the interface does not say which clock it has");
-  sweep.previous = static_cast<unsigned>(clock.number);
-  const Outcome outcome = co_await try_clocks(line, sweep);
-  sweep.left = sweep.previous;
-  const Error error = co_await switch_clock(line, sweep.previous);
+  found.previous = static_cast<unsigned>(clock.number);
+  const Outcome outcome = co_await try_clocks(line, found);
+  found.left = found.previous;
+  const Error error = co_await switch_clock(line, found.previous);
   if (error == Error::cross_check_failed) {
     co_return {error, "the clock that was set before could not be restored", check_clocks};
   }
   if (error != Error::none) {
     co_return {error, "it is not known whether the clock that was set before is restored", check_clocks};
   }
-  sweep.restored = true;
-  sweep.aborted = line.is_aborted();
+  found.restored = true;
+  found.aborted = line.is_aborted();
   co_return outcome;
+}
+
+// ---- In words
+
+namespace {
+
+struct Words {
+  Error error;
+  Explanation say;
+};
+
+constexpr std::string_view check_biss = "check what is connected, or select a lower MA clock (set-clock)";
+constexpr std::string_view check_clock = "select another MA clock (set-clock; clock-sweep finds one)";
+constexpr std::string_view check_model = "check that it is an E201-9S";
+
+constexpr auto of_samples = std::to_array<Words>({
+    {Error::invalid_argument, {"the interface samples 64 bits, and the word does not fit", "give it fewer bits"}},
+    {Error::line_stuck, {{}, "check that an encoder is connected and supplied: supply-on switches its supply on"}},
+    {Error::truncated,
+     {"the ACK is too long for the 64 samples", "select a lower MA clock (set-clock; clock-sweep finds one)"}},
+    {Error::bad_checksum, {"the interface does not compensate the delay of the line", check_clock}},
+    {Error::cross_check_failed, {"the bits behind the word are not what after_word says", "check the number of bits"}},
+    {Error::wrong_length, {"the interface answers with 16 hexadecimal digits and CR", check_stream}},
+});
+constexpr auto of_lines = std::to_array<Words>({
+    {Error::timeout, {"the interface is silent", check_model}},
+    {Error::wrong_length, {"the interface answers with a line that ends with CR", check_stream}},
+    {Error::bad_framing, {"this is no answer to that command", check_model}},
+});
+
+// Which of the checks of decode_position it was.
+Explanation explain_framing(const Format& format, Bytes reply) {
+  const Result<std::uint64_t> samples = decode_samples(reply);
+  if (!samples) return {"the interface answers with hexadecimal digits", check_model};
+  if (format.carries == Carries::ssi) return {"the line is not idle before the word", "check what is connected"};
+  if (*samples >> 61 != 0b110) return {"the samples do not begin with 110", check_biss};
+  if (*samples << 3 == 0) return {"no start bit follows the ACK", check_biss};
+  return {"the CDS bit is 1", check_biss};
+}
+
+}  // namespace
+
+Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {
+  const bool samples = request.empty() || request[0] == letter::samples;
+  if (samples && error == Error::bad_framing) return explain_framing(format, reply);
+  if (samples && error == Error::bad_checksum && format.carries == Carries::ssi) {
+    return {"the parity of the word is wrong", check_clock};
+  }
+  for (const Words& one : samples ? std::span<const Words>(of_samples) : std::span<const Words>(of_lines)) {
+    if (one.error == error) return one.say;
+  }
+  return {};
 }
 
 }  // namespace absenc::e201

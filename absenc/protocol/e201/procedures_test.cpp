@@ -9,18 +9,17 @@ namespace {
 
 using testing::answering;
 using testing::Bench;
+using testing::count;
 using testing::Ended;
 using testing::Fields;
 using testing::Said;
 using testing::says;
 using testing::Tamper;
-
-constexpr std::int64_t turn = std::int64_t{1} << 32;
-constexpr std::int64_t count = std::int64_t{1} << 13;  // of 19 bits
+using testing::turn;
 
 TEST(E201Read, APosition) {
   Bench bench;
-  bench.shaft.state.position = turn + 275096 * count;
+  bench.shaft.start.position = turn + 275096 * count;
   const Ended read = bench.run("position");
   EXPECT_EQ(read.error, "none");
   EXPECT_EQ(read.fields, (Fields{{"ack_bits", 3},
@@ -38,28 +37,19 @@ TEST(E201Read, APosition) {
 
 TEST(E201Read, AnSsiEncoder) {
   Bench bench("carries=ssi singleturn_bits=13 multiturn_bits=12 gray=true");
-  bench.shaft.state.position = 7 * turn + (std::int64_t{0x1234} << 19);
+  bench.shaft.start.position = 7 * turn + (std::int64_t{0x1234} << 19);
   const Ended read = bench.run("position");
   EXPECT_EQ(read.fields, (Fields{{"multiturn", 7}, {"singleturn", 0x1234}, {"angle_deg", 204}}));
-}
-
-TEST(E201Read, ALinearEncoder) {
-  Bench bench("position_bits=32 unit_um=0.05");
-  bench.shaft.state.position = 1'579'271;
-  const Ended read = bench.run("position");
-  ASSERT_TRUE(read.reading);
-  EXPECT_EQ(read.reading->unit_um, 0.05);
-  EXPECT_EQ(read.fields.at("position_um"), 78'963);
-  EXPECT_EQ(unit.resolution(bench.options).unit_um, 0.05);
 }
 
 TEST(E201Read, OptionsThatContradictIt) {
   std::vector<std::byte> storage(unit.host_storage);
   std::vector<std::byte> device_storage(unit.device_storage);
-  const testing::TestShaft shaft;
+  const sim::testing::TestShaft<19> shaft;
   const auto made = [&](std::string_view settings, std::string_view command) {
     const std::array<std::int64_t, 1> arguments{20};
-    return unit.host(testing::options_of(settings), *find_command(unit, command), arguments, storage).bytes != nullptr;
+    return unit.host(author::testing::options_of(unit, settings), *find_command(unit, command), arguments, storage)
+               .bytes != nullptr;
   };
   for (const auto& [settings, readable, usable] :
        std::vector<std::tuple<std::string_view, bool, bool>>{{"position_bits=51 unit_um=1", true, true},
@@ -69,17 +59,8 @@ TEST(E201Read, OptionsThatContradictIt) {
     EXPECT_EQ(made(settings, "clock-sweep"), readable);
     EXPECT_TRUE(made(settings, "info"));
     EXPECT_FALSE(made(settings, "set-clock"));  // 20 is none
-    EXPECT_EQ(unit.device(testing::options_of(settings), shaft, device_storage).bytes != nullptr, usable);
+    EXPECT_EQ(unit.device(author::testing::options_of(unit, settings), shaft, device_storage).bytes != nullptr, usable);
   }
-}
-
-TEST(E201Read, AlarmsOfTheEncoder) {
-  Bench bench;
-  bench.device.raise_alarms(word_error);
-  const Ended read = bench.run("position");
-  ASSERT_TRUE(read.reading);
-  EXPECT_EQ(read.reading->alarms, word_error);
-  EXPECT_FALSE(read.reading->singleturn_valid());
 }
 
 struct Failure {
@@ -111,7 +92,7 @@ TEST(E201Read, WhatFails) {
     EXPECT_EQ(read.error, one.error);
     EXPECT_TRUE(says(read.detail, one.detail)) << read.detail;
     EXPECT_TRUE(says(read.advice, one.advice)) << read.advice;
-    EXPECT_EQ(bench.tampered.asked(), one.asked);
+    EXPECT_EQ(bench.answering.asked(), one.asked);
     EXPECT_FALSE(read.reading);
     EXPECT_TRUE(read.fields.empty());
   }
@@ -142,7 +123,7 @@ TEST(E201Read, ItsTimes) {
   EXPECT_TRUE(says(noisy.advice, "stream-off")) << noisy.advice;
   EXPECT_GT(noisy.took, 100ms);
   EXPECT_LT(noisy.took, 130ms);
-  EXPECT_EQ(bench.tampered.asked(), "4");  // asking more would not help
+  EXPECT_EQ(bench.answering.asked(), "4");  // asking more would not help
 }
 
 TEST(E201Info, KeepsWhatItCannotRead) {
@@ -158,10 +139,19 @@ TEST(E201Info, KeepsWhatItCannotRead) {
   EXPECT_EQ(partly.fields, (Fields{{"version", 0}, {"serial", 0}, {"supply", 0}, {"clock", 4}, {"clock_khz", 280}}));
   EXPECT_EQ(bench.run_tampered(answering('e', {}), "info").fields,
             (Fields{{"version", 0}, {"serial", 0}, {"clock", 4}, {"clock_khz", 280}}));
+  // A text that comes twice is no answer to the next question.
+  EXPECT_EQ(bench.run_tampered(answering('v', {{"E201-9S V1.16\r"}, {"E201-9S V1.16\r"}}), "info").error,
+            "wrong_length");
+  EXPECT_EQ(
+      bench.run_tampered(answering('s', {{"09S0417\r"}, {"09S0417\r", 18ms}}), "info").fields,
+      (Fields{
+          {"version", 0}, {"supply", 0}, {"supply_mv", 4980}, {"supply_ma", 62}, {"clock", 4}, {"clock_khz", 280}}));
+  EXPECT_EQ(bench.run_tampered(answering('e', {{"4.98V 62mA\r"}, {"4.98V 62mA\r"}}), "info").fields,
+            (Fields{{"version", 0}, {"serial", 0}, {"clock", 4}, {"clock_khz", 280}}));
   EXPECT_EQ(bench.run_tampered(answering('v', {}), "info").error, "timeout");
   const Tamper stream = answering('s', std::vector<Said>(40, {"1", 10ms}));
   EXPECT_EQ(bench.run_tampered(stream, "info").error, "wrong_length");
-  EXPECT_EQ(bench.tampered.asked(), "vs");
+  EXPECT_EQ(bench.answering.asked(), "vs");
 }
 
 TEST(E201Set, IsReadBack) {
@@ -177,7 +167,7 @@ TEST(E201Set, IsReadBack) {
   EXPECT_EQ(bench.run_tampered(answering('M', {{"M2 ok\r\n"}, {"more", 15ms}}), "set-clock", {2}).error, "none");
   const Tamper stream = answering('M', std::vector<Said>(40, {"1", 10ms}));
   EXPECT_EQ(bench.run_tampered(stream, "set-clock", {2}).error, "wrong_length");
-  EXPECT_EQ(bench.tampered.asked(), "M");
+  EXPECT_EQ(bench.answering.asked(), "M");
   EXPECT_EQ(bench.run_tampered(answering('m', {}), "set-clock", {2}).error, "timeout");
 }
 
@@ -210,9 +200,9 @@ TEST(E201Supply, OffIsALineThatIsStuck) {
     const Ended ended = bench.run_tampered(answering('e', {{text + "\r"}}), command);
     EXPECT_EQ(ended.error, error) << command << text;
     EXPECT_EQ(error != "none", says(ended.detail, "contradicts"));
-    ASSERT_EQ(bench.tampered.log.size(), 2u);
-    EXPECT_EQ(bench.tampered.log[0].first, command == "supply-on" ? 'n' : 'f');
-    const Time pause = bench.tampered.log[1].second - bench.tampered.log[0].second;
+    ASSERT_EQ(bench.answering.log.size(), 2u);
+    EXPECT_EQ(bench.answering.log[0].first, command == "supply-on" ? 'n' : 'f');
+    const Time pause = bench.answering.log[1].second - bench.answering.log[0].second;
     EXPECT_GE(pause, 200ms);
     EXPECT_LT(pause, 201ms);
   }
@@ -220,9 +210,9 @@ TEST(E201Supply, OffIsALineThatIsStuck) {
 
 TEST(E201Zero, IsReadBack) {
   Bench bench;
-  bench.shaft.state.position = 275096 * count;
+  bench.shaft.start.position = 275096 * count;
   EXPECT_EQ(bench.run("set-zero").fields, (Fields{{"counts", 0}}));
-  bench.shaft.state.position -= 10 * count;
+  bench.shaft.start.position -= 10 * count;
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", -10}}));
   EXPECT_EQ(bench.run("position").fields.at("singleturn"), 275086);  // the encoder's own position
   EXPECT_EQ(bench.run("clear-zero").error, "none");
@@ -256,9 +246,9 @@ TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
     const Ended zero = bench.run_tampered(tamper, "set-zero");
     EXPECT_EQ(zero.error, one.error) << one.looks.back();
     const std::array asked{"", "?", "??", "??z?"};
-    EXPECT_EQ(bench.tampered.asked(), asked[one.looks.size()]);
+    EXPECT_EQ(bench.answering.asked(), asked[one.looks.size()]);
     if (one.looks.size() < 2) continue;
-    const Time pause = bench.tampered.log[1].second - bench.tampered.log[0].second;
+    const Time pause = bench.answering.log[1].second - bench.answering.log[0].second;
     EXPECT_GE(pause, 10ms);
     EXPECT_LT(pause, 14ms);
   }

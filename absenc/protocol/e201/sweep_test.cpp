@@ -14,6 +14,7 @@ using testing::Fields;
 using testing::Said;
 using testing::says;
 using testing::Tamper;
+using testing::Told;
 
 /// 10 us of latency, 32 + 8 bits: up to 20 bits of ACK fit, so M8 (45 bits) and M7 (22) are too fast.
 TEST(E201Sweep, CountsRecommendsAndRestores) {
@@ -21,9 +22,9 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
   bench.raw("M7\r");
   std::vector<Fields> progress;
   const Ended sweep = bench.run("clock-sweep", {5}, [&progress](const Conversation<std::uint8_t>& conversation) {
-    testing::Collector collector;
-    conversation.report(collector);
-    progress.push_back(collector.fields);
+    Told now;
+    now.take(conversation);
+    progress.push_back(now.numbers);
   });
   EXPECT_EQ(sweep.error, "none") << sweep.detail;
   EXPECT_EQ(sweep.fields, (Fields{{"frames", 5},
@@ -57,7 +58,7 @@ TEST(E201Sweep, LineDelayMovesTheRecommendation) {
 TEST(E201Sweep, TheLongestRunIsRecommended) {
   for (const auto& [good, recommended] : std::to_array<std::pair<std::string_view, unsigned>>(
            {{"11111111", 5}, {"10111011", 4}, {"11000110", 2}, {"00000001", 8}, {"01000011", 8}, {"00000000", 0}})) {
-    Sweep sweep{.frames = 3};
+    Found sweep{.frames = 3};
     for (unsigned i = 0; i < good.size(); ++i) sweep.valid[i] = good[i] == '1' ? 3 : 2;
     EXPECT_EQ(sweep.recommended(), recommended) << good;
   }
@@ -75,14 +76,29 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
     ASSERT_TRUE(bench.line.run(host, asked + 1s));
     EXPECT_LT(bench.line.now() - asked, 30ms) << steps;
     EXPECT_EQ(sweep.error(), Error::none);
-    EXPECT_TRUE(steps != 0 || bench.tampered.asked() == "MvmMm") << bench.tampered.asked();
+    EXPECT_TRUE(steps != 0 || bench.answering.asked() == "MvmMm") << bench.answering.asked();
     EXPECT_EQ(bench.raw("m"), "6\r") << steps;
-    testing::Collector collector;
-    sweep.report(collector);
-    EXPECT_EQ(collector.fields["aborted"], 1);
-    EXPECT_EQ(collector.fields["restored_clock"], 6);
-    EXPECT_FALSE(collector.fields.contains("recommended_clock"));
+    Told told;
+    told.take(sweep);
+    EXPECT_EQ(told.numbers["aborted"], 1);
+    EXPECT_EQ(told.numbers["restored_clock"], 6);
+    EXPECT_FALSE(told.numbers.contains("recommended_clock"));
   }
+}
+
+// What was found until then is told, and nothing recommended.
+TEST(E201Sweep, AnAbortedSweepRecommendsNothing) {
+  Bench bench;
+  unsigned emits = 0;
+  const Ended sweep = bench.run("clock-sweep", {2}, [&](Conversation<std::uint8_t>& conversation) {
+    if (++emits == 3) conversation.abort();
+  });
+  EXPECT_EQ(sweep.fields, (Fields{{"frames", 2},
+                                  {"valid_35_khz", 2},
+                                  {"valid_70_khz", 2},
+                                  {"valid_140_khz", 2},
+                                  {"restored_clock", 4},
+                                  {"aborted", 1}}));
 }
 
 TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
@@ -93,15 +109,15 @@ TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
   std::string left;
   while (!bench.line.done(host)) {
     bench.line.step();
-    testing::Collector collector;
-    sweep.report_left(collector);
-    if (collector.fields.empty()) {
-      EXPECT_FALSE(says(bench.tampered.asked(), "M6M")) << "another clock is set";
+    Told told;
+    sweep.report_left(told);
+    if (told.numbers.empty()) {
+      EXPECT_FALSE(says(bench.answering.asked(), "M6M")) << "another clock is set";
       continue;
     }
-    EXPECT_EQ(collector.fields["previous_clock"], 6);
-    const auto clock = static_cast<char>('0' + collector.fields["left_clock"]);
-    EXPECT_EQ(collector.fields["left_khz"], clocks_khz[static_cast<std::size_t>(clock - '1')]);
+    EXPECT_EQ(told.numbers["previous_clock"], 6);
+    const auto clock = static_cast<char>('0' + told.numbers["left_clock"]);
+    EXPECT_EQ(told.numbers["left_khz"], clocks_khz[static_cast<std::size_t>(clock - '1')]);
     if (left.empty() || left.back() != clock) left += clock;
   }
   EXPECT_EQ(left, "123456786");

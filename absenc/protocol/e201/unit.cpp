@@ -8,7 +8,6 @@
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/biss/fields.hpp"
 #include "absenc/protocol/e201/device.hpp"
-#include "absenc/protocol/e201/explain.hpp"
 #include "absenc/protocol/e201/procedures.hpp"
 #include "absenc/protocol/e201/vectors.hpp"
 
@@ -74,48 +73,53 @@ constexpr Format format_of(const Settings& given, const WordFormat* word) {
 
 // ---- Fields
 
-struct Values {
-  std::optional<Bytes> command{};
-  std::optional<Bytes> version{};
-  std::optional<Bytes> serial{};
-  std::optional<Bytes> supply{};
-  std::optional<unsigned> supply_mv{};
-  std::optional<unsigned> supply_ma{};
-  std::optional<std::int64_t> clock{};
-  std::optional<std::int64_t> width{};
-  std::optional<std::int64_t> counts{};
-  std::optional<unsigned> frames{};
-  std::array<std::optional<unsigned>, clocks_khz.size()> valid{};
-  std::optional<unsigned> recommended{};
-  std::optional<unsigned> restored{};
-  std::optional<bool> aborted{};
-  std::optional<unsigned> left{};
-  std::optional<unsigned> previous{};
-};
-
-template <std::size_t i>
-constexpr std::optional<unsigned> valid(const Values& values) {
-  return values.valid[i];
+template <auto member>
+constexpr std::optional<Bytes> words(const Found& found) {
+  return found.*member ? std::optional<Bytes>(*(found.*member)) : std::nullopt;
 }
+template <std::uint8_t symbol>
+constexpr std::optional<unsigned> milli(const Found& found) {
+  return found.supply ? find_milli(*found.supply, symbol) : std::nullopt;
+}
+constexpr std::optional<unsigned> frames(const Found& found) {
+  return found.frames != 0 ? std::optional(found.frames) : std::nullopt;
+}
+template <std::size_t i>
+constexpr std::optional<unsigned> valid(const Found& found) {
+  return i < found.measured ? std::optional(found.valid[i]) : std::nullopt;
+}
+constexpr std::optional<std::int64_t> restored(const Found& found) {
+  return found.restored ? std::optional<std::int64_t>(found.previous) : std::nullopt;
+}
+constexpr std::optional<std::int64_t> aborted(const Found& found) {
+  return found.restored ? std::optional<std::int64_t>(found.aborted) : std::nullopt;
+}
+std::optional<std::int64_t> recommended(const Found& found) {
+  const unsigned clock = found.restored && !found.aborted ? found.recommended() : 0;
+  return clock != 0 ? std::optional<std::int64_t>(clock) : std::nullopt;
+}
+constexpr std::optional<std::int64_t> set_clock_of(const Found& found) { return found.clock; }
+constexpr std::optional<std::int64_t> left(const Found& found) { return found.left; }
 template <auto clock>
-constexpr std::optional<unsigned> khz(const Values& values) {
-  if (!(values.*clock)) return std::nullopt;
-  return clocks_khz[static_cast<std::size_t>(*(values.*clock)) - 1];
+constexpr std::optional<unsigned> khz(const Found& found) {
+  const std::optional<std::int64_t> one = clock(found);
+  if (!one) return std::nullopt;
+  return clocks_khz[static_cast<std::size_t>(*one) - 1];
 }
 
 using enum FieldInfo::Kind;
-constexpr auto own_fields = fields_of<Values>(
-    field<&Values::command>({"command", text, "", "the request"}),
-    field<&Values::version>({"version", text, "", "firmware of the interface"}),
-    field<&Values::serial>({"serial", text, "", "serial number of the interface"}),
-    field<&Values::supply>({"supply", text, "", "supply of the encoder, as the interface says it"}),
-    field<&Values::supply_mv>({"supply_mv", number, "mV", "voltage in that text"}),
-    field<&Values::supply_ma>({"supply_ma", number, "mA", "current in that text"}),
-    field<&Values::clock>({"clock", number, "", "setting of the MA clock, 1 to 8"}),
-    field<khz<&Values::clock>>({"clock_khz", number, "kHz", "MA clock"}),
-    field<&Values::width>({"width", number, "bits", "width of the position that ? gives"}),
-    field<&Values::counts>({"counts", number, "counts", "position, the interface's zero taken off"}),
-    field<&Values::frames>({"frames", number, "", "frames read at each clock"}),
+constexpr auto own_fields = fields_of<Found>(
+    field<words<&Found::command>>({"command", text, "", "the request"}),
+    field<words<&Found::version>>({"version", text, "", "firmware of the interface"}),
+    field<words<&Found::serial>>({"serial", text, "", "serial number of the interface"}),
+    field<words<&Found::supply>>({"supply", text, "", "supply of the encoder, as the interface says it"}),
+    field<milli<'V'>>({"supply_mv", number, "mV", "voltage in that text"}),
+    field<milli<'A'>>({"supply_ma", number, "mA", "current in that text"}),
+    field<&Found::clock>({"clock", number, "", "setting of the MA clock, 1 to 8"}),
+    field<khz<set_clock_of>>({"clock_khz", number, "kHz", "MA clock"}),
+    field<&Found::width>({"width", number, "bits", "width of the position that ? gives"}),
+    field<&Found::counts>({"counts", number, "counts", "position, the interface's zero taken off"}),
+    field<frames>({"frames", number, "", "frames read at each clock"}),
     field<valid<0>>({"valid_35_khz", number, "", "good frames at 35 kHz"}),
     field<valid<1>>({"valid_70_khz", number, "", "good frames at 70 kHz"}),
     field<valid<2>>({"valid_140_khz", number, "", "good frames at 140 kHz"}),
@@ -124,26 +128,17 @@ constexpr auto own_fields = fields_of<Values>(
     field<valid<5>>({"valid_1100_khz", number, "", "good frames at 1100 kHz"}),
     field<valid<6>>({"valid_2200_khz", number, "", "good frames at 2200 kHz"}),
     field<valid<7>>({"valid_4400_khz", number, "", "good frames at 4400 kHz"}),
-    field<&Values::recommended>({"recommended_clock", number, "", "to be set with set-clock"}),
-    field<khz<&Values::recommended>>({"recommended_khz", number, "kHz", "that clock"}),
-    field<&Values::restored>({"restored_clock", number, "", "what it was before and is again"}),
-    field<&Values::aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}),
-    field<&Values::left>({"left_clock", number, "", "the clock that the sweep set last"}),
-    field<khz<&Values::left>>({"left_khz", number, "kHz", "that clock"}),
-    field<&Values::previous>({"previous_clock", number, "", "what it was before: give it back with set-clock"}));
-
-/// What a reply of one line says.
-constexpr void take(Values& values, std::uint8_t asked, const Reply& reply) {
-  const Bytes text = reply.text;
-  if (asked == letter::version) values.version = text;
-  if (asked == letter::serial) values.serial = text;
-  if (asked == letter::supply) values.supply = text;
-  if (asked == letter::supply) values.supply_mv = find_milli(text, 'V');
-  if (asked == letter::supply) values.supply_ma = find_milli(text, 'A');
-  if (asked == letter::clock) values.clock = reply.number;
-  if (asked == letter::width) values.width = reply.number;
-  if (asked == letter::decimal) values.counts = reply.number;
-}
+    field<recommended>({"recommended_clock", number, "", "to be set with set-clock"}),
+    field<khz<recommended>>({"recommended_khz", number, "kHz", "that clock"}),
+    field<restored>({"restored_clock", number, "", "what it was before and is again"}),
+    field<aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}));
+// Of a sweep that is broken off.
+constexpr auto left_fields = fields_of<Found>(
+    field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
+    field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
+    field<&Found::previous>({"previous_clock", number, "", "what it was before: give it back with set-clock"}));
+constexpr auto all_fields =
+    joined_fields(joined_fields(word_fields, biss::own_fields), joined_fields(own_fields.infos, left_fields.infos));
 
 constexpr void put_samples(FieldSink& sink, const Format& format, std::uint64_t samples) {
   const Position position = decode_position(format, samples).value();
@@ -155,8 +150,7 @@ constexpr void put_samples(FieldSink& sink, const Format& format, std::uint64_t 
 
 // ---- What is declared
 
-struct Definition {
-  using Protocol = e201::Protocol;
+struct Definition : Declares<Definition, e201::Protocol> {
   using Encoder = VirtualInterface;
   static constexpr std::string_view id = "e201", name = "RLS E201-9S USB interface",
                                     document = "RLS E201-9S Decoding the BiSS information";
@@ -168,9 +162,7 @@ struct Definition {
 
   static constexpr auto options = e201::options;
   static constexpr auto models = position_models;
-  static constexpr struct {
-    decltype(joined_fields(joined_fields(word_fields, biss::own_fields), own_fields.infos)) infos;
-  } fields{joined_fields(joined_fields(word_fields, biss::own_fields), own_fields.infos)};
+  static constexpr struct { decltype(all_fields) infos; } fields{all_fields};
   static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
   static constexpr auto vectors = e201::vectors;
 
@@ -203,70 +195,48 @@ struct Definition {
       {{"clock", "1 to 8, or 35 70 140 280 560 1100 2200 4400 kHz", 1, 4400}}};
   static constexpr std::array<Argument, 1> sweep_arguments{{{"frames", "to read at each clock", 1, 1000, 20, false}}};
   static constexpr std::array commands{
-      command<Definition, Protocol, Samples, read, does<letter::samples>>(
-          {"position", Verb::read, 0, "position, turns, error and warning"})
+      command<Found, read, does<letter::samples>>({"position", Verb::read, 0, "position, turns, error and warning"})
           .only_if(is_readable),
-      command<Definition, Protocol, Info, inform, does<letter::version>>(
+      command<Found, inform, does<letter::version>>(
           {"info", Verb::info, 0, "version, serial number, supply and MA clock of the interface"}),
-      reading<Definition, Protocol, asks<letter::clock>>({"clock", Verb::config_get, 0, "MA clock"}),
-      command<Definition, Protocol, ReadBack, set_clock, selects>(
+      reading<asks<letter::clock>>({"clock", Verb::config_get, 0, "MA clock"}),
+      command<Found, set_clock, selects>(
           {"set-clock", Verb::config_set, 0, "set the MA clock", clock_arguments, true, false, "clock"}),
-      reading<Definition, Protocol, asks<letter::width>>(
-          {"width", Verb::config_get, 0, "width of the position that ? gives"}),
-      command<Definition, Protocol, ReadBack, set_zero, does<letter::zero>>(
+      reading<asks<letter::width>>({"width", Verb::config_get, 0, "width of the position that ? gives"}),
+      command<Found, set_zero, does<letter::zero>>(
           {"set-zero", Verb::run, 0, "the interface's own zero: decimal counts from here", {}, true, false}),
-      reading<Definition, Protocol, asks<letter::clear_zero>>(
-          {"clear-zero", Verb::run, 0, "take that zero away", {}, true, false}),
-      reading<Definition, Protocol, asks<letter::decimal>>(
-          {"decimal", Verb::read_part, 0, "position from that zero, by ?"}),
-      command<Definition, Protocol, ReadBack, switch_supply, does<letter::supply_on>, true>(
+      reading<asks<letter::clear_zero>>({"clear-zero", Verb::run, 0, "take that zero away", {}, true, false}),
+      reading<asks<letter::decimal>>({"decimal", Verb::read_part, 0, "position from that zero, by ?"}),
+      command<Found, switch_supply, does<letter::supply_on>, true>(
           {"supply-on", Verb::run, 0, "switch the encoder's supply on", {}, true, false}),
-      command<Definition, Protocol, ReadBack, switch_supply, does<letter::supply_off>, false>(
+      command<Found, switch_supply, does<letter::supply_off>, false>(
           {"supply-off", Verb::run, 0, "switch the encoder's supply off", {}, true, false}),
-      reading<Definition, Protocol, asks<letter::stream_off>>(
+      reading<asks<letter::stream_off>>(
           {"stream-off", Verb::run, 0, "end the stream of positions that somebody began"}),
-      command<Definition, Protocol, Sweep, sweep_clocks, does<letter::samples>>(
-          {"clock-sweep", Verb::run, 0, "count the good frames at every MA clock and recommend one", sweep_arguments,
-           false, false})
+      command<Found, sweep_clocks, does<letter::samples>>({"clock-sweep", Verb::run, 0,
+                                                           "count the good frames at every MA clock and recommend one",
+                                                           sweep_arguments, false, false})
           .only_if(is_readable),
   };
 
   static constexpr void put(FieldSink& sink, const Format& format, const Request& request) {
-    const auto bytes = Protocol::encode(format, request);
-    own_fields.put(sink, {.command = trimmed(bytes)});
+    Found found;
+    found.command.emplace().append(trimmed(Protocol::encode(format, request)));
+    own_fields.put(sink, found);
   }
   static constexpr void put(FieldSink& sink, const Format& format, const Request& request, const Reply& reply) {
     if (request.letter == letter::samples) return put_samples(sink, format, reply.samples);
     if (!letter::is_in(letter::answered_by_a_line, request.letter)) return put(sink, format, request);
-    Values values;
-    take(values, request.letter, reply);
-    own_fields.put(sink, values);
+    Found found;
+    found.take(request.letter, reply);
+    own_fields.put(sink, found);
   }
-  static void put(FieldSink& sink, const Format& format, const Samples& found) {
-    put_samples(sink, format, found.samples);
+  static void put(FieldSink& sink, const Format& format, const Found& found) {
+    if (found.reading.singleturn_bits != 0) put_samples(sink, format, found.samples);
+    own_fields.put(sink, found);
   }
-  static void put(FieldSink& sink, const Format& format, const ReadBack& found) {
-    put(sink, format, found.request, found.reply);
-  }
-  static void put(FieldSink& sink, const Format&, const Info& found) {
-    Values values;
-    for (std::size_t i = 0; i < info_letters.size(); ++i) {
-      if (!found.replies[i].text.empty()) take(values, info_letters[i], found.replies[i]);
-    }
-    own_fields.put(sink, values);
-  }
-  static void put(FieldSink& sink, const Format&, const Sweep& found) {
-    Values values{.frames = found.frames};
-    for (unsigned i = 0; i < found.measured; ++i) values.valid[i] = found.valid[i];
-    if (found.restored) {
-      if (!found.aborted && found.recommended() != 0) values.recommended = found.recommended();
-      values.restored = found.previous;
-      values.aborted = found.aborted;
-    }
-    own_fields.put(sink, values);
-  }
-  static void put_left(FieldSink& sink, const Format&, const Sweep& found) {
-    if (found.left != 0) own_fields.put(sink, {.left = found.left, .previous = found.previous});
+  static void put_left(FieldSink& sink, const Format&, const Found& found) {
+    if (found.left != 0) left_fields.put(sink, found);
   }
 
   static Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {

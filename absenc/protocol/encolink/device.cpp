@@ -11,6 +11,30 @@ using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
 constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8..9] hold the resolution
+constexpr Time access_time = 200us;                         // until an access is executed; assumed
+
+struct Text {
+  std::size_t index;
+  std::string_view text;
+};
+constexpr std::array<Text, 3> texts{
+    {{serial_number, "AK2A0001"}, {serial_number_extended, "AK2A0001-0000001"}, {part_number, "MB080SLA20MENT00 SIM"}}};
+
+// Of each register that is a number, and of what follows them. 0: of what a calibration or the factory would have
+// found.
+constexpr std::size_t turns_taken = registers.size();  // off those of the shaft, by a preset
+constexpr auto at_shipping = [] {
+  std::array<std::uint32_t, turns_taken + 1> values{};
+  values[firmware_major] = 1;
+  values[firmware_minor] = 4;
+  values[protocol_register] = version::aksim2;
+  return values;
+}();
+
+// What `save` keeps, one after the other.
+constexpr std::array<std::size_t, 9> kept{position_offset, multiturn_preset,      write_lock,
+                                          turns_taken,     position_filter,       position_filter_speed,
+                                          velocity_filter, velocity_filter_speed, calibration_range};
 
 }  // namespace
 
@@ -174,11 +198,9 @@ void VirtualEncoder::end_calibration(Time now) {
   calibrating_ = false;
   const std::int64_t turned = shaft_->at(now).position - calibrated_from_;
   constexpr std::int64_t one_turn = std::int64_t{1} << 32;
-  if (turned < one_turn && -turned < one_turn) {
-    calibration_status_ |= calibration::timed_out;
-  } else {
-    calibration_status_ = static_cast<std::uint8_t>((calibration_status_ + 1) & calibration::count);
-  }
+  std::uint32_t& status = values_[calibration_status];
+  const bool too_little = turned < one_turn && -turned < one_turn;
+  status = too_little ? status | calibration::timed_out : (status + 1) & calibration::count;
 }
 
 // ---- Power
@@ -188,7 +210,6 @@ void VirtualEncoder::power_on(Time now, PowerOn kind) {
   zeros_until_ = next_frame_ = now;
   if (kind == PowerOn::real) zeros_until_ += start_up;
   busy_until_ = Time{};
-  calibration_status_ = 0;
   reset_channels();
   Responder::power_on(now, kind);
 }
@@ -196,6 +217,119 @@ void VirtualEncoder::power_on(Time now, PowerOn kind) {
 void VirtualEncoder::stopped(Time now) {
   update(now);
   save_pending_ = calibrating_ = identity_next_ = false;
+}
+
+// ---- Registers
+
+void VirtualEncoder::execute(Time at) {
+  const Result<RegisterRequest> request = decode_access(access_);
+  const bool writes = access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
+  access_.clear();
+  answer_.clear();
+  answered_bytes_ = 0;
+  busy_until_ = std::max(busy_until_, at + access_time);
+  if (request.error() == Error::unsupported) return;  // no operation of this number: it stays idle
+  AccessStatus status = writes ? AccessStatus::write_checksum : AccessStatus::read_checksum;
+  if (request.error() == Error::wrong_length) status = AccessStatus::byte_count;
+  // The registers of an AksIM-4 are others, which are not described.
+  const Register* found =
+      request && format_.generation == Generation::aksim2 ? find_register(request->address) : nullptr;
+  const std::size_t index = found != nullptr ? static_cast<std::size_t>(found - registers.data()) : 0;
+  if (request) status = judge(*request, found);
+  if (request && status == AccessStatus::ok && writes) status = write(index, load_big_endian(request->data), at);
+  answer_.push_back(writes ? channel3::write_ready : channel3::read_ready);
+  answer_.push_back(static_cast<std::uint8_t>(status));
+  if (!request || writes) return;
+  if (status == AccessStatus::ok) {
+    answer_.append(value_of(index, at));
+  } else {  // the vendor's host takes the bytes it asked for whatever the status says
+    for (std::size_t i = 0; i < std::min<std::size_t>(request->length, access_capacity); ++i) answer_.push_back(0);
+  }
+}
+
+AccessStatus VirtualEncoder::judge(const RegisterRequest& request, const Register* found) const {
+  const bool writes = request.operation == RegisterRequest::Operation::write;
+  if (found == nullptr) return AccessStatus::no_such_register;
+  if (writes && found->access == Access::read_only) return AccessStatus::denied;
+  if (found->size != request.length) return AccessStatus::byte_count;
+  if (!writes) return found->access == Access::write_only ? AccessStatus::denied : AccessStatus::ok;
+  const bool opens = found == &registers[write_lock];
+  return values_[write_lock] != 0 && !opens ? AccessStatus::locked : AccessStatus::ok;
+}
+
+AccessStatus VirtualEncoder::write(std::size_t index, std::uint64_t value, Time at) {
+  std::uint64_t largest = UINT64_MAX;
+  if (index == command_register) return obey(static_cast<std::uint8_t>(value), at);
+  if (index == position_offset) largest = format_.largest_offset();
+  if (index == multiturn_preset) largest = low_mask(static_cast<unsigned>(format_.multiturn_bits));
+  if (index == write_lock) largest = 1;
+  if (value > largest) return AccessStatus::out_of_range;
+  values_[index] = static_cast<std::uint32_t>(value);
+  if (index == multiturn_preset) {
+    values_[turns_taken] = static_cast<std::uint32_t>(static_cast<std::uint64_t>(place(at) >> 32) - value);
+  }
+  return AccessStatus::ok;
+}
+
+AccessStatus VirtualEncoder::obey(std::uint8_t command, Time at) {
+  const std::uint32_t calibrated = values_[calibration_status];
+  switch (command) {
+    case commands::save:
+      save_pending_ = true;
+      busy_until_ = at + save_time;
+      return AccessStatus::ok;
+    case commands::reset:
+      values_ = at_shipping;
+      values_[calibration_status] = calibrated;
+      return AccessStatus::ok;
+    case commands::self_calibrate:
+      calibrating_ = true;
+      calibrated_at_ = at + calibration_time;
+      calibrated_from_ = shaft_->at(at).position;
+      values_[calibration_status] = calibrated & calibration::count;
+      return AccessStatus::ok;
+    default:
+      return AccessStatus::out_of_range;
+  }
+}
+
+ByteBuffer<largest_register> VirtualEncoder::value_of(std::size_t index, Time at) const {
+  ByteBuffer<largest_register> bytes;
+  for (const Text& one : texts) {
+    if (one.index != index) continue;
+    for (const char c : one.text) bytes.push_back(static_cast<std::uint8_t>(c));
+    return bytes;
+  }
+  std::uint64_t number = values_[index];
+  if (index == temperature) number = static_cast<std::uint64_t>(10 * conditions_[condition_temperature]);
+  if (index == speed) number = static_cast<std::uint64_t>(std::int64_t{shaft_->at(at).speed_millirpm} / 100);
+  std::array<std::uint8_t, 8> all{};
+  store_big_endian(all, number);
+  bytes.append(Bytes(all).last(registers[index].size));
+  return bytes;
+}
+
+// ---- What survives without power
+
+constexpr std::size_t kept_size(std::size_t index) { return index == turns_taken ? 4 : registers[index].size; }
+
+void VirtualEncoder::load() {
+  values_ = at_shipping;
+  Bytes bytes = memory_;
+  for (const std::size_t index : kept) {
+    values_[index] = static_cast<std::uint32_t>(load_big_endian(bytes.first(kept_size(index))));
+    bytes = bytes.subspan(kept_size(index));
+  }
+}
+
+void VirtualEncoder::save() {
+  save_pending_ = false;
+  MutableBytes bytes = memory_;
+  for (const std::size_t index : kept) {
+    store_big_endian(bytes.first(kept_size(index)), values_[index]);
+    bytes = bytes.subspan(kept_size(index));
+  }
+  change_memory();
 }
 
 }  // namespace absenc::encolink

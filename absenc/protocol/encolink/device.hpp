@@ -10,7 +10,6 @@
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
 #include "absenc/protocol/encolink/registers.hpp"
-#include "absenc/protocol/encolink/timing.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::encolink {
@@ -43,9 +42,6 @@ class VirtualEncoder final : public author::Responder {
   [[nodiscard]] std::uint16_t alarms() const { return static_cast<std::uint16_t>(raised()); }
 
  private:
-  // Beside the registers: what is taken off the turns of the shaft.
-  static constexpr std::size_t turns_taken = registers.size();
-
   [[nodiscard]] std::size_t request_size(Bytes) const override { return request_bytes; }
   [[nodiscard]] std::size_t others_reply_size(Bytes) const override { return 0; }
   Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) override;
@@ -65,8 +61,7 @@ class VirtualEncoder final : public author::Responder {
   [[nodiscard]] AccessStatus judge(const RegisterRequest& request, const Register* found) const;
   [[nodiscard]] AccessStatus write(std::size_t index, std::uint64_t value, Time at);
   [[nodiscard]] AccessStatus obey(std::uint8_t command, Time at);
-  [[nodiscard]] std::uint64_t number_of(std::size_t index, Time at) const;
-  [[nodiscard]] ByteBuffer<20> value_of(std::size_t index, Time at) const;
+  [[nodiscard]] ByteBuffer<largest_register> value_of(std::size_t index, Time at) const;
 
   void update(Time now);
   void end_calibration(Time now);
@@ -77,7 +72,7 @@ class VirtualEncoder final : public author::Responder {
   Format format_;
   const Shaft* shaft_;
   std::array<std::int64_t, conditions.size()> conditions_{};
-  std::array<std::uint32_t, turns_taken + 1> values_{};  // of what can be written
+  std::array<std::uint32_t, registers.size() + 1> values_{};  // of the registers; and the turns taken off the shaft's
   std::array<std::uint8_t, 31> memory_{};
 
   Time zeros_until_{};
@@ -86,7 +81,6 @@ class VirtualEncoder final : public author::Responder {
   bool calibrating_ = false;
   Time calibrated_at_{};
   std::int64_t calibrated_from_ = 0;
-  std::uint8_t calibration_status_ = 0;
 
   bool identity_next_ = false;
   ReplyBytes cycle_;

@@ -29,8 +29,7 @@ inline constexpr std::string_view wrong_resolution =
 /// Why the registers of an AksIM-4 are refused.
 inline constexpr std::string_view not_described =
     "protocol version 4 (AksIM-4) has its registers at other addresses, which are not described here: its positions "
-    "may "
-    "be read";
+    "may be read";
 
 // What to do is ours: the vendor only names the bits.
 inline constexpr std::array<FlagInfo, 16> alarm_flags{{
@@ -65,18 +64,12 @@ inline constexpr std::array<FlagInfo, 4> calibration_flags{{
 struct Values {
   template <class T>
   using Maybe = std::optional<T>;
-  Maybe<std::uint32_t> singleturn{};
+  Maybe<Position> position{};
   Maybe<std::uint16_t> multiturn{};
-  Maybe<bool> error{};
-  Maybe<bool> warning{};
   Maybe<std::uint8_t> channel2{};
   Maybe<std::uint16_t> status{};
-  Maybe<std::uint16_t> alarms{};
   Maybe<std::uint8_t> channel3{};
-  Maybe<std::uint8_t> protocol_version{};
-  Maybe<std::uint8_t> frame_bytes{};
-  Maybe<unsigned> resolution{};
-  Maybe<Bytes> part_number{};
+  Maybe<Identity> identity{};
   Maybe<std::uint8_t> config{};
   Maybe<std::uint8_t> ra{};
   Maybe<std::string_view> op{};
@@ -90,31 +83,45 @@ struct Values {
 inline constexpr FieldInfo general_status_field{"general_status", FieldInfo::Kind::flags, "",
                                                 "the two low bits of a position frame, active low", general_flags};
 
+namespace detail {
+// A member of a part that may be there.
+template <auto part, auto member>
+constexpr auto of(const Values& values) {
+  return values.*part ? std::optional((*(values.*part)).*member) : std::nullopt;
+}
+constexpr std::optional<std::uint16_t> alarms_of(const Values& values) { return values.status; }
+constexpr std::optional<Bytes> part_number_of(const Values& values) {
+  return values.identity ? std::optional(values.identity->part_number()) : std::nullopt;
+}
+}  // namespace detail
+
 inline constexpr auto frame_fields = [] {
   using enum FieldInfo::Kind;
   using author::field;
+  using detail::of;
   return author::fields_of<Values>(
-      field<&Values::singleturn>({"singleturn", number, "counts", "position within the turn", {}, Role::position}),
-      field<&Values::multiturn>({"multiturn", number, "revolutions", "turn counter", {}, Role::turns}),
-      field<&Values::error>({"error", boolean, "", "the position is not valid"}),
-      field<&Values::warning>({"warning", boolean, "", "the position is valid, but something is near its limit"}),
-      field<&Values::channel2>({"channel2", number, "", "one byte of channel 2; the checksum does not cover it"}),
-      field<&Values::status>({"status", number, "", "detailed status of a channel 2 cycle"}),
-      field<&Values::alarms>({"alarms", flags, "", "detailed status", alarm_flags}),
-      field<&Values::channel3>(
-          {"channel3", number, "", "one byte of channel 3: 33 idle, 66 busy, 88 and 99 ready, or data"}),
-      field<&Values::protocol_version>({"protocol_version", number, "", "of EncoLink: 2 or 4"}),
-      field<&Values::frame_bytes>({"frame_bytes", number, "", "5 without turns, 7 with"}),
-      field<&Values::resolution>({"resolution", number, "bits", "of a turn"}),
-      field<&Values::part_number>({"part_number", text, "", "from the identity"}),
-      field<&Values::config>(
-          {"config", number, "", "first byte of a request: 00 position, AA reset of the channels, BB identify"}),
-      field<&Values::ra>({"ra", number, "", "second byte of a request: one byte of a register access"}),
-      field<&Values::op>({"op", text, "", "read or write"}),
-      field<&Values::name>({"register", text, "", "its name in the table of registers"}),
-      field<&Values::address>({"address", number, "", "of the register"}),
-      field<&Values::length>({"length", number, "bytes", "of the register"}),
-      field<&Values::data>({"data", bytes, "", "the register's bytes, most significant first", {}, Role::data}),
+      field<of<&Values::position, &Position::singleturn>>("singleturn", "counts", "position within the turn",
+                                                          Role::position),
+      field<&Values::multiturn>("multiturn", "revolutions", "turn counter", Role::turns),
+      field<of<&Values::position, &Position::error>>("error", "", "the position is not valid"),
+      field<of<&Values::position, &Position::warning>>("warning", "",
+                                                       "the position is valid, but something is near its limit"),
+      field<&Values::channel2>("channel2", "", "one byte of channel 2; the checksum does not cover it"),
+      field<&Values::status>("status", "", "detailed status of a channel 2 cycle"),
+      field<detail::alarms_of>("alarms", "detailed status", alarm_flags),
+      field<&Values::channel3>("channel3", "", "one byte of channel 3: 33 idle, 66 busy, 88 and 99 ready, or data"),
+      field<of<&Values::identity, &Identity::protocol_version>>("protocol_version", "", "of EncoLink: 2 or 4"),
+      field<of<&Values::identity, &Identity::frame_bytes>>("frame_bytes", "", "5 without turns, 7 with"),
+      field<of<&Values::identity, &Identity::resolution>>("resolution", "bits", "of a turn"),
+      field<detail::part_number_of>("part_number", "", "from the identity"),
+      field<&Values::config>("config", "",
+                             "first byte of a request: 00 position, AA reset of the channels, BB identify"),
+      field<&Values::ra>("ra", "", "second byte of a request: one byte of a register access"),
+      field<&Values::op>("op", "", "read or write"),
+      field<&Values::name>("register", "", "its name in the table of registers"),
+      field<&Values::address>("address", "", "of the register"),
+      field<&Values::length>("length", "bytes", "of the register"),
+      field<&Values::data>("data", "", "the register's bytes, most significant first", Role::data),
       field<&Values::value>({"value", number, "", "the same as a number", {}, Role::value}));
 }();
 
@@ -124,24 +131,21 @@ inline constexpr FieldInfo running_field{"running", FieldInfo::Kind::boolean, ""
                                          "whether the self-calibration still goes on"};
 inline constexpr FieldInfo not_described_field{"registers", FieldInfo::Kind::text, "", "why none of them is shown"};
 
-[[nodiscard]] constexpr FieldInfo register_field(const Register& one) {
-  switch (one.content) {
-    case Content::tenths:
-      return {one.name, FieldInfo::Kind::real, one.name == "speed_rpm" ? "rpm" : "degC", "register, in tenths"};
-    case Content::flags:
-      return {one.name, FieldInfo::Kind::flags, "", "how the last self-calibration ended", calibration_flags};
-    case Content::text:
-      return {one.name, FieldInfo::Kind::text, "", "register"};
-    case Content::number:
-      break;
-  }
-  return {one.name, FieldInfo::Kind::number, "", "register"};
-}
-
 /// One for each of the table, in its order.
-inline constexpr std::array<FieldInfo, registers.size()> register_fields = [] {
+inline constexpr auto register_fields = [] {
+  using enum FieldInfo::Kind;
+  constexpr std::array<FieldInfo, 5> of_content{{
+      {"", number, "", "register"},
+      {"", real, "degC", "register, in tenths"},
+      {"", real, "rpm", "register, in tenths"},
+      {"", flags, "", "how the last self-calibration ended", calibration_flags},
+      {"", text, "", "register"},
+  }};
   std::array<FieldInfo, registers.size()> made{};
-  for (std::size_t i = 0; i < made.size(); ++i) made[i] = register_field(registers[i]);
+  for (std::size_t i = 0; i < made.size(); ++i) {
+    made[i] = of_content[static_cast<std::size_t>(registers[i].content)];
+    made[i].name = registers[i].name;
+  }
   return made;
 }();
 
@@ -157,47 +161,14 @@ inline constexpr auto fields = [] {
   return made;
 }();
 
-[[nodiscard]] constexpr Values values_of(const Format& format, const Position& position) {
-  Values values{.singleturn = position.singleturn, .error = position.error, .warning = position.warning};
-  if (format.multiturn_bits > 0) values.multiturn = position.multiturn;
-  return values;
-}
-
-/// A position, with the detailed status where it is known.
+/// A position frame, with the detailed status where it is known; with a byte of channel 3 a cycle.
 constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
-                            std::optional<std::uint16_t> detailed = {}) {
-  Values values = values_of(format, position);
-  if (format.has_ch2) values.channel2 = position.channel2;
-  values.status = values.alarms = detailed;
+                            std::optional<std::uint16_t> detailed = {}, std::optional<std::uint8_t> channel3 = {}) {
+  Values values{.position = position, .status = detailed, .channel3 = channel3};
+  if (format.multiturn_bits > 0) values.multiturn = position.multiturn;
+  if (format.has_ch2 && !channel3) values.channel2 = position.channel2;
   frame_fields.put(sink, values);
-  Reading reading = to_reading(format, position);
-  if (detailed) add_status(reading, *detailed);
-  sink.put_reading(reading);
-}
-
-constexpr void put_cycle(FieldSink& sink, const Format& format, const Cycle& cycle) {
-  Values values = values_of(format, cycle.position);
-  values.status = values.alarms = cycle.status;
-  values.channel3 = cycle.channel3;
-  frame_fields.put(sink, values);
-  Reading reading = to_reading(format, cycle.position);
-  add_status(reading, cycle.status);
-  sink.put_reading(reading);
-}
-
-constexpr void put_identity(FieldSink& sink, const Identity& identity) {
-  frame_fields.put(sink, {.protocol_version = identity.protocol_version,
-                          .frame_bytes = identity.frame_bytes,
-                          .resolution = identity.resolution,
-                          .part_number = identity.part_number()});
-}
-
-constexpr void put_access(FieldSink& sink, const RegisterRequest& request) {
-  const bool reads = request.operation == RegisterRequest::Operation::read;
-  Values values{.op = reads ? "read" : "write", .address = request.address, .length = request.length};
-  if (!reads) values.data = request.data;
-  if (!reads && request.length < 8) values.value = load_big_endian(request.data);
-  frame_fields.put(sink, values);
+  sink.put_reading(to_reading(format, position, detailed));
 }
 
 /// Two's complement of 1 to 8 bytes.
@@ -209,22 +180,21 @@ constexpr void put_access(FieldSink& sink, const RegisterRequest& request) {
 
 /// What the bytes of a register of the table mean.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
-  const FieldInfo* info = &register_fields[index];
+  FieldValue shown{.info = &register_fields[index], .bytes = bytes};
   switch (registers[index].content) {
     case Content::number:
-      sink.put({info, static_cast<std::int64_t>(load_big_endian(bytes))});
-      break;
     case Content::flags:
-      sink.put({info, bytes[0]});
-      sink.put({&calibrations_field, bytes[0] & calibration::count});
+      shown.number = static_cast<std::int64_t>(load_big_endian(bytes));
       break;
-    case Content::tenths:
-      sink.put({.info = info, .real = static_cast<double>(signed_value(bytes)) / 10});
+    case Content::celsius:
+    case Content::rpm:
+      shown.real = static_cast<double>(signed_value(bytes)) / 10;
       break;
     case Content::text:
-      sink.put({.info = info, .bytes = bytes});
       break;
   }
+  sink.put(shown);
+  if (index == calibration_status) sink.put({&calibrations_field, bytes[0] & calibration::count});
 }
 
 /// What a frame is decoded with where the encoder cannot be asked: all 22 bits, turns as the length tells.
@@ -241,16 +211,18 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
 
 /// The request alone: two bytes, or all the `ra` bytes of a register access.
 constexpr Error decode_request(Bytes request, FieldSink& sink) {
-  if (request.size() != request_bytes) {
-    const Result<RegisterRequest> access = decode_access(request);
-    if (access) put_access(sink, *access);
-    return access.error();
+  if (request.size() == request_bytes) {
+    if (!is_config(request[0])) return Error::unsupported;
+    frame_fields.put(sink, {.config = request[0], .ra = request[1]});
+    return Error::none;
   }
-  const auto config = static_cast<Config>(request[0]);
-  if (config != Config::position && config != Config::reset_channels && config != Config::identify) {
-    return Error::unsupported;
-  }
-  frame_fields.put(sink, {.config = request[0], .ra = request[1]});
+  const Result<RegisterRequest> access = decode_access(request);
+  if (!access) return access.error();
+  const bool reads = access->operation == RegisterRequest::Operation::read;
+  Values values{.op = reads ? "read" : "write", .address = access->address, .length = access->length};
+  if (!reads) values.data = access->data;
+  if (!reads && access->length < 8) values.value = load_big_endian(access->data);
+  frame_fields.put(sink, values);
   return Error::none;
 }
 
@@ -259,13 +231,13 @@ constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSi
   if (reply.empty()) return decode_request(request, sink);
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) {
     const Result<Identity> identity = decode_identity(reply);
-    if (identity) put_identity(sink, *identity);
+    if (identity) frame_fields.put(sink, {.identity = *identity});
     return identity.error();
   }
   const Format known = assumed(format, reply);
   if (known.has_ch2 && reply.size() == known.cycle_bytes()) {
     const Result<Cycle> cycle = decode_cycle(known, reply);
-    if (cycle) put_cycle(sink, known, *cycle);
+    if (cycle) put_position(sink, known, cycle->position, cycle->status, cycle->channel3);
     return cycle.error();
   }
   const Result<Position> position = decode_position(known, reply);

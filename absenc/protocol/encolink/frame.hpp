@@ -6,14 +6,43 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/core/result.hpp"
+#include "absenc/core/time.hpp"
+#include "absenc/link/line.hpp"
 
 namespace absenc::encolink {
+
+using namespace std::chrono_literals;
+
+// ---- Times, as the host keeps them and the virtual encoder demands them
+
+inline constexpr LineSettings uart_settings{.rate = 1'000'000};  // interface variant L
+inline constexpr Time spi_lead = 5us;                            // t_s: NCS low to the first edge of SCK
+// 4 MHz at most; CPOL 0, CPHA 1
+inline constexpr LineSettings spi_settings{.rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead};
+inline constexpr Time shortest_clock = 250ns;
+inline constexpr Time spi_pause = 5us;  // t_p
+
+// Not in the document. The virtual encoder answers that long after a request; the host waits generously.
+inline constexpr Time answer_time = 5us;
+inline constexpr Time answer_limit = 500us;
+inline constexpr Time gap_limit = 30us;
+
+inline constexpr Time start_up = 100ms;  // of well-formed zeros; assumed
+inline constexpr Time save_time = 50ms;  // busy; assumed
+inline constexpr Time busy_limit = 2s;
+inline constexpr Time calibration_time = 1s;    // of the virtual encoder's shaft
+inline constexpr Time calibration_limit = 15s;  // the vendor allows the shaft 10 s
+inline constexpr Time calibration_poll = 100ms;
+inline constexpr Time listen_limit = 500ms;  // without a good frame of an encoder that transmits by itself
+
+// ---- Frames
 
 /// "Inverted CRC, 0x97 polynom", in normal notation: x8 + x7 + x4 + x2 + x + 1.
 inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
@@ -31,6 +60,7 @@ enum class Config : std::uint8_t {
   reset_channels = 0xAA,  // and the position
   identify = 0xBB,        // the frame after this one carries the identity
 };
+[[nodiscard]] constexpr bool is_config(std::uint8_t byte) { return byte == 0x00 || byte == 0xAA || byte == 0xBB; }
 
 inline constexpr std::size_t request_bytes = 2;           // config, ra
 inline constexpr std::size_t identity_bytes = 19;         // with the checksum
@@ -62,6 +92,10 @@ struct Format {
 
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
+  /// Zeros behind the turns.
+  [[nodiscard]] constexpr unsigned spare_turns() const {
+    return maximum_multiturn_bits - static_cast<unsigned>(multiturn_bits);
+  }
   /// Of channel 1; the checksum stands behind them.
   [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
@@ -138,42 +172,36 @@ struct Identity {
 
 namespace detail {
 
-constexpr void store_position(const Format& format, const Position& position, MutableBytes bytes) {
-  if (format.turns_bytes() != 0) {
-    const unsigned spare = maximum_multiturn_bits - static_cast<unsigned>(format.multiturn_bits);
-    store_big_endian(bytes.first(2), std::uint64_t{position.multiturn} << spare);
-  }
-  std::uint32_t word = position.singleturn << (24 - format.resolution);
-  if (!position.error) word |= 2;
-  if (!position.warning) word |= 1;
-  store_big_endian(bytes.subspan(format.turns_bytes(), 3), word);
+// Channel 1 is one number: turns, position, error and warning. `format` must be known.
+constexpr ReplyBytes position_bytes(const Format& format, const Position& position) {
+  std::uint64_t number = std::uint64_t{position.singleturn} << (24 - format.resolution);
+  if (!position.error) number |= 2;
+  if (!position.warning) number |= 1;
+  if (format.turns_bytes() != 0) number |= std::uint64_t{position.multiturn} << (24 + format.spare_turns());
+  std::array<std::uint8_t, 5> bytes{};
+  store_big_endian(bytes, number);
+  ReplyBytes frame;
+  frame.append(Bytes(bytes).last(format.position_bytes()));
+  return frame;
 }
 
 // Padding that is not zero means another resolution.
 constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
-  Position position;
-  if (format.turns_bytes() != 0) {
-    const unsigned spare = maximum_multiturn_bits - static_cast<unsigned>(format.multiturn_bits);
-    const std::uint64_t turns = load_big_endian(bytes.first(2));
-    if ((turns & low_mask(spare)) != 0) return Error::out_of_range;
-    position.multiturn = static_cast<std::uint16_t>(turns >> spare);
-  }
-  const auto word = static_cast<std::uint32_t>(load_big_endian(bytes.subspan(format.turns_bytes(), 3)));
+  const std::uint64_t number = load_big_endian(bytes.first(format.position_bytes()));
+  const auto word = static_cast<std::uint32_t>(number & low_mask(24));
+  const auto turns = static_cast<std::uint32_t>(number >> 24);
   if ((word >> 2 & low_mask(maximum_resolution - format.resolution)) != 0) return Error::out_of_range;
-  position.singleturn = word >> (24 - format.resolution);
-  position.error = (word & 2) == 0;
-  position.warning = (word & 1) == 0;
-  return position;
+  if (turns != 0 && (turns & low_mask(format.spare_turns())) != 0) return Error::out_of_range;
+  return Position{.singleturn = word >> (24 - format.resolution),
+                  .multiturn = static_cast<std::uint16_t>(turns >> format.spare_turns()),
+                  .error = (word & 2) == 0,
+                  .warning = (word & 1) == 0};
 }
 
 }  // namespace detail
 
-/// `format` must be known.
 [[nodiscard]] constexpr ReplyBytes encode_position(const Format& format, const Position& position) {
-  std::array<std::uint8_t, 5> bytes{};
-  detail::store_position(format, position, bytes);
-  ReplyBytes frame;
-  frame.append(Bytes(bytes).first(format.position_bytes()));
+  ReplyBytes frame = detail::position_bytes(format, position);
   frame.push_back(checksum(frame));
   if (format.has_ch2) frame.push_back(position.channel2);
   return frame;
@@ -189,10 +217,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 }
 
 [[nodiscard]] constexpr ReplyBytes encode_cycle(const Format& format, const Cycle& cycle) {
-  std::array<std::uint8_t, 5> position{};
-  detail::store_position(format, cycle.position, position);
-  ReplyBytes bytes;
-  bytes.append(Bytes(position).first(format.position_bytes()));
+  ReplyBytes bytes = detail::position_bytes(format, cycle.position);
   bytes.push_back(static_cast<std::uint8_t>(cycle.status >> 8));
   bytes.push_back(static_cast<std::uint8_t>(cycle.status));
   bytes.push_back(cycle.channel3);
@@ -266,23 +291,21 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return position.singleturn == 0 && position.multiturn == 0;
 }
 
-[[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position) {
+/// `detailed`: the status of a cycle, where there was one.
+[[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position,
+                                           std::optional<std::uint16_t> detailed = {}) {
+  const std::uint16_t alarms = detailed.value_or(0);
+  const bool valid = !position.error && (alarms & status::position_invalid) == 0;
   Reading reading;
   reading.singleturn = position.singleturn;
   reading.singleturn_bits = format.resolution;
-  reading.singleturn_valid_bits = position.error ? 0 : format.resolution;
+  reading.singleturn_valid_bits = valid ? format.resolution : 0;
   reading.multiturn = position.multiturn;
   reading.multiturn_bits = static_cast<unsigned>(format.multiturn_bits);
-  reading.multiturn_valid = format.multiturn_bits > 0 && !position.error;
+  reading.multiturn_valid = format.multiturn_bits > 0 && !position.error && (alarms & status::multiturn_mismatch) == 0;
   reading.status = (position.error ? general::error : 0) | (position.warning ? general::warning : 0);
+  reading.alarms = alarms;
   return reading;
-}
-
-/// The same with what the detailed status adds.
-constexpr void add_status(Reading& reading, std::uint16_t detailed) {
-  reading.alarms = detailed;
-  if ((detailed & status::multiturn_mismatch) != 0) reading.multiturn_valid = false;
-  if ((detailed & status::position_invalid) != 0) reading.singleturn_valid_bits = 0;
 }
 
 }  // namespace absenc::encolink

@@ -5,145 +5,85 @@
 
 namespace absenc::encolink {
 
-// Each frame is decided when it goes out: what was found in the one before is handed out first.
-Stream::Stream(const Format& format, unsigned attempts)
-    : Engine({.answer_limit = answer_limit, .gap_limit = gap_limit}, storage_),
-      format_(format),
-      attempts_(attempts),
-      attempts_left_(attempts) {
-  sleep({});
-}
-
-void Stream::reset_channels() {
-  uses_channel2_ = reset_pending_ = true;
-  lose_step();
-}
-
-void Stream::end(const author::Outcome& outcome) {
-  over_ = true;
-  finish(outcome);
-}
-
 // ---- Frames
 
-void Stream::woken() {
-  const Time earliest = begun_ && format_.wire == Wire::spi ? received_at() + spi_pause : Time{};
-  begun_ = true;
-  Config config = Config::position;
-  std::uint8_t ra = 0;
-  if (asked_ == Asked::identity) {  // its request is an ordinary one
-  } else if (identify_pending_ || !format_.known()) {
-    asked_ = Asked::to_identify;
-    config = Config::identify;
-  } else if (reset_pending_) {
-    asked_ = Asked::reset;
-    config = Config::reset_channels;
-  } else {
-    asked_ = Asked::position;
-    ra = next_ra();
-  }
-  request_ = {static_cast<std::uint8_t>(config), ra};
-  send(request_, {}, earliest);
+std::array<std::uint8_t, request_bytes> Frames::encode(const Format&, const Request& request) {
+  Config config = Config::position;  // also where the identity comes
+  if (request.ask == Ask::reset) config = Config::reset_channels;
+  if (request.ask == Ask::identify) config = Config::identify;
+  return {static_cast<std::uint8_t>(config), request.ra};
 }
 
 // 0: silence ends it. What comes before the identity has a length that may be unknown, and behind both there may be
 // more.
-std::size_t Stream::expected(Bytes) const {
-  if (asked_identity()) return format_.wire == Wire::spi ? identity_bytes : 0;
-  return format_.frame_bytes();
+std::size_t Frames::expected(const Format& format, const Request& request, Bytes) {
+  const bool identifies = request.ask == Ask::identify || request.ask == Ask::identity;
+  if (!identifies) return format.frame_bytes();
+  return format.wire == Wire::spi ? identity_bytes : 0;
 }
 
-Error Stream::check(Bytes reply) {
+Result<Position> Frames::decode(const Format& format, const Request& request, Bytes reply) {
   if (reply.empty()) return Error::timeout;
   const bool flat = std::all_of(reply.begin(), reply.end(), [&](std::uint8_t byte) { return byte == reply[0]; });
-  if (format_.wire == Wire::spi && flat && (reply[0] == 0x00 || reply[0] == 0xFF)) return Error::line_stuck;
-  if (asked_ == Asked::identity) return decode_identity(reply).error();
-  if (asked_ == Asked::to_identify) return Error::none;
-  return decode_position(format_, reply).error();
+  if (format.wire == Wire::spi && flat && (reply[0] == 0x00 || reply[0] == 0xFF)) return Error::line_stuck;
+  if (request.ask == Ask::identify) return Position{};
+  if (request.ask != Ask::identity) return decode_position(format, reply);
+  const Error error = decode_identity(reply).error();
+  return error == Error::none ? Result(Position{}) : error;
 }
 
-void Stream::answered(Error error) {
-  sleep({});
-  if (error != Error::none) return bad_frame(error);
-  if (asked_ == Asked::to_identify) {
-    asked_ = Asked::identity;
-    return;
+// ---- Channels
+
+void Channels::take(const author::HostOf<Frames>& host) {
+  const Format& format = host.format();
+  const Position& position = host.last();
+  ended.reset();
+  if (host.request().ask == Ask::reset) {  // its byte of channel 2 is still one of before
+    bytes_.clear();
+    in_step = true;
+  } else if (in_step) {
+    if (bytes_.empty()) first_ = position;
+    bytes_.push_back(position.channel2);
+    if (bytes_.size() == format.cycle_bytes()) {
+      const Result<Cycle> cycle = decode_cycle(format, bytes_);
+      ended = cycle && !same_place(cycle->position, first_) ? Error::cross_check_failed : cycle.error();
+      bytes_.clear();
+      in_step = ended == Error::none;
+      if (in_step) {
+        status = cycle->status;
+        channel3 = cycle->channel3;
+      }
+    }
   }
-  attempts_left_ = attempts_;
-  if (asked_ == Asked::identity) {
-    good_identity();
-  } else {
-    good_position();
-  }
-}
-
-void Stream::good_identity() {
-  const Identity identity = *decode_identity(reply());
-  identify_pending_ = false;
-  lose_step();  // asking for it has reset the channels
-  const Result<Format> known = trusts_identity_ ? as_identified(format_, identity) : complete(format_, identity);
-  if (!known) return end({.error = known.error()});
-  asked_ = Asked::position;
-  format_ = *known;
-  on_identity(identity);
-}
-
-void Stream::good_position() {
-  position_ = *decode_position(format_, reply());
-  ++frames_;
-  reading_ = to_reading(format_, position_);
-  if (detailed_status_) add_status(reading_, *detailed_status_);
+  reading = to_reading(format, position, status);
   // On SPI the position is taken when NCS falls. The document does not say when it is on a UART: at the end of the
   // request at the latest.
-  reading_.latched = format_.wire == Wire::spi ? begun_at() : sent_at();
-  reading_.received = received_at();
-  if (asked_ == Asked::reset) {  // its byte of channel 2 is still one of before
-    reset_pending_ = false;
-    cycle_.restart();
-  } else {
-    follow_channel2();
-  }
-  if (!over_) on_frame();
-}
-
-void Stream::bad_frame(Error error) {
-  lose_step();
-  reset_pending_ = uses_channel2_;
-  if (--attempts_left_ == 0 || is_noisy()) {
-    attempts_left_ = attempts_;
-    return on_failure(error);
-  }
-  if (asked_ == Asked::identity) asked_ = Asked::position, identify_pending_ = true;
-  on_damage(error);
-}
-
-void Stream::follow_channel2() {
-  const std::optional<Result<Cycle>> cycle = cycle_.feed(format_, position_);
-  if (!cycle) return;
-  if (*cycle) {
-    detailed_status_ = (*cycle)->status;
-    add_status(reading_, *detailed_status_);
-  } else {
-    reset_pending_ = true;
-  }
-  on_cycle(*cycle);
+  reading.latched = format.wire == Wire::spi ? host.begun_at() : host.sent_at();
+  reading.received = host.received_at();
 }
 
 // ---- ReadPosition
 
-void ReadPosition::on_frame() {
-  if (looking_closer_) return;
-  looking_closer_ = format().has_ch2 && (position().error || position().warning || is_all_zero(position()));
-  if (looking_closer_) {
-    reset_channels();
-  } else {
-    end({});
-  }
+ReadPosition::ReadPosition(const Format& format) : HostOf(format) {
+  ask({format.known() ? Ask::position : Ask::identify});
 }
 
-void ReadPosition::on_cycle(const Result<Cycle>& cycle) {
-  if (!cycle && is_all_zero(position())) mark_not_ready();
-  end({});
+void ReadPosition::answered(Error error) {
+  if (error != Error::none) return finish({.error = error});
+  if (request().ask == Ask::identify) return go_on(Ask::identity);
+  if (request().ask == Ask::identity) {
+    const Result<Format> known = complete(format(), *decode_identity(reply()));
+    if (!known) return finish({.error = known.error()});
+    set_format(*known);
+    return go_on(Ask::position);
+  }
+  channels_.take(*this);
+  const Position& position = last();
+  if (channels_.in_step && !channels_.ended) return go_on(Ask::position);
+  const bool looks_closer = position.error || position.warning || is_all_zero(position);
+  if (format().has_ch2 && looks_closer && !channels_.ended) return go_on(Ask::reset);
+  if (channels_.ended && !channels_.in_step && is_all_zero(position)) channels_.reading.ready = false;
+  finish({});
 }
 
 }  // namespace absenc::encolink

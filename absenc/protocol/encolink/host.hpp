@@ -1,116 +1,80 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of EncoLink: frame after frame, and the position that a drive repeats. line.hpp reaches the registers;
-// README.md describes both, link/step.hpp how to run a machine.
+// Host side of EncoLink: frames, what one after the other says, and the position that a drive repeats. procedures.hpp
+// has all that takes more.
 #pragma once
 
-#include <cstdint>
+#include <array>
 #include <optional>
 
-#include "absenc/protocol/author/engine.hpp"
-#include "absenc/protocol/encolink/channels.hpp"
+#include "absenc/protocol/author/line.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
-#include "absenc/protocol/encolink/timing.hpp"
 
 namespace absenc::encolink {
 
-/// Frame after frame, as fast as the encoder answers: positions in channel 1, and cycles of channel 2 once it was asked
-/// for. A subclass decides what comes next. What of the format is unknown is asked first.
-class Stream : public author::Engine {
- public:
+/// What a frame is asked for.
+enum class Ask : std::uint8_t {
+  position,
+  reset,     // and channels 2 and 3 begin anew in the next frame
+  identify,  // the next frame is the identity
+  identity,
+};
+
+/// author/line.hpp says what each of these is.
+struct Frames {
   using Format = encolink::Format;
+  struct Request {
+    Ask ask = Ask::position;
+    std::uint8_t ra = 0;  // a byte of a register access
+  };
+  using Reply = Position;  // of the identity nothing
+  static constexpr std::size_t longest_reply = identity_bytes;
 
-  /// The latest position: at every `emit`, and at the end.
-  [[nodiscard]] const Reading* reading() const override {
-    return error() == Error::none && frames_ > 0 ? &reading_ : nullptr;
-  }
-  [[nodiscard]] const Format& format() const { return format_; }
-  /// Of the latest good frame.
-  [[nodiscard]] const Position& position() const { return position_; }
-  /// Of the latest good cycle; nothing before the first.
-  [[nodiscard]] std::optional<std::uint16_t> detailed_status() const { return detailed_status_; }
-  /// Good frames so far.
-  [[nodiscard]] std::uint32_t frames() const { return frames_; }
-  /// Whether the last request was for the identity, or the one before it.
-  [[nodiscard]] bool asked_identity() const { return asked_ == Asked::identity || asked_ == Asked::to_identify; }
+  static constexpr author::Wire wire(const Format&) { return {.answer_limit = answer_limit, .gap_limit = gap_limit}; }
+  static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
+  static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
+  static std::size_t expected(const Format& format, const Request& request, Bytes);
+  /// Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of decode_identity.
+  static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
+  /// SPI has brought all there is; on a UART more may be coming.
+  static bool is_whole(const Format& format, Error) { return format.wire == Wire::spi; }
+  /// How long after a frame the next one may begin.
+  static Time pause(const Format& format) { return format.wire == Wire::spi ? spi_pause : Time{}; }
+};
 
- protected:
-  /// `attempts`: how often a frame is asked for before its error counts.
-  Stream(const Format& format, unsigned attempts);
-  ~Stream() = default;
+/// What the frames of a conversation say together: the position, and cycles of channel 2, a byte a frame, from a reset
+/// of the channels until a frame is lost.
+struct Channels {
+  Reading reading{};                      // of the last good frame; nothing before the first
+  std::optional<std::uint16_t> status{};  // of the last good cycle
+  std::optional<Error> ended{};           // the last frame ended a cycle: none, or what is wrong with it
+  std::uint8_t channel3 = 0;              // of the last good cycle
+  bool in_step = false;                   // the bytes of channel 2 are those of a cycle
 
-  /// Channels 2 and 3 begin anew. The format has channel 2.
-  void reset_channels();
-  void identify() { identify_pending_ = true; }
-  /// What the identity says counts, also against the options.
-  void trust_identity() { trusts_identity_ = true; }
-  /// The positions cannot be trusted yet.
-  void mark_not_ready() { reading_.ready = false; }
-  void end(const author::Outcome& outcome);
-  [[nodiscard]] bool is_over() const { return over_; }
-  /// Whether the bytes of channel 2 are known to be those of a cycle.
-  [[nodiscard]] bool in_step() const { return cycle_.in_step(); }
-  void lose_step() { cycle_.lose_step(); }
-
-  /// The second byte of the next request.
-  virtual std::uint8_t next_ra() { return 0; }
-  /// A good position frame came.
-  virtual void on_frame() {}
-  /// A cycle is complete, or not what it should be.
-  virtual void on_cycle(const Result<Cycle>&) {}
-  virtual void on_identity(const Identity&) {}
-  /// A frame was lost or damaged; it is asked for again.
-  virtual void on_damage(Error) {}
-  /// No good frame came, as often as it was asked for.
-  virtual void on_failure(Error error) { end({.error = error}); }
+  /// A good frame. A cycle whose position is not that of the frame with which it began is cross_check_failed; one that
+  /// is not good ends the step.
+  void take(const author::HostOf<Frames>& host);
 
  private:
-  enum class Asked : std::uint8_t { position, reset, to_identify, identity };
-
-  [[nodiscard]] std::size_t expected(Bytes reply) const final;
-  [[nodiscard]] Error check(Bytes reply) final;
-  // SPI has brought all there is; on a UART more may be coming.
-  [[nodiscard]] bool is_whole(Error) const final { return format_.wire == Wire::spi; }
-  void answered(Error error) final;
-  void woken() final;
-  void good_identity();
-  void good_position();
-  void bad_frame(Error error);
-  void follow_channel2();
-
-  Format format_;
-  unsigned attempts_;
-  unsigned attempts_left_;
-
-  Asked asked_ = Asked::position;
-  bool identify_pending_ = false;
-  bool trusts_identity_ = false;
-  bool uses_channel2_ = false;
-  bool reset_pending_ = false;
-  bool begun_ = false;
-  bool over_ = false;
-
-  CycleReader cycle_;
-  std::array<std::uint8_t, request_bytes> request_{};
-  // Longer than the longest reply: what no longer fits changes nothing.
-  std::array<std::uint8_t, 2 * reply_capacity> storage_;
-  Position position_{};
-  std::optional<std::uint16_t> detailed_status_;
-  Reading reading_{};
-  std::uint32_t frames_ = 0;
+  ByteBuffer<Format{.multiturn_bits = 16}.cycle_bytes()> bytes_;
+  Position first_{};
 };
 
 /// One frame. When its position is not valid, near a limit, or all zero as while the encoder starts, a cycle of channel
-/// 2 follows: its alarms become those of the reading, and zeros without a channel 2 are not `ready`.
-class ReadPosition : public Stream {
+/// 2 follows: its alarms become those of the reading, and zeros without a channel 2 are not `ready`. What of the format
+/// is unknown is asked first.
+class ReadPosition : public author::HostOf<Frames> {
  public:
-  explicit ReadPosition(const Format& format) : Stream(format, 1) {}
-  /// What it finds is told by the unit's own: firmware links no texts.
-  void report(FieldSink&) const override {}
+  explicit ReadPosition(const Format& format);
+  [[nodiscard]] const Reading* reading() const final {
+    return error() == Error::none && channels_.reading.singleturn_bits != 0 ? &channels_.reading : nullptr;
+  }
+  [[nodiscard]] const Channels& channels() const { return channels_; }
 
  private:
-  void on_frame() final;
-  void on_cycle(const Result<Cycle>& cycle) final;
-  bool looking_closer_ = false;
+  void answered(Error error) final;
+  void go_on(Ask next) { ask({next}, received_at() + Frames::pause(format())); }
+
+  Channels channels_;
 };
 
 }  // namespace absenc::encolink

@@ -21,16 +21,20 @@ class Listen final : public Conversation<std::uint8_t> {
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return detail_; }
-  [[nodiscard]] const Reading* reading() const override;
+  [[nodiscard]] const Reading* reading() const override {
+    return error_ == Error::none && found_ > 0 ? &reading_ : nullptr;
+  }
   void report(FieldSink& sink) const override;
-  [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
+  [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
+    return {{}, frame_.empty() ? bytes_.view() : frame_.view(), received_at_, received_at_};
+  }
   /// Bytes that belong to no good frame.
   [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
 
  private:
-  void byte_received(std::uint8_t byte, Time at);
-  void accept(const Position& position, Time at);
-  void give_up();
+  void byte_received(std::uint8_t byte);
+  void drop(std::size_t count);
+  void end(Error error, std::string_view detail);
 
   Format format_;
   std::uint32_t count_;
@@ -39,9 +43,9 @@ class Listen final : public Conversation<std::uint8_t> {
   bool in_step_ = false;
   bool emit_pending_ = false;
   bool done_ = false;
-  Error last_bad_ = Error::none;
+  Error last_bad_ = Error::wrong_length;
   ByteBuffer<2 * reply_capacity> bytes_;
-  ReplyBytes frame_;
+  ReplyBytes frame_;  // the last good one
   Position position_{};
   Reading reading_{};
   Time deadline_{};

@@ -7,132 +7,293 @@
 namespace absenc::encolink {
 
 using author::done;
+using author::Outcome;
 using author::Part;
 using author::Procedure;
-using Fate = Line::Answer::Fate;
 
 namespace {
 
+constexpr unsigned frame_attempts = 3;
 constexpr unsigned cycle_attempts = 3;
+constexpr unsigned access_attempts = 5;  // each is some hundred frames, all of which must be good
 constexpr unsigned write_attempts = 3;
+constexpr unsigned idle_cycles_allowed = 8;  // after the last byte of an access
+
+constexpr std::string_view channels_disagree =
+    "channel 2 has another position than channel 1: positions go on, but the detailed status cannot be trusted";
+constexpr std::string_view channel2_damaged = "channel 2 is damaged: positions go on, but registers cannot be reached";
+constexpr std::string_view no_channel2 = "without channel 2 (has_ch2=false) there is neither status nor register";
+constexpr std::string_view busy_too_long =
+    "the register access was answered with busy for more than 2 s: positions go on";
 constexpr std::string_view size_needed = "this address is not in the table of registers: say how many bytes it has";
 
-bool is_near(const Line& line, std::uint32_t singleturn, std::uint32_t millidegrees = author::standstill_millidegrees) {
-  return author::is_near(line.position().singleturn, singleturn, line.format().resolution, millidegrees);
+// ---- Frames
+
+// One that is lost or damaged ends the step of channel 2.
+Part<Error> frame(Line& line, Found& found, Frames::Request request) {
+  if (found.emits && found.is_new) line.emit();
+  found.is_new = false;
+  found.ended.reset();
+  const Result<Position> position = co_await line.attempt(request).after(Frames::pause(line.format()));
+  if (!position) {
+    found.in_step = false;
+    ++found.lost;
+    co_return position.error();
+  }
+  if (request.ask != Ask::identify) found.lost = 0;
+  if (request.ask != Ask::position && request.ask != Ask::reset) co_return Error::none;
+  found.take(line);
+  found.is_new = true;
+  co_return Error::none;
 }
 
-// ---- Parts
+bool is_gone(const Line& line, const Found& found) { return found.lost >= frame_attempts || line.is_noisy(); }
+
+Outcome stopped(const Found& found, Error error) {
+  const bool in_access = error == Error::timeout && !found.access.empty();
+  return {error, in_access ? "the encoder stopped answering during a register access" : std::string_view{}};
+}
+
+// With `trusted` it counts also against the options. Asking for it resets the channels. Ends the procedure when it does
+// not come.
+Part<Identity> identify(Line& line, Found& found, bool trusted) {
+  for (;;) {
+    Error error = co_await frame(line, found, {Ask::identify});
+    if (error == Error::none) error = co_await frame(line, found, {Ask::identity});
+    if (error == Error::none) break;
+    if (is_gone(line, found)) co_await line.stop(stopped(found, error));
+  }
+  found.in_step = false;
+  const Identity identity = *decode_identity(line.reply());
+  const Result<Format> known = trusted ? as_identified(line.format(), identity) : complete(line.format(), identity);
+  if (!known) co_await line.stop({known.error()});
+  line.set_format(*known);
+  found.protocol_version = identity.protocol_version;
+  co_return identity;
+}
+
+// The next good frame; out of step it is asked for by `ask`. Ends the procedure when none comes.
+Part<bool> next_frame(Line& line, Found& found, Ask ask = Ask::position) {
+  if (!line.format().known()) co_await identify(line, found, false);
+  for (;;) {
+    const Error error = co_await frame(line, found, {found.in_step ? Ask::position : ask});
+    if (error == Error::none) co_return true;
+    if (is_gone(line, found)) co_await line.stop({error});
+  }
+}
+
+// ---- Register accesses
+
+// What is wrong with the last frame, or the cycle that it ended.
+Error damage(const Found& found, Error error) {
+  return error == Error::none ? found.ended.value_or(Error::none) : error;
+}
+
+// The bytes of the request, one a frame.
+Part<Error> send(Line& line, Found& found) {
+  found.was_asked = false;
+  for (std::size_t sent = 0; !found.was_asked;) {
+    Frames::Request request{Ask::reset};
+    if (found.in_step) request = {Ask::position, found.access[sent++]};
+    found.was_asked = sent == found.access.size();
+    const Error error = co_await frame(line, found, request);
+    if (damage(found, error) != Error::none) co_return damage(found, error);
+  }
+  co_return Error::none;
+}
+
+// The next cycle: its byte of channel 3 is one of the answer.
+Part<Error> receive(Line& line, Found& found) {
+  do {
+    const Error error = co_await frame(line, found, {});
+    if (damage(found, error) != Error::none) co_return damage(found, error);
+  } while (!found.ended);
+  co_return Error::none;
+}
+
+// A write that may have been executed is not repeated blindly: whoever wants it reads back first.
+Fate lost(Found& found, Error error, std::string_view detail = {}) {
+  if (found.ended.value_or(Error::none) != Error::none) {
+    detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
+  }
+  return found.end(Fate::lost, {error, detail}, !found.writes || !found.was_asked);
+}
+
+Part<Fate> try_to_execute(Line& line, Found& found) {
+  found.data.clear();
+  const Error unasked = co_await send(line, found);
+  if (unasked != Error::none) co_return lost(found, unasked);
+  const Time asked = line.received_at();
+  const std::uint8_t ready = found.writes ? channel3::write_ready : channel3::read_ready;
+  unsigned idle = 0;
+  do {
+    const Error error = co_await receive(line, found);
+    if (error != Error::none) co_return lost(found, error);
+    const bool is_idle = found.channel3 == channel3::idle;
+    const bool is_busy = found.channel3 == channel3::busy;
+    if (!is_idle && !is_busy && found.channel3 != ready) {
+      co_return lost(found, Error::unexpected_reply, "channel 3 says neither idle nor busy nor ready");
+    }
+    if (is_idle && ++idle > idle_cycles_allowed) {
+      co_return lost(found, Error::timeout, "the encoder ignores register accesses: positions go on");
+    }
+    if (is_busy && line.received_at() - asked > busy_limit) {
+      co_return found.end(Fate::refused, {Error::busy, busy_too_long});
+    }
+  } while (found.channel3 != ready);
+  const Error unsaid = co_await receive(line, found);
+  if (unsaid != Error::none) co_return lost(found, unsaid);
+  const auto status = static_cast<AccessStatus>(found.channel3);
+  if (status != AccessStatus::ok) {
+    co_return found.end(Fate::refused, {Error::request_rejected, text_of(status)}, is_damaged(status));
+  }
+  while (!found.writes && found.data.size() < found.length) {
+    const Error error = co_await receive(line, found);
+    if (error != Error::none) co_return lost(found, error);
+    found.data.push_back(found.channel3);
+  }
+  co_return found.end(Fate::good, done);
+}
+
+// The identity is asked first: an encoder with other registers is left alone.
+Part<Fate> execute(Line& line, Found& found) {
+  if (!line.format().has_ch2) co_await line.stop({Error::unsupported, no_channel2});
+  if (found.protocol_version == 0) co_await identify(line, found, false);
+  if (found.protocol_version == version::aksim4) co_await line.stop({Error::unsupported, not_described});
+  for (unsigned left = access_attempts - 1;; --left) {
+    const Fate fate = co_await try_to_execute(line, found);
+    if (fate != Fate::good) found.in_step = false;  // more of the answer may be coming
+    if (is_gone(line, found)) co_return found.end(Fate::gone, stopped(found, found.why.error));
+    if (!found.again || left == 0) co_return fate;
+  }
+}
+
+}  // namespace
+
+Part<Fate> attempt_read(Line& line, Found& found, std::uint32_t address, std::uint16_t size) {
+  found.begin(read_request(address, size));
+  return execute(line, found);
+}
+
+Part<Fate> attempt_write(Line& line, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+  found.begin(write_request(address, size, value));
+  return execute(line, found);
+}
+
+namespace {
+
+// The bytes of a register, as `data`. Ends the procedure when there are none.
+Part<bool> read(Line& line, Found& found, std::uint32_t address, std::uint16_t size) {
+  const Fate fate = co_await attempt_read(line, found, address, size);
+  if (fate != Fate::good) co_await line.stop(found.why);
+  co_return true;
+}
+
+Part<bool> read(Line& line, Found& found, RegisterIndex index) {
+  return read(line, found, registers[index].address, registers[index].size);
+}
 
 // A write whose answer is lost is repeated only if reading back shows that it was not executed.
-Part<bool> write(Line& line, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+Part<bool> write(Line& line, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
   constexpr std::string_view in_the_middle =
       "the encoder stopped answering in the middle of a register write: read it to see whether it was written";
   for (unsigned left = write_attempts; left > 0; --left) {
-    const Line::Answer written = co_await line.attempt_write(address, size, value);
-    if (written.fate == Fate::refused) co_await line.stop(written.why);
-    if (written.fate == Fate::gone && !line.was_asked()) co_await line.stop(written.why);
-    if (written.fate == Fate::gone) co_await line.stop({written.why.error, in_the_middle});
-    const Line::Answer back = co_await line.attempt_read(address, size);
-    if (back.fate == Fate::gone) co_await line.stop({back.why.error, in_the_middle});
-    if (back.fate != Fate::good) {
-      co_await line.stop({back.why.error, "the register may be written: it could not be read back"});
+    Fate fate = co_await attempt_write(line, found, address, size, value);
+    const bool untouched = fate == Fate::gone && !found.was_asked;
+    if (fate == Fate::refused || untouched) co_await line.stop(found.why);
+    if (fate != Fate::gone) fate = co_await attempt_read(line, found, address, size);
+    if (fate == Fate::gone) co_await line.stop({found.why.error, in_the_middle});
+    if (fate != Fate::good) {
+      co_await line.stop({found.why.error, "the register may be written: it could not be read back"});
     }
-    if (load_big_endian(line.data()) == value) co_return true;
+    if (load_big_endian(found.data) == value) co_return true;
   }
   co_await line.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
   co_return false;
 }
 
-Part<bool> write(Line& line, RegisterIndex index, std::uint64_t value) {
-  return write(line, registers[index].address, registers[index].size, value);
+Part<bool> write(Line& line, Found& found, RegisterIndex index, std::uint64_t value) {
+  return write(line, found, registers[index].address, registers[index].size, value);
 }
 
-Part<bool> send(Line& line, std::uint8_t command) {
-  const Line::Answer answer = co_await line.attempt_write(registers[command_register].address, 1, command);
-  const bool untouched = answer.fate == Fate::gone && !line.was_asked();
-  if (answer.fate == Fate::refused || untouched) co_await line.stop(answer.why);
-  if (answer.fate == Fate::gone) {
-    co_await line.stop({answer.why.error, "the encoder stopped answering: the command may have been executed"});
+Part<bool> command(Line& line, Found& found, std::uint8_t code) {
+  const Fate fate = co_await attempt_write(line, found, registers[command_register].address, 1, code);
+  const bool untouched = fate == Fate::gone && !found.was_asked;
+  if (fate == Fate::refused || untouched) co_await line.stop(found.why);
+  if (fate == Fate::gone) {
+    co_await line.stop({found.why.error, "the encoder stopped answering: the command may have been executed"});
   }
-  if (answer.fate == Fate::lost) {
-    co_await line.stop({answer.why.error, "the answer to the command was lost: it may have been executed"});
+  if (fate == Fate::lost) {
+    co_await line.stop({found.why.error, "the answer to the command was lost: it may have been executed"});
   }
   co_return true;
 }
 
-Part<bool> stands_still(Line& line) {
-  const Position first = co_await line.frame();
+bool is_near(const Line& line, std::uint32_t singleturn, std::uint32_t millidegrees = author::standstill_millidegrees) {
+  return author::is_near(line.last().singleturn, singleturn, line.format().resolution, millidegrees);
+}
+
+Part<bool> stands_still(Line& line, Found& found) {
+  co_await next_frame(line, found);
+  const std::uint32_t first = line.last().singleturn;
   const Time looked = line.received_at();
-  while (line.received_at() - looked < author::between_looks) co_await line.frame();
-  co_return is_near(line, first.singleturn);
+  while (line.received_at() - looked < author::between_looks) co_await next_frame(line, found);
+  co_return is_near(line, first);
 }
 
 }  // namespace
 
 // ---- What is read
 
-Procedure read_alarms(Line& line, FoundAlarms&) {
-  Error error = Error::none;
+Procedure read_alarms(Line& line, Found& found) {
+  if (!line.format().has_ch2) co_return {Error::unsupported, no_channel2};
+  found.tells_status = true;
   for (unsigned left = cycle_attempts; left > 0; --left) {
-    const Result<Cycle> cycle = co_await line.cycle();
-    if (cycle) co_return done;
-    error = cycle.error();
+    found.in_step = false;
+    do {
+      co_await next_frame(line, found, Ask::reset);
+    } while (!found.ended);
+    if (*found.ended == Error::none) co_return done;
   }
+  const Error error = *found.ended;
   co_return {error, error == Error::cross_check_failed ? channels_disagree : std::string_view{}};
 }
 
-Procedure read_identity(Line& line, FoundIdentity& found) {
-  found.identity = co_await line.identity(true);
+Procedure read_identity(Line& line, Found& found) {
+  const Identity identity = co_await identify(line, found, true);
+  found.identity = identity;
   co_return done;
 }
 
-Procedure read_info(Line& line, FoundIdentity& found) {
-  found.identity = co_await line.identity(true);
-  if (!line.format().has_ch2 || found.identity.protocol_version == version::aksim4) {
-    co_await line.frame();
+Procedure read_info(Line& line, Found& found) {
+  const Identity identity = co_await identify(line, found, true);
+  found.identity = identity;
+  if (!line.format().has_ch2 || identity.protocol_version == version::aksim4) {
+    co_await next_frame(line, found);
     co_return done;
   }
   for (std::size_t i = 0; i < registers.size(); ++i) {
     if (!registers[i].in_info) continue;
-    const Line::Answer answer = co_await line.attempt_read(registers[i].address, registers[i].size);
-    if (answer.why.error == Error::request_rejected) continue;
-    if (answer.fate != Fate::good) co_return answer.why;
-    found.has[i] = true;
-    found.data.append(line.data());
+    const Fate fate = co_await attempt_read(line, found, registers[i].address, registers[i].size);
+    if (found.why.error == Error::request_rejected) continue;
+    if (fate != Fate::good) co_return found.why;
+    found.tell(i, found.data);
   }
   co_return done;
 }
 
-Procedure read_register(Line& line, FoundRegister& found, std::size_t index) {
-  line.emit_frames();
-  co_await line.read(registers[index]);
-  found.address = registers[index].address;
-  co_return done;
-}
+namespace {
 
-Procedure read_memory(Line& line, FoundRegister& found, Arguments arguments) {
-  const auto address = static_cast<std::uint32_t>(arguments[0]);
-  const std::uint16_t size = size_of(address, arguments[1]);
+Procedure read_at(Line& line, Found& found, std::uint32_t address, std::uint16_t size) {
   if (size == 0 || size > access_capacity) co_return {Error::invalid_argument, size_needed};
-  line.emit_frames();
-  co_await line.read(address, size);
+  found.emits = true;
+  co_await read(line, found, address, size);
   found.address = address;
   co_return done;
 }
 
-// ---- What is written
-
-Procedure write_register(Line& line, FoundRegister& found, std::size_t index, Arguments arguments) {
-  line.emit_frames();
-  co_await write(line, static_cast<RegisterIndex>(index), static_cast<std::uint64_t>(arguments[0]));
-  found.address = registers[index].address;
-  co_return done;
-}
-
-Procedure write_memory(Line& line, FoundRegister& found, Arguments arguments) {
-  const auto address = static_cast<std::uint32_t>(arguments[0]);
-  const auto value = static_cast<std::uint64_t>(arguments[1]);
-  const std::uint16_t size = size_of(address, arguments[2]);
+Procedure write_at(Line& line, Found& found, std::uint32_t address, std::uint16_t size, std::int64_t argument) {
+  const auto value = static_cast<std::uint64_t>(argument);
   if (size == 0 || size > 8) co_return {Error::invalid_argument, size_needed};
   if (value > low_mask(8u * size)) {
     co_return {Error::invalid_argument, "the value does not fit into the register"};
@@ -140,163 +301,106 @@ Procedure write_memory(Line& line, FoundRegister& found, Arguments arguments) {
   if (address == registers[command_register].address) {
     co_return {Error::invalid_argument, "the command register is written by save, reset and self-calibrate"};
   }
-  line.emit_frames();
-  co_await write(line, address, size, value);
+  found.emits = true;
+  co_await write(line, found, address, size, value);
   found.address = address;
   co_return done;
 }
 
-Procedure send_command(Line& line, Nothing&, std::uint8_t command) {
-  line.emit_frames();
-  co_await send(line, command);
+}  // namespace
+
+Procedure read_register(Line& line, Found& found, std::size_t index) {
+  return read_at(line, found, registers[index].address, registers[index].size);
+}
+
+Procedure read_memory(Line& line, Found& found, Arguments arguments) {
+  const auto address = static_cast<std::uint32_t>(arguments[0]);
+  return read_at(line, found, address, size_of(address, arguments[1]));
+}
+
+// ---- What is written
+
+Procedure write_register(Line& line, Found& found, std::size_t index, Arguments arguments) {
+  return write_at(line, found, registers[index].address, registers[index].size, arguments[0]);
+}
+
+Procedure write_memory(Line& line, Found& found, Arguments arguments) {
+  const auto address = static_cast<std::uint32_t>(arguments[0]);
+  return write_at(line, found, address, size_of(address, arguments[2]), arguments[1]);
+}
+
+Procedure send_command(Line& line, Found& found, std::uint8_t code) {
+  found.emits = true;
+  co_await command(line, found, code);
   co_return done;
 }
 
-Procedure zero(Line& line, FoundZero& found, Arguments arguments) {
-  line.emit_frames();
-  const Bytes stored = co_await line.read(registers[position_offset]);
-  const auto old = static_cast<std::uint32_t>(load_big_endian(stored));
-  const bool still = co_await stands_still(line);
-  if (line.position().error) {
+Procedure zero(Line& line, Found& found, Arguments arguments) {
+  found.emits = true;
+  co_await read(line, found, position_offset);
+  const auto old = static_cast<std::uint32_t>(load_big_endian(found.data));
+  const bool still = co_await stands_still(line, found);
+  if (line.last().error) {
     co_return {Error::invalid_argument, "the position is not valid: read the alarms, mend their cause"};
   }
   if (!still) co_return {Error::invalid_argument, "the shaft turns: hold it still"};
-  const std::uint32_t offset = line.format().moved_offset(old, line.position().singleturn);
-  co_await write(line, position_offset, offset);
+  const std::uint32_t offset = line.format().moved_offset(old, line.last().singleturn);
+  co_await write(line, found, position_offset, offset);
   if (!is_near(line, 0, author::zero_millidegrees)) {
-    co_await write(line, position_offset, old);
+    co_await write(line, found, position_offset, old);
     co_return {Error::cross_check_failed,
                "the position did not become zero, the old offset is back: hold the shaft still, or change the option "
                "offset_sign or offset_unit"};
   }
-  if (arguments[0] != 0) co_await send(line, commands::save);
-  found.offset = offset;
+  found.tell(position_offset, found.data);
+  if (arguments[0] != 0) co_await command(line, found, commands::save);
   co_return done;
 }
 
-Procedure preset_multiturn(Line& line, Nothing&, Arguments arguments) {
-  line.emit_frames();
-  co_await line.identity();
+Procedure preset_multiturn(Line& line, Found& found, Arguments arguments) {
+  found.emits = true;
+  co_await identify(line, found, false);
   const auto bits = static_cast<unsigned>(line.format().multiturn_bits);
   const auto turns = static_cast<std::uint64_t>(arguments[0]);
   if (bits == 0) co_return {Error::unsupported, "this encoder counts no turns"};
   if (turns > low_mask(bits)) co_return {Error::invalid_argument, "the turn counter has not so many bits"};
-  co_await write(line, multiturn_preset, turns);
-  if (line.position().multiturn != turns) {
+  co_await write(line, found, multiturn_preset, turns);
+  if (line.last().multiturn != turns) {
     co_return {Error::cross_check_failed, "the preset is written, but the turns are others: hold the shaft still"};
   }
-  if (arguments[1] != 0) co_await send(line, commands::save);
+  if (arguments[1] != 0) co_await command(line, found, commands::save);
   co_return done;
 }
 
 // It has ended when its counter moved on, or it shows a failure that was not there before.
-Procedure self_calibrate(Line& line, FoundCalibration& found) {
-  const Register& status = registers[calibration_status];
-  const Bytes first = co_await line.read(status);
-  const std::uint8_t before = found.status = first[0];
-  co_await send(line, commands::self_calibrate);
+Procedure self_calibrate(Line& line, Found& found) {
+  co_await read(line, found, calibration_status);
+  const std::uint8_t before = found.data[0];
+  co_await command(line, found, commands::self_calibrate);
   found.running = true;
+  std::uint8_t status = before;
   const Time started = line.received_at();
-  for (Time look = started + calibration_poll; found.running;) {
-    while (line.received_at() < look) co_await line.frame();
+  for (Time look = started + calibration_poll; *found.running;) {
+    while (line.received_at() < look) co_await next_frame(line, found);
     look = line.received_at() + calibration_poll;
-    const Bytes now = co_await line.read(status);
-    found.status = now[0];
+    co_await read(line, found, calibration_status);
+    status = found.data[0];
+    found.values.clear();
+    found.tell(calibration_status, found.data);
     const unsigned failures = calibration::timed_out | calibration::out_of_range;
-    found.running = ((found.status ^ before) & calibration::count) == 0 && (found.status & ~before & failures) == 0;
-    if (found.running && line.received_at() - started > calibration_limit) {
+    found.running = ((status ^ before) & calibration::count) == 0 && (status & ~before & failures) == 0;
+    if (*found.running && line.received_at() - started > calibration_limit) {
       co_return {Error::timeout, "the self-calibration does not end: positions go on"};
     }
-    if (found.running) line.emit();
+    if (*found.running) line.emit();
   }
-  if ((found.status & calibration::timed_out) != 0) {
+  if ((status & calibration::timed_out) != 0) {
     co_return {Error::cross_check_failed, "the self-calibration gave up: turn the shaft evenly, more than one turn"};
   }
-  if ((found.status & calibration::out_of_range) != 0) {
+  if ((status & calibration::out_of_range) != 0) {
     co_return {Error::cross_check_failed, "the ring is too eccentric to be calibrated: mount it again"};
   }
   co_return done;
-}
-
-// ---- What is told
-
-namespace {
-
-void put_register(FieldSink& sink, std::uint32_t address, Bytes data) {
-  const Register* known = find_register(address);
-  const bool in_table = known != nullptr && known->size == data.size();
-  Values values{.address = address, .length = data.size(), .data = data};
-  if (known != nullptr) values.name = known->name;
-  if (!in_table && data.size() < 8) values.value = load_big_endian(data);
-  frame_fields.put(sink, values);
-  if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
-}
-
-void put_position(FieldSink& sink, const Line& line) { put_position(sink, line.format(), line.position()); }
-
-}  // namespace
-
-void put(FieldSink& sink, const Stream& stream) {
-  put_position(sink, stream.format(), stream.position(), stream.detailed_status());
-}
-
-void put(FieldSink& sink, const Line& line, const Nothing&) { put_position(sink, line); }
-
-void put(FieldSink& sink, const Line& line, const FoundAlarms&) { put(sink, line); }
-
-void put(FieldSink& sink, const Line& line, const FoundRegister& found) {
-  if (!found.address) return put_position(sink, line);
-  put_register(sink, *found.address, line.data());
-}
-
-void put(FieldSink& sink, const Line& line, const FoundZero& found) {
-  put_position(sink, line);
-  if (found.offset) sink.put({&register_fields[position_offset], *found.offset});
-}
-
-void put(FieldSink& sink, const Line& line, const FoundCalibration& found) {
-  put_position(sink, line);
-  put_value(sink, calibration_status, Bytes(&found.status, 1));
-  sink.put({&running_field, found.running ? 1 : 0});
-}
-
-void put(FieldSink& sink, const Line&, const FoundIdentity& found) {
-  put_identity(sink, found.identity);
-  if (found.identity.protocol_version == version::aksim4) {
-    const Bytes why(reinterpret_cast<const std::uint8_t*>(not_described.data()), not_described.size());
-    sink.put({.info = &not_described_field, .bytes = why});
-  }
-  std::size_t at = 0;
-  for (std::size_t i = 0; i < registers.size(); ++i) {
-    if (!found.has[i]) continue;
-    put_value(sink, i, found.data.view().subspan(at, registers[i].size));
-    at += registers[i].size;
-  }
-}
-
-Explanation explain(const Stream& stream) {
-  const Bytes reply = stream.reply();
-  switch (stream.error()) {
-    case Error::unexpected_reply:
-      if (!stream.asked_identity() || !decode_identity(reply)) return {};
-      return {
-          "the identity says another resolution than the options, or disagrees on whether there are turns: "
-          "leave resolution and multiturn_bits out, and it is asked"};
-    case Error::wrong_length:
-      if (stream.asked_identity()) {
-        return {"the encoder did not identify itself: it is starting, or resolution and multiturn_bits must be set"};
-      }
-      if (stream.is_disturbed() || reply.size() > stream.format().frame_bytes()) {
-        return {"more came than one frame: other turns, or more than one sender"};
-      }
-      return {"the reply ended early"};
-    case Error::out_of_range:
-      return {stream.asked_identity() ? std::string_view{} : wrong_resolution};
-    case Error::line_stuck:
-      return {reply[0] == 0 ? "MISO stayed low" : "MISO stayed high"};
-    default:
-      return {};
-  }
 }
 
 std::uint16_t size_of(std::uint32_t address, std::int64_t wanted) {

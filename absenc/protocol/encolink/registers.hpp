@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
 #include "absenc/core/bits.hpp"
 #include "absenc/core/bytes.hpp"
@@ -42,23 +43,17 @@ enum class AccessStatus : std::uint8_t {
 }
 
 [[nodiscard]] constexpr std::string_view text_of(AccessStatus status) {
-  switch (status) {
-    case AccessStatus::ok:
-      return "done";
-    case AccessStatus::no_such_register:
-      return "the encoder has no register at this address";
-    case AccessStatus::out_of_range:
-      return "the value is outside the range of this register";
-    case AccessStatus::denied:
-      return "access denied: this register cannot be written";
-    case AccessStatus::read_checksum:
-    case AccessStatus::read_checksum_too:
-    case AccessStatus::write_checksum:
-      return "the request reached the encoder with a wrong CRC";
-    case AccessStatus::byte_count:
-      return "the register has another number of bytes";
-    case AccessStatus::locked:
-      return "the configuration is locked: write 0 to the register write_lock first";
+  constexpr auto texts = std::to_array<std::pair<AccessStatus, std::string_view>>({
+      {AccessStatus::ok, "done"},
+      {AccessStatus::no_such_register, "the encoder has no register at this address"},
+      {AccessStatus::out_of_range, "the value is outside the range of this register"},
+      {AccessStatus::denied, "access denied: this register cannot be written"},
+      {AccessStatus::byte_count, "the register has another number of bytes"},
+      {AccessStatus::locked, "the configuration is locked: write 0 to the register write_lock first"},
+  });
+  if (is_damaged(status)) return "the request reached the encoder with a wrong CRC";
+  for (const auto& [one, text] : texts) {
+    if (one == status) return text;
   }
   return "the encoder answered with an unknown status";
 }
@@ -66,24 +61,15 @@ enum class AccessStatus : std::uint8_t {
 enum class Access : std::uint8_t { read_only, read_write, write_only };
 
 /// How the bytes of a register are to be understood; all are big endian.
-enum class Content : std::uint8_t { number, tenths, flags, text };
-
-/// A register that has commands of its own: one that reads it, named as it is, and set-... that writes it.
-struct Setting {
-  std::string_view meaning{};  // empty: it has none
-  std::string_view how{};      // what set-... does
-  std::string_view value{};    // of its argument
-  std::int64_t largest = 0;
-};
+enum class Content : std::uint8_t { number, celsius, rpm, flags, text };  // celsius and rpm in tenths, signed
 
 struct Register {
   std::string_view name;
   std::uint16_t address;
   std::uint8_t size;
   Access access;
-  Content content;
-  bool in_info;  // part of what `info` shows
-  Setting setting{};
+  Content content = Content::number;
+  bool in_info = false;  // part of what `info` shows
 };
 
 enum RegisterIndex : std::size_t {
@@ -109,55 +95,43 @@ enum RegisterIndex : std::size_t {
   serial_number,
   part_number,
   serial_number_extended,
-  temperature_compensation_k,
-  temperature_compensation_n,
-  voltage_compensation_k,
-  voltage_compensation_n,
 };
 
 // Addresses and sizes: rls-encolink 1.0.1, product_aksim2_map.h. Some overlap; each is accessed as a whole. Which can
 // be written it does not say: README.md has what is assumed.
-inline constexpr std::array<Register, 26> registers{{
-    {"position_offset",
-     0x00,
-     4,
-     Access::read_write,
-     Content::number,
-     false,
-     {"position offset", "set it, until power off unless saved", "in what offset_unit says", 0xFFFFFFFF}},
-    {"position_filter", 0x04, 4, Access::read_write, Content::number, false},
-    {"position_filter_speed", 0x08, 4, Access::read_write, Content::number, false},
-    {"velocity_filter", 0x0C, 4, Access::read_write, Content::number, false},
-    {"velocity_filter_speed", 0x10, 4, Access::read_write, Content::number, false},
-    {"multiturn_preset", 0x14, 4, Access::read_write, Content::number, false},
-    {"calibration_range", 0x19, 2, Access::read_write, Content::number, false},
-    {"eccentricity", 0x1B, 2, Access::read_only, Content::number, false},
-    {"eccentricity_phase", 0x1D, 2, Access::read_only, Content::number, false},
-    {"radial_displacement", 0x1F, 2, Access::read_only, Content::number, false},
-    {"write_lock",
-     0x2E,
-     1,
-     Access::read_write,
-     Content::number,
-     true,
-     {"whether the configuration is locked", "lock or unlock it, until power off unless saved", "0: open, 1: locked",
-      1}},
-    {"firmware_major", 0x2F, 2, Access::read_only, Content::number, true},
-    {"firmware_minor", 0x31, 2, Access::read_only, Content::number, true},
-    {"protocol_register", 0x33, 4, Access::read_only, Content::number, false},
-    {"revision", 0x35, 4, Access::read_only, Content::number, false},
-    {"command", 0x49, 1, Access::write_only, Content::number, false},
-    {"temperature_c", 0x4C, 2, Access::read_only, Content::tenths, true},
-    {"speed_rpm", 0x50, 4, Access::read_only, Content::tenths, true},
-    {"calibration_status", 0x52, 1, Access::read_only, Content::flags, false},
-    {"serial_number", 0x5C, 8, Access::read_only, Content::text, true},
-    {"order_number", 0x64, 20, Access::read_only, Content::text, true},
-    {"serial_number_extended", 0x100, 16, Access::read_only, Content::text, true},
-    {"temperature_compensation_k", 0x120C, 4, Access::read_only, Content::number, false},
-    {"temperature_compensation_n", 0x1210, 4, Access::read_only, Content::number, false},
-    {"voltage_compensation_k", 0x1214, 4, Access::read_only, Content::number, false},
-    {"voltage_compensation_n", 0x1218, 4, Access::read_only, Content::number, false},
-}};
+inline constexpr auto registers = [] {
+  using enum Access;
+  using enum Content;
+  return std::to_array<Register>({
+      {"position_offset", 0x00, 4, read_write},
+      {"position_filter", 0x04, 4, read_write},
+      {"position_filter_speed", 0x08, 4, read_write},
+      {"velocity_filter", 0x0C, 4, read_write},
+      {"velocity_filter_speed", 0x10, 4, read_write},
+      {"multiturn_preset", 0x14, 4, read_write},
+      {"calibration_range", 0x19, 2, read_write},
+      {"eccentricity", 0x1B, 2, read_only},
+      {"eccentricity_phase", 0x1D, 2, read_only},
+      {"radial_displacement", 0x1F, 2, read_only},
+      {"write_lock", 0x2E, 1, read_write, number, true},
+      {"firmware_major", 0x2F, 2, read_only, number, true},
+      {"firmware_minor", 0x31, 2, read_only, number, true},
+      {"protocol_register", 0x33, 4, read_only},
+      {"revision", 0x35, 4, read_only},
+      {"command", 0x49, 1, write_only},
+      {"temperature_c", 0x4C, 2, read_only, celsius, true},
+      {"speed_rpm", 0x50, 4, read_only, rpm, true},
+      {"calibration_status", 0x52, 1, read_only, flags},
+      {"serial_number", 0x5C, 8, read_only, text, true},
+      {"order_number", 0x64, 20, read_only, text, true},
+      {"serial_number_extended", 0x100, 16, read_only, text, true},
+      {"temperature_compensation_k", 0x120C, 4, read_only},
+      {"temperature_compensation_n", 0x1210, 4, read_only},
+      {"voltage_compensation_k", 0x1214, 4, read_only},
+      {"voltage_compensation_n", 0x1218, 4, read_only},
+  });
+}();
+inline constexpr std::size_t largest_register = 20;  // bytes
 
 /// Values of the command register.
 namespace commands {
@@ -209,14 +183,12 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
 
 /// All the `ra` bytes of an access.
 [[nodiscard]] constexpr AccessBytes encode_access(const RegisterRequest& request) {
-  std::array<std::uint8_t, access_header> header{};
-  for (std::size_t i = 0; i < access_keys.size(); ++i) header[i] = access_keys[i];
-  header[access_keys.size()] = static_cast<std::uint8_t>(request.operation);
-  const MutableBytes numbers = MutableBytes(header).last(6);
-  store_big_endian(numbers.first(2), request.length);
-  store_big_endian(numbers.last(4), request.address);
   AccessBytes bytes;
-  bytes.append(header);
+  bytes.append(access_keys);
+  bytes.push_back(static_cast<std::uint8_t>(request.operation));
+  std::array<std::uint8_t, 6> numbers{};
+  store_big_endian(numbers, std::uint64_t{request.length} << 32 | request.address);
+  bytes.append(numbers);
   if (request.operation == RegisterRequest::Operation::write) bytes.append(request.data);
   bytes.push_back(checksum(bytes.view().subspan(access_keys.size() + 1)));
   return bytes;

@@ -8,8 +8,6 @@
 #include "absenc/protocol/encolink/device.hpp"
 #include "absenc/protocol/encolink/fields.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
-#include "absenc/protocol/encolink/options.hpp"
-#include "absenc/protocol/encolink/probe.hpp"
 #include "absenc/protocol/encolink/procedures.hpp"
 #include "absenc/protocol/encolink/vectors.hpp"
 
@@ -18,6 +16,41 @@ namespace absenc::encolink {
 namespace {
 
 using author::CommandOf;
+using author::option;
+
+// ---- Options
+
+constexpr std::array<std::string_view, 2> offset_signs{"add", "subtract"};
+constexpr std::array<std::string_view, 2> offset_units{"counts", "turn_fraction"};
+constexpr std::array<std::string_view, 2> generations{"2", "4"};
+
+constexpr author::OptionsOf options{
+    option<&Format::resolution>("resolution",
+                                "bits of a turn; 0: asked from the encoder before each command (decode: 22)", 0,
+                                maximum_resolution),
+    option<&Format::multiturn_bits>(
+        "multiturn_bits",
+        "bits of the turn counter; 0: no turns, 5 bytes a frame; -1: asked as well (decode: by the length)", -1,
+        maximum_multiturn_bits),
+    option<&Format::has_ch2>(
+        "has_ch2",
+        "whether frames end in a byte of channel 2; false: those of an AksIM-1, without status and registers"),
+    option<&Format::offset_sign>(
+        "offset_sign", "whether the position offset is added to the measured position or subtracted", offset_signs),
+    option<&Format::stream_rate>(
+        "stream_rate", "frames a second that the encoder sends by itself (UART): nothing is sent then; 0: it is asked",
+        0, 10'000),
+    option<&Format::offset_unit>("offset_unit", "of the position offset: counts of the resolution, or 2^-32 revolution",
+                                 offset_units),
+    option<&Format::generation>("protocol_version",
+                                "virtual encoder: 2, or 4 as an AksIM-4, of which only the positions are described",
+                                generations),
+    option<&Format::identity_size>(
+        "identity_bytes",
+        "virtual encoder, UART: bytes of its identity; 20: one is behind it, and the frame before is as long, as "
+        "clients with the vendor's library read them",
+        identity_bytes, padded_identity_bytes),
+};
 
 // ---- What goes out
 
@@ -40,12 +73,11 @@ struct Protocol {
     return bytes;
   }
   static std::size_t request_size(Bytes begin) {
-    if (begin.size() < request_bytes) return request_bytes;
-    const auto config = static_cast<Config>(begin[0]);
-    const bool known = config == Config::position || config == Config::reset_channels || config == Config::identify;
-    return known ? request_bytes : 0;
+    return begin.size() < request_bytes || is_config(begin[0]) ? request_bytes : 0;
   }
 };
+
+using MakeRequest = Result<Request> (*)(const Format&, Arguments);
 
 template <Config config>
 Result<Request> frame(const Format&, Arguments) {
@@ -57,15 +89,21 @@ Result<Request> reading_of(const Format&, Arguments) {
   return Request{Config::position, read_request(registers[index].address, registers[index].size)};
 }
 
+Result<Request> writing(std::uint32_t address, std::int64_t wanted, std::int64_t argument) {
+  const std::uint16_t size = size_of(address, wanted);
+  const auto value = static_cast<std::uint64_t>(argument);
+  if (size == 0 || size > 8 || value > low_mask(8u * size)) return Error::invalid_argument;
+  return Request{Config::position, write_request(address, size, value)};
+}
+
 template <std::size_t index>
 Result<Request> writing_of(const Format&, Arguments arguments) {
-  const auto value = static_cast<std::uint64_t>(arguments[0]);
-  return Request{Config::position, write_request(registers[index].address, registers[index].size, value)};
+  return writing(registers[index].address, 0, arguments[0]);
 }
 
 template <std::uint8_t code>
 Result<Request> order(const Format&, Arguments) {
-  return Request{Config::position, write_request(registers[command_register].address, 1, code)};
+  return writing(registers[command_register].address, 0, code);
 }
 
 Result<Request> memory_reading(const Format&, Arguments arguments) {
@@ -76,14 +114,10 @@ Result<Request> memory_reading(const Format&, Arguments arguments) {
 }
 
 Result<Request> memory_writing(const Format&, Arguments arguments) {
-  const auto address = static_cast<std::uint32_t>(arguments[0]);
-  const std::uint16_t size = size_of(address, arguments[2]);
-  const auto value = static_cast<std::uint64_t>(arguments[1]);
-  if (size == 0 || size > 8 || value > low_mask(8u * size)) return Error::invalid_argument;
-  return Request{Config::position, write_request(address, size, value)};
+  return writing(static_cast<std::uint32_t>(arguments[0]), arguments[2], arguments[1]);
 }
 
-constexpr auto not_known = nullptr;  // the value depends on the position, or nothing is sent
+constexpr MakeRequest not_known = nullptr;  // the value depends on the position, or nothing is sent
 
 // ---- Where a frame ends: its checksum alone tells
 
@@ -109,9 +143,71 @@ bool covered(const Options& values, Frame request, Frame reply, std::size_t bit)
   return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
 }
 
-// ---- Commands
+// ---- What is told
 
-struct Report;  // what is told of each, below
+/// Of a conversation, as author/command.hpp asks for it.
+struct Report {
+  static void put(FieldSink& sink, const ReadPosition& read) {
+    put_position(sink, read.format(), read.last(), read.channels().status);
+  }
+  template <class Run>
+  static void put(FieldSink& sink, const Run& run) {
+    put_found(sink, run, run.found());
+  }
+  static void put_found(FieldSink& sink, const Line& line, const Found& found) {
+    if (found.identity) {
+      frame_fields.put(sink, {.identity = found.identity});
+      if (found.identity->protocol_version == version::aksim4) {
+        const Bytes why(reinterpret_cast<const std::uint8_t*>(not_described.data()), not_described.size());
+        sink.put({.info = &not_described_field, .bytes = why});
+      }
+    } else if (found.address) {
+      put_register(sink, *found.address, found.data);
+    } else {
+      put_position(sink, line.format(), line.last(), found.tells_status ? found.status : std::nullopt);
+    }
+    for (const Found::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
+    if (found.running) sink.put({&running_field, *found.running ? 1 : 0});
+  }
+  static void put_register(FieldSink& sink, std::uint32_t address, Bytes data) {
+    const Register* known = find_register(address);
+    const bool in_table = known != nullptr && known->size == data.size();
+    Values values{.address = address, .length = data.size(), .data = data};
+    if (known != nullptr) values.name = known->name;
+    if (!in_table && data.size() < 8) values.value = load_big_endian(data);
+    frame_fields.put(sink, values);
+    if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
+  }
+
+  static Explanation explain(const author::HostOf<Frames>& host) {
+    const Ask ask = host.request().ask;
+    const bool of_identity = ask == Ask::identify || ask == Ask::identity;
+    const Bytes reply = host.reply();
+    switch (host.error()) {
+      case Error::unexpected_reply:
+        if (!of_identity || !decode_identity(reply)) return {};
+        return {
+            "the identity says another resolution than the options, or disagrees on whether there are turns: "
+            "leave resolution and multiturn_bits out, and it is asked"};
+      case Error::wrong_length:
+        if (of_identity) {
+          return {"the encoder did not identify itself: it is starting, or resolution and multiturn_bits must be set"};
+        }
+        if (host.is_disturbed() || reply.size() > host.format().frame_bytes()) {
+          return {"more came than one frame: other turns, or more than one sender"};
+        }
+        return {"the reply ended early"};
+      case Error::out_of_range:
+        return {of_identity ? std::string_view{} : wrong_resolution};
+      case Error::line_stuck:
+        return {reply[0] == 0 ? "MISO stayed low" : "MISO stayed high"};
+      default:
+        return {};
+    }
+  }
+};
+
+// ---- Commands
 
 constexpr Argument address{"address", "of the register; the README lists them", 0, 0xFFFFFFFF, 0, true, Role::address};
 constexpr Argument length{"length", "bytes of the register; 0: as the table of registers says", 0, 8, 0, false};
@@ -122,9 +218,11 @@ constexpr std::array<Argument, 3> write_arguments{
 constexpr std::array<Argument, 1> zero_arguments{{keep}};
 constexpr std::array<Argument, 2> preset_arguments{{{"turns", "", 0, 65535, 0, false}, keep}};
 constexpr std::array<Argument, 1> listen_arguments{{{"count", "frames", 1, UINT32_MAX, 100, false}}};
+constexpr std::array<Argument, 1> offset_arguments{{{"value", "in what offset_unit says", 0, 0xFFFFFFFF}}};
+constexpr std::array<Argument, 1> lock_arguments{{{"value", "0: open, 1: locked", 0, 1}}};
 
-template <class Found, auto procedure, auto... bound>
-constexpr CommandOf<Protocol> command(const Command& info, Result<Request> (*request)(const Format&, Arguments)) {
+template <auto procedure, auto... bound>
+constexpr CommandOf<Protocol> command(const Command& info, MakeRequest request) {
   CommandOf<Protocol> made =
       author::command<Report, Protocol, Found, procedure, frame<Config::position>, bound...>(info);
   made.request = request;
@@ -151,86 +249,113 @@ constexpr CommandOf<Protocol> listen(const Command& info) {
           .size = sizeof(Listen)};
 }
 
-/// The names of the two commands of a register: as it is, with '-' for '_'.
-template <std::size_t index>
-struct SettingNames {
-  static constexpr std::string_view prefix = "set-";
-  static constexpr std::array<char, prefix.size() + registers[index].name.size()> text = [] {
-    std::array<char, prefix.size() + registers[index].name.size()> made{};
-    std::size_t at = 0;
-    for (const char c : prefix) made[at++] = c;
-    for (const char c : registers[index].name) made[at++] = c == '_' ? '-' : c;
-    return made;
-  }();
-  static constexpr std::string_view set{text.data(), text.size()};
-  static constexpr std::string_view get = set.substr(prefix.size());
-  static constexpr std::array<Argument, 1> arguments{
-      {{"value", registers[index].setting.value, 0, registers[index].setting.largest}}};
-};
-
-template <std::size_t index>
-constexpr CommandOf<Protocol> get() {
-  return command<FoundRegister, read_register, index>(
-      {SettingNames<index>::get, Verb::config_get, 0, registers[index].setting.meaning}, reading_of<index>);
-}
-
-template <std::size_t index>
-constexpr CommandOf<Protocol> set() {
-  using Names = SettingNames<index>;
-  return command<FoundRegister, write_register, index>(
-      {Names::set, Verb::config_set, 0, registers[index].setting.how, Names::arguments, true, false, Names::get},
-      writing_of<index>);
-}
-
 constexpr bool streams(const Format& format) { return format.wire == Wire::uart && format.stream_rate > 0; }
 
 constexpr Command read_position{"position", Verb::read, 0, "position, turns, and the alarms when there are any"};
 constexpr std::array commands_of_unit{
     position(read_position).or_when(streams, listen(read_position)),
-    command<FoundAlarms, read_alarms>(
-        {"alarms", Verb::read_part, 0, "detailed status from channel 2, checked against channel 1"},
-        frame<Config::reset_channels>),
-    command<FoundIdentity, read_info>({"info", Verb::info, 0, "identity, firmware, serial number, temperature, speed"},
-                                      frame<Config::identify>),
-    command<FoundIdentity, read_identity>(
-        {"identify", Verb::run, 0, "identity: protocol version, resolution, part number"}, frame<Config::identify>),
-    command<FoundRegister, read_register, temperature>(
-        {"temperature", Verb::temperature, 0, "temperature of the readhead"}, reading_of<temperature>),
-    command<FoundZero, zero>(
+    command<read_alarms>({"alarms", Verb::read_part, 0, "detailed status from channel 2, checked against channel 1"},
+                         frame<Config::reset_channels>),
+    command<read_info>({"info", Verb::info, 0, "identity, firmware, serial number, temperature, speed"},
+                       frame<Config::identify>),
+    command<read_identity>({"identify", Verb::run, 0, "identity: protocol version, resolution, part number"},
+                           frame<Config::identify>),
+    command<read_register, temperature>({"temperature", Verb::temperature, 0, "temperature of the readhead"},
+                                        reading_of<temperature>),
+    command<zero>(
         {"zero", Verb::zero, 0, "make this the zero of the turn, by the position offset", zero_arguments, true, false},
         not_known),
-    command<Nothing, preset_multiturn>({"preset-multiturn", Verb::reset_multiturn, 0,
-                                        "set the turns, to 0 if not told otherwise", preset_arguments, true, false},
-                                       writing_of<multiturn_preset>),
-    command<FoundRegister, read_memory>({"memory-read", Verb::memory_read, 0, "read a register", read_arguments},
-                                        memory_reading),
-    command<FoundRegister, write_memory>(
+    command<preset_multiturn>({"preset-multiturn", Verb::reset_multiturn, 0,
+                               "set the turns, to 0 if not told otherwise", preset_arguments, true, false},
+                              writing_of<multiturn_preset>),
+    command<read_memory>({"memory-read", Verb::memory_read, 0, "read a register", read_arguments}, memory_reading),
+    command<write_memory>(
         {"memory-write", Verb::memory_write, 0, "write a register and read it back", write_arguments, true, false},
         memory_writing),
-    get<position_offset>(),
-    set<position_offset>(),
-    get<write_lock>(),
-    set<write_lock>(),
-    command<Nothing, send_command, commands::save>(
+    command<read_register, position_offset>({"position-offset", Verb::config_get, 0, "position offset"},
+                                            reading_of<position_offset>),
+    command<write_register, position_offset>(
+        {"set-position-offset", Verb::config_set, 0, "set it, until power off unless saved", offset_arguments, true,
+         false, "position-offset"},
+        writing_of<position_offset>),
+    command<read_register, write_lock>({"write-lock", Verb::config_get, 0, "whether the configuration is locked"},
+                                       reading_of<write_lock>),
+    command<write_register, write_lock>(
+        {"set-write-lock", Verb::config_set, 0, "lock or unlock it, until power off unless saved", lock_arguments, true,
+         false, "write-lock"},
+        writing_of<write_lock>),
+    command<send_command, commands::save>(
         {"save", Verb::run, 0, "write the configuration into the flash", {}, true, false}, order<commands::save>),
-    command<Nothing, send_command, commands::reset>(
+    command<send_command, commands::reset>(
         {"reset", Verb::run, 0, "set the configuration to the values at shipping", {}, true, false},
         order<commands::reset>),
-    command<FoundCalibration, self_calibrate>(
+    command<self_calibrate>(
         {"self-calibrate", Verb::run, 0, "calibrate for eccentricity while the shaft is turned", {}, true, false},
         order<commands::self_calibrate>),
     listen(
         {"listen", Verb::run, 0, "the last of some frames of an encoder that transmits by itself", listen_arguments}),
 };
 
-struct Report {
-  static void put(FieldSink& sink, const ReadPosition& read) { encolink::put(sink, read); }
-  template <class Run>
-  static void put(FieldSink& sink, const Run& run) {
-    encolink::put(sink, run, run.found());
-  }
-  static Explanation explain(const Stream& stream) { return encolink::explain(stream); }
+// ---- What captures tell of the format of an encoder that cannot be asked
+
+constexpr std::size_t option_resolution = options.find("resolution");
+constexpr std::size_t option_multiturn_bits = options.find("multiturn_bits");
+
+// What speaks for a format: the identity, or without one the length that most frames have.
+struct Told {
+  std::optional<Identity> identity{};
+  std::size_t identity_at = 0;         // index of its capture
+  std::array<std::size_t, 2> good{};   // position frames without turns, with turns
+  std::array<std::size_t, 2> first{};  // the first of them
+
+  [[nodiscard]] bool tells() const { return identity || good[0] != good[1]; }
+  [[nodiscard]] bool has_turns() const { return identity ? identity->frame_bytes == 7 : good[1] > good[0]; }
 };
+
+Told told_by(const Format& format, std::span<const Capture> captures) {
+  Told told;
+  for (std::size_t i = 0; i < captures.size(); ++i) {
+    const Bytes reply = captures[i].reply;
+    const Result<Identity> identity = decode_identity(reply);
+    if (identity && !told.identity) {
+      told.identity = *identity;
+      told.identity_at = i;
+    }
+    for (std::size_t turns = 0; turns < 2 && !identity; ++turns) {
+      const int multiturn_bits = turns != 0 ? static_cast<int>(maximum_multiturn_bits) : 0;
+      if (!decode_position({maximum_resolution, multiturn_bits, format.has_ch2}, reply)) continue;
+      if (told.good[turns]++ == 0) told.first[turns] = i;
+    }
+  }
+  return told;
+}
+
+// Without an identity whether there are turns is told by the length that most position frames have, because of one
+// frame with turns in 250 a shorter part has a good checksum too.
+bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
+  const Told told = told_by(options.format(values), captures);
+  constexpr std::string_view open = "these frames do not tell";
+  for (std::int64_t bits = 1; bits <= std::int64_t{maximum_resolution}; ++bits) {
+    const bool possible = !told.identity || bits == told.identity->resolution;
+    sink.put({option_resolution, bits, possible, possible ? 0 : told.identity_at,
+              !told.identity ? open
+              : possible     ? "the identity says so"
+                             : "the identity says another one"});
+  }
+  for (std::int64_t bits = 0; bits <= std::int64_t{maximum_multiturn_bits}; ++bits) {
+    const bool possible = !told.tells() || (bits > 0) == told.has_turns();
+    const std::size_t against = told.identity ? told.identity_at : told.first[told.has_turns() ? 1 : 0];
+    sink.put({option_multiturn_bits, bits, possible, possible ? 0 : against,
+              possible ? (told.tells() ? "agrees with the length of the frames" : open)
+                       : "frames of this encoder have another length"});
+  }
+  if (told.identity && values[option_resolution] == 0) values.values[option_resolution] = told.identity->resolution;
+  if (told.tells() && values[option_multiturn_bits] < 0) {
+    values.values[option_multiturn_bits] = told.has_turns() ? std::int64_t{maximum_multiturn_bits} : 0;
+  }
+  const bool is_resolution = !told.identity || values[option_resolution] == told.identity->resolution;
+  return is_resolution && (!told.tells() || (values[option_multiturn_bits] > 0) == told.has_turns());
+}
 
 // ---- What is declared
 
@@ -272,10 +397,10 @@ struct Definition {
       return vector_texts::uart;
     }
   }();
-  static constexpr std::size_t frames_size = 1280;
+  static constexpr std::size_t frames_size = 2000;
   static constexpr auto& conditions = encolink::conditions;
   static constexpr const FieldInfo* status = &general_status_field;
-  static constexpr const FieldInfo* alarms = frame_fields.of<&Values::alarms>();
+  static constexpr const FieldInfo* alarms = frame_fields.of<detail::alarms_of>();
   static constexpr auto& registers = register_infos;
   static constexpr const Unit* over_spi = spi ? nullptr : &spi_unit;
   static constexpr auto probe = encolink::probe;
