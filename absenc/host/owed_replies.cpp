@@ -22,6 +22,11 @@ bool OwedReplies<Item>::is_answered(Items request) const {
 }
 
 template <class Item>
+Time OwedReplies<Item>::pause_after(Items request) const {
+  return unit_->pause == nullptr ? Time{} : unit_->pause(*options_, to_frame(request));
+}
+
+template <class Item>
 bool OwedReplies<Item>::is_reply(Items request, Items reply) const {
   Nowhere nowhere;
   return unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) == Error::none;

@@ -40,6 +40,8 @@ class OwedReplies {
     options_ = &options;
   }
   [[nodiscard]] bool is_answered(Items request) const;
+  /// How long it must not be sent again.
+  [[nodiscard]] Time pause_after(Items request) const;
   [[nodiscard]] bool is_reply(Items request, Items reply) const;
   /// Whether it may be a reply, good or bad: on a CAN bus others send too.
   [[nodiscard]] bool concerns(Items request, Items reply) const;

@@ -289,6 +289,7 @@ void ReplyGuard<Item>::conclude_asking(bool silent) {
     if (const Owed* owed = owed_.owed_to(reply_)) {
       suspected_ = first_at_ - owed->oldest();
       until_ = std::min(sent_at_ + std::clamp(suspected_ * 5 / 4, quiet_time(), longest_wait()), latest_);
+      if (may_repeat_) until_ = std::max(until_, received_at_ + owed_.pause_after(request_));
       reply_.clear();
       phase_ = Phase::holding;
       return;

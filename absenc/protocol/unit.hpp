@@ -255,6 +255,8 @@ struct Unit {
   bool (*streams)(const Options& options) = nullptr;
   /// Whether this request, a good one, is answered; null: every one is.
   bool (*answered)(const Options& options, Frame request) = nullptr;
+  /// How long after what was last heard this good request may be sent again; null: at once.
+  Time (*pause)(const Options& options, Frame request) = nullptr;
   std::span<const Condition> conditions{};  // that can be set of the virtual encoder, also while it runs
 };
 

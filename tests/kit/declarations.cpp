@@ -165,7 +165,10 @@ void refused_arguments(const Unit& unit, const Configuration& way, const Command
     findings.require(!request && (request.error() == Error::invalid_argument || request.error() == Error::unsupported),
                      [&] { return what() + "has a request"; });
     const Any<Conversation> host = unit.host(way.options, command, values, storage);
-    findings.require(host.bytes == nullptr && host.frames == nullptr, [&] { return what() + "has a conversation"; });
+    const auto is_refused = [](const auto* made) {
+      return made == nullptr || (made->error() == Error::invalid_argument || made->error() == Error::unsupported);
+    };
+    findings.require(is_refused(host.bytes) && is_refused(host.frames), [&] { return what() + "has a conversation"; });
   };
   const Values good = least_arguments(command);
   for (std::size_t i = 0; i < good.size(); ++i) {

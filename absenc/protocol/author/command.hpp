@@ -15,19 +15,20 @@
 
 namespace absenc::author {
 
-/// A conversation that is over before it began: this encoder does not have the command.
+/// A conversation that is over before it began.
 template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
-  explicit Refusal(std::string_view why) : why_(why) {}
+  explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
   void feed(const Event<Item>&) override {}
   Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
-  [[nodiscard]] Error error() const override { return Error::unsupported; }
+  [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return why_; }
   void report(FieldSink&) const override {}
   [[nodiscard]] Exchange<Item> exchange() const override { return {}; }
 
  private:
+  Error error_;
   std::string_view why_;
 };
 
@@ -193,7 +194,7 @@ struct CommandOf {
   }
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
-    if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, why);
+    if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, Error::unsupported, why);
     if (possible != nullptr && !possible(format)) return {};
     if (!can_ask(format, arguments)) return {};
     const bool other = is_other != nullptr && is_other(format);

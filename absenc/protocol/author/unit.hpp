@@ -185,7 +185,10 @@ struct UnitOf {
 
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                                 std::span<std::byte> storage) {
-    if (!are_good(command, arguments)) return {};
+    if (!are_good(command, arguments)) {
+      return make_host<Refusal<ItemOf<P>>>(storage, Error::invalid_argument,
+                                           "an argument is missing, or outside its range; nothing was sent");
+    }
     return find(command).run(format(values), arguments, storage);
   }
 
@@ -223,6 +226,12 @@ struct UnitOf {
       const Manner manner = P::manner(f, *request);
       return manner.answered && !manner.any_reply;
     }
+  }
+
+  static Time pause(const Options& values, Frame asked) {
+    const Format f = format(values);
+    const Result<Request> request = P::decode_request(f, items(asked));
+    return request ? P::manner(f, *request).pause : Time{};
   }
 
   // As the links of the protocol carry it.
@@ -427,6 +436,7 @@ struct UnitOf {
       P::manner(Format{}, Request{});
     };
     if constexpr (by_manner || requires { &Definition::answered; }) unit.answered = answered;
+    if constexpr (by_manner && requires { P::manner(Format{}, Request{}).pause; }) unit.pause = pause;
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
     if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;

@@ -47,9 +47,10 @@ TEST(E201Read, OptionsThatContradictIt) {
   std::vector<std::byte> device_storage(unit.device_storage);
   const sim::testing::TestShaft<19> shaft;
   const auto made = [&](std::string_view settings, std::string_view command) {
-    const std::array<std::int64_t, 1> arguments{20};
-    return unit.host(author::testing::options_of(unit, settings), *find_command(unit, command), arguments, storage)
-               .bytes != nullptr;
+    const Command& info = *find_command(unit, command);
+    const std::vector<std::int64_t> arguments(info.arguments.size(), 20);
+    const auto* const host = unit.host(author::testing::options_of(unit, settings), info, arguments, storage).bytes;
+    return host != nullptr && host->error() != Error::invalid_argument;
   };
   for (const auto& [settings, readable, usable] :
        std::vector<std::tuple<std::string_view, bool, bool>>{{"position_bits=51 unit_um=1", true, true},

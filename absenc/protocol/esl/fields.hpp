@@ -136,7 +136,8 @@ inline constexpr auto fields = [] {
           "ch2_sequence", "", "SC2: counts the replies, 0 to 127", Role::sequence),
       field<&Shown::page>("page", "", "memory page"),
       field<&Shown::memory_address>("memory_address", "", "ADF: 0 to 126; 127 selects the page"),
-      field<&Shown::busy>("busy", "", "1 while the memory is read or written: the request was not executed"),
+      field<&Shown::busy>(
+          {"busy", FieldInfo::Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
       field<&Shown::value>("value", "", "EDF: the byte in memory", Role::value),
       field<&Shown::data>("data", "", "the bytes in memory from `memory_address` on", Role::data),
       field<&Shown::written>("written", "", "false when the value was there already"),

@@ -73,7 +73,8 @@ inline constexpr auto fields = [] {
       field<&Values::multiturn>("multiturn", "revolutions", "ABM", Role::turns),
       field<&Values::alarms>("alarms", "ALMC", alarm_flags), field<&Values::page>("page", "", "memory page"),
       field<&Values::address>("address", "", "ADF: memory address; 127 selects the page"),
-      field<&Values::busy>("busy", "", "1 while the encoder writes: the request was not executed"),
+      field<&Values::busy>(
+          {"busy", FieldInfo::Kind::number, "", "1 while the encoder writes: the request was not executed"}),
       field<&Values::value>("value", "", "EDF: the byte in memory", Role::value),
       field<&Values::data>("data", "", "the bytes in memory from `address` on", Role::data),
       field<&Values::temperature>("temperature_c", "degC", "of the encoder's board, within 3 degC"),
