@@ -112,7 +112,9 @@ void SerialPort::change_rate(std::uint32_t rate) {
 
 void SerialPort::apply(const LineSettings& settings) {
   if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
-  const LineSettings given = set_terminal(descriptor(), settings);
+  const std::optional<LineSettings> set = set_terminal(descriptor(), settings);
+  if (!set) fail(errno);  // it may go away just then
+  const LineSettings given = *set;
   line_ = settings;
   if (is_gadget(path_)) return;
   if (!rates_agree(settings.rate, given.rate)) {

@@ -7,8 +7,6 @@
 #include <bit>
 #include <cerrno>
 
-#include "absenc/os/error.hpp"
-
 namespace absenc::os {
 
 namespace {
@@ -53,15 +51,15 @@ std::uint32_t terminal_rate(int descriptor) {
 
 void restore_terminal(int descriptor, const TerminalState& state) { ::ioctl(descriptor, TCSETSW2, &state); }
 
-LineSettings set_terminal(int descriptor, const LineSettings& settings) {
+std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& settings) {
   termios2 state{};
-  if (::ioctl(descriptor, TCGETS2, &state) < 0) throw system_failure("reading the port's settings", errno);
+  if (::ioctl(descriptor, TCGETS2, &state) < 0) return std::nullopt;
   write_line(state, settings);
   int result = 0;
   do {
     result = ::ioctl(descriptor, TCSETSW2, &state);
   } while (result < 0 && errno == EINTR);
-  if (result < 0 || ::ioctl(descriptor, TCGETS2, &state) < 0) throw system_failure("setting up the port", errno);
+  if (result < 0 || ::ioctl(descriptor, TCGETS2, &state) < 0) return std::nullopt;
   return read_line(state);
 }
 

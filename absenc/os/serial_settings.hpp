@@ -25,8 +25,8 @@ using TerminalState = std::array<std::byte, 44>;
 void restore_terminal(int descriptor, const TerminalState& state);
 
 /// Raw mode, 8 data bits, no flow control, and `settings`, after what was written has left. Returns what the driver
-/// made of them, which need not be the same. Throws Failure.
-LineSettings set_terminal(int descriptor, const LineSettings& settings);
+/// made of them, which need not be the same; nothing with an error in errno.
+std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& settings);
 
 /// Whether a UART at one rate understands one at the other: not more than 1 % apart. (Each end may be 2 to 3 % off
 /// before a 10-bit character breaks; the encoder needs its share.)

@@ -103,9 +103,10 @@ class DescriptorPort : public StreamPort {
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;
 
- private:
+  /// Throws what `error`, a value of errno, or 0 at the end of the file, means of this port.
   [[noreturn]] void fail(int error) const;
 
+ private:
   Descriptor descriptor_;
   std::string name_;
 };

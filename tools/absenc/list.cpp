@@ -42,11 +42,19 @@ std::string section(std::string_view heading, Rows rows) {
   return fmt::format("\n{}\n{}", heading, table(rows));
 }
 
+// As this model has it.
+std::string line_of_model(const Unit& unit, const Model& model) {
+  Options options;
+  static_cast<void>(resolve_options(unit, model.name, {}, options));  // a name of its own, and nothing else
+  return line_of(unit.link, unit.settings != nullptr ? unit.settings(options) : unit.line);
+}
+
 std::string supported_encoders() {
   Rows rows{{"PROTOCOL", "MODEL", "WHAT", "LINE"}};
   for (const Unit* unit : all_units()) {
     for (const Model& model : unit->models) {
-      rows.push_back({std::string(unit->id), std::string(model.name), std::string(model.meaning), line_of(*unit)});
+      rows.push_back(
+          {std::string(unit->id), std::string(model.name), std::string(model.meaning), line_of_model(*unit, model)});
     }
     if (unit->models.empty()) rows.push_back({std::string(unit->id), "", std::string(unit->name), line_of(*unit)});
   }

@@ -294,7 +294,7 @@ Procedure set_baud(Line& line, Found& found, Arguments arguments) {
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
   // Its reply may come at the new rate.
-  co_await line.attempt(setting(format, baud_parameters[*baud]));
+  static_cast<void>(co_await line.attempt(setting(format, baud_parameters[*baud])));
   const Outcome end =
       co_await look_for_it(line, format.address, bauds[*baud],
                            "the encoder answers at its old baud rate still: it did not take the new one");
@@ -339,7 +339,7 @@ Procedure set_zero(Line& line, Found& found, Arguments arguments) {
   show_position(line, found);
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;
-  co_await line.attempt(setting(line.format(), parameter::zero));  // perhaps done without a reply
+  static_cast<void>(co_await line.attempt(setting(line.format(), parameter::zero)));  // perhaps done without a reply
   co_await line.rest(memory_time);
   const Result<Reply> now = co_await look(line, line.format().address, 3);
   if (!now) co_return {now.error(), "the zero was sent, but then the position could not be read"};
