@@ -10,7 +10,6 @@
 // even over all bits before it, with `!` odd. `value` is any other number; `skip` carries nothing and is sent as 0.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -55,16 +54,9 @@ class WordFieldName {
 };
 
 struct WordField {
-  constexpr WordField() = default;
-  constexpr WordField(WordFieldName its_name, Meaning its_meaning, unsigned its_bits, bool is_active_low = false)
-      : name(its_name),
-        meaning(its_meaning),
-        bits(static_cast<std::uint8_t>(std::min(its_bits, 255u))),
-        active_low(is_active_low) {}
-
   WordFieldName name{};  // that of the meaning unless another was given
   Meaning meaning = Meaning::skip;
-  std::uint8_t bits = 0;  // 1 to 64; error, warning and parity have 1
+  unsigned bits = 0;  // 1 to 64; error, warning and parity have 1
   bool active_low = false;
 };
 

@@ -236,7 +236,7 @@ std::string bits_of(BitView bits) {
 }
 
 TEST_F(Sigrok, ReadsTheBitsOfSsi) {
-  const ssi::Format format{.word = "multiturn:12 position:13 gray"_word, .extra_clocks = 25};
+  constexpr ssi::Format format{.word = "multiturn:12 position:13 gray"_word, .extra_clocks = 25};
   biss::testing::ClockedBench<ssi::VirtualEncoder> bench(ssi::line_settings, format);
   Picture waveform(LinkKind::clocked, ssi::line_settings);
   waveform.observe(bench.line);
@@ -251,7 +251,7 @@ TEST_F(Sigrok, ReadsTheBitsOfSsi) {
 }
 
 TEST_F(Sigrok, ReadsTheSamplesOfBiss) {
-  const biss::Format format{.word = "multiturn:16 position:19 error:1! warning:1!"_word};
+  constexpr biss::Format format{.word = "multiturn:16 position:19 error:1! warning:1!"_word};
   biss::testing::Bench bench(biss::line_settings, format);
   Picture waveform(LinkKind::clocked, biss::line_settings);
   waveform.observe(bench.line);
