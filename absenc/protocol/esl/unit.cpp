@@ -188,7 +188,8 @@ struct Definition {
     if (check == Check::passed) return;
     words.add(text_of(check).sentence);
     std::string_view before = "; the reply is good with the profile ";
-    for (const OptionValue& one : find_change(profile, host.reply()).view()) {
+    const auto change = find_change(profile, host.reply());
+    for (const OptionValue& one : change.view()) {
       const Option& option = options.infos[one.option];
       words.add(before).add(option.name).add("=").add(option.choices[static_cast<std::size_t>(one.value)]);
       before = " ";
