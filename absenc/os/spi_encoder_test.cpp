@@ -29,7 +29,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
   for (const unsigned bits : {7u, 8u, 12u, 13u, 25u}) {
     WordFormat word;
     word.add({"position", Meaning::position, bits});
-    constexpr ssi::Format format{.word = word};
+    const ssi::Format format{.word = word};
     ssi::VirtualEncoder encoder(format, shaft);
     encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
     FakeSpi controller;
@@ -47,8 +47,8 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
 }
 
 TEST_F(SpiEncoder, SsiReadTwice) {
-  constexpr WordFormat word = "position:13"_word;
-  constexpr ssi::Format format{.word = word, .extra_clocks = 13};
+  const WordFormat word = "position:13"_word;
+  const ssi::Format format{.word = word, .extra_clocks = 13};
   ssi::VirtualEncoder encoder(format, shaft);
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
   kernel.connect(LinkKind::clocked, ssi::line_settings, encoder);
@@ -61,7 +61,7 @@ TEST_F(SpiEncoder, SsiReadTwice) {
 }
 
 TEST_F(SpiEncoder, Biss) {
-  constexpr biss::Format format{.word = "multiturn:16 position:19 error:1! warning:1!"_word};
+  const biss::Format format{.word = "multiturn:16 position:19 error:1! warning:1!"_word};
   biss::VirtualEncoder encoder(format, shaft);
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
   kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
