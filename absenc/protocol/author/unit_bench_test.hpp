@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,11 @@
 namespace absenc::author::testing {
 
 using namespace std::chrono_literals;
+using Wire = std::vector<std::uint8_t>;
+using PowerOn = Device<std::uint8_t>::PowerOn;
+using Numbers = std::map<std::string, std::int64_t>;
+
+inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
 /// How a command ended, and what it told: real numbers rounded among the numbers.
 struct Told : FieldSink {
@@ -25,7 +31,7 @@ struct Told : FieldSink {
     const std::string name(value.info->name);
     const bool is_real = value.info->kind == FieldInfo::Kind::real;
     numbers[name] = is_real ? static_cast<std::int64_t>(value.real) : value.number;
-    texts[name] = std::string(value.bytes.begin(), value.bytes.end());
+    if (!value.bytes.empty()) texts[name] = std::string(value.bytes.begin(), value.bytes.end());
   }
   void take(const Conversation<std::uint8_t>& conversation) {
     error = conversation.error();
@@ -33,13 +39,19 @@ struct Told : FieldSink {
     advice = conversation.advice();
     if (const Reading* const now = conversation.reading()) reading = *now;
     conversation.report(*this);
+    sent = wire(conversation.exchange().sent);
+    received_at = conversation.exchange().received_at;
   }
+  [[nodiscard]] bool says(std::string_view words) const { return detail.find(words) != std::string::npos; }
+
   Error error = Error::none;
   std::string detail;
   std::string advice;
   std::optional<Reading> reading;
-  std::map<std::string, std::int64_t> numbers;
+  Numbers numbers;
   std::map<std::string, std::string> texts;
+  Wire sent;  // in the last exchange
+  Time received_at{};
   bool finished = false;
   unsigned emits = 0;
   std::uint64_t frames = 0;  // that the encoder answered
@@ -59,18 +71,53 @@ inline Options options_of(const Unit& unit, std::string_view text) {
   return options;
 }
 
-/// Changes what the encoder hears and what it sends; by default nothing. `nth` counts from 0.
+/// The same of a format whose members are the options.
+template <class Declared, class Format>
+requires requires(const Declared& declared) { declared.infos; }
+Options options_of(const Declared& declared, const Format& format) {
+  Options options;
+  for (std::size_t i = 0; i < declared.infos.size(); ++i) options.values[i] = declared.get(format, i);
+  return options;
+}
+
+/// A command of a unit; the last arguments may be left out.
+template <class Item>
+class Talk {
+ public:
+  Talk(const Unit& unit, const Options& options, std::string_view name, std::vector<std::int64_t> arguments = {})
+      : storage_(unit.host_storage) {
+    const Command& command = *find_command(unit, name);
+    for (std::size_t i = arguments.size(); i < command.arguments.size(); ++i) {
+      arguments.push_back(command.arguments[i].default_value);
+    }
+    const Any<Conversation> made = unit.host(options, command, arguments, storage_);
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      made_ = made.frames;
+    } else {
+      made_ = made.bytes;
+    }
+  }
+  Conversation<Item>& operator*() const { return *made_; }
+  Conversation<Item>* operator->() const { return made_; }
+
+ private:
+  std::vector<std::byte> storage_;
+  Conversation<Item>* made_ = nullptr;
+};
+
+/// Changes what the n-th time (from 0) comes or goes; of what is sent nothing left: it is lost.
+using Tamper = std::function<void(unsigned nth, Wire& bytes)>;
+
+/// Changes what the encoder hears and what it sends; by default nothing.
 class Tampered final : public Machine<std::uint8_t> {
  public:
-  using Bytes = std::vector<std::uint8_t>;
-  using Tamper = std::function<void(unsigned nth, Bytes& bytes)>;
   explicit Tampered(Machine<std::uint8_t>& encoder) : encoder_(encoder) {}
   void requests(Tamper tamper) { requests_ = {std::move(tamper)}; }
   void replies(Tamper tamper) { replies_ = {std::move(tamper)}; }
 
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind != Event<std::uint8_t>::Kind::received || !requests_.tamper) return encoder_.feed(event);
-    Bytes items(event.items.begin(), event.items.end());
+    Wire items = wire(event.items);
     requests_.tamper(requests_.count++, items);
     Event<std::uint8_t> changed = event;
     changed.items = items;
@@ -80,7 +127,7 @@ class Tampered final : public Machine<std::uint8_t> {
     for (;;) {
       Step<std::uint8_t> step = encoder_.next(now);
       if (step.kind != Step<std::uint8_t>::Kind::transfer || !replies_.tamper) return step;
-      out_.assign(step.out.begin(), step.out.end());
+      out_ = wire(step.out);
       replies_.tamper(replies_.count++, out_);
       step.out = out_;
       if (!out_.empty()) return step;
@@ -96,60 +143,81 @@ class Tampered final : public Machine<std::uint8_t> {
   Machine<std::uint8_t>& encoder_;
   Counted requests_;
   Counted replies_;
-  Bytes out_;
+  Wire out_;
+};
+
+/// A line with one host at a time, and nobody in its place in between.
+struct HostedLine : sim::Line<std::uint8_t> {
+  HostedLine(LinkKind kind, const LineSettings& settings) : Line(kind, settings) {}
+
+  void put_on(Machine<std::uint8_t>& host) {
+    if (node) return replace(*node, host);
+    node = attach(sim::Role::host, host, [this] { return !on_emit || on_emit(); });
+  }
+  /// Whether it came to its end.
+  bool converse(Machine<std::uint8_t>& host) {
+    put_on(host);
+    const bool ended = run(*node, now() + 60s);
+    run_until(now());  // the device's own `sent` is at the same time
+    replace(*node, idle);
+    return ended;
+  }
+
+  struct Idle final : Machine<std::uint8_t> {
+    void feed(const Event<std::uint8_t>&) override {}
+    Step<std::uint8_t> next(Time) override { return {.kind = Step<std::uint8_t>::Kind::done}; }
+  };
+  Idle idle{};
+  std::optional<std::size_t> node{};
+  std::function<bool()> on_emit{};
 };
 
 template <unsigned singleturn_bits>
 struct UnitBench {
-  using PowerOn = Device<std::uint8_t>::PowerOn;
+  using PowerOn = testing::PowerOn;
   using OnEmit = std::function<void(Conversation<std::uint8_t>&)>;
 
-  UnitBench(const Unit& of, std::string_view settings) : unit(of), options(options_of(of, settings)) {
+  UnitBench(const Unit& of, std::string_view settings) : UnitBench(of, options_of(of, settings)) {}
+  UnitBench(const Unit& of, const Options& with) : unit(of), options(with) {
     device.power_on(Time{}, PowerOn::skip);
     line.attach(sim::Role::device, tampered);
   }
 
-  Conversation<std::uint8_t>& make(std::string_view name, std::vector<std::int64_t> arguments = {}) {
-    const Command& command = *find_command(unit, name);
-    for (std::size_t i = arguments.size(); i < command.arguments.size(); ++i) {
-      arguments.push_back(command.arguments[i].default_value);
-    }
-    return *unit.host(options, command, arguments, host_storage).bytes;
-  }
   /// A command of the unit to its end, told what `options` say. `on_emit` is called at every emit.
   Told run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
-    return run(make(name, arguments), on_emit);
+    const Talk<std::uint8_t> talk(unit, options, name, arguments);
+    return run(*talk, on_emit);
   }
   Told run(Conversation<std::uint8_t>& conversation, const OnEmit& on_emit = {}) {
     Told told;
     const Time begin = line.now();
     const std::uint64_t before = device.answered();
-    const std::size_t host = line.attach(sim::Role::host, conversation, [&] {
+    line.on_emit = [&] {
       ++told.emits;
       if (on_emit) on_emit(conversation);
       return true;
-    });
-    told.finished = line.run(host, begin + 60s);
-    line.run_until(line.now());  // the device's own `sent` is at the same time
+    };
+    told.finished = line.converse(conversation);
+    line.on_emit = {};
     told.take(conversation);
     told.frames = device.answered() - before;
     told.took = line.now() - begin;
     return told;
   }
-  /// These bytes, not before 5 us have passed; and what comes back until the line is silent.
-  sim::testing::RawHost raw(std::vector<std::uint8_t> request, Time answer = 50ms, Time gap = 5ms) {
-    sim::testing::RawHost host(std::move(request), answer, gap, line.now() + 5us);
-    line.run(line.attach(sim::Role::host, host), line.now() + 60s);
-    line.run_until(line.now());
+  /// These bytes, at once; and what comes back until the line is silent.
+  sim::testing::RawHost raw(Wire request, Time answer = 50ms, Time gap = 5ms) {
+    sim::testing::RawHost host(std::move(request), answer, gap, line.now());
+    line.converse(host);
     return host;
   }
   void tell(std::string_view settings) { options = options_of(unit, settings); }
   void pass(Time time) { line.run_until(line.now() + time); }
-  void restart(PowerOn kind) {
+  void restart(PowerOn kind = PowerOn::skip) {
     device.power_off(line.now());
     device.power_on(line.now(), kind);
   }
   void condition(std::size_t index, std::int64_t value) { device.set_condition(index, value, line.now()); }
+  [[nodiscard]] std::uint32_t violations() const { return device.violation_count(); }
   [[nodiscard]] std::string first_violation() const {
     return std::string(device.violations().empty() ? "" : device.violations()[0].rule);
   }
@@ -157,11 +225,10 @@ struct UnitBench {
   const Unit& unit;
   Options options;
   sim::testing::TestShaft<singleturn_bits> shaft;
-  std::vector<std::byte> host_storage = std::vector<std::byte>(unit.host_storage);
   std::vector<std::byte> device_storage = std::vector<std::byte>(unit.device_storage);
   Device<std::uint8_t>& device = *unit.device(options, shaft, device_storage).bytes;
   Tampered tampered{device};
-  sim::Line<std::uint8_t> line{unit.link, unit.settings(options)};
+  HostedLine line{unit.link, unit.settings(options)};
 };
 
 }  // namespace absenc::author::testing

@@ -68,7 +68,8 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
   for (unsigned steps = 0; steps < 400; steps += 3) {
     Bench bench;
     bench.raw("M6\r");
-    Conversation<std::uint8_t>& sweep = bench.make("clock-sweep", {100});
+    const author::testing::Talk<std::uint8_t> talk(unit, bench.options, "clock-sweep", {100});
+    Conversation<std::uint8_t>& sweep = *talk;
     const std::size_t host = bench.line.attach(sim::Role::host, sweep);
     for (unsigned i = 0; i < steps && !bench.line.done(host); ++i) bench.line.step();
     const Time asked = bench.line.now();
@@ -104,7 +105,8 @@ TEST(E201Sweep, AnAbortedSweepRecommendsNothing) {
 TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
   Bench bench;
   bench.raw("M6\r");
-  Conversation<std::uint8_t>& sweep = bench.make("clock-sweep", {3});
+  const author::testing::Talk<std::uint8_t> talk(unit, bench.options, "clock-sweep", {3});
+  Conversation<std::uint8_t>& sweep = *talk;
   const std::size_t host = bench.line.attach(sim::Role::host, sweep);
   std::string left;
   while (!bench.line.done(host)) {

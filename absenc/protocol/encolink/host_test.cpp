@@ -47,7 +47,7 @@ TEST_P(EncolinkHost, WhatIsWrongIsSaid) {
   struct Case {
     std::string_view wires;
     std::string_view told;
-    author::testing::Tampered::Tamper tamper;
+    author::testing::Tamper tamper;
     Error error;
     std::string_view words;
   };
@@ -232,7 +232,7 @@ TEST_P(EncolinkHost, ACycleThatIsNotGoodIsReadAgain) {
     return [=](unsigned frame, RawBytes& reply) { reply[byte] ^= frame == nth ? 0x01 : 0; };
   };
   struct Case {
-    author::testing::Tampered::Tamper tamper;
+    author::testing::Tamper tamper;
     Error error;
     unsigned frames;
   };

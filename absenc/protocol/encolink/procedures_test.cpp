@@ -17,14 +17,14 @@ class EncolinkRegister : public testing::OnBothWires {};
 INSTANTIATE_TEST_SUITE_P(Wires, EncolinkRegister, ::testing::Values(Wire::uart, Wire::spi));
 
 /// Damages these frames, counted from 0.
-author::testing::Tampered::Tamper damaging(std::vector<unsigned> frames) {
+author::testing::Tamper damaging(std::vector<unsigned> frames) {
   return [=](unsigned nth, RawBytes& reply) {
     if (std::find(frames.begin(), frames.end(), nth) != frames.end()) reply[1] ^= 0x10;
   };
 }
 
 /// So often the encoder hears one byte for another.
-author::testing::Tampered::Tamper mishearing(std::uint8_t right, std::uint8_t wrong, int times) {
+author::testing::Tamper mishearing(std::uint8_t right, std::uint8_t wrong, int times) {
   return [=](unsigned, RawBytes& request) mutable {
     for (std::uint8_t& byte : request) {
       if (byte == right && times-- > 0) byte = wrong;

@@ -2,17 +2,19 @@
 // For tests: virtual QS35 encoders and a host on one line in virtual time.
 #pragma once
 
+#include "absenc/protocol/author/unit_bench_test.hpp"
 #include "absenc/protocol/esl/device.hpp"
 #include "absenc/protocol/esl/unit.hpp"
-#include "tests/kit/bench.hpp"
 
 namespace absenc::esl::testing {
 
-using kit::Outcome;
-using kit::PowerOn;
-using kit::Tamper;
-using kit::wire;
-using kit::Wire;
+using author::testing::HostedLine;
+using author::testing::PowerOn;
+using author::testing::Tamper;
+using author::testing::Told;
+using author::testing::wire;
+using author::testing::Wire;
+using Talk = author::testing::Talk<std::uint8_t>;
 using TestShaft = sim::testing::TestShaft<24>;
 
 inline Wire wire(const Reply& reply) { return wire(encode_reply({}, reply).view()); }
@@ -25,18 +27,15 @@ struct RawHost final : sim::testing::RawHost {
       : sim::testing::RawHost(std::move(request), answer_limit, gap_limit, at) {}
 };
 
-inline Options options_of(const Profile& profile) {
-  Options values;
-  for (std::size_t i = 0; i < options.infos.size(); ++i) values.values[i] = options.get(profile, i);
-  return values;
-}
+inline Options options_of(const Profile& profile) { return author::testing::options_of(options, profile); }
 
 /// One encoder on a line of its own.
-struct Bench : kit::Bench<VirtualEncoder, TestShaft> {
+struct Bench : author::testing::UnitBench<24> {
   explicit Bench(const Profile& bench_profile = {}, Tamper tamper = {})
-      : kit::Bench<VirtualEncoder, TestShaft>(esl::unit, options_of(bench_profile), bench_profile, std::move(tamper)),
-        profile(bench_profile) {}
-  using kit::Bench<VirtualEncoder, TestShaft>::raw;
+      : UnitBench(esl::unit, options_of(bench_profile)), profile(bench_profile) {
+    tampered.replies(std::move(tamper));
+  }
+  Wire raw(Wire request) { return UnitBench::raw(std::move(request), 100us, 12us).reply; }
   Wire raw(Request request) {
     request.encoder_address = profile.address;
     return raw(wire_of(request, profile));
@@ -47,6 +46,7 @@ struct Bench : kit::Bench<VirtualEncoder, TestShaft> {
   }
 
   Profile profile;
+  VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
 }  // namespace absenc::esl::testing

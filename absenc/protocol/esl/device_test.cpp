@@ -213,7 +213,7 @@ TEST(EslDevice, MemorySurvivesPowerOffAndRegistersDoNot) {
   bench.raw(memory_write(0x05, 0x11));
   *bench.encoder.stored(14, 0x1F) = 0x22;
   *bench.encoder.stored(6, 0x0B) = 0x33;
-  bench.switch_off_and_on();
+  bench.restart();
   EXPECT_EQ(bench.raw(memory_read(0x05))[2], 0);
   EXPECT_EQ(*bench.encoder.stored(14, 0x1F), 0x22);
   EXPECT_EQ(*bench.encoder.stored(6, 0x0B), 0x33);
@@ -260,7 +260,7 @@ TEST(EslDevice, WhatClearsWhichAlarm) {
     reset(bench, DataId::clear_alarms);
     EXPECT_EQ(bench.read().one.alarms == 0, row.by_d_and_c) << int{row.alarm};
     if (row.by_c || row.by_d_and_c) continue;
-    bench.switch_off_and_on();
+    bench.restart();
     EXPECT_EQ(bench.read().one.alarms == 0, row.by_power) << int{row.alarm};
     bench.encoder.lower_alarms(row.alarm);
     EXPECT_EQ(bench.read().one.alarms, 0);
@@ -271,7 +271,7 @@ TEST(EslDevice, WhatAPowerCycleLeaves) {
   Bench bench;
   bench.encoder.raise_alarms(alarms::turns_wrong | alarms::overspeed | alarms::memory_error);
   for (unsigned i = 0; i < 5; ++i) bench.read();
-  bench.switch_off_and_on();
+  bench.restart();
   const Reply reply = bench.read();
   EXPECT_EQ(reply.one.alarms, alarms::turns_wrong);
   EXPECT_EQ(reply.one.sequence, 1);
@@ -286,13 +286,13 @@ TEST(EslDevice, SupplySpeedAndTemperature) {
         std::tuple{condition::supply_voltage, 3701, alarms::over_voltage + 0, status::ready | status::safety_error},
         std::tuple{condition::temperature, 105, 0, status::ready + 0},
         std::tuple{condition::temperature, 106, 0, status::ready | status::temperature_warning}}) {
-    bench.set(index, value);
+    bench.condition(index, value);
     EXPECT_EQ(bench.read().one.alarms, alarms) << value;
     EXPECT_EQ(bench.read().one.status, status) << value;
-    bench.set(index, conditions[index].normal);
+    bench.condition(index, conditions[index].normal);
   }
-  bench.set(condition::temperature, -10);
-  EXPECT_EQ(bench.run("temperature").fields.at("temperature_c"), -10);
+  bench.condition(condition::temperature, -10);
+  EXPECT_EQ(bench.run("temperature").numbers.at("temperature_c"), -10);
   bench.shaft.spin(10'000, bench.line.now());
   EXPECT_EQ(bench.read(DataId::alarms).one.alarms, 0);
   bench.shaft.spin(-10'001, bench.line.now());
@@ -331,8 +331,8 @@ TEST(EslDevice, AResetOnATurningShaftIsAViolation) {
 TEST(EslDevice, FaultsStayInTheirChannel) {
   Bench bench;
   bench.shaft.put(0, 0x800000);
-  bench.set(condition::ch2_stuck, 0);
-  bench.set(condition::ch2_alarms, alarms::singleturn_error);
+  bench.condition(condition::ch2_stuck, 0);
+  bench.condition(condition::ch2_alarms, alarms::singleturn_error);
   const Wire bytes = bench.raw(Request{DataId::alarms});
   EXPECT_EQ(bytes[2], 0);
   EXPECT_EQ(bytes[6], alarms::singleturn_error);

@@ -14,14 +14,14 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
-using testing::Outcome;
+using testing::Told;
 using testing::Wire;
 using testing::wire;
 
 TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   Bench bench;
   bench.shaft.put(4660, 0xABCDEF);
-  const Outcome read = bench.run("position");
+  const Told read = bench.run("position");
   ASSERT_EQ(read.error, Error::none);
   EXPECT_EQ(bench.line.now(), 2us + answer_time + 18us);
   ASSERT_TRUE(read.reading.has_value());
@@ -30,7 +30,7 @@ TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   EXPECT_TRUE(read.reading->singleturn_valid() && read.reading->multiturn_valid && read.reading->ready);
   EXPECT_EQ(read.reading->latched, 1us + position_time);  // the end bit of CF is over after one character
   EXPECT_EQ(read.reading->received, 22us);
-  EXPECT_EQ(read.fields.at("redundant_singleturn"), 0xABCDEF >> 15);
+  EXPECT_EQ(read.numbers.at("redundant_singleturn"), 0xABCDEF >> 15);
 }
 
 TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
@@ -50,10 +50,10 @@ TEST(EslHost, EveryProfileIsSpokenOnBothSides) {
       options.put(profile, option, static_cast<std::int64_t>(value));
       Bench bench(profile);
       bench.shaft.put(-1, 0xABCDEF);
-      const Outcome safe = bench.run("safe-position");
+      const Told safe = bench.run("safe-position");
       ASSERT_EQ(safe.error, Error::none) << safe.detail;
-      EXPECT_EQ(safe.fields.at("safe_singleturn"), 0xABCDEF);
-      EXPECT_EQ(safe.fields.at("encoder_address"), 5);
+      EXPECT_EQ(safe.numbers.at("safe_singleturn"), 0xABCDEF);
+      EXPECT_EQ(safe.numbers.at("encoder_address"), 5);
       EXPECT_EQ(bench.run("position").reading->multiturn, 0xFFFFu);
       EXPECT_EQ(bench.run("calibration").reading->singleturn, 0xABCDEFu);
       EXPECT_EQ(bench.run("led-or-lissajous").error, Error::none);
@@ -66,7 +66,7 @@ TEST(EslHost, EveryProfileIsSpokenOnBothSides) {
 TEST(EslHost, SilenceIsATimeout) {
   Bench bench;
   bench.encoder.power_off(Time{});
-  const Outcome read = bench.run("position");
+  const Told read = bench.run("position");
   EXPECT_EQ(read.error, Error::timeout);
   EXPECT_EQ(bench.line.now(), 2us + answer_limit);
   EXPECT_EQ(read.detail, "it is also silent when request_crc, crc_bit_order or address is another");
@@ -96,7 +96,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
   };
   for (const Row& row : rows) {
     Bench bench({}, row.tamper);
-    const Outcome read = bench.run("position");
+    const Told read = bench.run("position");
     EXPECT_EQ(text_of(read.error).name, text_of(row.error).name) << row.sentence;
     EXPECT_TRUE(read.says(row.sentence)) << read.detail;
     EXPECT_FALSE(read.reading.has_value());
@@ -108,8 +108,8 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
 // Of characters that were damaged nobody knows what they would have been.
 TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
   using Happening = Event<std::uint8_t>;
-  const kit::Made made(unit, testing::options_of({}), "position");
-  Conversation<std::uint8_t>& host = made.host;
+  const testing::Talk made(unit, testing::options_of({}), "position");
+  Conversation<std::uint8_t>& host = *made;
   static_cast<void>(host.next({}));
   host.feed({.kind = Happening::Kind::sent, .at = 2us});
   const Wire channel_1 = wire({.one = {.status = status::ready}});
@@ -143,7 +143,8 @@ TEST(EslHost, AProfileThatDoesNotFitIsNamed) {
        }) {
     Bench bench(row.encoder);
     bench.shaft.put(0, 0xABCDEF);
-    const Outcome read = bench.line.run_command(unit, testing::options_of(row.host), row.command);
+    bench.options = testing::options_of(row.host);
+    const Told read = bench.run(row.command);
     EXPECT_NE(read.error, Error::none) << row.sentence;
     EXPECT_TRUE(read.says(row.sentence)) << row.sentence << ": " << read.detail;
   }
@@ -164,9 +165,9 @@ TEST(EslHost, ANodeThatNeverStopsDoesNotHoldTheHost) {
     Shouting shouting;
     Bench bench;
     bench.line.attach(sim::Role::device, shouting);
-    const Outcome read = bench.run(command);
+    const Told read = bench.run(command);
     EXPECT_EQ(read.error, Error::wrong_length);
-    EXPECT_TRUE(read.ended);
+    EXPECT_TRUE(read.finished);
     EXPECT_TRUE(read.says("without a pause")) << read.detail;
     EXPECT_LE(bench.line.now(), 2 * noise_limit);
   }
@@ -178,7 +179,7 @@ TEST(EslHost, Resets) {
   Bench bench;
   bench.shaft.put(12, 4'000'000);
   bench.encoder.raise_alarms(alarms::xc_error);
-  Outcome after = bench.run("clear-alarms");
+  Told after = bench.run("clear-alarms");
   EXPECT_EQ(after.error, Error::none) << after.detail;
   EXPECT_EQ(after.reading->alarms, 0u);
   EXPECT_EQ(after.reading->multiturn, 12u);
@@ -192,7 +193,7 @@ TEST(EslHost, Resets) {
   EXPECT_EQ(after.reading->singleturn, 0u);
   EXPECT_EQ(bench.violations(), 0u);
   // The zero survives power off, in both channels.
-  bench.switch_off_and_on();
+  bench.restart();
   EXPECT_EQ(bench.read().singleturn, 0u);
   EXPECT_EQ(bench.read().redundant, 0u);
   EXPECT_EQ(bench.read().multiturn, 0u);
@@ -233,12 +234,12 @@ TEST(EslHost, WhatCannotBeClearedIsNamed) {
                   "memory_error, singleturn_error remain; switch the encoder off and on"}}) {
     Bench bench;
     bench.encoder.raise_alarms(static_cast<std::uint32_t>(raised));
-    const Outcome clear = bench.run("clear-alarms");
+    const Told clear = bench.run("clear-alarms");
     EXPECT_EQ(clear.error, Error::cross_check_failed);
     EXPECT_EQ(clear.detail, sentence);
   }
   Bench bench;
-  bench.set(condition::ch2_alarms, alarms::memory_error);
+  bench.condition(condition::ch2_alarms, alarms::memory_error);
   EXPECT_EQ(bench.run("clear-alarms").detail, "memory_error remains; switch the encoder off and on");
 }
 
@@ -246,19 +247,19 @@ TEST(EslHost, AMultiturnErrorNeedsDThenC) {
   Bench bench;
   bench.shaft.put(7, 100);
   bench.encoder.raise_alarms(alarms::multiturn_error);
-  const Outcome turns = bench.run("reset-multiturn");
+  const Told turns = bench.run("reset-multiturn");
   EXPECT_EQ(turns.error, Error::none);
-  EXPECT_EQ(turns.fields.at("ch1_alarms"), alarms::multiturn_error);
-  const Outcome clear = bench.run("clear-alarms");
+  EXPECT_EQ(turns.numbers.at("ch1_alarms"), alarms::multiturn_error);
+  const Told clear = bench.run("clear-alarms");
   EXPECT_EQ(clear.error, Error::none);
-  EXPECT_EQ(clear.fields.at("ch1_alarms"), 0);
+  EXPECT_EQ(clear.numbers.at("ch1_alarms"), 0);
 }
 
 TEST(EslHost, AnIdDThatMovesTheSingleTurnZeroIsFound) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
-  bench.set(condition::id_d_clears_singleturn, 1);
-  const Outcome turns = bench.run("reset-multiturn");
+  bench.condition(condition::id_d_clears_singleturn, 1);
+  const Told turns = bench.run("reset-multiturn");
   EXPECT_EQ(turns.error, Error::cross_check_failed);
   EXPECT_TRUE(turns.says("single-turn zero too"));
 }
@@ -267,14 +268,14 @@ TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
   for (const std::int32_t rpm : {5, -5}) {
     Bench bench;
     bench.shaft.spin(rpm, Time{});
-    const Outcome zero = bench.run("zero");
+    const Told zero = bench.run("zero");
     EXPECT_EQ(zero.error, Error::invalid_argument);
     EXPECT_TRUE(zero.says("nothing was sent"));
     EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
   }
   Bench starting;
-  starting.switch_off_and_on(testing::PowerOn::real);
-  const Outcome zero = starting.run("zero");
+  starting.restart(testing::PowerOn::real);
+  const Told zero = starting.run("zero");
   EXPECT_EQ(zero.error, Error::invalid_argument);
   EXPECT_TRUE(zero.says("not ready"));
 }
@@ -297,7 +298,7 @@ TEST(EslHost, ALostReplyStopsAResetUnlessItIsTheLast) {
       if (index >= row.first && index <= row.last) reply.pop_back();
     });
     bench.shaft.put(5, 0);
-    const Outcome reset = bench.run("reset-multiturn");
+    const Told reset = bench.run("reset-multiturn");
     EXPECT_EQ(reset.error, row.error) << row.first;
     EXPECT_TRUE(reset.says(row.words)) << reset.detail;
     EXPECT_EQ(bench.encoder.answered(), row.sent) << row.first;
@@ -315,7 +316,7 @@ TEST(EslHost, AResetThatDidNotHappenIsFound) {
                     .singleturn = static_cast<std::uint32_t>(counts),
                     .multiturn = static_cast<std::uint16_t>(turns)});
     });
-    const Outcome reset = bench.run(command);
+    const Told reset = bench.run(command);
     EXPECT_EQ(reset.error, Error::cross_check_failed);
     EXPECT_TRUE(reset.says(words)) << reset.detail;
     EXPECT_FALSE(reset.reading.has_value());
@@ -338,7 +339,7 @@ struct Line8 {
   }
   std::vector<std::unique_ptr<testing::TestShaft>> shafts;
   std::vector<std::unique_ptr<VirtualEncoder>> encoders;
-  kit::HostedLine line{line_settings};
+  testing::HostedLine line{LinkKind::half_duplex, line_settings};
 };
 
 TEST(EslBus, EachAnswersItsOwnRequestsAtOnceBehindThoseOfOthers) {
@@ -346,10 +347,11 @@ TEST(EslBus, EachAnswersItsOwnRequestsAtOnceBehindThoseOfOthers) {
   bus.encoders[3]->power_off(Time{});
   for (unsigned round = 0; round < 100; ++round) {
     for (std::uint8_t address = 0; address < most_encoders; ++address) {
-      const Outcome read = bus.line.run_command(unit, testing::options_of({.address = address}), "position");
-      ASSERT_EQ(read.error, address == 3 ? Error::timeout : Error::none) << round << " " << int{address};
+      const testing::Talk read(unit, testing::options_of({.address = address}), "position");
+      ASSERT_TRUE(bus.line.converse(*read));
+      ASSERT_EQ(read->error(), address == 3 ? Error::timeout : Error::none) << round << " " << int{address};
       if (address == 3) continue;
-      EXPECT_EQ(read.reading->singleturn, address * 1'000'000u + 77);
+      EXPECT_EQ(read->reading()->singleturn, address * 1'000'000u + 77);
     }
   }
   for (const auto& encoder : bus.encoders) EXPECT_EQ(encoder->violation_count(), 0u);
@@ -368,8 +370,8 @@ TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
                                               std::tuple{Wire{1, 4, 4}, std::vector{1, 4}, std::vector{4}},
                                               std::tuple{Wire{}, std::vector<int>{}, std::vector<int>{}}}) {
     Line8 bus(there);
-    const kit::Made made(unit, testing::options_of({}), "scan");
-    Conversation<std::uint8_t>& host = made.host;
+    const testing::Talk made(unit, testing::options_of({}), "scan");
+    Conversation<std::uint8_t>& host = *made;
     EXPECT_TRUE(bus.line.converse(host));
     EXPECT_EQ(host.error(), nodes.empty() ? Error::timeout : Error::none);
     Scan found;

@@ -8,7 +8,7 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
-using testing::Outcome;
+using testing::Told;
 using testing::Wire;
 using testing::wire;
 
@@ -18,26 +18,26 @@ constexpr const char* write = "memory-write";
 
 TEST(EslMemory, MemoryIsWrittenReadBackAndSparedWear) {
   Bench bench;
-  const Outcome first = bench.run(write, {0x7E, 0x5A, 0});
+  const Told first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
-  EXPECT_EQ(first.fields.at("written"), 1);
+  EXPECT_EQ(first.numbers.at("written"), 1);
   EXPECT_EQ(bench.encoder.answered(), 6u);  // page, two reads, the write, and two reads when its time is over
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
-  const Outcome same = bench.run(write, {0x7E, 0x5A, 0});
+  const Told same = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(same.error, Error::none);
-  EXPECT_EQ(same.fields.at("written"), 0);
+  EXPECT_EQ(same.numbers.at("written"), 0);
   EXPECT_EQ(bench.encoder.memory_version(), 1u);
-  const Outcome bytes = bench.run(read, {0x78, 0, 7});
+  const Told bytes = bench.run(read, {0x78, 0, 7});
   EXPECT_EQ(bytes.error, Error::none) << bytes.detail;
-  EXPECT_EQ(bytes.data, (Wire{0, 0, 0, 0, 0, 0, 0x5A}));
-  EXPECT_EQ(bytes.fields.at("memory_address"), 0x78);
+  EXPECT_EQ(bytes.texts.at("data"), std::string("\0\0\0\0\0\0\x5A", 7));
+  EXPECT_EQ(bytes.numbers.at("memory_address"), 0x78);
   EXPECT_EQ(bench.violations(), 0u);
 }
 
 TEST(EslMemory, WhatIsNotForTheUserNeedsForce) {
   for (const MemoryArea& area : memory_map) {
     Bench bench;
-    const Outcome closed = bench.run(write, {area.first, 0x42, area.page});
+    const Told closed = bench.run(write, {area.first, 0x42, area.page});
     EXPECT_EQ(closed.error, area.page <= 3 ? Error::none : Error::invalid_argument);
     EXPECT_EQ(closed.says("needs force") && closed.says(std::string(area.meaning)), area.page > 3) << closed.detail;
     EXPECT_EQ(bench.encoder.answered() > 0, area.page <= 3);
@@ -52,7 +52,7 @@ TEST(EslMemory, WhatTable11LacksIsRefusedBeforeAnythingIsSent) {
        {std::pair{read, std::vector<std::int64_t>{0, 7}}, std::pair{read, std::vector<std::int64_t>{0x7E, 0, 2}},
         std::pair{write, std::vector<std::int64_t>{page_select_address, 1, 0, 1}},
         std::pair{"select-page", std::vector<std::int64_t>{9}}}) {
-    const Outcome refused = bench.run(command, arguments);
+    const Told refused = bench.run(command, arguments);
     EXPECT_EQ(refused.error, Error::invalid_argument);
     EXPECT_TRUE(refused.says("nothing was sent"));
   }
@@ -63,9 +63,9 @@ TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
   for (const std::uint8_t before : std::to_array<std::uint8_t>({0, 8, 14})) {
     Bench bench;
     ASSERT_EQ(bench.run("select-page", {before}).error, Error::none);
-    const Outcome info = bench.run("led-or-lissajous");
+    const Told info = bench.run("led-or-lissajous");
     EXPECT_EQ(info.error, Error::none);
-    EXPECT_FALSE(info.fields.contains("page_left"));
+    EXPECT_FALSE(info.numbers.contains("page_left"));
     EXPECT_EQ(bench.raw(Request{DataId::read_memory, 0, page_select_address})[2], before);
     EXPECT_EQ(bench.violations(), 0u);
   }
@@ -77,10 +77,10 @@ TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
     });
     bench.raw(Request{DataId::write_memory, 0, page_select_address, 0});
     bench.pass(page_time);
-    const Outcome info = bench.run("led-or-lissajous");
+    const Told info = bench.run("led-or-lissajous");
     EXPECT_EQ(info.error, Error::none);
-    ASSERT_TRUE(info.fields.contains("page_left")) << first;
-    EXPECT_EQ(info.fields.at("page_left"), 8);
+    ASSERT_TRUE(info.numbers.contains("page_left")) << first;
+    EXPECT_EQ(info.numbers.at("page_left"), 8);
   }
 }
 
@@ -88,7 +88,7 @@ TEST(EslMemory, APageThatIsNotSelectedIsFound) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = page_select_address, .value = 3});
   });
-  const Outcome select = bench.run("select-page", {4});
+  const Told select = bench.run("select-page", {4});
   EXPECT_EQ(select.error, Error::cross_check_failed);
   EXPECT_EQ(select.detail, "another page is selected");
 }
@@ -99,7 +99,7 @@ TEST(EslMemory, MemoryOnABusIsRefused) {
        {std::pair{read, std::vector<std::int64_t>{0}}, std::pair{write, std::vector<std::int64_t>{0, 1, 0}},
         std::pair{"select-page", std::vector<std::int64_t>{0}},
         std::pair{"led-or-lissajous", std::vector<std::int64_t>{}}}) {
-    const Outcome refused = bench.run(command, arguments);
+    const Told refused = bench.run(command, arguments);
     EXPECT_EQ(refused.error, Error::unsupported);
     EXPECT_TRUE(refused.says("several encoders on the line")) << refused.detail;
   }
@@ -111,7 +111,7 @@ TEST(EslMemory, AMemoryThatStaysBusyIsGivenUp) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index > 0) reply = wire({.id = DataId::read_memory, .memory_address = 1, .busy = true});
   });
-  const Outcome bytes = bench.run(read, {1, 0});
+  const Told bytes = bench.run(read, {1, 0});
   EXPECT_EQ(bytes.error, Error::busy);
   EXPECT_TRUE(bytes.says("stays busy"));
   EXPECT_GT(bench.line.now(), page_time + 2 * page_time);
@@ -124,9 +124,9 @@ TEST(EslMemory, AnEepromByteIsNotBelievedWithoutABusyAnswerBefore) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = 5, .value = 0x77});
   });
   *bench.encoder.stored(0, 5) = 0x78;
-  const Outcome bytes = bench.run(read, {5, 0});
+  const Told bytes = bench.run(read, {5, 0});
   EXPECT_EQ(bytes.error, Error::none);
-  EXPECT_EQ(bytes.fields.at("value"), 0x78);
+  EXPECT_EQ(bytes.numbers.at("value"), 0x78);
 }
 
 // Replies of a write: page select, two reads, write, two reads.
@@ -148,7 +148,7 @@ TEST(EslMemory, WhatGoesWrongWithAWrite) {
     Bench bench({}, [&row](unsigned index, Wire& reply) {
       if (index == row.index) row.tamper(index, reply);
     });
-    const Outcome outcome = bench.run(write, {10, 0x33, 1});
+    const Told outcome = bench.run(write, {10, 0x33, 1});
     EXPECT_EQ(outcome.error, row.error) << row.index << outcome.detail;
     EXPECT_TRUE(outcome.says(row.words)) << outcome.detail;
     EXPECT_EQ(bench.encoder.memory_version(), row.writes) << row.index;
@@ -159,7 +159,7 @@ TEST(EslMemory, WhatGoesWrongWithAWrite) {
     Bench bench({}, [from = from](unsigned index, Wire& reply) {
       if (index >= from) reply[2] ^= 1;
     });
-    const Outcome outcome = bench.run(write, {10, 0x33, 1});
+    const Told outcome = bench.run(write, {10, 0x33, 1});
     EXPECT_EQ(outcome.error, Error::bad_checksum) << from;
     EXPECT_TRUE(outcome.says(words)) << outcome.detail;
     EXPECT_GE(bench.line.now(), outcome.received_at + (from == 0 ? page_time : eeprom_read_time));
@@ -169,15 +169,15 @@ TEST(EslMemory, WhatGoesWrongWithAWrite) {
 TEST(EslMemory, LedAndLissajousAreToldApart) {
   for (const bool lissajous : {false, true}) {
     Bench bench;
-    bench.set(condition::lissajous, lissajous ? 1 : 0);
+    bench.condition(condition::lissajous, lissajous ? 1 : 0);
     bench.encoder.raise_alarms(alarms::led_or_lissajous_error);
     const std::uint8_t sf = bench.read().one.status;
     EXPECT_EQ(sf & (status::safety_error | status::non_safety_error),
               lissajous ? status::non_safety_error : status::safety_error);
-    const Outcome info = bench.run("led-or-lissajous");
+    const Told info = bench.run("led-or-lissajous");
     EXPECT_EQ(info.error, Error::none);
-    EXPECT_EQ(info.fields.at("led_error"), lissajous ? 0 : 1);
-    EXPECT_EQ(info.fields.at("lissajous_error"), lissajous ? 1 : 0);
+    EXPECT_EQ(info.numbers.at("led_error"), lissajous ? 0 : 1);
+    EXPECT_EQ(info.numbers.at("lissajous_error"), lissajous ? 1 : 0);
   }
 }
 

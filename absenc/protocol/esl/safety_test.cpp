@@ -400,13 +400,13 @@ TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
     shaft.put(static_cast<std::int64_t>(random.below(65536)), static_cast<std::int64_t>(random.below(1 << 24)));
     if (random.chance(0.05)) encoder.raise_alarms(1u << random.below(8));
     if (random.chance(0.05)) encoder.lower_alarms(0xFF);
-    kit::Made read(unit, testing::options_of({}), "safe-position");
-    ASSERT_TRUE(host.run(read.host, 10s)) << "hangs";
-    if (read.host.error() != Error::none) continue;
+    const testing::Talk read(unit, testing::options_of({}), "safe-position");
+    ASSERT_TRUE(host.run((*read), 10s)) << "hangs";
+    if ((*read).error() != Error::none) continue;
     ++safe;
     const Reply truth = encoder.reply_to(DataId::position, line.now());
-    ASSERT_NE(read.host.reading(), nullptr);
-    ASSERT_EQ(read.host.reading()->singleturn, truth.singleturn);
+    ASSERT_NE((*read).reading(), nullptr);
+    ASSERT_EQ((*read).reading()->singleturn, truth.singleturn);
     ASSERT_EQ(truth.one.alarms & alarms::unsafe, 0);
   }
   print("safe positions over a bad line", 50'000, safe);

@@ -13,38 +13,12 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/protocol/author/unit_bench_test.hpp"
 #include "absenc/protocol/raa38/unit.hpp"
-#include "absenc/sim/bench_test.hpp"
-#include "absenc/sim/line.hpp"
 
 namespace absenc::raa38::testing {
 
-/// A command of the unit, which is made by its name.
-template <class Item>
-class Talk {
- public:
-  /// Arguments that are not given have their defaults.
-  Talk(const Unit& unit, const Options& options, std::string_view name, std::vector<std::int64_t> arguments = {})
-      : storage_(unit.host_storage), arguments_(std::move(arguments)) {
-    const Command& command = *find_command(unit, name);
-    for (std::size_t i = arguments_.size(); i < command.arguments.size(); ++i) {
-      arguments_.push_back(command.arguments[i].default_value);
-    }
-    const Any<Conversation> made = unit.host(options, command, arguments_, storage_);
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      made_ = made.frames;
-    } else {
-      made_ = made.bytes;
-    }
-  }
-  Conversation<Item>& operator*() { return *made_; }
-  Conversation<Item>* operator->() { return made_; }
-
- private:
-  std::vector<std::byte> storage_;
-  std::vector<std::int64_t> arguments_;
-  Conversation<Item>* made_ = nullptr;
-};
+using author::testing::Talk;
 
 struct Collector final : FieldSink {
   void put(const FieldValue& value) override {

@@ -6,19 +6,20 @@
 
 #include <concepts>
 
+#include "absenc/protocol/author/unit_bench_test.hpp"
 #include "absenc/protocol/tformat/device.hpp"
 #include "absenc/protocol/tformat/host.hpp"
 #include "absenc/protocol/tformat/unit.hpp"
-#include "tests/kit/bench.hpp"
 
 namespace absenc::tformat::testing {
 
-using kit::Numbers;
-using kit::Outcome;
-using kit::PowerOn;
-using kit::Tamper;
-using kit::wire;
-using kit::Wire;
+using author::testing::Numbers;
+using author::testing::PowerOn;
+using author::testing::Tamper;
+using author::testing::Told;
+using author::testing::wire;
+using author::testing::Wire;
+using Talk = author::testing::Talk<std::uint8_t>;
 using TestShaft = sim::testing::TestShaft<17>;
 
 inline Wire wire(const Reply& reply) { return wire(encode_reply(reply).view()); }
@@ -35,26 +36,21 @@ inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
   };
 }
 
-inline Options default_options() {
-  Options options;
-  EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
-  return options;
-}
-
-struct Bench : kit::Bench<VirtualEncoder, TestShaft> {
-  explicit Bench(Tamper tamper = {})
-      : kit::Bench<VirtualEncoder, TestShaft>(tformat::unit, default_options(), Format{}, std::move(tamper)) {}
+struct Bench : author::testing::UnitBench<17> {
+  explicit Bench(Tamper tamper = {}) : UnitBench(tformat::unit, "") { tampered.replies(std::move(tamper)); }
   /// Runs a conversation to its end and returns it.
   template <std::derived_from<Machine<std::uint8_t>> Host>
   Host& run(Host& host) {
     EXPECT_TRUE(line.converse(host));
     return host;
   }
-  using kit::Bench<VirtualEncoder, TestShaft>::run;
+  using UnitBench::run;
+  Wire raw(Wire request) { return UnitBench::raw(std::move(request), 100us, 12us).reply; }
   Reply everything() {
     ReadPosition read({});
     return run(read).reply();
   }
+  VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
 }  // namespace absenc::tformat::testing

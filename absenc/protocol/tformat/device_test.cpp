@@ -146,7 +146,7 @@ TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA2);
   // Page 0 after power on, at once.
   memory_write(bench, 126, 1);
-  bench.switch_off_and_on();
+  bench.restart();
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA0);
 }
 
@@ -198,7 +198,7 @@ TEST(TformatDevice, AZeroThatWasNotWrittenBeforePowerOffIsLost) {
   Bench bench;
   bench.shaft.put(0, 1000);
   reset(bench, DataId::zero);
-  bench.switch_off_and_on();
+  bench.restart();
   bench.pass(memory_time);
   EXPECT_EQ(bench.everything().singleturn, 1000u);
 }
@@ -212,7 +212,7 @@ TEST(TformatDevice, ZeroTakes18MillisecondsAndSurvivesPowerOff) {
   bench.pass(memory_time);
   EXPECT_EQ(bench.everything().singleturn, 0u);
   EXPECT_EQ(bench.everything().multiturn, 7u);
-  bench.switch_off_and_on();
+  bench.restart();
   EXPECT_EQ(bench.everything().singleturn, 0u);
   bench.shaft.put(7, 999);
   EXPECT_EQ(bench.everything().singleturn, 0x1FFFFu);
@@ -262,15 +262,15 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
 
 TEST(TformatDevice, OverHeatIsLatchedUntilCooledAndCleared) {
   Bench bench;
-  bench.set(temperature, 90);
+  bench.condition(temperature, 90);
   EXPECT_EQ(bench.everything().alarms, 0);
-  bench.set(temperature, 91);
+  bench.condition(temperature, 91);
   const Reply hot = bench.everything();
   EXPECT_EQ(hot.alarms, alarms::over_heat);
   EXPECT_EQ(hot.status, status::alarm);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
-  bench.set(temperature, 60);
+  bench.condition(temperature, 60);
   EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.everything().alarms, 0);
@@ -284,7 +284,7 @@ TEST(TformatDevice, CounterOverflowGoesOnModulo65536) {
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
   EXPECT_EQ(bench.everything().multiturn, 0u);
   EXPECT_EQ(bench.everything().status, 0);  // SF does not show it
-  bench.switch_off_and_on();
+  bench.restart();
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
 }
 
@@ -306,19 +306,19 @@ TEST(TformatDevice, FullAbsoluteStatusClearsBelow100Rpm) {
 TEST(TformatDevice, BatteryFlags) {
   Bench bench;
   bench.shaft.put(9, 0);
-  bench.set(battery_voltage, 3050);
+  bench.condition(battery_voltage, 3050);
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
-  bench.set(battery_voltage, 3600);
+  bench.condition(battery_voltage, 3600);
   EXPECT_EQ(bench.everything().alarms, 0);  // not latched
-  bench.set(battery_voltage, 2600);
+  bench.condition(battery_voltage, 2600);
   bench.encoder.power_on(bench.line.now(), PowerOn::skip);      // it is on
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises with the power off only
-  bench.switch_off_and_on();
+  bench.restart();
   const Reply lost = bench.everything();
   EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
   EXPECT_FALSE(to_reading({}, lost).multiturn_valid);
   EXPECT_EQ(lost.multiturn, 0u);  // nothing counted them
-  bench.set(battery_voltage, 3600);
+  bench.condition(battery_voltage, 3600);
   reset(bench, DataId::reset_multiturn);
   EXPECT_EQ(bench.everything().alarms, 0);
 }
@@ -343,15 +343,15 @@ TEST(TformatDevice, CountingAndMultiturnErrorsEndWithThePower) {
   Bench bench;
   bench.encoder.raise_alarms(alarms::counting_error | alarms::multiturn_error | alarms::over_speed);
   EXPECT_EQ(bench.everything().status, status::counting_error | status::alarm);
-  bench.switch_off_and_on();
+  bench.restart();
   EXPECT_EQ(bench.everything().alarms, alarms::over_speed);
 }
 
 TEST(TformatDevice, IsSilentWhileItStarts) {
   for (const bool battery : {true, false}) {
     Bench bench;
-    bench.set(battery_voltage, battery ? 3600 : 0);
-    bench.switch_off_and_on(PowerOn::real);
+    bench.condition(battery_voltage, battery ? 3600 : 0);
+    bench.restart(PowerOn::real);
     const Time start = battery ? start_up_with_battery : start_up_without_battery;
     testing::RawHost early({0x1A}, start - 1ms);
     EXPECT_TRUE(bench.run(early).reply.empty());

@@ -32,12 +32,12 @@ TEST(TformatHost, ReadsEverythingInTheTimeOfTheWire) {
   EXPECT_TRUE(read.reading()->multiturn_valid);
   EXPECT_EQ(read.reading()->latched, 4us);
   EXPECT_EQ(read.reading()->received, 51us);
-  EXPECT_EQ(bench.run("position").fields, (Numbers{{"data_id", 3},
-                                                   {"status", 0},
-                                                   {"singleturn", 0x12345},
-                                                   {"encoder_id", 17},
-                                                   {"multiturn", 4660},
-                                                   {"alarms", 0}}));
+  EXPECT_EQ(bench.run("position").numbers, (Numbers{{"data_id", 3},
+                                                    {"status", 0},
+                                                    {"singleturn", 0x12345},
+                                                    {"encoder_id", 17},
+                                                    {"multiturn", 4660},
+                                                    {"alarms", 0}}));
 }
 
 TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
@@ -58,7 +58,7 @@ TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
   EXPECT_EQ(alarmed.reading()->alarms, alarms::multiturn_error);
   const auto id = bench.run("encoder-id");
   EXPECT_FALSE(id.reading);
-  EXPECT_EQ(id.fields.at("encoder_id"), 0x11);
+  EXPECT_EQ(id.numbers.at("encoder_id"), 0x11);
 }
 
 TEST(TformatHost, SilenceIsATimeoutAndNothingIsRepeated) {
@@ -102,7 +102,7 @@ TEST(TformatHost, ARefusedRequestIsSentAgainInsideProcedures) {
   Bench bench(refuse(2, 3, status::parity_error));  // the read behind the page select
   const auto read = bench.run("temperature");
   EXPECT_EQ(read.error, Error::none);
-  EXPECT_EQ(read.fields, (Numbers{{"temperature_c", 35}}));
+  EXPECT_EQ(read.numbers, (Numbers{{"temperature_c", 35}}));
 }
 
 }  // namespace

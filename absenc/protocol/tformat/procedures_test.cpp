@@ -23,11 +23,11 @@ TEST(TformatProcedures, ThePageThatADriveHadSelectedIsRestored) {
     Bench bench;
     bench.raw(wire(Request{DataId::write_memory, page_select_address, before}));
     bench.pass(memory_time);
-    EXPECT_EQ(bench.run("temperature").fields, (Numbers{{"temperature_c", 35}}));
+    EXPECT_EQ(bench.run("temperature").numbers, (Numbers{{"temperature_c", 35}}));
     EXPECT_EQ(selected_page(bench), before);
     EXPECT_EQ(bench.run("overheat-threshold").error, Error::none);
     EXPECT_EQ(selected_page(bench), before);
-    EXPECT_EQ(bench.run("set-overheat-threshold", {80}).fields,
+    EXPECT_EQ(bench.run("set-overheat-threshold", {80}).numbers,
               (Numbers{{"overheat_enabled", 1}, {"overheat_threshold_c", 80}, {"written", 1}}));
     EXPECT_EQ(selected_page(bench), before);
     EXPECT_EQ(bench.violations(), 0u);
@@ -37,18 +37,18 @@ TEST(TformatProcedures, ThePageThatADriveHadSelectedIsRestored) {
 TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
   // An encoder that refuses to say which page is selected, as it does with a closed address (9.4).
   Bench refusing(refuse(0, 3, 0));
-  EXPECT_EQ(refusing.run("temperature").fields, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
+  EXPECT_EQ(refusing.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   // One that says a page that there is not.
   Bench odd([](unsigned index, Wire& reply) {
     if (index == 0) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 9});
   });
-  EXPECT_EQ(odd.run("temperature").fields, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
+  EXPECT_EQ(odd.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   EXPECT_EQ(odd.encoder.answered(), 3u);
   // One that says another page in the end than was selected again.
   Bench other([](unsigned index, Wire& reply) {
     if (index == 4) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 3});
   });
-  EXPECT_EQ(other.run("temperature").fields, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
+  EXPECT_EQ(other.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   struct Row {
     unsigned lost;  // from this reply on: page, page select, temperature, page select, page
     Error error;
@@ -62,7 +62,7 @@ TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
     const auto lost = bench.run("temperature");
     EXPECT_EQ(lost.error, row.error) << row.lost;
     EXPECT_EQ(lost.says("page 7 may be left selected"), row.error != Error::none) << lost.detail;
-    EXPECT_EQ(lost.fields.contains("page_left"), row.left && row.error == Error::none) << row.lost;
+    EXPECT_EQ(lost.numbers.contains("page_left"), row.left && row.error == Error::none) << row.lost;
     // A page change that may be going on is over when the next one asks.
     const Wire answer = bench.raw({0xEA, 0x7F, 0x95});
     EXPECT_EQ(bench.violations(), 0u) << row.lost;
@@ -73,39 +73,39 @@ TEST(TformatProcedures, WhatIsLeftByOneThatIsBrokenOff) {
   for (const auto& [name, time, left] :
        {std::tuple{"temperature", 10us, false}, {"temperature", 200us, true}, {"zero", 200us, false}}) {
     Bench bench;
-    const kit::Made made(unit, bench.options, name);
-    bench.line.put_on(made.host);
+    const testing::Talk made(unit, bench.options, name);
+    bench.line.put_on(*made);
     bench.pass(time);
-    testing::Outcome told;
-    made.host.report_left(told);
-    EXPECT_EQ(told.fields, left ? (Numbers{{"page_left", 7}}) : Numbers{}) << name << time.count();
+    testing::Told told;
+    made->report_left(told);
+    EXPECT_EQ(told.numbers, left ? (Numbers{{"page_left", 7}}) : Numbers{}) << name << time.count();
   }
 }
 
 TEST(TformatProcedures, TemperatureAndItsThreshold) {
   Bench bench;
-  bench.set(temperature, -10);
-  EXPECT_EQ(bench.run("temperature").fields.at("temperature_c"), -10);
-  EXPECT_EQ(bench.run("overheat-threshold").fields, (Numbers{{"overheat_enabled", 1}, {"overheat_threshold_c", 90}}));
-  bench.set(temperature, 31);
-  EXPECT_EQ(bench.run("set-overheat-threshold", {31}).fields.at("overheat_threshold_c"), 31);
+  bench.condition(temperature, -10);
+  EXPECT_EQ(bench.run("temperature").numbers.at("temperature_c"), -10);
+  EXPECT_EQ(bench.run("overheat-threshold").numbers, (Numbers{{"overheat_enabled", 1}, {"overheat_threshold_c", 90}}));
+  bench.condition(temperature, 31);
+  EXPECT_EQ(bench.run("set-overheat-threshold", {31}).numbers.at("overheat_threshold_c"), 31);
   EXPECT_EQ(bench.everything().alarms, 0);
   bench.run("set-overheat-threshold", {30});
   EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
-  EXPECT_EQ(bench.run("set-overheat-threshold", {0}).fields, (Numbers{{"overheat_enabled", 0}, {"written", 1}}));
+  EXPECT_EQ(bench.run("set-overheat-threshold", {0}).numbers, (Numbers{{"overheat_enabled", 0}, {"written", 1}}));
   EXPECT_EQ(bench.run("clear-alarms").error, Error::none);
   EXPECT_EQ(bench.violations(), 0u);
 }
 
 TEST(TformatProcedures, MemoryIsWrittenReadBackAndSparedWear) {
   Bench bench;
-  EXPECT_EQ(bench.run("memory-write", {126, 0x5A, 3}).fields,
+  EXPECT_EQ(bench.run("memory-write", {126, 0x5A, 3}).numbers,
             (Numbers{{"page", 3}, {"address", 126}, {"value", 0x5A}, {"written", 1}}));
-  EXPECT_EQ(bench.run("memory-write", {126, 0x5A, 3}).fields.at("written"), 0);
+  EXPECT_EQ(bench.run("memory-write", {126, 0x5A, 3}).numbers.at("written"), 0);
   EXPECT_EQ(bench.encoder.writes(), 1u);
   EXPECT_EQ(bench.encoder.memory()[3 * 127 + 126], 0x5A);
-  EXPECT_EQ(bench.run("memory-read", {126, 3, 1}).fields, (Numbers{{"page", 3}, {"address", 126}, {"value", 0x5A}}));
-  EXPECT_EQ(bench.run("memory-read", {120, 3, 7}).fields.count("data"), 1u);
+  EXPECT_EQ(bench.run("memory-read", {126, 3, 1}).numbers, (Numbers{{"page", 3}, {"address", 126}, {"value", 0x5A}}));
+  EXPECT_EQ(bench.run("memory-read", {120, 3, 7}).numbers.count("data"), 1u);
   EXPECT_EQ(selected_page(bench), 3);
   EXPECT_EQ(bench.violations(), 0u);
 }
@@ -215,7 +215,7 @@ TEST(TformatProcedures, Resets) {
   EXPECT_EQ(zero.reading->multiturn, 12u);
   EXPECT_EQ(zero.reading->received, bench.line.now());
   EXPECT_EQ(zero.reading->latched, bench.line.now() - 47us);
-  EXPECT_EQ(zero.fields.at("singleturn"), 0);
+  EXPECT_EQ(zero.numbers.at("singleturn"), 0);
   bench.encoder.raise_alarms(alarms::battery_error);
   const auto turns = bench.run("reset-multiturn");
   EXPECT_EQ(turns.error, Error::none);

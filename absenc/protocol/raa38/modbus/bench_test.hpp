@@ -16,11 +16,11 @@ namespace absenc::raa38::rtu {
 
 namespace testing {
 
+using author::testing::PowerOn;
+using author::testing::Wire;
 using raa38::testing::End;
 using raa38::testing::ended;
 using raa38::testing::says;
-using PowerOn = Device<std::uint8_t>::PowerOn;
-using Wire = std::vector<std::uint8_t>;
 
 struct Talk final : raa38::testing::Talk<std::uint8_t> {
   Talk(const Format& format, std::string_view name, std::vector<std::int64_t> arguments = {})

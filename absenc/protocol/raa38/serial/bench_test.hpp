@@ -25,10 +25,10 @@ namespace absenc::raa38::serial {
 
 namespace testing {
 
+using author::testing::Wire;
 using raa38::testing::End;
 using raa38::testing::ended;
 using raa38::testing::says;
-using Wire = std::vector<std::uint8_t>;
 
 inline constexpr LineSettings line_of_tests{.rate = 115'200};
 using Shaft14 = sim::testing::TestShaft<14>;
@@ -40,7 +40,7 @@ struct Talk final : raa38::testing::Talk<std::uint8_t> {
 
 /// A virtual encoder of which a test may change what it sends: `frame` counts from 0; nothing left: nothing is sent.
 struct Tampered final : Device<std::uint8_t> {
-  using Tamper = std::function<void(unsigned frame, Wire& reply)>;
+  using Tamper = author::testing::Tamper;
   Tampered(const Format& format, const Shaft& shaft) : encoder(format, shaft) {}
   void set(Tamper how) { tamper = std::move(how); }
 
