@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- tools; os needs core, link."""
+"""Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- tools; os needs
+core, link."""
 
 import os
 import re
@@ -19,6 +20,7 @@ BELOW = {
     "sim": {"core", "link", "protocol"},
     "capture": {"core", "link", "protocol"},
     "os": {"core", "link"},
+    "client": {"core", "link", "protocol", "host", "sim", "capture", "os"},
 }
 FREESTANDING = {"core", "link", "protocol", "host"}
 FREESTANDING_HEADERS = set(

@@ -3,15 +3,16 @@
 
 #include <array>
 
+#include "absenc/client/way/connection.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/encoder.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/run.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -56,14 +57,14 @@ void show_json(const Unit& unit, const Reading& reading) {
 
 int run_alarms(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   if (uri.unit->alarms == nullptr && uri.unit->status == nullptr) {
     throw UsageError(fmt::format("the encoders of {} have no alarms", uri.unit->id));
   }
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   const Outcome outcome = encoder->read();
-  if (outcome.error != Error::none) throw CommandFailure(encoder->trouble(outcome));
-  if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no alarms");
+  if (outcome.error != Error::none) throw EncoderFailure(encoder->trouble(outcome));
+  if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no alarms");
   if (invocation.has("--json")) {
     show_json(*uri.unit, *outcome.reading);
   } else {

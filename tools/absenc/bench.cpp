@@ -5,14 +5,15 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/run.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -26,7 +27,7 @@ struct Measurement {
   std::uint64_t items = 0;
 };
 
-Measurement measure(Encoder& encoder, double seconds) {
+Measurement measure(Connection& encoder, double seconds) {
   Measurement measurement;
   encoder.read();  // the first one is read twice, and echo is found out
   const Time start = os::now();
@@ -67,7 +68,7 @@ struct Percentile {
 constexpr std::array<Percentile, 4> percentiles{{{"50", 0.5}, {"90", 0.9}, {"99", 0.99}, {"99.9", 0.999}}};
 
 // How much of the time characters were on the line; 0 when the line has no rate, or carries no characters.
-double line_share(const Encoder& encoder, const Measurement& measurement) {
+double line_share(const Connection& encoder, const Measurement& measurement) {
   const LineSettings& line = encoder.uri().line;
   const LinkKind link = encoder.unit().link;
   if (line.rate == 0 || (link != LinkKind::half_duplex && link != LinkKind::full_duplex)) return 0;
@@ -82,7 +83,7 @@ double readings_a_second(const Measurement& measurement) {
 
 double microseconds(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
-Json to_json(const Encoder& encoder, const Measurement& measurement) {
+Json to_json(const Connection& encoder, const Measurement& measurement) {
   Json latency = Json::object();
   for (const auto& [name, share] : percentiles) {
     latency.set(fmt::format("p{}", name), microseconds(percentile(measurement.latencies, share)));
@@ -102,17 +103,17 @@ Json to_json(const Encoder& encoder, const Measurement& measurement) {
       .set("ok", true);
 }
 
-std::string to_text(const Encoder& encoder, const Measurement& measurement) {
+std::string measurement_text(const Connection& encoder, const Measurement& measurement) {
   std::string latencies;
   for (const auto& [name, share] : percentiles) {
-    latencies += fmt::format("{} % {}, ", name, tool::to_text(percentile(measurement.latencies, share)));
+    latencies += fmt::format("{} % {}, ", name, to_text(percentile(measurement.latencies, share)));
   }
   const auto count = static_cast<std::int64_t>(measurement.latencies.size());
   std::vector<std::vector<std::string>> rows{
-      {"readings", fmt::format("{} in {}: {:.0f} a second", count, tool::to_text(measurement.duration),
-                               readings_a_second(measurement))},
-      {"latency", fmt::format("{}longest {}", latencies, tool::to_text(measurement.latencies.back()))},
-      {"processor", fmt::format("{} a reading", tool::to_text(measurement.processor / count))},
+      {"readings",
+       fmt::format("{} in {}: {:.0f} a second", count, to_text(measurement.duration), readings_a_second(measurement))},
+      {"latency", fmt::format("{}longest {}", latencies, to_text(measurement.latencies.back()))},
+      {"processor", fmt::format("{} a reading", to_text(measurement.processor / count))},
       {"exchanges", summary(encoder.counters())},
   };
   const double share = line_share(encoder, measurement);
@@ -125,16 +126,17 @@ std::string to_text(const Encoder& encoder, const Measurement& measurement) {
 
 int run_bench(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const double seconds = invocation.real("--seconds", 5, 0.01, 86400);
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   const Outcome first = encoder->read();
-  if (first.error != Error::none) throw CommandFailure(encoder->trouble(first));
+  if (first.error != Error::none) throw EncoderFailure(encoder->trouble(first));
   const Measurement measurement = measure(*encoder, seconds);
   if (measurement.latencies.empty()) {
-    throw ToolFailure(fmt::format("there was no good reading; exchanges: {}", summary(encoder->counters())));
+    throw Failure(fmt::format("there was no good reading; exchanges: {}", summary(encoder->counters())));
   }
-  print_line(invocation.has("--json") ? to_json(*encoder, measurement).line() : to_text(*encoder, measurement));
+  print_line(invocation.has("--json") ? to_json(*encoder, measurement).line()
+                                      : measurement_text(*encoder, measurement));
   return measurement.failed == 0 ? exit_good : exit_failed;
 }
 

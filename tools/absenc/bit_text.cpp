@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/absenc/bit_text.hpp"
+#include "absenc/client/text/unit_text.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +9,7 @@
 
 namespace absenc::tool {
 
-std::string to_text(const BitRanges& ranges) {
+std::string ranges_text(const BitRanges& ranges) {
   std::string text;
   for (std::size_t i = ranges.size(); i > 0; --i) {
     const BitRange& range = ranges[i - 1];
@@ -34,7 +35,7 @@ FieldPlaces::FieldPlaces(const Unit& unit, const Options& options, Frame request
 std::string FieldPlaces::text() const {
   std::string text;
   for (const auto& [name, ranges] : all_) {
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, to_text(ranges));
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, ranges_text(ranges));
   }
   return text;
 }
@@ -56,7 +57,7 @@ Json FieldPlaces::json() const {
 void FieldPlaces::add_to(std::vector<std::vector<std::string>>& rows) const {
   for (std::vector<std::string>& row : rows) {
     const auto place = std::find_if(all_.begin(), all_.end(), [&](const auto& one) { return one.first == row[0]; });
-    row.insert(row.begin() + 2, place == all_.end() ? "" : "bits " + to_text(place->second));
+    row.insert(row.begin() + 2, place == all_.end() ? "" : "bits " + ranges_text(place->second));
   }
 }
 

@@ -6,13 +6,14 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "tools/absenc/json.hpp"
 
 namespace absenc::tool {
 
 /// "16-32", "7", "24-31 16-23": from the most significant on.
-[[nodiscard]] std::string to_text(const BitRanges& ranges);
+[[nodiscard]] std::string ranges_text(const BitRanges& ranges);
 
 /// The fields of a good reply of which its unit says where they stand, in order.
 class FieldPlaces {

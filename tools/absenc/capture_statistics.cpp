@@ -6,10 +6,13 @@
 
 #include <algorithm>
 
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 namespace {
 

@@ -11,14 +11,16 @@
 #include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
+#include "absenc/client/captures/position_trace.hpp"
+#include "absenc/client/captures/run.hpp"
 #include "absenc/host/statistics.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "tools/absenc/annotation_text.hpp"
-#include "tools/absenc/capture_run.hpp"
 #include "tools/absenc/json.hpp"
-#include "tools/absenc/position_trace.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 /// Times in quarters of a power of two.
 class TimeHistogram {

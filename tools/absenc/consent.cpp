@@ -26,7 +26,8 @@ bool is_yes(std::string_view answer) {
 
 }  // namespace
 
-bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_view what, std::string_view meaning) {
+bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
+              std::string_view meaning) {
   // The virtual encoder of sim: is gone afterwards anyway.
   if (uri.place == Place::sim || invocation.has("--yes")) return false;
   if (can_ask()) return true;
@@ -34,7 +35,7 @@ bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_v
       fmt::format("{} changes the encoder ({}) and nobody is there to be asked: give --yes to do it", what, meaning));
 }
 
-bool confirmed(const EncoderUri& uri, std::string_view meaning) {
+bool confirmed(const EncoderAddress& uri, std::string_view meaning) {
   const std::string where = uri.place == Place::tcp ? fmt::format("{}:{}", uri.host, uri.port) : uri.path;
   print_prompt(fmt::format("This changes the encoder at {}: {}. Go on? [y/N] ", where, meaning));
   pollfd input{0, POLLIN, 0};

@@ -4,16 +4,18 @@
 
 #include <string_view>
 
-#include "tools/absenc/encoder_uri.hpp"
+#include "absenc/client/way/address.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
 
+using namespace client;
+
 /// Whether the user is to be asked before `what`, which means `meaning`. Throws UsageError when nobody is there.
-[[nodiscard]] bool must_ask(const Invocation& invocation, const EncoderUri& uri, std::string_view what,
+[[nodiscard]] bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
                             std::string_view meaning);
 
 /// Asks; only y and yes go on, in upper or lower case. Throws os::Interrupted.
-[[nodiscard]] bool confirmed(const EncoderUri& uri, std::string_view meaning);
+[[nodiscard]] bool confirmed(const EncoderAddress& uri, std::string_view meaning);
 
 }  // namespace absenc::tool

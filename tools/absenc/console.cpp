@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <array>
 
+#include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/nearest.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 

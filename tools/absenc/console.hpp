@@ -6,11 +6,13 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/emulation/virtual_device.hpp"
 #include "absenc/link/step.hpp"
 #include "absenc/os/input_lines.hpp"
-#include "tools/absenc/virtual_device.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 class Console {
  public:

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "absenc/capture/search/crc_search.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/json.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
 

@@ -3,20 +3,22 @@
 
 #include <array>
 
+#include "absenc/client/captures/run.hpp"
+#include "absenc/client/captures/sequence_watch.hpp"
+#include "absenc/client/way/diagnosis.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/annotation_text.hpp"
 #include "tools/absenc/bit_text.hpp"
-#include "tools/absenc/capture_run.hpp"
+#include "tools/absenc/capture_choices.hpp"
 #include "tools/absenc/capture_statistics.hpp"
-#include "tools/absenc/diagnosis.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/reading_text.hpp"
-#include "tools/absenc/sequence_watch.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/unit_text.hpp"
-#include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
 

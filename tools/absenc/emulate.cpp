@@ -7,6 +7,9 @@
 #include <optional>
 #include <vector>
 
+#include "absenc/client/memory/keeper.hpp"
+#include "absenc/client/memory/kept.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/os/cuse/spidev_node.hpp"
 #include "absenc/os/emulator_port.hpp"
@@ -17,13 +20,10 @@
 #include "absenc/os/spidev.hpp"
 #include "tools/absenc/console.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/memory_file.hpp"
-#include "tools/absenc/memory_keeper.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/served_port.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/unit_text.hpp"
 #include "tools/absenc/virtual_line.hpp"
 
 namespace absenc::tool {
@@ -165,7 +165,7 @@ struct Emulation {
     try {
       notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : consoled);
       if (keeps_memory) keeper.finish();
-    } catch (const ToolFailure& failure) {
+    } catch (const Failure& failure) {
       print_message(failure.what());
       status = exit_failed;
     }
@@ -227,7 +227,7 @@ Notes serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const LineSett
 }
 
 int emulate_bytes(const Unit& unit, const Options& options, const Invocation& invocation) {
-  std::optional<EncoderUri> served;
+  std::optional<EncoderAddress> served;
   if (invocation.has("--port")) served = parse_served_port(unit, invocation.text("--port"));
   Emulation<std::uint8_t> emulation(unit, options, invocation);
   const Time end = emulation.end();
@@ -341,12 +341,12 @@ DeviceSettings device_settings(const Invocation& invocation) {
   return settings;
 }
 
-EncoderUri further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
-                           const DeviceSettings& settings) {
+EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
+                               const DeviceSettings& settings) {
   std::string base = fmt::format("sim:{}?", unit.id);
   if (invocation.has("--model")) base += fmt::format("model={}&", invocation.text("--model"));
   for (const std::string& option : invocation.texts("--option")) base += option + '&';
-  EncoderUri uri = parse_encoder(base + further);
+  EncoderAddress uri = parse_address(base + further);
   uri.device.delay = settings.delay;
   uri.device.real_power_on = settings.real_power_on;
   return uri;

@@ -6,19 +6,20 @@
 #include <filesystem>
 #include <optional>
 
+#include "absenc/client/identify/capture.hpp"
+#include "absenc/client/identify/line.hpp"
+#include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
+#include "tools/absenc/capture_choices.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/identify_capture.hpp"
-#include "tools/absenc/identify_line.hpp"
 #include "tools/absenc/identify_text.hpp"
-#include "tools/absenc/nearest.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/unit_text.hpp"
-#include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
 
@@ -200,8 +201,8 @@ void refuse_missing_file(std::string_view where) {
   }
   const std::vector<std::string_view> names(files.begin(), files.end());
   const std::string_view near = nearest(where, names);
-  throw ToolFailure(fmt::format("there is no file {}, and no port of that name{}", where,
-                                near.empty() ? "" : fmt::format("; did you mean {}?", near)));
+  throw Failure(fmt::format("there is no file {}, and no port of that name{}", where,
+                            near.empty() ? "" : fmt::format("; did you mean {}?", near)));
 }
 
 int run_identify(const Invocation& invocation) {

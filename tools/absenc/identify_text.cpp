@@ -8,10 +8,11 @@
 #include <cmath>
 #include <utility>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/json.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 

@@ -8,9 +8,11 @@
 #include <string_view>
 #include <vector>
 
-#include "tools/absenc/identify_line.hpp"
+#include "absenc/client/identify/line.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 /// The fewest settings by which these options come about: "model=23-bit".
 [[nodiscard]] std::vector<std::string> settings_for(const Unit& unit, const Options& options);

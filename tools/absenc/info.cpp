@@ -5,14 +5,16 @@
 #include <algorithm>
 #include <array>
 
+#include "absenc/client/way/connection.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/encoder.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -21,7 +23,7 @@ namespace {
 using Rows = std::vector<std::vector<std::string>>;
 
 // What needs no argument and exists with these options.
-bool can_be_asked(const EncoderUri& uri, const Command& command) {
+bool can_be_asked(const EncoderAddress& uri, const Command& command) {
   const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
                                           [](const Argument& argument) { return argument.required; });
   if (needs_argument) return false;
@@ -33,7 +35,7 @@ bool can_be_asked(const EncoderUri& uri, const Command& command) {
 }
 
 // In this order; the position comes behind them.
-std::vector<const Command*> questions(const EncoderUri& uri) {
+std::vector<const Command*> questions(const EncoderAddress& uri) {
   std::vector<const Command*> commands;
   for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
     for (const Command& command : uri.unit->commands) {
@@ -51,7 +53,7 @@ std::string resolution_text(const Resolution& resolution) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-Rows identity_rows(const EncoderUri& uri) {
+Rows identity_rows(const EncoderAddress& uri) {
   const Unit& unit = *uri.unit;
   const Model* model = uri.options.model;
   Rows rows{{"encoder", address_of(uri)}, {"protocol", std::string(unit.name)}};
@@ -66,7 +68,7 @@ Rows identity_rows(const EncoderUri& uri) {
   return rows;
 }
 
-Json identity_json(const EncoderUri& uri, const Resolution& resolution) {
+Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
   const Unit& unit = *uri.unit;
   Json bits = Json::object().set("singleturn_bits", resolution.singleturn_bits);
   bits.set("multiturn_bits", resolution.multiturn_bits);
@@ -84,8 +86,8 @@ Json identity_json(const EncoderUri& uri, const Resolution& resolution) {
 /// Asks the encoder and keeps what it says, for people and for programs.
 class Survey {
  public:
-  explicit Survey(const EncoderUri& uri)
-      : encoder_(Encoder::open(uri)), resolution_(uri.unit->resolution(uri.options)) {}
+  explicit Survey(const EncoderAddress& uri)
+      : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)) {}
 
   void ask(const Command& command) {
     const Outcome outcome = encoder_->run(command, require_arguments(command, {}));
@@ -108,7 +110,7 @@ class Survey {
     const Outcome outcome = encoder_->read();
     const Command& command = *find_command(unit, Verb::read);
     if (outcome.error != Error::none) return fail(command, encoder_->trouble(outcome));
-    if (outcome.reading == nullptr) throw ToolFailure("the encoder's reply carries no position");
+    if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no position");
     const Resolution read_as = resolution_of(*outcome.reading);
     if (heard_ && !same(read_as, resolution_)) return fail(command, contradiction(read_as));
     hear(read_as);
@@ -117,7 +119,7 @@ class Survey {
     set_reading(json, unit, reading, encoder_->confirmed());
     answers.set(command.name, json);
     add_heading(command);
-    position = "  " + to_text(unit, reading);
+    position = "  " + reading_text(unit, reading);
     if (const std::string alarms = alarms_in_words(unit, reading); !alarms.empty()) position += '\n' + alarms;
     if (reading.singleturn_valid() != outcome.reading->singleturn_valid()) {
       position += "\n  no two readings in a row agree as well as the fastest shaft allows";
@@ -158,7 +160,7 @@ class Survey {
   }
 
   void fail(const Command& command, const Trouble& trouble) {
-    answers.set(command.name, trouble.json());
+    answers.set(command.name, to_json(trouble));
     rows.push_back(
         {std::string(command.name), "FAILED", fmt::format("{}: {}", text_of(trouble.error).name, trouble.message)});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),
@@ -166,14 +168,14 @@ class Survey {
     if (!is_known) troubles.push_back(trouble);
   }
 
-  std::unique_ptr<Encoder> encoder_;
+  std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
   bool heard_ = false;  // from the encoder
 };
 
 int run_info(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const bool json = invocation.has("--json");
   if (!json) print_line(table(identity_rows(uri)) + '\n');
   Survey survey(uri);

@@ -4,13 +4,14 @@
 
 #include <array>
 
+#include "absenc/client/way/address.hpp"
+#include "absenc/client/way/named_encoder.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/all.hpp"
-#include "tools/absenc/encoder_uri.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/named_encoder.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -322,7 +323,7 @@ Json unit_json(const Unit& unit) {
       .set("conditions", conditions_json(unit));
 }
 
-Json name_json(std::string_view name, const EncoderUri& uri) {
+Json name_json(std::string_view name, const EncoderAddress& uri) {
   return Json::object()
       .set("name", name)
       .set("encoder", address_of(uri))
@@ -333,11 +334,11 @@ Json name_json(std::string_view name, const EncoderUri& uri) {
 
 // Nothing is shown when one of them is wrong.
 int list_names(bool json) {
-  const Config config = require_config("the names are those of absenc.toml");
+  const SettingsFile config = require_settings_file("the names are those of absenc.toml");
   Rows rows{{"NAME", "ENCODER", "MODEL"}};
   std::string lines;
-  for (const ConfigSection& encoder : config.encoders) {
-    const EncoderUri uri = parse_encoder(encoder.name);
+  for (const FileSection& encoder : config.encoders) {
+    const EncoderAddress uri = parse_address(encoder.name);
     rows.push_back({encoder.name, address_of(uri), std::string(uri.options.model ? uri.options.model->name : "")});
     lines += name_json(encoder.name, uri).line() + '\n';
   }

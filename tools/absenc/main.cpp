@@ -12,12 +12,13 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/client/text/nearest.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/help.hpp"
-#include "tools/absenc/nearest.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/run.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -189,13 +190,13 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
   const bool json = invocation.has("--json");
   try {
     return subcommand.run(invocation);
-  } catch (const CommandFailure& failed) {
+  } catch (const EncoderFailure& failed) {
     if (!json) throw;
-    print_line(failed.trouble.json().line());
+    print_line(to_json(failed.trouble).line());
   } catch (const os::Failure& failed) {
     if (!json) throw;
     print_line(failure(name_of(failed.kind()), failed.what()).line());
-  } catch (const ToolFailure& failed) {
+  } catch (const Failure& failed) {
     if (!json) throw;
     print_line(failure("failed", failed.what()).line());
   }

@@ -5,16 +5,17 @@
 
 #include <array>
 
+#include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/encoder_memory.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/memory_change.hpp"
-#include "tools/absenc/nearest.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/run.hpp"
-#include "tools/absenc/unit_text.hpp"
-#include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
 
@@ -62,13 +63,13 @@ const Command& register_command(const Invocation& invocation, const Unit& unit, 
   return *find_command(unit, verb);
 }
 
-int read_register(const Invocation& invocation, const EncoderUri& uri) {
+int read_register(const Invocation& invocation, const EncoderAddress& uri) {
   const Command& command = register_command(invocation, *uri.unit, Verb::memory_read);
   const std::int64_t address = register_address(invocation, *uri.unit, false);
   return run_command(invocation, uri, command, role_arguments(command, {{Role::address, address}}));
 }
 
-int write_register(const Invocation& invocation, const EncoderUri& uri) {
+int write_register(const Invocation& invocation, const EncoderAddress& uri) {
   const Command& command = register_command(invocation, *uri.unit, Verb::memory_write);
   const std::int64_t address = register_address(invocation, *uri.unit, true);
   const std::span<const std::string> values = invocation.texts("values");
@@ -80,7 +81,7 @@ int write_register(const Invocation& invocation, const EncoderUri& uri) {
 
 int run_read(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   if (!uri.unit->registers.empty()) return read_register(invocation, uri);
   require_memory(*uri.unit, Access::read);
   const MemoryAddress first = first_address(invocation);
@@ -89,8 +90,9 @@ int run_read(const Invocation& invocation) {
   for (std::uint32_t i = 0; i < count; ++i) image[{first.page, first.address + i}] = 0;
   require_open(*uri.unit, image, Access::read);
 
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
-  image = EncoderMemory(*encoder).read(image);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
+  EncoderMemory memory(*encoder);
+  image = read_memory(memory, image);
   if (!invocation.has("--json")) {
     print_line(hex_dump(image));
     return exit_good;
@@ -107,7 +109,7 @@ int run_read(const Invocation& invocation) {
 
 int run_write(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   if (!uri.unit->registers.empty()) return write_register(invocation, uri);
   const Access access = write_access(invocation);
   require_memory(*uri.unit, access);

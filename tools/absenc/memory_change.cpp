@@ -7,16 +7,17 @@
 #include <exception>
 #include <optional>
 
+#include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/consent.hpp"
-#include "tools/absenc/encoder_memory.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/run.hpp"
-#include "tools/absenc/unit_text.hpp"
-#include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
 
@@ -50,17 +51,17 @@ std::string write_life(const Unit& unit, const MemoryImage& image) {
 
 class Change {
  public:
-  Change(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted, Access access)
+  Change(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access)
       : invocation_(invocation), uri_(uri), unit_(*uri.unit), wanted_(wanted), access_(access) {}
 
   int run() {
     const bool dry = invocation_.has("--dry-run");
     asks_ = !dry && must_ask(invocation_, uri_, "writing memory", "bytes that differ are overwritten");
-    encoder_ = Encoder::open(uri_);
+    encoder_ = open_connection(uri_);
     memory_.emplace(*encoder_);
     try {
       memory_->check_model();
-      found_ = memory_->read(wanted_);
+      found_ = read_memory(*memory_, wanted_);
       left_ = differing(wanted_, found_);
       differing_ = left_;
       show();
@@ -115,13 +116,13 @@ class Change {
 
   // Each byte was read back when it was written; this finds one that a later one has changed.
   void verify() {
-    const MemoryImage wrong = differing(done_, memory_->read(done_));
+    const MemoryImage wrong = differing(done_, read_memory(*memory_, done_));
     if (wrong.empty()) return;
     for (const auto& [at, value] : wrong) {
       done_.erase(at);
       left_[at] = value;
     }
-    throw ToolFailure("bytes that were written and read back have changed again");
+    throw Failure("bytes that were written and read back have changed again");
   }
 
   int finish() const {
@@ -165,9 +166,9 @@ class Change {
       answer.set("message", words);
     } catch (const OutputClosed&) {  // nobody has seen what would be written
       words = "nobody reads standard output";
-    } catch (const CommandFailure& failure) {
+    } catch (const EncoderFailure& failure) {
       words = failure.what();
-      answer = failure.trouble.json();
+      answer = to_json(failure.trouble);
     } catch (const std::exception& error) {
       words = error.what();
       answer.set("message", words);
@@ -193,12 +194,12 @@ class Change {
   }
 
   const Invocation& invocation_;
-  const EncoderUri& uri_;
+  const EncoderAddress& uri_;
   const Unit& unit_;
   const MemoryImage& wanted_;
   Access access_;
   bool asks_ = false;
-  std::unique_ptr<Encoder> encoder_;
+  std::unique_ptr<Connection> encoder_;
   std::optional<EncoderMemory> memory_;
   MemoryImage found_;
   MemoryImage differing_;
@@ -209,8 +210,15 @@ class Change {
 
 }  // namespace
 
-int change_memory(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted, Access access) {
+int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access) {
   return Change(invocation, uri, wanted, access).run();
+}
+
+MemoryImage read_memory(EncoderMemory& memory, const MemoryImage& image) {
+  Progress progress;
+  return memory.read(image, [&](std::size_t done, std::size_t all) {
+    progress.show(fmt::format("reading {} of {} bytes", done, all));
+  });
 }
 
 std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,

@@ -2,12 +2,14 @@
 // Brings bytes of an encoder's memory to what they should be: shows, asks, writes what differs, reads back.
 #pragma once
 
-#include "tools/absenc/encoder_uri.hpp"
+#include "absenc/client/way/address.hpp"
+#include "absenc/client/memory/encoder_memory.hpp"
 #include "tools/absenc/json.hpp"
-#include "tools/absenc/memory_image.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 /// What --force makes of it.
 [[nodiscard]] inline Access write_access(const Invocation& invocation) {
@@ -16,7 +18,10 @@ namespace absenc::tool {
 
 /// Heeds --yes, --json and --dry-run; returns the exit status. When it ends too early it says which bytes were written
 /// and which were not. `wanted` must be open. Throws UsageError when nobody can be asked.
-int change_memory(const Invocation& invocation, const EncoderUri& uri, const MemoryImage& wanted, Access access);
+int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access);
+
+/// What the encoder has at the addresses of `image`, with progress on a terminal.
+[[nodiscard]] MemoryImage read_memory(EncoderMemory& memory, const MemoryImage& image);
 
 /// WHERE, FILE, ENCODER: a row for up to 8 bytes that follow each other.
 [[nodiscard]] std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,

@@ -4,15 +4,16 @@
 
 #include <array>
 
+#include "absenc/client/memory/dump.hpp"
+#include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/text/text_file.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/dump_file.hpp"
-#include "tools/absenc/encoder_memory.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/memory_change.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
-#include "tools/absenc/text_file.hpp"
 
 namespace absenc::tool {
 
@@ -20,16 +21,16 @@ namespace {
 
 int run_dump(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   require_memory(*uri.unit, Access::read);
   const bool to_file = invocation.has("--output");
   const std::string path = to_file ? link_target(std::string(invocation.text("--output"))) : "";
   if (to_file) require_replaceable(path);
 
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   EncoderMemory memory(*encoder);
   memory.check_model();
-  const MemoryImage image = memory.read(dump_addresses(*uri.unit));
+  const MemoryImage image = read_memory(memory, dump_addresses(*uri.unit));
   const std::string text = to_dump(*uri.unit, uri.options, image);
   if (!to_file) {
     print_line(text);
@@ -40,14 +41,14 @@ int run_dump(const Invocation& invocation) {
   return exit_good;
 }
 
-MemoryImage read_dump(const Invocation& invocation, const EncoderUri& uri, Access access) {
+MemoryImage read_dump(const Invocation& invocation, const EncoderAddress& uri, Access access) {
   const std::string path(invocation.text("file"));
   const std::string text = read_text_file("the dump", path);
   const Dump dump = parse_dump(path, text, *uri.unit, uri.options, access);
   if (dump.checked) return dump.image;
   const std::string what = fmt::format("{} has no checksum, which is its last line: was it cut off?", path);
   if (!invocation.has("--force")) {
-    throw ToolFailure(
+    throw Failure(
         fmt::format("{} If you edited it and it is whole, end it with the line \"checksum: edited\"; "
                     "--force takes it as it is",
                     what));
@@ -58,7 +59,7 @@ MemoryImage read_dump(const Invocation& invocation, const EncoderUri& uri, Acces
 
 int run_load(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const Access access = write_access(invocation);
   require_memory(*uri.unit, access);
   return change_memory(invocation, uri, read_dump(invocation, uri, access), access);
@@ -66,13 +67,13 @@ int run_load(const Invocation& invocation) {
 
 int run_verify(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   require_memory(*uri.unit, Access::read);
   const MemoryImage wanted = read_dump(invocation, uri, Access::read);
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   EncoderMemory memory(*encoder);
   memory.check_model();
-  const MemoryImage found = memory.read(wanted);
+  const MemoryImage found = read_memory(memory, wanted);
   const MemoryImage wrong = differing(wanted, found);
   if (invocation.has("--json")) {
     print_line(Json::object()

@@ -6,15 +6,17 @@
 #include <map>
 #include <memory>
 
+#include "absenc/client/way/shared_link.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/monitor_view.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/rate.hpp"
-#include "tools/absenc/shared_link.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
@@ -163,8 +165,8 @@ bool summarize(const Watches& watches, Time start, Time processor) {
 
 Watches make_watches(const Invocation& invocation, double rate) {
   const std::span<const std::string> names = invocation.texts("encoder");
-  std::vector<EncoderUri> uris;
-  for (const std::string& name : names) uris.push_back(parse_encoder(name, invocation.texts("--option")));
+  std::vector<EncoderAddress> uris;
+  for (const std::string& name : names) uris.push_back(parse_address(name, invocation.texts("--option")));
   for (std::size_t i = 0; i < uris.size(); ++i) {
     for (std::size_t other = 0; other < i; ++other) {
       const bool one_chip = uris[i].place == Place::spi && uris[other].place == Place::spi;

@@ -7,12 +7,15 @@
 #include <array>
 #include <cmath>
 
+#include "absenc/client/text/unit_text.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/reading_text.hpp"
 #include "tools/absenc/short_names.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 namespace {
 
@@ -36,7 +39,7 @@ bool has_position(const Snapshot& snapshot) {
 }
 
 double unit_um(const Shown& shown) {
-  const EncoderUri& uri = shown.watch->uri();
+  const EncoderAddress& uri = shown.watch->uri();
   return uri.unit->resolution(uri.options).unit_um;
 }
 
@@ -148,7 +151,7 @@ int draw_list(Screen& screen, int row, const View& view) {
 
 // What the bar is long: the turn, or all that a linear encoder can count.
 std::string range_text(const Shown& shown) {
-  const EncoderUri& uri = shown.watch->uri();
+  const EncoderAddress& uri = shown.watch->uri();
   const Resolution resolution = uri.unit->resolution(uri.options);
   if (resolution.unit_um == 0) return "360";
   return fmt::format("{:.6g} mm", std::ldexp(resolution.unit_um, static_cast<int>(resolution.singleturn_bits)) / 1000);
@@ -173,13 +176,13 @@ void draw_position(Screen& screen, int row, const Shown& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
     const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;  // or else they are below
-    const std::string text = has_room ? to_text(unit, snapshot.last.reading) : place_text(snapshot.last.reading);
+    const std::string text = has_room ? reading_text(unit, snapshot.last.reading) : place_text(snapshot.last.reading);
     const bool good = has_position(snapshot);
     return screen.put(row, 2, text, good ? Style::bold : Style::bad);
   }
   std::string text = fmt::format("{}: no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   if (snapshot.has_reading) {
-    text += fmt::format("; the last was: {}", to_text(unit, snapshot.last.reading));
+    text += fmt::format("; the last was: {}", reading_text(unit, snapshot.last.reading));
   }
   screen.put(row, 2, text, style_of(snapshot.state));
 }
@@ -345,8 +348,8 @@ std::string to_line(const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   std::string text = fmt::format("{}: ", shown.watch->name());
   if (is_live(snapshot)) {
-    text += fmt::format("{}   {} {}", to_text(*shown.watch->uri().unit, snapshot.last.reading), speed_text(snapshot),
-                        speed_unit(snapshot.last.reading));
+    text += fmt::format("{}   {} {}", reading_text(*shown.watch->uri().unit, snapshot.last.reading),
+                        speed_text(snapshot), speed_unit(snapshot.last.reading));
   } else {
     text += fmt::format("{}, no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   }

@@ -20,7 +20,7 @@ void print_line(std::string_view text) {
   std::fputc('\n', stdout);
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
   if (errno == EPIPE) throw OutputClosed{};
-  throw ToolFailure(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
+  throw Failure(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
 }
 
 // That a message finds no reader is no reason to end otherwise: fmt::print would throw.
@@ -49,14 +49,6 @@ std::string table(std::span<const std::vector<std::string>> rows) {
     text += line + '\n';
   }
   return text;
-}
-
-std::string to_text(Time time) {
-  const auto nanoseconds = static_cast<double>(time.count());
-  if (nanoseconds < 999.5) return fmt::format("{} ns", time.count());
-  if (nanoseconds < 999.5e3) return fmt::format("{:.3g} us", nanoseconds / 1e3);
-  if (nanoseconds < 999.5e6) return fmt::format("{:.3g} ms", nanoseconds / 1e6);
-  return fmt::format("{:.4g} s", nanoseconds / 1e9);
 }
 
 }  // namespace absenc::tool

@@ -11,7 +11,7 @@
 
 namespace absenc::tool {
 
-/// Writes `text`, with one line end behind it, to standard output at once. Throws OutputClosed, ToolFailure.
+/// Writes `text`, with one line end behind it, to standard output at once. Throws OutputClosed, Failure.
 void print_line(std::string_view text);
 
 /// Writes "absenc: <text>" to standard error.
@@ -26,8 +26,5 @@ void print_prompt(std::string_view text);
 
 /// Rows in aligned columns, each line with its end. No trailing spaces.
 [[nodiscard]] std::string table(std::span<const std::vector<std::string>> rows);
-
-/// "85 us", "2.1 ms", "1.5 s"
-[[nodiscard]] std::string to_text(Time time);
 
 }  // namespace absenc::tool

@@ -6,12 +6,13 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/unit_text.hpp"
-#include "tools/absenc/wire_text.hpp"
 
 namespace absenc::tool {
 

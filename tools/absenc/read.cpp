@@ -5,10 +5,12 @@
 #include <array>
 #include <string>
 
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/live_encoder.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/pace.hpp"
 #include "tools/absenc/parameters.hpp"
@@ -25,8 +27,8 @@ enum class Format : std::uint8_t { human, json, csv };
 /// Shows readings and failures as they come, and keeps quiet about what was said already.
 class Display {
  public:
-  Display(const LiveEncoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
-    const EncoderUri& uri = live.encoder().uri();
+  Display(const Encoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
+    const EncoderAddress& uri = live.encoder().uri();
     const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
     const std::string header = csv_header(*uri.unit, linear);
     if (format == Format::csv) print_line(fmt::format("{},event", header));
@@ -83,7 +85,7 @@ class Display {
     told_doubt_ = sample.doubtful;
     if (format_ == Format::json) return print_line(to_json(unit, reading, seconds(sample), sample.confirmed).line());
     if (format_ == Format::csv) return print_line(to_csv(unit, reading, seconds(sample)) + ',');
-    print_line(to_text(unit, reading));
+    print_line(reading_text(unit, reading));
     if (reading.alarms != alarms_) {
       print_note(reading.alarms != 0 ? alarms_in_words(unit, reading) : "  the alarms are gone");
       alarms_ = reading.alarms;
@@ -92,14 +94,14 @@ class Display {
 
   void show_trouble(const Sample& sample) {
     Trouble trouble = sample.trouble;
-    if (format_ == Format::json) return print_line(trouble.json().line());
+    if (format_ == Format::json) return print_line(to_json(trouble).line());
     if (format_ == Format::csv) print_event_row(sample);
     if (trouble.error == last_trouble_) trouble.advice.clear();
     last_trouble_ = trouble.error;
     print_message(trouble.text());
   }
 
-  const LiveEncoder* live_;
+  const Encoder* live_;
   Format format_;
   std::string commas_;  // between the time and the event, where there is no reading
   Time start_;
@@ -116,7 +118,7 @@ struct Tally {
 };
 
 // Endless reading survives that the port goes away.
-void read_all(LiveEncoder& live, Display& display, std::uint64_t count, Pace& pace, Tally& tally) {
+void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, Tally& tally) {
   for (std::uint64_t i = 0; count == 0 || i < count; ++i) {
     if (i > 0) os::sleep_until(pace.next());
     if (os::interrupted()) throw os::Interrupted{};
@@ -131,13 +133,13 @@ void read_all(LiveEncoder& live, Display& display, std::uint64_t count, Pace& pa
 
 int run_read(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const auto count = static_cast<std::uint64_t>(invocation.number("--count", 1, 0, INT64_MAX));
   Pace pace(readings_a_second(invocation, 10));
   if (invocation.has("--json") && invocation.has("--csv")) throw UsageError("--json and --csv exclude each other");
   const Format format = invocation.has("--json") ? Format::json : invocation.has("--csv") ? Format::csv : Format::human;
 
-  LiveEncoder live(uri, pace.period());
+  Encoder live(uri, pace.period());
   live.connect();
   print_notes(live.encoder());
   Display display(live, format);

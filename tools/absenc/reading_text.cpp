@@ -8,10 +8,13 @@
 #include <array>
 #include <cmath>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/core/bits.hpp"
-#include "tools/absenc/unit_text.hpp"
+#include "tools/absenc/field_text.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 namespace {
 
@@ -34,17 +37,6 @@ int digits(unsigned bits) { return static_cast<int>(fmt::formatted_size("{}", lo
 
 std::string flags_text(const Flags& flags) {
   return fmt::format("{}", fmt::join(flag_names(*flags.field, flags.bits), " "));
-}
-
-std::uint32_t flag_mask(const FieldInfo& field) {
-  return static_cast<std::uint32_t>(low_mask(static_cast<unsigned>(field.flags.size())));
-}
-
-std::vector<Flags> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits) {
-  std::vector<Flags> flags;
-  if (first != nullptr) flags.push_back({first, bits & flag_mask(*first)});
-  if (second != nullptr) flags.push_back({second, bits >> first->flags.size()});
-  return flags;
 }
 
 bool has_channels(const Unit& unit) { return unit.second_status != nullptr || unit.second_alarms != nullptr; }
@@ -93,14 +85,6 @@ std::string turns_text(const Reading& reading) {
 
 }  // namespace
 
-std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading) {
-  return both(unit.alarms, unit.second_alarms, reading.alarms);
-}
-
-std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
-  return both(unit.status, unit.second_status, reading.status);
-}
-
 namespace {
 
 // The alarms, of encoders without any the status; of two channels both.
@@ -118,7 +102,7 @@ std::string place_text(const Reading& reading) {
   return text;
 }
 
-std::string to_text(const Unit& unit, const Reading& reading) {
+std::string reading_text(const Unit& unit, const Reading& reading) {
   std::string text = place_text(reading);
   for (const Flags& flags : flags_in_line(unit, reading)) {
     const std::string names = flags_text(flags);
@@ -205,13 +189,6 @@ Json to_json(const Unit& unit, const Reading& reading, double seconds, bool conf
   return json;
 }
 
-Reading checked(Reading reading, bool confirmed) {
-  if (confirmed || !reading.ready || !reading.singleturn_valid()) return reading;
-  reading.singleturn_valid_bits = 0;
-  reading.multiturn_valid = false;
-  return reading;
-}
-
 std::vector<std::string_view> csv_flag_names(const Unit& unit) {
   if (!has_channels(unit)) return {"status", "alarms"};
   std::vector<std::string_view> names;
@@ -255,14 +232,6 @@ std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
 void set_validity(Json& json, const Reading& reading) {
   if (reading.singleturn_bits != 0) json.set("singleturn_valid", reading.singleturn_valid() && reading.ready);
   if (reading.multiturn_bits != 0) json.set("multiturn_valid", reading.multiturn_valid);
-}
-
-std::vector<std::string_view> FieldsWithReading::invalid() const {
-  std::vector<std::string_view> names;
-  for (const FieldInfo* info : names_) {
-    if (reading_ && !holds(*info, *reading_)) names.push_back(info->name);
-  }
-  return names;
 }
 
 }  // namespace absenc::tool

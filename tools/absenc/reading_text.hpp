@@ -9,25 +9,17 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/reading.hpp"
 #include "absenc/core/angle.hpp"
-#include "absenc/protocol/unit.hpp"
 #include "tools/absenc/json.hpp"
 
 namespace absenc::tool {
 
-/// What one field of flags of the unit says.
-struct Flags {
-  const FieldInfo* field;
-  std::uint32_t bits;
-};
-
-/// One for each channel that the unit has flags of; none when it has no such field.
-[[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
-[[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
+using namespace client;
 
 /// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"; of a linear encoder
 /// "  78.96355 mm      78963.55 um   1579271 counts   no alarms"
-[[nodiscard]] std::string to_text(const Unit& unit, const Reading& reading);
+[[nodiscard]] std::string reading_text(const Unit& unit, const Reading& reading);
 
 /// Its first part: position and turns.
 [[nodiscard]] std::string place_text(const Reading& reading);
@@ -43,29 +35,6 @@ void set_reading(Json& json, const Unit& unit, const Reading& reading, bool conf
 
 /// Sets singleturn_valid and multiturn_valid, as far as the reading carries them.
 void set_validity(Json& json, const Reading& reading);
-
-/// Hands fields on, and keeps the reading that says which of them hold.
-class FieldsWithReading final : public FieldSink {
- public:
-  explicit FieldsWithReading(FieldSink& sink) : sink_(sink) {}
-  void put(const FieldValue& value) override {
-    names_.push_back(value.info);
-    sink_.put(value);
-  }
-  void put_reading(const Reading& one) override { reading_ = one; }
-
-  [[nodiscard]] const std::optional<Reading>& reading() const { return reading_; }
-  /// The fields that do not hold.
-  [[nodiscard]] std::vector<std::string_view> invalid() const;
-
- private:
-  FieldSink& sink_;
-  std::vector<const FieldInfo*> names_;
-  std::optional<Reading> reading_;
-};
-
-/// A position that no second one confirmed is not valid.
-[[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 /// "0.125" without more decimals than the unit of a count has.
 [[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);

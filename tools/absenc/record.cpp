@@ -3,10 +3,12 @@
 
 #include <array>
 
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/live_encoder.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/pace.hpp"
 #include "tools/absenc/parameters.hpp"
@@ -22,7 +24,7 @@ namespace {
 /// Says once a second how far it is.
 class Report {
  public:
-  void show(const Recording& recording, const LiveEncoder& live) {
+  void show(const Recording& recording, const Encoder& live) {
     const Time now = os::now();
     if (!progress_.visible() || now < next_) return;
     next_ = now + std::chrono::seconds(1);
@@ -45,7 +47,7 @@ struct Limits {
 };
 
 // What comes between the readings is told; the file has it too.
-void tell(const Sample& sample, const LiveEncoder& live, Report& report) {
+void tell(const Sample& sample, const Encoder& live, Report& report) {
   if (sample.restarted && live.restarts() == 1) {  // the summary says how often
     report.clear();
     print_message(sample.message);
@@ -57,7 +59,7 @@ void tell(const Sample& sample, const LiveEncoder& live, Report& report) {
 }
 
 // Returns whether the last reading was good.
-bool record_all(LiveEncoder& live, Recording& recording, Pace& pace, const Limits& limits, Report& report) {
+bool record_all(Encoder& live, Recording& recording, Pace& pace, const Limits& limits, Report& report) {
   Sample sample;
   const auto tell_missed = [&] {
     const std::uint64_t missed = pace.take_missed();
@@ -98,7 +100,7 @@ RecordingSettings settings_of(const Invocation& invocation) {
 }
 
 // `whole`: what was written is in the files.
-void summarize(const Recording& recording, const LiveEncoder& live, bool whole) {
+void summarize(const Recording& recording, const Encoder& live, bool whole) {
   std::string text = fmt::format("{} readings and {} failures in {} {}", recording.readings(), recording.failures(),
                                  to_text(os::now() - recording.start()),
                                  whole ? fmt::format("are in {}", recording.names()) : "were written");
@@ -116,13 +118,13 @@ void summarize(const Recording& recording, const LiveEncoder& live, bool whole) 
 
 int run_record(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const RecordingSettings settings = settings_of(invocation);
   const double seconds = invocation.real("--for", 0, 0.001, 1e9);
   const auto count = static_cast<std::uint64_t>(invocation.number("--count", 0, 0, INT64_MAX));
 
   Pace pace(settings.rate);
-  LiveEncoder live(uri, pace.period());
+  Encoder live(uri, pace.period());
   live.connect();
   print_notes(live.encoder());
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
@@ -144,7 +146,7 @@ int run_record(const Invocation& invocation) {
   } catch (const os::Failure& failure) {
     whole = failure.kind() != os::Failure::Kind::lost;
     end_early(failure.what());
-  } catch (const ToolFailure& failure) {
+  } catch (const Failure& failure) {
     end_early(failure.what());
   }
   report.clear();

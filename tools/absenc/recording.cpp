@@ -13,10 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/reading_text.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -69,7 +70,7 @@ std::string date_and_time() {
 
 }  // namespace
 
-Recording::Recording(const RecordingSettings& settings, const EncoderUri& uri)
+Recording::Recording(const RecordingSettings& settings, const EncoderAddress& uri)
     : settings_(settings),
       unit_(uri.unit),
       options_(uri.options),

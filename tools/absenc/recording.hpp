@@ -6,10 +6,12 @@
 #include <optional>
 #include <string>
 
+#include "absenc/client/encoder.hpp"
 #include "absenc/os/line_file.hpp"
-#include "tools/absenc/live_encoder.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 struct RecordingSettings {
   std::string path;                        // ending in .csv, .jsonl or .ndjson
@@ -24,7 +26,7 @@ struct RecordingSettings {
 class Recording {
  public:
   /// Makes the first file. Throws UsageError and os::Failure, also when there is a file of that name already.
-  Recording(const RecordingSettings& settings, const EncoderUri& uri);
+  Recording(const RecordingSettings& settings, const EncoderAddress& uri);
 
   /// Writes a line at once, whole or not at all. Throws os::Failure.
   void take(const Sample& sample);

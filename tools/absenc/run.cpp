@@ -4,22 +4,24 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/consent.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/run.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
 namespace {
 
 int run_run(const Invocation& invocation) {
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const Command& command = require_command(*uri.unit, invocation.text("command"));
   const std::vector<std::int64_t> arguments = require_arguments(command, invocation.texts("arguments"));
   if (command.verb == Verb::scan) return run_scan_command(invocation, uri, command, arguments);
@@ -27,7 +29,7 @@ int run_run(const Invocation& invocation) {
 }
 
 // The newest of what is known so far.
-void show_progress(Progress& progress, const Encoder& encoder, const Command& command) {
+void show_progress(Progress& progress, const Connection& encoder, const Command& command) {
   if (!progress.visible()) return;
   FieldTable so_far;
   encoder.report(so_far);
@@ -36,13 +38,13 @@ void show_progress(Progress& progress, const Encoder& encoder, const Command& co
   progress.show(fmt::format("{}: {}: {}", command.name, newest[0], newest[1]));
 }
 
-Outcome run_watched(Encoder& encoder, const Command& command, Arguments arguments) {
+Outcome run_watched(Connection& encoder, const Command& command, Arguments arguments) {
   Progress progress;
   try {
     return encoder.run(command, arguments, [&] { show_progress(progress, encoder, command); });
   } catch (const os::Interrupted&) {
     if (!command.changes_encoder) throw;
-    throw ToolFailure(
+    throw Failure(
         fmt::format("interrupted in the middle of {}: whether it was done is not known, read the encoder "
                     "before you try again",
                     command.name));
@@ -50,7 +52,7 @@ Outcome run_watched(Encoder& encoder, const Command& command, Arguments argument
     FieldTable left;
     encoder.report_left(left);
     if (left.rows.empty()) throw;
-    throw ToolFailure(
+    throw Failure(
         fmt::format("{}\n{} was broken off and has left:\n{}", failure.what(), command.name, table(left.rows)));
   }
 }
@@ -71,7 +73,7 @@ constexpr std::array<Example, 2> examples{{
 
 }  // namespace
 
-int run_command(const Invocation& invocation, const EncoderUri& uri, const Command& command, Arguments arguments) {
+int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments) {
   os::catch_interrupts();
   if (command.changes_encoder && must_ask(invocation, uri, command.name, command.meaning) &&
       !confirmed(uri, command.meaning)) {
@@ -79,9 +81,9 @@ int run_command(const Invocation& invocation, const EncoderUri& uri, const Comma
     return exit_failed;
   }
 
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   const Outcome outcome = run_watched(*encoder, command, arguments);
-  if (outcome.error != Error::none) throw CommandFailure(encoder->trouble(outcome));
+  if (outcome.error != Error::none) throw EncoderFailure(encoder->trouble(outcome));
   JsonFields fields;
   FieldTable rows;
   const bool json = invocation.has("--json");
@@ -90,12 +92,6 @@ int run_command(const Invocation& invocation, const EncoderUri& uri, const Comma
   if (!outcome.aborted) return exit_good;
   print_message(fmt::format("interrupted: {} ended early, and what it had changed is as it was before", command.name));
   return exit_failed;
-}
-
-void run_into(Encoder& encoder, const Command& command, Arguments arguments, FieldSink& sink) {
-  const Outcome outcome = encoder.run(command, arguments);
-  if (outcome.error != Error::none) throw CommandFailure(encoder.trouble(outcome));
-  encoder.report(sink);
 }
 
 const Subcommand run_subcommand{"run",

@@ -6,12 +6,14 @@
 #include <map>
 #include <vector>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/run.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -60,9 +62,10 @@ struct Records final : FieldSink {
 
 }  // namespace
 
-int run_scan_command(const Invocation& invocation, const EncoderUri& uri, const Command& command, Arguments arguments) {
+int run_scan_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command,
+                     Arguments arguments) {
   os::catch_interrupts();
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   Records records;
   run_into(*encoder, command, arguments, records);
   std::size_t good = 0;
@@ -85,7 +88,7 @@ int run_scan_command(const Invocation& invocation, const EncoderUri& uri, const 
 namespace {
 
 int run_scan(const Invocation& invocation) {
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   if (const Command* command = find_command(*uri.unit, Verb::scan)) {
     return run_scan_command(invocation, uri, *command, require_arguments(*command, {}));
   }

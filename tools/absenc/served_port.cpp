@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/os/error.hpp"
@@ -15,7 +16,6 @@
 #include "absenc/os/socketcan.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -116,8 +116,8 @@ class Server {
 
 }  // namespace
 
-EncoderUri parse_served_port(const Unit& unit, std::string_view text) {
-  const EncoderUri uri = parse_encoder(fmt::format("{}:{}", unit.id, text));
+EncoderAddress parse_served_port(const Unit& unit, std::string_view text) {
+  const EncoderAddress uri = parse_address(fmt::format("{}:{}", unit.id, text));
   if (uri.place != Place::serial) {
     throw UsageError(fmt::format("--port is \"{}\", but must be a serial port, as in /dev/ttyUSB1", text));
   }
@@ -134,7 +134,7 @@ EncoderUri parse_served_port(const Unit& unit, std::string_view text) {
   return uri;
 }
 
-void serve_port(Machine<std::uint8_t>& device, const EncoderUri& uri, Time send_slack, Time end) {
+void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time send_slack, Time end) {
   // Only a host can find out by itself whether it hears itself: it speaks first.
   host::EchoFilter line(uri.echo == host::EchoMode::on ? host::EchoMode::on : host::EchoMode::off);
   line.attach(device);

@@ -7,19 +7,21 @@
 #include <string>
 #include <string_view>
 
+#include "absenc/client/way/address.hpp"
 #include "absenc/core/time.hpp"
 #include "absenc/link/step.hpp"
-#include "tools/absenc/encoder_uri.hpp"
 
 namespace absenc::tool {
 
+using namespace client;
+
 /// "/dev/ttyUSB1", with settings of the port behind it as behind an encoder. Throws UsageError.
-[[nodiscard]] EncoderUri parse_served_port(const Unit& unit, std::string_view text);
+[[nodiscard]] EncoderAddress parse_served_port(const Unit& unit, std::string_view text);
 
 /// Says that it is ready, and serves until a signal or `end`. A port that goes away is waited for: whoever plugs it in
 /// again finds the encoder as it was. A transfer due within `send_slack` is sent at once.
 /// Throws os::Failure when it cannot be opened at first.
-void serve_port(Machine<std::uint8_t>& device, const EncoderUri& uri, Time send_slack, Time end);
+void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time send_slack, Time end);
 /// The same on a CAN interface, as "vcan0".
 void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end);
 

@@ -5,15 +5,17 @@
 #include <algorithm>
 #include <array>
 
+#include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/consent.hpp"
+#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/nearest.hpp"
+#include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/run.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -79,25 +81,25 @@ Change require_change(const Unit& unit, std::string_view name) {
 }
 
 // What the encoder is left with when the port is lost in the middle.
-void write_setting(Encoder& encoder, const Command& setter, Arguments values, FieldSink& written) {
+void write_setting(Connection& encoder, const Command& setter, Arguments values, FieldSink& written) {
   try {
     run_into(encoder, setter, values, written);
   } catch (const os::Failure& failure) {
     FieldTable left;
     encoder.report_left(left);
     if (left.rows.empty()) throw;
-    throw ToolFailure(fmt::format("{}\n{} was written, but what became of it could not be seen:\n{}", failure.what(),
-                                  setter.name, table(left.rows)));
+    throw Failure(fmt::format("{}\n{} was written, but what became of it could not be seen:\n{}", failure.what(),
+                              setter.name, table(left.rows)));
   }
 }
 
 int run_get(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   std::vector<const Command*> settings = all_settings(*uri.unit);
   if (invocation.has("name")) settings = {&require_setting(*uri.unit, invocation.text("name"))};
 
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   Rows rows{{"SETTING", "FIELD", "VALUE", ""}};
   Json all = Json::object();
   for (const Command* command : settings) {
@@ -119,7 +121,7 @@ void require_same(const Setting& now, const Setting& written, std::string_view n
   for (const auto& row : written.shown.rows) {
     const std::string& value = now.text(row[0]);
     if (value == "-" || value == row[1]) continue;
-    throw ToolFailure(fmt::format("{} was written, but {} reads as {} instead of {}", name, row[0], value, row[1]));
+    throw Failure(fmt::format("{} was written, but {} reads as {} instead of {}", name, row[0], value, row[1]));
   }
 }
 
@@ -147,7 +149,7 @@ std::vector<std::int64_t> setter_arguments(const Invocation& invocation, const U
 }
 
 // What the encoder was set to may be what it is reached with.
-void follow(Encoder& encoder, const Command& setter, std::int64_t value) {
+void follow(Connection& encoder, const Command& setter, std::int64_t value) {
   const std::span<const Option> options = encoder.unit().options;
   const auto option = std::find_if(options.begin(), options.end(),
                                    [&](const Option& one) { return one.name == setter.changes_option; });
@@ -165,13 +167,13 @@ void follow(Encoder& encoder, const Command& setter, std::int64_t value) {
 
 int run_set(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const auto [setter, getter] = require_change(*uri.unit, invocation.text("name"));
   const std::string_view name = getter != nullptr ? getter->name : setter->name;
   const std::vector<std::int64_t> values = setter_arguments(invocation, *uri.unit, *setter);
   const bool asks = must_ask(invocation, uri, name, setter->meaning);
 
-  const std::unique_ptr<Encoder> encoder = Encoder::open(uri);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
   Setting old, written, now;
   if (getter != nullptr) run_into(*encoder, *getter, {}, old);
   if (asks) {
@@ -188,8 +190,8 @@ int run_set(const Invocation& invocation) {
     follow(*encoder, *setter, values.front());
     if (getter != nullptr) run_into(*encoder, *getter, {}, now);
   } catch (const os::Interrupted&) {
-    throw ToolFailure(getter != nullptr ? fmt::format("interrupted: `absenc config get` says what {} is now", name)
-                                        : fmt::format("interrupted: whether {} was written is not known", name));
+    throw Failure(getter != nullptr ? fmt::format("interrupted: `absenc config get` says what {} is now", name)
+                                    : fmt::format("interrupted: whether {} was written is not known", name));
   }
   if (getter != nullptr) require_same(now, written, name);
   if (written.text("written") == "no") print_message("note: nothing was sent, because it is so already");

@@ -4,10 +4,10 @@
 
 #include <array>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/run.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -26,7 +26,7 @@ std::string related(const Unit& unit, std::string_view word) {
 
 template <Verb verb>
 int run_verb(const Invocation& invocation) {
-  const EncoderUri uri = parse_encoder(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const Command* command = find_command(*uri.unit, verb);
   if (command == nullptr) {
     throw UsageError(fmt::format("{} has no command for this: `absenc list {}` shows those it has{}", uri.unit->id,

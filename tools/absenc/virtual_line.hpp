@@ -6,18 +6,20 @@
 #include <type_traits>
 #include <vector>
 
+#include "absenc/client/way/address.hpp"
 #include "absenc/sim/bus.hpp"
 #include "absenc/sim/frame_bus.hpp"
-#include "tools/absenc/encoder_uri.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
 
+using namespace client;
+
 /// As the options of the verb say. Throws UsageError.
 [[nodiscard]] DeviceSettings device_settings(const Invocation& invocation);
 /// What stands behind sim: for one more encoder of the line. Throws UsageError.
-[[nodiscard]] EncoderUri further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
-                                         const DeviceSettings& settings);
+[[nodiscard]] EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
+                                             const DeviceSettings& settings);
 /// Requests, faults and broken rules of one device since `start`.
 void print_summary(const VirtualDevice& device, std::string_view name, Time start);
 
@@ -31,7 +33,7 @@ class VirtualLine {
     if (!further_.empty()) tell_shared(unit, first);
     devices_.push_back(std::make_unique<VirtualDevice>(unit, first, settings));
     for (const std::string& further : further_) {
-      EncoderUri uri = further_encoder(unit, invocation, further, settings);
+      EncoderAddress uri = further_encoder(unit, invocation, further, settings);
       tell_shared(unit, uri.options);
       devices_.push_back(std::make_unique<VirtualDevice>(unit, uri.options, uri.device));
     }

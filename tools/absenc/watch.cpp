@@ -8,14 +8,16 @@
 #include <chrono>
 #include <utility>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/pace.hpp"
 #include "tools/absenc/reading_text.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 namespace {
 
@@ -67,7 +69,7 @@ std::string_view name_of(Snapshot::State state) {
   return names[static_cast<std::size_t>(state)];
 }
 
-Watch::Watch(std::string name, const EncoderUri& uri, double rate, Time offset)
+Watch::Watch(std::string name, const EncoderAddress& uri, double rate, Time offset)
     : name_(std::move(name)),
       uri_(uri),
       rate_(rate),
@@ -114,7 +116,7 @@ void Watch::run(const Command& command) {
 void Watch::work(const std::stop_token& stop) {
   try {
     Pace pace(rate_, offset_);
-    LiveEncoder live(uri_, pace.period());
+    Encoder live(uri_, pace.period());
     live.encoder().end_when([&] { return stop.stop_requested() && !command_runs_; });
     Time next = start_ + offset_;
     for (;;) {
@@ -149,7 +151,7 @@ void Watch::end(const std::string& why) {
   known_.message = why;
 }
 
-void Watch::publish(const LiveEncoder& live, const Sample& sample) {
+void Watch::publish(const Encoder& live, const Sample& sample) {
   trace(live, sample);
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -175,7 +177,7 @@ void Watch::publish(const LiveEncoder& live, const Sample& sample) {
     case Sample::Kind::back:
       break;
   }
-  const Encoder& encoder = live.encoder();
+  const Connection& encoder = live.encoder();
   if (encoder.counters().bad() != known_.counters.bad()) known_.bad = live.bad_exchanges();
   known_.counters = encoder.counters();
   known_.losses = live.losses();
@@ -193,7 +195,7 @@ void Watch::publish(const LiveEncoder& live, const Sample& sample) {
   known_.longest = encoder.latencies().longest();
 }
 
-void Watch::trace(const LiveEncoder& live, const Sample& sample) {
+void Watch::trace(const Encoder& live, const Sample& sample) {
   const Unit& unit = live.encoder().unit();
   switch (sample.kind) {
     case Sample::Kind::reading: {
@@ -203,7 +205,7 @@ void Watch::trace(const LiveEncoder& live, const Sample& sample) {
       if (!other_alarms && sample.at < next_line_) return;
       alarms_ = sample.reading.alarms;
       next_line_ = sample.at + between_lines;
-      return add_line(sample.at, to_text(unit, sample.reading));
+      return add_line(sample.at, reading_text(unit, sample.reading));
     }
     case Sample::Kind::failed: {
       std::string text = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);
@@ -224,7 +226,7 @@ void Watch::add_line(Time at, const std::string& text) {
   if (lines_.size() > most_lines) lines_.pop_front();
 }
 
-void Watch::run_command(LiveEncoder& live, const Command& command) {
+void Watch::run_command(Encoder& live, const Command& command) {
   std::string notice;
   if (!live.encoder().connected()) {
     notice = fmt::format("{} was not done: the port is away", command.name);

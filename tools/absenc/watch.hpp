@@ -11,9 +11,11 @@
 #include <thread>
 #include <vector>
 
-#include "tools/absenc/live_encoder.hpp"
+#include "absenc/client/encoder.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 /// What is known of an encoder at a moment.
 struct Snapshot {
@@ -36,7 +38,7 @@ struct Snapshot {
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // of the position, as LiveEncoder::restarts
+  std::uint64_t restarts = 0;  // of the position, as Encoder::restarts
   double rate = 0;             // readings a second
   Time median{};               // of the latencies
   Time percentile_99{};
@@ -51,7 +53,7 @@ struct Snapshot {
 class Watch {
  public:
   /// `name` as the user wrote it. The first reading comes `offset` after the start.
-  Watch(std::string name, const EncoderUri& uri, double rate, Time offset);
+  Watch(std::string name, const EncoderAddress& uri, double rate, Time offset);
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
@@ -64,19 +66,19 @@ class Watch {
   void run(const Command& command);
 
   [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] const EncoderUri& uri() const { return uri_; }
+  [[nodiscard]] const EncoderAddress& uri() const { return uri_; }
   [[nodiscard]] Time start() const { return start_; }
 
  private:
   void work(const std::stop_token& stop);
-  void publish(const LiveEncoder& live, const Sample& sample);
-  void trace(const LiveEncoder& live, const Sample& sample);
+  void publish(const Encoder& live, const Sample& sample);
+  void trace(const Encoder& live, const Sample& sample);
   void add_line(Time at, const std::string& text);
-  void run_command(LiveEncoder& live, const Command& command);
+  void run_command(Encoder& live, const Command& command);
   void end(const std::string& why);
 
   std::string name_;
-  EncoderUri uri_;
+  EncoderAddress uri_;
   double rate_;
   Time offset_;
   Time start_;
@@ -93,7 +95,7 @@ class Watch {
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
-  bool restarted_ = false;  // by the reading before
+  bool restarted_ = false;     // by the reading before
   bool command_runs_ = false;  // it is not broken off
 
   std::jthread thread_;  // last: it uses all of the others

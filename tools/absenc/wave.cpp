@@ -12,6 +12,9 @@
 #include <vector>
 
 #include "absenc/capture/annotate/drawing.hpp"
+#include "absenc/client/way/address.hpp"
+#include "absenc/client/text/text_file.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
@@ -19,14 +22,11 @@
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/sim_port.hpp"
 #include "absenc/sim/waveform.hpp"
-#include "tools/absenc/encoder_uri.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/text_file.hpp"
-#include "tools/absenc/unit_text.hpp"
 
 namespace absenc::tool {
 
@@ -81,7 +81,7 @@ std::vector<Spoken> commands_of(const Unit& unit, std::span<const std::string> t
 
 /// A virtual encoder and its host in virtual time.
 struct Conversations {
-  const EncoderUri& uri;
+  const EncoderAddress& uri;
   std::vector<Spoken> commands;
   std::uint64_t rounds;
   Time period;
@@ -137,7 +137,7 @@ struct Conversations {
 };
 
 void converse(Conversations& conversations) {
-  const EncoderUri& uri = conversations.uri;
+  const EncoderAddress& uri = conversations.uri;
   VirtualDevice device(*uri.unit, uri.options, uri.device);
   device.power_on(Time{});
   if (device.bytes() != nullptr) {
@@ -165,16 +165,17 @@ void write(const Invocation& invocation, const std::string& path, capture::Drawi
   std::ofstream out(file.path(), std::ios::binary);
   format == FileFormat::vcd ? capture::write_vcd(out, drawing) : capture::write_saleae_csv(out, drawing);
   out.flush();
-  if (!out) throw ToolFailure(fmt::format("{} cannot be written: {}", path, std::strerror(errno)));
+  if (!out) throw Failure(fmt::format("{} cannot be written: {}", path, std::strerror(errno)));
   file.take_place(os::Durable::no);
 }
 
 // "sim:" may be left out: no other encoder shows its wires.
-EncoderUri virtual_encoder(const Invocation& invocation) {
+EncoderAddress virtual_encoder(const Invocation& invocation) {
   const std::string_view text = invocation.text("encoder");
   const std::string_view id = text.substr(0, text.find_first_of("?:"));
   const bool bare = find_unit(id) != nullptr && (id.size() == text.size() || text[id.size()] == '?');
-  EncoderUri uri = parse_encoder(bare ? fmt::format("sim:{}", text) : std::string(text), invocation.texts("--option"));
+  EncoderAddress uri =
+      parse_address(bare ? fmt::format("sim:{}", text) : std::string(text), invocation.texts("--option"));
   if (uri.place != Place::sim) {
     throw UsageError(fmt::format("{} is no virtual encoder: waveforms are drawn of sim:{}", text, uri.unit->id));
   }
@@ -191,7 +192,7 @@ int run_wave(const Invocation& invocation) {
   if (std::filesystem::exists(path) && !invocation.has("--force")) {
     throw UsageError(fmt::format("{} exists: give another name, or --force to replace it", name));
   }
-  const EncoderUri uri = virtual_encoder(invocation);
+  const EncoderAddress uri = virtual_encoder(invocation);
   require_replaceable(path);
 
   capture::Drawing drawing(std::string(uri.unit->id), scratch_file(path), scratch_file(path));

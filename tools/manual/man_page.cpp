@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
-#include "tools/absenc/encoder_uri.hpp"
+#include "absenc/client/way/address.hpp"
 #include "tools/absenc/help.hpp"
 
 namespace absenc::tool {
+
+using namespace client;
 
 namespace {
 

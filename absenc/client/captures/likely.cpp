@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a capture itself tells of its line and of its encoder, found by reading its beginning.
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "absenc/client/captures/run.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+using capture::Tick;
+
+// Those that a checksum or the like has proved, and those with characters that are none.
+struct Frames final : capture::AnnotationSink {
+  void put(const capture::Annotation& annotation) override {
+    if (annotation.remark == capture::Remark::damaged) ++damaged;
+    if (annotation.error != Error::none || annotation.remark == capture::Remark::cut) return;
+    if (annotation.kind == capture::Annotation::Kind::request) return;
+    ++good;
+  }
+  std::uint64_t good = 0;
+  std::uint64_t damaged = 0;
+};
+
+/// Good replies with their requests, and an end when there are enough of them.
+struct Sample final : capture::AnnotationSink {
+  struct Enough {};
+
+  void put(const capture::Annotation& annotation) override {
+    if (annotation.error != Error::none || annotation.reply.empty()) return;
+    frames.push_back({{annotation.request.bytes.begin(), annotation.request.bytes.end()},
+                      {annotation.reply.bytes.begin(), annotation.reply.bytes.end()}});
+    if (frames.size() == enough) throw Enough{};
+  }
+  [[nodiscard]] std::vector<Capture> captures() const {
+    std::vector<Capture> all;
+    for (const auto& [request, reply] : frames) all.push_back({request, reply});
+    return all;
+  }
+
+  static constexpr std::size_t enough = 1000;
+  std::vector<std::pair<std::vector<std::uint8_t>, std::vector<std::uint8_t>>> frames;
+};
+
+/// Which values frames can have, of which options.
+struct Possible final : EvidenceSink {
+  void put(const OptionEvidence& evidence) override { values.insert({evidence.option, evidence.value}); }
+  [[nodiscard]] bool is_open(std::size_t option, std::int64_t value) const {
+    const auto first = values.lower_bound({option, INT64_MIN});
+    return first != values.end() && first->first == option && !values.contains({option, value});
+  }
+  std::set<std::pair<std::size_t, std::int64_t>> values;
+};
+
+}  // namespace
+
+// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning. So with
+// the parity, where characters are damaged: a parity bit that is taken for a stop bit is wrong half of the time.
+CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
+  constexpr std::size_t enough_characters = 20'000;
+  Speed best{choices_.baud, choices_.parity.value_or(line_.parity)};
+  if (choices_.path == "-") return best;
+  const auto frames_at = [&](const Speed& speed) {
+    Frames frames;
+    const auto reader = open_capture(choices_);
+    static_cast<void>(decode_lines(*reader, lines, speed, enough_characters, frames, [](Tick) {}));
+    return frames;
+  };
+  const bool rate_is_open = choices_.baud == 0 && line_.rate != 0;
+  if (!rate_is_open && choices_.parity) return best;
+  Frames at_best = frames_at(best);
+  const auto try_at = [&](const Speed& speed, std::uint64_t handicap) {
+    const Frames frames = frames_at(speed);
+    if (frames.good < std::max<std::uint64_t>(1, at_best.good + handicap)) return;
+    best = speed;
+    at_best = frames;
+  };
+  if (rate_is_open) try_at({static_cast<double>(line_.rate), best.parity}, 0);
+  if (choices_.parity || (at_best.damaged == 0 && at_best.good != 0)) return best;
+  for (const Parity parity : {Parity::none, Parity::odd, Parity::even}) {
+    if (parity == line_.parity) continue;
+    if (rate_is_open) try_at({static_cast<double>(line_.rate), parity}, 1);
+    try_at({choices_.baud, parity}, 1);
+  }
+  return best;
+}
+
+const Options& CaptureRun::settle_options() {
+  if (unit_.probe == nullptr || choices_.path == "-") return options_;
+  Sample sample;
+  try {
+    static_cast<void>(CaptureRun(unit_, options_, choices_).run(sample, [](Tick) {}));
+  } catch (const Sample::Enough&) {
+  }
+  const std::vector<Capture> captures = sample.captures();
+  Possible possible;
+  Options told = options_;
+  if (!unit_.probe(told, captures, possible)) return options_;
+  for (std::size_t i = 0; i < unit_.options.size(); ++i) {
+    if (possible.is_open(i, options_[i])) options_.values[i] = told[i];
+  }
+  return options_;
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a position went over the time of a capture of any length, in as many columns as a terminal has.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "absenc/core/angle.hpp"
+
+namespace absenc::client {
+
+class PositionTrace {
+ public:
+  static constexpr std::size_t columns = 64;
+
+  /// Times must not be before the first. What is not valid leaves a gap.
+  void add(std::uint64_t tick, const Reading& reading) {
+    if (!reading.singleturn_valid() || !reading.ready) return;
+    if (count_ == 0) {
+      first_ = tick;
+      bits_ = reading.singleturn_bits;
+      unit_um_ = reading.unit_um;
+      turns_ = reading.multiturn_valid && reading.multiturn_bits + bits_ <= 64;
+    }
+    if (turns_ && !reading.multiturn_valid) return;
+    ++count_;
+    const std::uint64_t since = tick - std::min(tick, first_);
+    while (since >> shift_ >= columns) halve();
+    Column& column = columns_[static_cast<std::size_t>(since >> shift_)];
+    const std::uint64_t counts = reading.singleturn | (turns_ ? reading.multiturn << bits_ : 0);
+    column.least = std::min(column.least, counts);
+    column.most = std::max(column.most, counts);
+  }
+
+  [[nodiscard]] std::uint64_t count() const { return count_; }
+  /// A small plot with its scale; "" when there was no valid position.
+  [[nodiscard]] std::string plot() const;
+  /// Ticks from the left end of the plot to its right end.
+  [[nodiscard]] std::uint64_t ticks() const { return columns << shift_; }
+  [[nodiscard]] std::uint64_t first() const { return first_; }
+
+ private:
+  struct Column {
+    std::uint64_t least = UINT64_MAX;
+    std::uint64_t most = 0;
+    [[nodiscard]] bool empty() const { return least > most; }
+  };
+
+  void halve();
+  [[nodiscard]] double value(std::uint64_t counts) const;
+  [[nodiscard]] std::string_view unit() const;
+
+  std::array<Column, columns> columns_{};
+  unsigned shift_ = 0;  // a column has 2^shift_ ticks
+  std::uint64_t first_ = 0;
+  std::uint64_t count_ = 0;
+  unsigned bits_ = 1;
+  bool turns_ = false;  // as the first one: with turns, those without leave a gap
+  double unit_um_ = 0;
+};
+
+}  // namespace absenc::client

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/captures/run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <thread>
+#include <utility>
+
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotate_frames.hpp"
+#include "absenc/capture/files/open.hpp"
+#include "absenc/capture/lines/blocks.hpp"
+#include "absenc/capture/lines/can_line.hpp"
+#include "absenc/capture/lines/pipeline.hpp"
+#include "absenc/client/captures/channels.hpp"
+#include "absenc/client/captures/stdin_source.hpp"
+#include "absenc/client/captures/words.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+using capture::Carries;
+using capture::Content;
+using capture::Part;
+using capture::Tick;
+
+// What the sink throws must not pass through a decoder that has threads.
+class Guard {
+ public:
+  template <class Work>
+  bool operator()(Work&& work) {
+    try {
+      work();
+      return true;
+    } catch (...) {
+      thrown_ = std::current_exception();
+      return false;
+    }
+  }
+  void rethrow() const {
+    if (thrown_) std::rethrow_exception(thrown_);
+  }
+
+ private:
+  std::exception_ptr thrown_;
+};
+
+std::string_view name_of(Parity parity) {
+  static constexpr std::array<std::string_view, 3> names{"none", "odd", "even"};
+  return names[static_cast<std::size_t>(parity)];
+}
+
+unsigned threads() { return std::max(1u, std::thread::hardware_concurrency()); }
+
+[[noreturn]] void refuse(const Unit& unit, std::string_view holds, std::string_view advice) {
+  throw UsageError(
+      fmt::format("the capture holds {}, but {} is spoken on {}: {}", holds, unit.id, line_of(unit), advice));
+}
+
+void require_link(const Unit& unit, Content content) {
+  const bool uart = unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
+  if (content == Content::frames && unit.link != LinkKind::can) refuse(unit, "CAN frames", "is it another protocol?");
+  if (content == Content::bytes && !uart) refuse(unit, "bytes", "record the levels of its wires, or CAN frames");
+}
+
+// A damage is the reason, whatever the little that precedes it lacks.
+std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
+  for (const capture::Damage& damage : outcome.damages) {
+    if (!damage.note) return to_text(damage, clock);
+  }
+  return outcome.problem;
+}
+
+// Reads blocks that need no decoding.
+template <class Take>
+void read_all(capture::Reader& reader, Take&& take) {
+  capture::Block block;
+  while (reader.claim(block)) {
+    reader.fill(block);
+    take(block);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
+  const capture::OpenChoices how{.channels = choices.raw_channels, .samples_per_second = choices.samples_per_second};
+  try {
+    if (choices.path != "-") return capture::open_capture(choices.path, how);
+    auto source = std::make_unique<StdinSource>();
+    // Where binary files end matters, and some are read from there.
+    std::array<std::uint8_t, 64> head{};
+    const std::size_t size = source->read(0, head);
+    if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
+      throw UsageError("from standard input only text can be read: name the file");
+    }
+    return capture::open_capture(std::move(source), "standard input", how);
+  } catch (const capture::OpenError& error) {
+    throw Failure(error.what());
+  }
+}
+
+CaptureRun::CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices)
+    : unit_(unit),
+      options_(options),
+      line_(unit.settings != nullptr ? unit.settings(options) : unit.line),
+      choices_(choices),
+      reader_(open_capture(choices)) {
+  require_link(unit, reader_->layout().content);
+}
+
+CaptureRun::~CaptureRun() = default;
+
+std::uint64_t CaptureRun::ticks_per_second() const { return reader_->layout().ticks_per_second; }
+
+CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+  const Content content = reader_->layout().content;
+  const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange;
+  CaptureOutcome outcome = content == Content::bytes     ? run_bytes(sink, progress)
+                           : content == Content::frames  ? run_frames(sink, progress)
+                           : clocked                     ? run_bursts(sink, progress)
+                           : unit_.link == LinkKind::can ? run_bus(sink, progress)
+                                                         : run_characters(sink, progress);
+  outcome.damages = reader_->damages();
+  if (!outcome.problem.empty()) throw Failure(why_nothing(outcome, TickClock(ticks_per_second())));
+  return outcome;
+}
+
+CaptureRun::Lines CaptureRun::find_lines() const {
+  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
+  Lines lines;
+  for (std::size_t i = 0; i < wires.wires.size(); ++i) {
+    if (!wires.wires[i]) continue;
+    lines.settings.channels[lines.channels.size()] = i == 0 ? Carries::requests : Carries::replies;
+    lines.channels.push_back(*wires.wires[i]);
+  }
+  const std::size_t count = lines.settings.channel_count = lines.channels.size();
+  if (count == 1 && (wires.found || unit_.link == LinkKind::half_duplex)) lines.settings.channels[0] = Carries::both;
+  if (count == 2 && wires.found) lines.settings.channels = {Carries::one, Carries::one};
+  return lines;
+}
+
+CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
+                                        capture::AnnotationSink& sink,
+                                        const std::function<void(Tick)>& progress) const {
+  std::vector<capture::AsyncLine> settings;
+  for (const unsigned channel : lines.channels) {
+    settings.push_back({channel, {.baud = speed.baud, .parity = speed.parity, .stop_bits = line_.stop_bits}});
+  }
+  CaptureOutcome outcome;
+  Guard guard;
+  std::unique_ptr<capture::Annotator> annotator;
+  const auto take = [&](const Part& part) {
+    const std::size_t count = std::min(characters, part.characters.size());
+    characters -= count;
+    return guard([&] {
+             if (annotator == nullptr) {
+               lines.settings.ticks = capture::line_ticks(unit_, part.formats[0].bit, reader.layout().ticks_per_second);
+               annotator = std::make_unique<capture::Annotator>(unit_, options_, lines.settings, sink);
+             }
+             for (const capture::Character& character : part.characters.first(count)) annotator->put(character);
+             outcome.end = std::max(outcome.end, part.end);
+             progress(part.end);
+           }) &&
+           characters != 0;
+  };
+  const capture::AsyncOutcome decoded = capture::decode_async(reader, settings, threads(), take);
+  guard.rethrow();
+  outcome.problem = decoded.problem;
+  outcome.baud = decoded.measured_baud;
+  if (annotator == nullptr) return outcome;
+  annotator->finish(outcome.end);
+  const bool were_found = lines.settings.channels[0] == Carries::one && lines.channels.size() == 2;
+  for (std::size_t i = 0; were_found && i < 2; ++i) {
+    const std::string_view whose = annotator->carries(i) == Carries::requests ? "the host's" : "the encoder's";
+    outcome.carries.push_back(fmt::format("{} is {}", reader.layout().channels[lines.channels[i]], whose));
+  }
+  return outcome;
+}
+
+CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+  const Lines lines = find_lines();
+  const Speed speed = likely_speed(lines);
+  CaptureOutcome outcome = decode_lines(*reader_, lines, speed, SIZE_MAX, sink, progress);
+  if (!choices_.parity && speed.parity != line_.parity) {
+    outcome.notes.push_back(fmt::format("the characters have the parity {}, but those of {} usually {}",
+                                        name_of(speed.parity), unit_.id, name_of(line_.parity)));
+  }
+  return outcome;
+}
+
+CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
+  const bool exchange = unit_.link == LinkKind::exchange;
+  const capture::ClockedLine line{.clock = *wires.wires[0],
+                                  .in = wires.wires[1],
+                                  .out = exchange ? wires.wires[2] : std::nullopt,
+                                  .select = exchange ? wires.wires[3] : std::nullopt,
+                                  .rising = line_.spi_mode == 0 || line_.spi_mode == 3};
+  CaptureOutcome outcome;
+  Guard guard;
+  capture::BurstAnnotator annotator(unit_, options_, sink);
+  const auto take = [&](const Part& part) {
+    return guard([&] {
+      for (const capture::Burst& burst : part.bursts) annotator.put(burst);
+      outcome.end = std::max(outcome.end, part.end);
+      progress(part.end);
+    });
+  };
+  const capture::ClockedOutcome decoded = capture::decode_clocked(*reader_, line, threads(), take);
+  guard.rethrow();
+  outcome.problem = decoded.problem;
+  return outcome;
+}
+
+CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+  const std::vector<std::string>& channels = reader_->layout().channels;
+  capture::Annotator::Settings settings;
+  settings.channel_count = std::max<std::size_t>(1, channels.size());
+  if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
+  settings.begins_silent = true;  // whoever wrote the bytes down had them whole
+  CaptureOutcome outcome;
+  std::unique_ptr<capture::Annotator> annotator;
+  read_all(*reader_, [&](const capture::Block& block) {
+    for (const capture::Character& character : block.bytes) {
+      if (annotator == nullptr) {
+        // Of a decoder that saw the line: from the first data bit to the last.
+        const double data_bits = static_cast<double>(character.end - character.begin);
+        if (data_bits > 1) settings.ticks = capture::line_ticks(unit_, data_bits / 8, ticks_per_second());
+        if (data_bits > 1) settings.ticks.pause += static_cast<Tick>(data_bits / 4);
+        annotator = std::make_unique<capture::Annotator>(unit_, options_, settings, sink);
+      }
+      annotator->put(character);
+    }
+    outcome.end = std::max(outcome.end, block.end);
+    progress(block.end);
+  });
+  // What was written down has ended when its last line was.
+  if (annotator != nullptr) annotator->finish(outcome.end + settings.ticks.pause);
+  return outcome;
+}
+
+// The levels of a bus.
+CaptureOutcome CaptureRun::run_bus(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
+  const double rate = choices_.baud > 0 ? choices_.baud : static_cast<double>(line_.rate);
+  const double bit = static_cast<double>(ticks_per_second()) / rate;
+  if (bit < 3) {
+    throw Failure(
+        fmt::format("{} samples a second are too few for a bus of {:.0f} bit/s: 3 for each bit at least, 8 "
+                    "are better",
+                    ticks_per_second(), rate));
+  }
+  CaptureOutcome outcome;
+  capture::CanDecoder decoder(bit);
+  capture::CanAnnotator annotator(unit_, options_, capture::line_ticks(unit_, bit, ticks_per_second()), sink);
+  std::vector<capture::CanRecord> frames;
+  const auto take = [&] {
+    for (const capture::CanRecord& frame : frames) annotator.put(frame);
+    frames.clear();
+  };
+  capture::LevelReader reader(*reader_, {*wires.wires[0]});
+  outcome.problem = reader.problem();
+  if (!outcome.problem.empty()) return outcome;
+  capture::Block block;
+  capture::Levels levels;
+  while (reader.claim(block)) {
+    reader.expand(block, levels);
+    decoder.decode(levels.changes[0], levels.first, levels.end, frames);
+    take();
+    outcome.end = std::max(outcome.end, levels.end);
+    progress(levels.end);
+  }
+  decoder.finish(frames);
+  take();
+  annotator.finish(outcome.end);
+  return outcome;
+}
+
+CaptureOutcome CaptureRun::run_frames(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+  const std::vector<std::string>& channels = reader_->layout().channels;
+  std::optional<unsigned> wanted;
+  if (choices_.channels.size() > 1) throw UsageError("--channel: a CAN interface is one channel");
+  if (!choices_.channels.empty()) wanted = find_channel(channels, choices_.channels[0]);
+  const double ticks_per_bit =
+      line_.rate == 0 ? 0 : static_cast<double>(ticks_per_second()) / static_cast<double>(line_.rate);
+  CaptureOutcome outcome;
+  capture::CanAnnotator annotator(unit_, options_, capture::line_ticks(unit_, ticks_per_bit, ticks_per_second()), sink);
+  read_all(*reader_, [&](const capture::Block& block) {
+    for (const capture::CanRecord& record : block.frames) {
+      if (!wanted || record.channel == *wanted) annotator.put(record);
+    }
+    outcome.end = std::max(outcome.end, block.end);
+    progress(block.end);
+  });
+  annotator.finish(outcome.end);
+  return outcome;
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a capture to its annotations: opens it, finds which channel is which, and sends all of it through the decoders.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotation.hpp"
+#include "absenc/capture/signal.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::client {
+
+/// What the user says of a capture.
+struct CaptureChoices {
+  std::string path;                      // "-": standard input
+  std::vector<std::string> channels;     // "D0", "clock=D0", or several of them with commas between
+  unsigned raw_channels = 0;             // 0: it is no raw file
+  std::uint64_t samples_per_second = 0;  // 0: the file tells
+  double baud = 0;                       // 0: found from the capture
+  std::optional<Parity> parity{};        // none: the protocol's own, or found from the capture
+};
+
+struct CaptureOutcome {
+  std::string problem;               // why nothing could be decoded; "": it could
+  capture::Tick end = 0;             // of what was decoded
+  std::vector<double> baud;          // measured, of each asynchronous line
+  std::vector<std::string> carries;  // "D0 carries requests", where it was found out
+  std::vector<std::string> notes;    // sentences: what else was found out
+  std::vector<capture::Damage> damages;
+};
+
+/// Throws UsageError, Failure.
+[[nodiscard]] std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices);
+
+class CaptureRun {
+ public:
+  /// Opens it. Throws UsageError, Failure.
+  CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
+  ~CaptureRun();
+
+  /// 0: the capture has no times.
+  [[nodiscard]] std::uint64_t ticks_per_second() const;
+  /// What the user did not say and only the encoder could be asked for, taken from the frames of the capture; the
+  /// options with it. Not from standard input, which can be read once only.
+  const Options& settle_options();
+  /// Decodes all of it into `sink`; `progress` is called now and then with how far it is. Throws UsageError,
+  /// Failure and what `sink` throws.
+  CaptureOutcome run(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+
+ private:
+  // The lines of the capture and who speaks on them.
+  struct Lines {
+    std::vector<unsigned> channels;
+    capture::Annotator::Settings settings;
+  };
+
+  [[nodiscard]] Lines find_lines() const;
+  struct Speed {
+    double baud = 0;  // 0: that which the changes suggest
+    Parity parity = Parity::none;
+  };
+  [[nodiscard]] Speed likely_speed(const Lines& lines) const;
+  /// At most so many characters.
+  CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
+                              capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
+  CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_bursts(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_bytes(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_bus(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run_frames(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+
+  const Unit& unit_;
+  Options options_;
+  LineSettings line_;  // as the options describe it
+  CaptureChoices choices_;
+  std::unique_ptr<capture::Reader> reader_;
+};
+
+}  // namespace absenc::client

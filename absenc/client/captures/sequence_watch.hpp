@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Looks at the counters that replies carry: a reply that was seen before is good by itself, and yet says nothing new.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "absenc/capture/annotate/annotation.hpp"
+
+namespace absenc::client {
+
+/// Hands annotations on. A reply whose counter (a field of the role sequence) stands where that encoder's last one
+/// stood becomes a `sequence_mismatch`, as a host that looks at counters would have it.
+class SequenceWatch final : public capture::AnnotationSink {
+ public:
+  /// All must outlive it.
+  SequenceWatch(const Unit& unit, const Options& options, capture::AnnotationSink& sink)
+      : unit_(unit), options_(options), sink_(sink) {}
+
+  void put(const capture::Annotation& annotation) override {
+    using Kind = capture::Annotation::Kind;
+    ++count_;
+    const bool is_good = annotation.error == Error::none && annotation.remark != capture::Remark::cut;
+    Counter counter;
+    if (is_good && !annotation.reply.empty() && annotation.kind != Kind::noise) {
+      static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, counter));
+    }
+    if (!counter.value) return sink_.put(annotation);
+    const Seen now{*counter.value, count_};
+    const auto [last, is_first] = last_.try_emplace(counter.address, now);
+    const bool stands = !is_first && last->second.value == now.value && now.at - last->second.at < most_between;
+    last->second = now;
+    if (!stands) return sink_.put(annotation);
+    capture::Annotation repeated = annotation;
+    repeated.error = Error::sequence_mismatch;
+    repeated.reading = nullptr;
+    sink_.put(repeated);
+  }
+
+ private:
+  // With more in between, a counter of 7 bits may have come round.
+  static constexpr std::uint64_t most_between = 100;
+
+  struct Counter final : FieldSink {
+    void put(const FieldValue& field) override {
+      if (field.info->role == Role::encoder) address = field.number;
+      if (!value && field.info->role == Role::sequence) value = field.number;
+    }
+    std::int64_t address = 0;
+    std::optional<std::int64_t> value;
+  };
+  struct Seen {
+    std::int64_t value;
+    std::uint64_t at;
+  };
+
+  const Unit& unit_;
+  const Options& options_;
+  capture::AnnotationSink& sink_;
+  std::map<std::int64_t, Seen> last_;  // by the address of the encoder
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace absenc::client

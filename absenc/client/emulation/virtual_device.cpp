@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/emulation/virtual_device.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/core/bits.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+std::uint64_t checked(std::string_view name, std::optional<std::int64_t> value, unsigned bits) {
+  if (!value) return 0;
+  if (bits == 0) throw UsageError(fmt::format("{} cannot be set: this encoder has no such position", name));
+  const std::uint64_t maximum = low_mask(bits);
+  if (*value >= 0 && static_cast<std::uint64_t>(*value) <= maximum) return static_cast<std::uint64_t>(*value);
+  throw UsageError(fmt::format("{} is {}, but must be from 0 to {}: it has {} bits", name, *value, maximum, bits));
+}
+
+// The shaft's position (core/shaft.hpp) at which the encoder shows what the user wants.
+std::int64_t start_position(const Unit& unit, const Options& options, const DeviceSettings& settings) {
+  const Resolution resolution = unit.resolution(options);
+  const std::uint64_t counts = checked("singleturn", settings.singleturn, resolution.singleturn_bits);
+  const std::uint64_t turns = checked("multiturn", settings.multiturn, resolution.multiturn_bits);
+  const unsigned bits = resolution.singleturn_bits;
+  const std::uint64_t fraction = bits <= 32 ? counts << (32 - bits) : counts >> (bits - 32);
+  return static_cast<std::int64_t>(turns << 32 | fraction);
+}
+
+sim::Motion motion_of(const Unit& unit, const Options& options, const DeviceSettings& settings) {
+  const std::int64_t start = start_position(unit, options, settings);
+  try {
+    return sim::parse_motion(settings.motion, start);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+}
+
+sim::FaultRates fault_rates(const DeviceSettings& settings) {
+  sim::FaultRates rates;
+  rates.delay = settings.delay;
+  try {
+    for (const std::string& text : settings.faults) {
+      const sim::FaultRate fault = sim::parse_fault(text);
+      rates[fault.kind] = fault.rate;
+    }
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+  return rates;
+}
+
+std::string unknown_condition(const Unit& unit, std::string_view name) {
+  if (unit.conditions.empty()) return fmt::format("the virtual encoder of {} has no conditions to be set", unit.id);
+  std::vector<std::string_view> names;
+  for (const Condition& condition : unit.conditions) names.push_back(condition.name);
+  return fmt::format("there is no condition \"{}\"{}", name, suggestion(name, names));
+}
+
+}  // namespace
+
+VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const DeviceSettings& settings)
+    : motion_(motion_of(unit, options, settings)),
+      storage_(std::make_unique<std::byte[]>(unit.device_storage)),
+      device_(unit.device(options, motion_, {storage_.get(), unit.device_storage})),
+      real_power_on_(settings.real_power_on) {
+  if (device_.bytes == nullptr && device_.frames == nullptr) {
+    throw UsageError(fmt::format("{} has no virtual encoder with these options", unit.id));
+  }
+  if (!settings.alarms.empty() && unit.alarms == nullptr) {
+    throw UsageError(fmt::format("the encoders of {} have no alarms", unit.id));
+  }
+  if (unit.alarms != nullptr) alarms_ = require_flags(*unit.alarms, settings.alarms);
+  for (const Condition& condition : unit.conditions) conditions_.push_back(condition.normal);
+  for (const std::string& text : settings.conditions) {
+    const OptionText written = split_setting(text);
+    const Condition* condition = find_condition(unit, written.name);
+    if (condition == nullptr) throw UsageError(unknown_condition(unit, written.name));
+    conditions_[static_cast<std::size_t>(condition - unit.conditions.data())] =
+        require_value(*condition, written.value);
+  }
+  if (settings.faults.empty()) return;
+  const sim::FaultRates rates = fault_rates(settings);
+  if (device_.bytes != nullptr) faulty_ = std::make_unique<sim::FaultyDevice>(*device_.bytes, rates, settings.seed);
+  if (device_.frames != nullptr)
+    faulty_node_ = std::make_unique<sim::FaultyNode>(*device_.frames, rates, settings.seed);
+}
+
+Machine<std::uint8_t>* VirtualDevice::bytes() const {
+  return faulty_ ? static_cast<Machine<std::uint8_t>*>(faulty_.get()) : device_.bytes;
+}
+
+Machine<CanFrame>* VirtualDevice::frames() const {
+  return faulty_node_ ? static_cast<Machine<CanFrame>*>(faulty_node_.get()) : device_.frames;
+}
+
+const sim::FaultCounts* VirtualDevice::faults() const {
+  if (faulty_) return &faulty_->counts();
+  return faulty_node_ ? &faulty_node_->counts() : nullptr;
+}
+
+// What both kinds of device can do.
+template <class Use>
+void VirtualDevice::each(Use use) {
+  if (device_.bytes != nullptr) use(*device_.bytes);
+  if (device_.frames != nullptr) use(*device_.frames);
+}
+
+void VirtualDevice::power_on(Time now) {
+  motion_.begin_at(now);
+  for (std::size_t i = 0; i < conditions_.size(); ++i) {
+    set_condition(i, conditions_[i], now);
+  }
+  switch_on(now, real_power_on_);
+  raise_alarms(alarms_);
+}
+
+void VirtualDevice::switch_on(Time now, bool real) {
+  if (std::exchange(is_on_, true)) return;
+  each([&]<class Item>(Device<Item>& device) {
+    device.power_on(now, real ? Device<Item>::PowerOn::real : Device<Item>::PowerOn::skip);
+  });
+}
+
+void VirtualDevice::switch_off(Time now) {
+  if (!std::exchange(is_on_, false)) return;
+  each([&](auto& device) { device.power_off(now); });
+}
+
+void VirtualDevice::raise_alarms(std::uint32_t bits) {
+  each([&](auto& device) { device.raise_alarms(bits); });
+}
+
+void VirtualDevice::lower_alarms(std::uint32_t bits) {
+  each([&](auto& device) { device.lower_alarms(bits); });
+}
+
+void VirtualDevice::set_condition(std::size_t index, std::int64_t value, Time now) {
+  conditions_[index] = value;
+  each([&](auto& device) { device.set_condition(index, value, now); });
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/identify/capture.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/protocol/all.hpp"
+#include "absenc/client/captures/words.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+using capture::HeardExchange;
+using capture::Hypothesis;
+
+constexpr std::size_t enough = 300;         // replies, good or bad
+constexpr std::size_t enough_noise = 3000;  // bytes that are part of no frame
+
+/// Thrown when more of the capture would say no more.
+struct Enough {};
+
+capture::HeardFrame owned(const Frame& frame) {
+  capture::HeardFrame heard{.bytes = {frame.bytes.begin(), frame.bytes.end()}, .bits = frame.bits};
+  if (frame.can != nullptr) heard.can = *frame.can;
+  return heard;
+}
+
+/// Replies with what they answer; each byte of noise was a chance for a frame and is an exchange of its own.
+struct Collector final : capture::AnnotationSink {
+  void put(const capture::Annotation& annotation) override {
+    using Kind = capture::Annotation::Kind;
+    if (os::interrupted()) throw os::Interrupted{};
+    if (annotation.remark == capture::Remark::cut) return;
+    if (annotation.kind == Kind::noise) {
+      for (const std::uint8_t byte : annotation.reply.bytes) exchanges.push_back({.reply = {.bytes = {byte}}});
+      noise += annotation.reply.bytes.size();
+    } else if (!annotation.reply.empty()) {
+      exchanges.push_back({owned(annotation.request), owned(annotation.reply)});
+      ++replies;
+    }
+    if (replies >= enough || noise >= enough_noise) throw Enough{};
+  }
+  std::vector<HeardExchange> exchanges;
+  std::size_t replies = 0;
+  std::size_t noise = 0;
+};
+
+using Sentences = std::vector<std::string>;
+
+std::vector<HeardExchange> heard_as(const Unit& unit, const Options& options, const CaptureChoices& choices,
+                                    Sentences& damages) {
+  CaptureRun run(unit, options, choices);
+  Collector collector;
+  try {
+    const CaptureOutcome outcome = run.run(collector, [](capture::Tick) {});
+    for (const capture::Damage& damage : outcome.damages) {
+      if (!damage.note) damages.push_back(to_text(damage, TickClock(run.ticks_per_second())));
+    }
+  } catch (const Enough&) {
+  }
+  if (collector.replies == 0) return {};  // single bytes, which no options make a frame of
+  return std::move(collector.exchanges);
+}
+
+// The models, and what the document leaves open: a frame may not even be recognised as one otherwise.
+std::vector<Options> bases(const Unit& unit) {
+  std::vector<Options> all = capture::likely_options(unit, {});
+  if (all.empty()) return all;
+  const Options usual = all.front();
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const auto count = static_cast<std::int64_t>(unit.options[i].probeable ? unit.options[i].choices.size() : 0);
+    for (std::int64_t value = 0; value < count; ++value) {
+      if (value == usual[i]) continue;
+      all.push_back(usual);
+      all.back().values[i] = value;
+      all.back().model = nullptr;
+    }
+  }
+  return all;
+}
+
+// Where frames begin and end depends on the options, and the options on the frames: what is found by the frames of one
+// model is looked for again.
+std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, std::size_t& searches,
+                                    Sentences& damages) {
+  std::vector<Hypothesis> best;
+  const auto better = [&](std::vector<Hypothesis>& found) {
+    return !found.empty() && (best.empty() || found.front().chance() < best.front().chance());
+  };
+  for (const Options& options : bases(unit)) {
+    if (options.model == nullptr && !best.empty() && best.front().chance() <= capture::is_found) break;
+    ++searches;
+    std::vector<Hypothesis> found = capture::explain(unit, {}, heard_as(unit, options, choices, damages));
+    if (!better(found)) continue;
+    const Hypothesis first = found.front();
+    best = std::move(found);
+    if (first.options.values == options.values) continue;
+    ++searches;
+    std::vector<Hypothesis> again = capture::explain(unit, {}, heard_as(unit, first.options, choices, damages));
+    if (better(again)) best = std::move(again);
+  }
+  return best;
+}
+
+}  // namespace
+
+CaptureFindings search_capture(const CaptureChoices& choices, const std::function<void(const std::string&)>& progress) {
+  CaptureFindings findings;
+  std::size_t searches = 0;
+  for (const Unit* unit : all_units()) {
+    progress(fmt::format("{}: {} found so far", unit->id, findings.candidates.size()));
+    try {
+      for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
+        findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
+      }
+    } catch (const UsageError& error) {  // it is spoken on another kind of wire
+      findings.refusals.emplace_back(error.what());
+    } catch (const Failure& failure) {
+      findings.refusals.emplace_back(failure.what());
+    }
+  }
+  for (Sentences* sentences : {&findings.damages, &findings.refusals}) {
+    std::sort(sentences->begin(), sentences->end());
+    sentences->erase(std::unique(sentences->begin(), sentences->end()), sentences->end());
+  }
+  std::erase_if(findings.refusals, [&](const std::string& refusal) {
+    return std::binary_search(findings.damages.begin(), findings.damages.end(), refusal);
+  });
+  rank(findings.candidates, searches);
+  return findings;
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/identify/line.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "absenc/capture/search/stream.hpp"
+#include "absenc/client/identify/attempt.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/serial.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+constexpr Time short_patience = 700ms;  // with a scan that nobody answers,
+constexpr Time long_patience = 5s;      // and at the end, when nothing was found
+constexpr std::size_t busy_line = 32;   // bytes while listening: nobody can be asked
+constexpr double beyond_doubt = -3;     // log10 of chance: then no further rates are tried
+constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
+                                                     230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
+
+/// Frames that one encoder sent by itself.
+struct Sender {
+  const Option* option = nullptr;  // that says which encoder is meant; null: there is none
+  std::string number{};            // its value
+  std::vector<HeardExchange> exchanges{};
+
+  [[nodiscard]] std::string name() const {
+    return option != nullptr ? fmt::format("{}={}", option->name, number) : std::string();
+  }
+};
+
+// Who is meant stands in the frames: one encoder's must not be taken for those of another.
+std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) {
+  const std::vector<Options> likely = capture::likely_options(unit, {});
+  std::vector<Sender> all;
+  for (const CanFrame& frame : frames) {
+    Sender sender{.exchanges = {{.reply = {.can = frame}}}};
+    Addresses addresses;
+    const Frame reply = sender.exchanges.front().reply.frame();
+    if (!likely.empty() && unit.decode(likely.front(), {}, reply, addresses) == Error::none) {
+      if (!addresses.all.empty()) sender.option = find_role(unit.options, Role::encoder);
+      if (sender.option != nullptr) sender.number = fmt::format("{}", addresses.all.front());
+    }
+    const auto same = std::find_if(all.begin(), all.end(), [&](const Sender& one) {
+      return one.option == sender.option && one.number == sender.number;
+    });
+    if (same == all.end()) {
+      all.push_back(std::move(sender));
+    } else {
+      same->exchanges.push_back(std::move(sender.exchanges.front()));
+    }
+  }
+  return all;
+}
+
+/// All attempts, the usual settings of every unit first.
+class Search {
+ public:
+  explicit Search(const LineSearch& search) : search_(search), deadline_(os::now() + search.limit) {}
+
+  LineFindings run() {
+    try {
+      for (const Unit* unit : all_units()) {
+        if (fits(*unit, search_)) attempt(*unit, search_.settings);
+      }
+      for (const Unit* unit : all_units()) {
+        if (fits(*unit, search_)) try_rates(*unit);
+      }
+      if (is_beyond_doubt()) cut_.clear();
+      patience_ = long_patience;
+      for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
+    } catch (const Stop&) {
+      findings_.out_of_time = true;
+    } catch (const os::Interrupted&) {
+      findings_.interrupted = true;
+    }
+    if (!opened_ && failure_) throw os::Failure(*failure_);
+    rank(findings_.candidates, findings_.searches);
+    drop_repeated();
+    return std::move(findings_);
+  }
+
+ private:
+  void try_rates(const Unit& unit) {
+    if (has_setting(search_.settings, rate_setting) || way_of(search_) != Way::serial) return;
+    std::vector<std::string> rates;
+    const Option* rate = find_role(unit.options, Role::rate);
+    if (rate != nullptr) {
+      for (std::size_t i = 0; i < rate->choices.size(); ++i) {
+        if (static_cast<std::int64_t>(i) != rate->default_value) rates.emplace_back(rate->choices[i]);
+      }
+    } else if (unit.line.rate == 0 && !os::is_pseudo_terminal(search_.place)) {
+      for (const std::uint32_t one : common_rates) rates.push_back(fmt::format("{}", one));
+    }
+    for (const std::string& value : rates) {
+      // Who answers well at one rate is at that one.
+      if (is_beyond_doubt() || is_explained(unit)) return;
+      Settings settings = search_.settings;
+      settings.push_back(fmt::format("{}={}", rate_setting, value));
+      attempt(unit, settings);
+    }
+  }
+
+  void attempt(const Unit& unit, const Settings& settings) {
+    if (!takes_rate(unit)) return;
+    if (unit.link == LinkKind::can) return attempt_on<CanFrame>(unit, settings);
+    attempt_on<std::uint8_t>(unit, settings);
+  }
+
+  // Whether the user's rate is one that the unit can have.
+  [[nodiscard]] bool takes_rate(const Unit& unit) const {
+    const Option* rate = find_role(unit.options, Role::rate);
+    if (rate == nullptr || rate->choices.empty()) return true;
+    return std::all_of(search_.settings.begin(), search_.settings.end(), [&](const std::string& setting) {
+      const OptionText one = split_setting(setting);
+      return one.name != rate_setting ||
+             std::find(rate->choices.begin(), rate->choices.end(), one.value) != rate->choices.end();
+    });
+  }
+
+  template <class Item>
+  void attempt_on(const Unit& unit, const Settings& settings) {
+    if (os::now() >= deadline_) throw Stop::out_of_time;
+    Attempt<Item> one(search_, unit, settings, patience_, deadline_, findings_);
+    if (one.line().rate == 0 && way_of(search_) == Way::serial) return;  // the rates come later
+    const std::string line = line_of(unit.link, one.line());
+    if (search_.progress) {
+      search_.progress(fmt::format("{}, {}: {} found so far", unit.id, line, findings_.candidates.size()));
+    }
+    try {
+      one.open();
+      opened_ = true;
+    } catch (const os::Failure& failure) {
+      if (!failure_) failure_ = failure;
+      if (failure.kind() != os::Failure::Kind::bad_rate && failure.kind() != os::Failure::Kind::unsupported) throw;
+      findings_.notes.push_back(fmt::format("not tried: {}: {}", unit.id, failure.what()));
+      return;
+    }
+    findings_.lines.insert(line);
+    if (way_of(search_) == Way::spi || !listen(one, unit)) one.ask();
+    if (one.cut() && settings == search_.settings) cut_.push_back(&unit);
+  }
+
+  // Once for all units with these settings of the line. Returns whether somebody sends by himself: then nobody would
+  // hear a question.
+  template <class Item>
+  bool listen(Attempt<Item>& attempt, const Unit& unit) {
+    const LineSettings& line = attempt.line();
+    const auto key = std::tuple(line.rate, line.parity, line.stop_bits);
+    const auto known =
+        std::find_if(listened_.begin(), listened_.end(), [&](const auto& one) { return one.first == key; });
+    if (known != listened_.end()) return known->second;
+    const std::size_t before = findings_.candidates.size();
+    const std::vector<Item> items = attempt.listen();
+    findings_.unasked += items.size();
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      explain_frames(items, line_of(unit.link, line));
+    } else {
+      explain_bytes(items, line, unit.link);
+    }
+    const bool busy = !std::is_same_v<Item, CanFrame> && items.size() >= busy_line;
+    if (busy && findings_.candidates.size() == before) {
+      const std::string where = line.rate != 0 ? fmt::format(" at {} baud", line.rate) : std::string();
+      findings_.notes.push_back(fmt::format("nothing was sent{}: somebody sends all the time", where));
+    }
+    listened_.emplace_back(key, busy);
+    return busy;
+  }
+
+  void explain_frames(std::span<const CanFrame> frames, const std::string& line) {
+    for (const Unit* unit : all_units()) {
+      if (!fits(*unit, search_)) continue;
+      for (const Sender& sender : senders(*unit, frames)) {
+        ++findings_.searches;
+        std::vector<OptionText> settings;
+        if (sender.option != nullptr) settings.push_back({sender.option->name, sender.number});
+        for (Hypothesis& one : capture::explain(*unit, settings, sender.exchanges)) {
+          findings_.candidates.push_back({unit, std::move(one), search_.settings, true, line, sender.name()});
+        }
+      }
+    }
+  }
+
+  void explain_bytes(Bytes bytes, const LineSettings& line, LinkKind link) {
+    for (const Unit* other : all_units()) {
+      const bool same_line = fits(*other, search_) && hears(*other, line.rate, search_) &&
+                             other->line.parity == line.parity && other->line.stop_bits == line.stop_bits;
+      if (!same_line || bytes.empty()) continue;
+      ++findings_.searches;
+      for (Hypothesis& one : capture::explain_stream(*other, bytes, listening)) {
+        Settings settings = search_.settings;
+        const bool needs_rate = other->line.rate != line.rate && way_of(search_) == Way::serial &&
+                                !has_setting(settings, rate_setting) && !os::is_pseudo_terminal(search_.place);
+        if (needs_rate) settings.push_back(fmt::format("{}={}", rate_setting, line.rate));
+        findings_.candidates.push_back({other, std::move(one), settings, true, line_of(link, line)});
+      }
+    }
+  }
+
+  // Who answers is better known than who only sends; and one encoder may have been found in several ways.
+  void drop_repeated() {
+    std::vector<Candidate> kept;
+    for (const Candidate& one : findings_.candidates) {
+      const bool repeated = std::any_of(kept.begin(), kept.end(), [&](const Candidate& other) {
+        return other.unit == one.unit && other.hypothesis.options.values == one.hypothesis.options.values;
+      });
+      if (!repeated && !(one.unasked && is_explained(*one.unit))) kept.push_back(one);
+    }
+    findings_.candidates = std::move(kept);
+  }
+
+  // Whether one of this unit answers, and all that it answers is explained.
+  [[nodiscard]] bool is_explained(const Unit& unit) const {
+    return std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [&](const Candidate& one) {
+      return one.unit == &unit && !one.unasked && one.hypothesis.evidence.explains_all();
+    });
+  }
+
+  [[nodiscard]] bool is_beyond_doubt() const {
+    return std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [](const Candidate& one) {
+      return one.hypothesis.evidence.explains_all() && one.hypothesis.chance() <= beyond_doubt;
+    });
+  }
+
+  const LineSearch& search_;
+  Time deadline_;
+  LineFindings findings_;
+  std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
+  Time patience_ = short_patience;
+  std::vector<const Unit*> cut_;  // those that have more addresses than the time allowed to ask
+  std::optional<os::Failure> failure_;
+  bool opened_ = false;
+};
+
+}  // namespace
+
+void rank(std::vector<Candidate>& candidates, std::size_t searches) {
+  for (Candidate& one : candidates) one.hypothesis.tried *= std::max<std::size_t>(searches, 1);
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& one, const Candidate& other) {
+    return capture::is_likelier(one.hypothesis, other.hypothesis);
+  });
+}
+
+LineFindings search_line(const LineSearch& search) { return Search(search).run(); }
+
+}  // namespace absenc::client

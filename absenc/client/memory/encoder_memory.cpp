@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/memory/encoder_memory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+/// What memory_read reports.
+struct ReadBytes final : FieldSink {
+  void put(const FieldValue& field) override {
+    if (field.info->role == Role::data) data.assign(field.bytes.begin(), field.bytes.end());
+    if (field.info->role == Role::value && data.empty()) data = {static_cast<std::uint8_t>(field.number)};
+  }
+  std::vector<std::uint8_t> data;
+};
+
+// So many bytes of a run can be read at once.
+std::size_t most_at_once(const Unit& unit, const Command& command, MemoryAddress at) {
+  const Argument* count = find_role(command.arguments, Role::count);
+  const auto most = count != nullptr ? static_cast<std::size_t>(count->maximum) : 1;
+  for (const MemoryArea& area : unit.memory) {
+    if (area.has(at.page, at.address)) return std::min<std::size_t>(most, area.first + area.count - at.address);
+  }
+  return 1;
+}
+
+}  // namespace
+
+void EncoderMemory::check_model() {
+  if (find_command(encoder_->unit(), Verb::read) == nullptr) return;
+  const Outcome outcome = encoder_->read();
+  if (outcome.error != Error::none) throw EncoderFailure(encoder_->trouble(outcome));
+}
+
+MemoryImage EncoderMemory::read(const MemoryImage& image, const Progress& progress) {
+  const Unit& unit = encoder_->unit();
+  const Command& command = *find_command(unit, Verb::memory_read);
+  MemoryImage found;
+  for (const MemoryRun& run : runs(image)) {
+    for (std::size_t done = 0; done < run.bytes.size();) {
+      const MemoryAddress at{run.first.page, static_cast<std::uint32_t>(run.first.address + done)};
+      const std::size_t count = std::min(run.bytes.size() - done, most_at_once(unit, command, at));
+      const std::vector<std::uint8_t> bytes = read_run(at, count);
+      for (std::uint32_t i = 0; i < count; ++i) found[{at.page, at.address + i}] = bytes[i];
+      done += count;
+      if (progress) progress(found.size(), image.size());
+    }
+  }
+  return found;
+}
+
+std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t count) {
+  const Command& command = *find_command(encoder_->unit(), Verb::memory_read);
+  ReadBytes bytes;
+  run_into(*encoder_, command,
+           role_arguments(
+               command,
+               {{Role::page, at.page}, {Role::address, at.address}, {Role::count, static_cast<std::int64_t>(count)}}),
+           bytes);
+  if (bytes.data.size() == count) return bytes.data;
+  throw Failure(fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(encoder_->unit(), at),
+                            bytes.data.size()));
+}
+
+void EncoderMemory::write(MemoryAddress at, std::uint8_t value, Access access) {
+  const Command& command = *find_command(encoder_->unit(), Verb::memory_write);
+  ReadBytes ignored;
+  run_into(*encoder_, command,
+           role_arguments(command, {{Role::page, at.page},
+                                    {Role::address, at.address},
+                                    {Role::value, value},
+                                    {Role::force, access == Access::force ? 1 : 0}}),
+           ignored);
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Between what a user writes or reads and a unit's descriptor: units, options, commands and fields by their names.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::client {
+
+/// Throws UsageError, which names the nearest.
+[[nodiscard]] const Unit& require_unit(std::string_view id);
+[[nodiscard]] const Command& require_command(const Unit& unit, std::string_view name);
+
+/// "name=value"; throws UsageError.
+[[nodiscard]] OptionText split_setting(std::string_view text);
+
+/// The options of a model with single settings; "model" may be among the settings. `extra_names` are proposed beside
+/// the unit's own when a name is unknown. Throws UsageError.
+[[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
+                                      std::span<const std::string_view> extra_names = {});
+/// From --option and --model as they were written.
+[[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const std::string> settings);
+
+/// One value for each argument of the command. Throws UsageError.
+[[nodiscard]] std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written);
+
+struct RoleArgument {
+  Role role;
+  std::int64_t value;
+};
+/// In the order of the command, which need not have all of them; the others get their defaults.
+[[nodiscard]] std::vector<std::int64_t> role_arguments(const Command& command,
+                                                       std::initializer_list<RoleArgument> values);
+
+/// The bits of the flags with these names. Throws UsageError.
+[[nodiscard]] std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names);
+
+/// Null when the virtual encoder has no condition of this name.
+[[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
+/// Throws UsageError.
+[[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
+/// "-20 to 127 degC"
+[[nodiscard]] std::string range_of(const Condition& condition);
+/// "85 degC"
+[[nodiscard]] std::string to_text(const Condition& condition, std::int64_t value);
+
+/// "85 us", "2.1 ms", "1.5 s"
+[[nodiscard]] std::string to_text(Time time);
+
+/// "1 to 24" or "true, false"
+[[nodiscard]] std::string range_of(const Option& option);
+[[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
+/// Of an option with decimals: the number that the user writes.
+[[nodiscard]] double real_value(const Option& option, std::int64_t value);
+
+/// As it was written, or would be: "multiturn:12 position:24 gray"
+[[nodiscard]] std::string to_text(const WordFormat& word);
+/// "name=value" of each that counts; a word in place of those that it stands in for.
+[[nodiscard]] std::vector<std::string> option_texts(const Unit& unit, const Options& options);
+
+[[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
+[[nodiscard]] std::string to_text(const FieldValue& value);
+/// Text of an encoder as it can be shown: what is no ASCII is a point.
+[[nodiscard]] std::string printable(Bytes bytes);
+
+/// "100000 writes in total", "1000000 writing cycles" where the document does not say of what; "": not known
+[[nodiscard]] std::string life_of(const MemoryArea& area);
+
+/// "half_duplex"
+[[nodiscard]] std::string_view name_of(LinkKind link);
+/// "RS-485 half duplex, 2.5 Mbit/s"
+[[nodiscard]] std::string line_of(const Unit& unit);
+[[nodiscard]] std::string line_of(LinkKind link, const LineSettings& line);
+[[nodiscard]] std::string_view name_of(Verb verb);
+
+/// Whether what this field shows of the position holds; what is no part of it does.
+[[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
+/// The value of such a field: as it is, or "INVALID (74565 counts)".
+[[nodiscard]] std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading);
+
+}  // namespace absenc::client

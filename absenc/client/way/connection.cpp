@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/way/connection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "absenc/client/way/aborting_port.hpp"
+#include "absenc/client/way/diagnosis.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/way/shared_link.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+Frame to_frame(Bytes bytes, std::size_t bits = 0) { return {.bytes = bytes, .bits = std::min(bits, bytes.size() * 8)}; }
+Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
+  return {.can = frames.empty() ? nullptr : &frames.front()};
+}
+
+struct Nowhere final : FieldSink {
+  void put(const FieldValue&) override {}
+};
+
+template <class Item>
+class ConnectionOn final : public Connection {
+ public:
+  explicit ConnectionOn(const EncoderAddress& uri)
+      : Connection(uri),
+        storage_(std::make_unique<std::byte[]>(uri.unit->host_storage)),
+        session_(*uri.unit, uri.options, aborting_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
+    session_.observe(&statistics_);
+  }
+
+  void connect() override {
+    link_ = connect_link(uri());
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      port_.attach(*link_->link().frames);
+    } else {
+      port_.attach(*link_->link().bytes);
+    }
+    session_.share(link_->guard<Item>());
+    session_.doubt();
+  }
+
+  void disconnect() override { link_.reset(); }
+  bool connected() const override { return link_ != nullptr; }
+  const std::vector<std::string>& notes() const override { return link_->link().notes; }
+
+  Outcome read(host::Take take) override {
+    const Command* command = find_command(unit(), Verb::read);
+    if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
+    return outcome(*command, link_->take_turn([&] { return session_.read(*command, take); }));
+  }
+
+  Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
+    if (link_.use_count() > 1) tell_of_company();
+    return outcome(command, link_->take_turn([&] {
+      return session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
+        last_ = &conversation;
+        if (on_emit) on_emit();
+        return true;
+      });
+    }));
+  }
+
+  void set_options(const Options& options) override {
+    Connection::set_options(options);
+    session_.set_options(options);
+  }
+
+  void end_when(std::function<bool()> over) override { port_.over = std::move(over); }
+  void report(FieldSink& sink) const override {
+    last_->report(sink);
+    if (const Reading* reading = last_->reading()) sink.put_reading(*reading);
+  }
+  void report_left(FieldSink& sink) const override { session_.report_left(sink); }
+  bool confirmed() const override { return session_.confirmed(); }
+  const host::Counters& counters() const override { return session_.counters(); }
+  const host::Latencies& latencies() const override { return statistics_.latencies(); }
+
+  std::vector<KeptExchange> bad_exchanges() const override {
+    std::vector<KeptExchange> kept;
+    for (std::size_t i = 0; i < statistics_.kept(); ++i) {
+      const host::BadExchange<Item>& bad = statistics_.bad(i);
+      kept.push_back({bad.error, bad.at, wire_text(bad.sent), wire_text(bad.received)});
+    }
+    return kept;
+  }
+
+  std::uint64_t items() const override { return port_.items_sent + port_.items_received; }
+  Time now() override {
+    return link_->take_turn([&] { return port_.now(); });
+  }
+
+  Trouble trouble(const Outcome& outcome) const override {
+    Trouble trouble{.error = outcome.error};
+    const bool callers_fault = outcome.error <= Error::buffer_too_small;
+    if (callers_fault) {
+      trouble.message = describe(outcome.error, outcome.detail, {});
+      trouble.advice = outcome.advice;
+      return trouble;
+    }
+    if (port_.sent.empty() && port_.clocks == 0) return unasked_trouble(outcome);
+    const Diagnosis diagnosis = diagnose_last();
+    trouble.message = describe(outcome.error, outcome.detail, diagnosis.finding);
+    trouble.sent = wire_text(port_.sent);
+    trouble.received = port_.clocks == 0 ? wire_text(port_.received) : clocked_text();
+    trouble.exchange = exchange(trouble);
+    const std::string_view advice = outcome.advice.empty() ? text_of(outcome.error).advice : outcome.advice;
+    trouble.advice = diagnosis.advice.empty() ? std::string(advice) : diagnosis.advice;
+    tell_lateness(trouble);
+    return trouble;
+  }
+
+ private:
+  // Others have the same line open.
+  void tell_of_company() {
+    Options options = uri().options;
+    tell_shared(unit(), options);
+    set_options(options);
+  }
+
+  Outcome outcome(const Command& command, const Conversation<Item>* conversation) {
+    if (conversation == nullptr) {
+      throw UsageError(fmt::format("{} cannot run {} with these options", unit().id, command.name));
+    }
+    last_ = conversation;
+    return {conversation->error(), conversation->detail(), conversation->advice(), aborting_.take_aborted(),
+            conversation->reading()};
+  }
+
+  // A reply that comes, only too late, is another trouble than one that never comes.
+  void tell_lateness(Trouble& trouble) const {
+    const Time lateness = session_.lateness();
+    if (trouble.error != Error::timeout || lateness == Time{}) return;
+    trouble.message += fmt::format(
+        ": replies came up to {} after their requests, later than its limit, and were dropped", to_text(lateness));
+    if (uri().place == Place::sim) return;
+    trouble.advice = fmt::format(
+        "allow the way so long with latency={} (milliseconds) behind the encoder, or find what "
+        "holds replies up: a busy computer, a network, the latency timer of a USB adapter",
+        std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count());
+  }
+
+  // Of a conversation that sent nothing.
+  [[nodiscard]] Trouble unasked_trouble(const Outcome& outcome) const {
+    const std::span<const Item> damaged = last_->exchange().received;
+    const std::span<const Item> received = damaged.empty() ? std::span<const Item>(port_.received) : damaged;
+    Trouble trouble{.error = outcome.error, .message = describe(outcome.error, outcome.detail, {})};
+    trouble.received = wire_text(received);
+    trouble.exchange = received.empty() ? fmt::format("nothing came from {}", link_->link().place)
+                                        : fmt::format("received {} from {}", trouble.received, link_->link().place);
+    trouble.advice = outcome.advice.empty() ? text_of(outcome.error).advice : outcome.advice;
+    return trouble;
+  }
+
+  [[nodiscard]] Diagnosis diagnose_last() const {
+    const Frame sent = to_frame(std::span<const Item>(port_.sent));
+    const std::span<const Item> received(port_.received);
+    const auto diagnosed = [&](std::span<const Item> reply) {
+      return diagnose(unit(), uri().options, sent, to_frame(reply, port_.clocks));
+    };
+    const bool takes_echo = session_.echo().mode() == host::EchoMode::on && received.size() > port_.sent.size();
+    if (!takes_echo) return diagnosed(received);
+    Nowhere ignored;
+    if (unit().decode(uri().options, sent, to_frame(received), ignored) == Error::none) {
+      return {"it is a good reply if no echo is taken from it", "set echo=off or echo=auto"};
+    }
+    return diagnosed(received.subspan(port_.sent.size()));
+  }
+
+  [[nodiscard]] std::string exchange(const Trouble& trouble) const {
+    if (port_.clocks != 0) {
+      const std::string came = port_.received.empty() ? "nothing" : trouble.received;
+      return fmt::format("{} clocks to {}; received {}", port_.clocks, link_->link().place, came);
+    }
+    const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->link().place);
+    if (port_.received.empty()) {
+      const std::string latency =
+          link_->link().latency > Time{} ? fmt::format(" + {} for the way", to_text(link_->link().latency)) : "";
+      return fmt::format("{}; nothing came back within {}{}", sent, to_text(port_.answer), latency);
+    }
+    const Time after = port_.first_received_at - port_.sent_at;
+    const std::string later = after > Time{} ? fmt::format(" {} later", to_text(after)) : "";
+    return fmt::format("{}; received {}{}", sent, trouble.received, later);
+  }
+
+  // What the last clocks brought.
+  [[nodiscard]] std::string clocked_text() const {
+    return to_wire_text(unit().link, to_frame(std::span<const Item>(port_.received), port_.clocks));
+  }
+
+  [[nodiscard]] std::string wire_text(std::span<const Item> items) const {
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      std::string text;
+      for (const CanFrame& frame : items) {
+        text += (text.empty() ? "" : " ") + to_wire_text(unit().link, {.can = &frame});
+      }
+      return text;
+    } else {
+      constexpr std::size_t most_shown = 64;
+      const std::string text = to_hex(items.first(std::min(items.size(), most_shown)));
+      return items.size() <= most_shown ? text : fmt::format("{} ... ({} bytes)", text, items.size());
+    }
+  }
+
+  std::shared_ptr<SharedLink> link_;
+  WatchedPort<Item> port_;
+  AbortingPort<Item> aborting_{port_, [this] { return session_.abort(); }};
+  std::unique_ptr<std::byte[]> storage_;
+  host::Session<Item> session_;
+  host::Statistics<Item> statistics_;
+  const Conversation<Item>* last_ = nullptr;
+};
+
+}  // namespace
+
+std::string Trouble::text() const {
+  std::string lines = fmt::format("{}: {}", text_of(error).name, message);
+  if (!exchange.empty()) lines += fmt::format("\n  {}", exchange);
+  if (!advice.empty()) lines += fmt::format("\n  Try: {}", advice);
+  return lines;
+}
+
+std::unique_ptr<Connection> Connection::make(const EncoderAddress& uri) {
+  if (uri.unit->link == LinkKind::can) return std::make_unique<ConnectionOn<CanFrame>>(uri);
+  return std::make_unique<ConnectionOn<std::uint8_t>>(uri);
+}
+
+std::unique_ptr<Connection> Connection::open(const EncoderAddress& uri) {
+  std::unique_ptr<Connection> encoder = make(uri);
+  encoder->connect();
+  return encoder;
+}
+
+void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink) {
+  const Outcome outcome = connection.run(command, arguments);
+  if (outcome.error != Error::none) throw EncoderFailure(connection.trouble(outcome));
+  connection.report(sink);
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// An opened encoder: runs the commands of its unit, whatever its link carries, and explains what went wrong.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/way/link.hpp"
+#include "absenc/host/session.hpp"
+
+namespace absenc::client {
+
+/// How a command ended; valid until the next one.
+struct Outcome {
+  Error error = Error::none;
+  std::string_view detail{};
+  std::string_view advice{};         // "": that of the error
+  bool aborted = false;              // ended early because of a signal, and left the encoder as it was
+  const Reading* reading = nullptr;  // null when it failed, or is no position
+};
+
+/// A failed command in words. The texts but `error` may be empty.
+struct Trouble {
+  Error error = Error::none;
+  std::string message{};   // what happened, and what the reply turns out to be
+  std::string exchange{};  // what was sent, what came back and when
+  std::string advice{};    // what to try
+  std::string sent{};      // hexadecimal or as the link's wire text
+  std::string received{};
+
+  /// Of several lines, without the last line end.
+  [[nodiscard]] std::string text() const;
+};
+
+/// A bad exchange that was kept.
+struct KeptExchange {
+  Error error = Error::none;
+  Time at{};           // on the clock of the readings
+  std::string sent{};  // as the link's wire text
+  std::string received{};
+};
+
+class Connection {
+ public:
+  /// Not connected yet.
+  [[nodiscard]] static std::unique_ptr<Connection> make(const EncoderAddress& uri);
+  /// Connected. Throws as `connect`.
+  [[nodiscard]] static std::unique_ptr<Connection> open(const EncoderAddress& uri);
+  virtual ~Connection() = default;
+
+  /// Opens the way to it, again after `disconnect`; counters and statistics go on. Throws os::Failure, UsageError.
+  virtual void connect() = 0;
+  virtual void disconnect() = 0;
+  [[nodiscard]] virtual bool connected() const = 0;
+  /// What could be better about the port, a sentence each.
+  [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
+
+  // All of the following only while it is connected, but for counters and statistics.
+
+  /// The position, with all the alarms the unit can tell; of those that an encoder transmits by itself, which. Throws
+  /// UsageError when the unit has none.
+  virtual Outcome read(host::Take take = host::Take::newest) = 0;
+  /// `on_emit` is called for each result but the last; `report` then tells of it.
+  virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
+  /// The fields of the last outcome, and its reading.
+  virtual void report(FieldSink& sink) const = 0;
+  /// After `run` threw: what the encoder was left with. Nothing for most commands.
+  virtual void report_left(FieldSink& sink) const = 0;
+  /// Of the last outcome.
+  [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
+  /// Whether two positions in a row agreed since the encoder was opened or silent.
+  [[nodiscard]] virtual bool confirmed() const = 0;
+  [[nodiscard]] virtual const host::Counters& counters() const = 0;
+  [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
+  /// The last bad exchanges, the newest first.
+  [[nodiscard]] virtual std::vector<KeptExchange> bad_exchanges() const = 0;
+  /// Bytes or frames over the line so far, both ways.
+  [[nodiscard]] virtual std::uint64_t items() const = 0;
+  /// The clock of the readings.
+  [[nodiscard]] virtual Time now() = 0;
+
+  /// What waits on the line throws os::Ended from the moment on in which `over` is true, also when the line is never
+  /// silent. Empty: never.
+  virtual void end_when(std::function<bool()> over) = 0;
+
+  /// From now on, without opening it again: it was set to something else itself.
+  virtual void set_options(const Options& options) { uri_.options = options; }
+
+  [[nodiscard]] const EncoderAddress& uri() const { return uri_; }
+  [[nodiscard]] const Unit& unit() const { return *uri_.unit; }
+
+ protected:
+  explicit Connection(const EncoderAddress& uri) : uri_(uri) {}
+
+ private:
+  EncoderAddress uri_;
+};
+
+/// A command that the encoder did not do, or a reading that failed.
+struct EncoderFailure : Failure {
+  explicit EncoderFailure(Trouble what_failed) : Failure(what_failed.text()), trouble(std::move(what_failed)) {}
+  Trouble trouble;
+};
+
+/// The fields that a command tells, into `sink`. Throws EncoderFailure, and as Connection::run.
+void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink);
+
+}  // namespace absenc::client

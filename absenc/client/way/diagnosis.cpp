@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/way/diagnosis.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "absenc/client/text/unit_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+struct Nowhere final : FieldSink {
+  void put(const FieldValue&) override {}
+};
+
+bool is_good(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
+  Nowhere nowhere;
+  return unit.decode(options, request, reply, nowhere) == Error::none;
+}
+
+std::string bytes_text(std::size_t count) { return fmt::format("{} byte{}", count, count == 1 ? "" : "s"); }
+
+// An echo before it, or something else before or behind it.
+Diagnosis surrounded(const Unit& unit, const Options& options, const Frame& request, Bytes reply) {
+  const Bytes sent = request.bytes;
+  const bool echoed =
+      !sent.empty() && reply.size() >= sent.size() && std::equal(sent.begin(), sent.end(), reply.begin());
+  if (echoed && reply.size() == sent.size()) {
+    return {"only the request itself came back (the adapter's echo), and nothing from the encoder",
+            std::string(text_of(Error::timeout).advice)};
+  }
+  if (echoed && is_good(unit, options, request, {.bytes = reply.subspan(sent.size())})) {
+    return {"it is a good reply after the adapter's echo of the request", "set echo=on or echo=auto"};
+  }
+  for (std::size_t size = reply.size() - 1; size > 0; --size) {
+    if (!is_good(unit, options, request, {.bytes = reply.first(size)})) continue;
+    return {fmt::format("the first {} are a good reply, but {} more came behind it", bytes_text(size),
+                        bytes_text(reply.size() - size)),
+            {}};
+  }
+  for (std::size_t before = 1; before < reply.size(); ++before) {
+    if (!is_good(unit, options, request, {.bytes = reply.subspan(before)})) continue;
+    return {fmt::format("the last {} are a good reply, but {} came before it", bytes_text(reply.size() - before),
+                        bytes_text(before)),
+            {}};
+  }
+  return {};
+}
+
+Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
+  for (const Model& model : unit.models) {
+    Options other;
+    if (&model == options.model || resolve_options(unit, model.name, {}, other).kind != OptionError::Kind::none)
+      continue;
+    if (!is_good(unit, other, request, reply)) continue;
+    return {fmt::format("it is a good reply of the model {}", model.name), fmt::format("set model={}", model.name)};
+  }
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const Option& option = unit.options[i];
+    for (std::size_t value = 0; value < option.choices.size(); ++value) {
+      Options other = options;
+      other.values[i] = static_cast<std::int64_t>(value);
+      if (other.values[i] == options[i] || !is_good(unit, other, request, reply)) continue;
+      return {fmt::format("it is a good reply with {}={}", option.name, option.choices[value]), {}};
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
+  // A procedure may fail although each of its replies was good.
+  if (reply.empty() || is_good(unit, options, request, reply)) return {};
+  if (!reply.bytes.empty() && reply.bits == 0) {
+    Diagnosis found = surrounded(unit, options, request, reply.bytes);
+    if (!found.finding.empty()) return found;
+  }
+  return other_settings(unit, options, request, reply);
+}
+
+std::string describe(Error error, std::string_view detail, std::string_view finding) {
+  std::string text(text_of(error).description);
+  if (!detail.empty()) text += fmt::format(": {}", detail);
+  if (!finding.empty()) text += fmt::format("; {}", finding);
+  return text;
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is wrong with an exchange, in words, and which setting would make it right.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::client {
+
+/// Both are empty when nothing fits.
+struct Diagnosis {
+  std::string finding;  // what the reply turns out to be
+  std::string advice;   // what would make it right
+};
+
+/// What a reply that failed turns out to be: an echo, a good reply with something around it, one of another model or
+/// with another option.
+[[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
+
+/// "<what the error means>: <detail>; <finding>", each part only if there is one.
+[[nodiscard]] std::string describe(Error error, std::string_view detail, std::string_view finding);
+
+}  // namespace absenc::client

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/way/shared_link.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <vector>
+
+#include "absenc/client/error.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// The device behind the links of udev.
+fs::path device(const std::string& path) {
+  std::error_code error;
+  const fs::path canonical = fs::weakly_canonical(path, error);
+  return error ? fs::path(path) : canonical;
+}
+
+bool same_place(const EncoderAddress& one, const EncoderAddress& other) {
+  if (one.place != other.place) return false;
+  if (one.place == Place::serial || one.place == Place::slcan) return device(one.path) == device(other.path);
+  if (one.place == Place::can) return one.path == other.path;
+  return one.place == Place::tcp && one.host == other.host && one.port == other.port;
+}
+
+std::string latency_text(const std::optional<Time>& latency) {
+  if (!latency) return "automatic";
+  return fmt::format("{} ms", std::chrono::duration_cast<std::chrono::milliseconds>(*latency).count());
+}
+
+struct Opened {
+  EncoderAddress uri;
+  std::weak_ptr<SharedLink> link;
+};
+
+/// Every link that is open.
+struct Registry {
+  std::mutex mutex;
+  std::vector<Opened> opened;
+};
+
+Registry& registry() {
+  static Registry all;
+  return all;
+}
+
+}  // namespace
+
+bool SharedLink::lost() const {
+  const std::lock_guard lock(mutex_);
+  return loss_.has_value();
+}
+
+void SharedLink::lose(const os::Failure& failure) {
+  const std::lock_guard lock(mutex_);
+  loss_ = {failure.kind(), failure.what()};
+  link_.owner.reset();  // an exclusive port could not be opened again while it is held
+}
+
+bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
+  if (!same_place(one, other)) return false;
+  const auto refuse = [&](const std::string& why) {
+    throw UsageError(fmt::format("{} and {} are on one line, so {}", address_of(one), address_of(other), why));
+  };
+  if (one.line.rate != other.line.rate) {
+    refuse(fmt::format("they must have the same {}, not {} and {}",
+                       one.unit->link == LinkKind::can ? "bitrate" : "baud", one.line.rate, other.line.rate));
+  }
+  if (one.line != other.line) refuse("their protocols must have the same characters");
+  if (one.adapter_rate != other.adapter_rate) refuse("they must have the same baud");
+  if (one.log != other.log) refuse("they must have the same log");
+  if (one.rs485 != other.rs485) refuse("they must have the same rs485");
+  if (one.latency != other.latency) {
+    refuse(fmt::format("they must have the same latency, not {} and {}", latency_text(one.latency),
+                       latency_text(other.latency)));
+  }
+  return true;
+}
+
+// Opening is done under the lock, so that encoders which come back at the same time open one port.
+std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri) {
+  Registry& all = registry();
+  const std::lock_guard lock(all.mutex);
+  std::erase_if(all.opened, [](const Opened& opened) { return opened.link.expired(); });
+  for (const Opened& opened : all.opened) {
+    std::shared_ptr<SharedLink> link = opened.link.lock();
+    if (link != nullptr && !link->lost() && share_line(opened.uri, uri)) return link;
+  }
+  auto link = std::make_shared<SharedLink>(open_link(uri));
+  all.opened.push_back({uri, link});
+  return link;
+}
+
+}  // namespace absenc::client
