@@ -3,11 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/reading.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -19,6 +22,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Time time_between_tries = 250ms;
+constexpr Time between_looks = 20ms;  // whether it was cancelled
 
 // What transmits by itself has no time but that of its arrival.
 host::Unwrapper make_unwrapper(const EncoderAddress& uri) {
@@ -40,31 +44,100 @@ double speed_of(const Reading& reading, double counts_per_second) {
 
 }  // namespace
 
-Encoder::Encoder(const EncoderAddress& uri, Time period)
-    : encoder_(Connection::make(uri)), period_(period), unwrapper_(make_unwrapper(uri)) {}
+Encoder::Encoder(const EncoderAddress& address, Time period)
+    : cancelled_(std::make_unique<std::atomic<bool>>(false)),
+      connection_(Connection::make(address)),
+      period_(period),
+      unwrapper_(make_unwrapper(address)) {
+  connection_->end_when([cancelled = cancelled_.get()] { return cancelled->load(); });
+}
+Encoder::Encoder(Encoder&&) noexcept = default;
+Encoder& Encoder::operator=(Encoder&&) noexcept = default;
+Encoder::~Encoder() = default;
+
+Encoder open(std::string_view text, std::span<const std::string> settings) {
+  Encoder encoder(parse_address(text, settings), Time{});
+  encoder.connect();
+  return encoder;
+}
+
+void Encoder::cancel() { cancelled_->store(true); }
+
+const Unit& Encoder::unit() const { return connection_->unit(); }
+const Options& Encoder::options() const { return connection_->uri().options; }
+const std::vector<std::string>& Encoder::notes() const { return connection_->notes(); }
+const host::Counters& Encoder::counters() const { return connection_->counters(); }
+const host::Latencies& Encoder::latencies() const { return connection_->latencies(); }
+
+Reading Encoder::read() {
+  if (!connection_->connected()) connect();
+  Sample sample = next();
+  if (sample.kind == Sample::Kind::failed) throw EncoderFailure(std::move(sample.trouble));
+  if (sample.kind == Sample::Kind::lost) throw os::Failure(os::Failure::Kind::lost, sample.message);
+  return sample.reading;
+}
+
+Answer Encoder::run(std::string_view name, std::span<const std::int64_t> arguments) {
+  const Command& command = require_command(unit(), name);
+  if (!connection_->connected()) connect();
+  AnswerSink sink;
+  run_into(*connection_, command, complete_arguments(command, arguments), sink);
+  return std::move(sink.answer);
+}
+
+Samples Encoder::samples(const SampleChoices& choices) {
+  period_ = choices.rate_hz > 0 ? Time(std::llround(1e9 / choices.rate_hz)) : Time{};
+  return {*this, choices};
+}
+
+Samples::Iterator Samples::begin() {
+  next_ = os::now();
+  advance();
+  return Iterator(*this);
+}
+
+void Samples::advance() {
+  const Time period = encoder_->period_;
+  ended_ = choices_.count != 0 && taken_ == choices_.count;
+  if (ended_) return;
+  try {
+    while (taken_ != 0 && os::now() < next_) {
+      if (*encoder_->cancelled_) throw Cancelled{};
+      os::sleep_until(std::min(next_, os::now() + between_looks));
+    }
+    sample_ = encoder_->next();
+  } catch (const Cancelled&) {
+    ended_ = true;
+    return;
+  }
+  ++taken_;
+  next_ += period;
+  const Time late = os::now() - next_;
+  if (period > Time{} && late > Time{}) next_ += late / period * period;
+}
 
 void Encoder::connect() {
-  encoder_->connect();
-  offset_ = os::now() - encoder_->now();
+  connection_->connect();
+  offset_ = os::now() - connection_->now();
   was_there_ = true;
 }
 
 void Encoder::forget_position() {
-  unwrapper_ = make_unwrapper(encoder_->uri());
+  unwrapper_ = make_unwrapper(connection_->uri());
   velocity_.restart();
 }
 
 Sample Encoder::next() {
-  if (!encoder_->connected()) return search();
+  if (!connection_->connected()) return search();
   try {
-    const Outcome outcome = encoder_->read(period_ == Time{} ? host::Take::every : host::Take::newest);
+    const Outcome outcome = connection_->read(period_ == Time{} ? host::Take::every : host::Take::newest);
     if (outcome.error != Error::none) {
-      return {.kind = Sample::Kind::failed, .at = os::now(), .trouble = encoder_->trouble(outcome)};
+      return {.kind = Sample::Kind::failed, .at = os::now(), .trouble = connection_->trouble(outcome)};
     }
     if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no position");
     return take(*outcome.reading);
   } catch (const os::Failure& failure) {
-    encoder_->disconnect();
+    connection_->disconnect();
     velocity_.restart();
     ++losses_;
     lost_at_ = os::now();
@@ -74,7 +147,10 @@ Sample Encoder::next() {
 }
 
 Sample Encoder::search() {
-  os::sleep_until(next_try_);
+  while (os::now() < next_try_) {
+    if (*cancelled_) throw Cancelled{};
+    os::sleep_until(std::min(next_try_, os::now() + between_looks));
+  }
   const Time now = os::now();
   next_try_ = now + time_between_tries;
   const bool again = was_there_;
@@ -91,7 +167,7 @@ Sample Encoder::search() {
 double Encoder::rate() const { return rate_.per_second(os::now()); }
 
 std::vector<KeptExchange> Encoder::bad_exchanges() const {
-  std::vector<KeptExchange> exchanges = encoder_->bad_exchanges();
+  std::vector<KeptExchange> exchanges = connection_->bad_exchanges();
   for (KeptExchange& exchange : exchanges) exchange.at += offset_;
   return exchanges;
 }
@@ -101,7 +177,7 @@ Sample Encoder::take(Reading reading) {
   reading.received += offset_;
   rate_.add(reading.received);
   ++readings_;
-  Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = encoder_->confirmed()};
+  Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = connection_->confirmed()};
   sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
   sample.reading = reading = checked(reading, sample.confirmed);
   const host::Unwrapper::Joined joined = unwrapper_.add(reading);
@@ -124,7 +200,7 @@ void Encoder::note_restart(Sample& sample, const Reading& reading) {
   sample.message = fmt::format(
       "{} between two readings are too long to know how far it went meanwhile, at up to {}: the position starts again "
       "from the encoder's own{}",
-      to_text(reading.latched - unwrapped_at_), limit_text(encoder_->uri(), reading),
+      to_text(reading.latched - unwrapped_at_), limit_text(connection_->uri(), reading),
       reading.unit_um > 0 ? "" : ". If the shaft is slower, say so with max_rpm=RPM");
 }
 
@@ -146,7 +222,7 @@ std::string_view event_name(const Sample& sample) {
 std::string_view speed_unit(const Reading& reading) { return reading.unit_um > 0 ? "mm/s" : "rpm"; }
 
 std::string Encoder::rate_note() const {
-  const EncoderAddress& uri = encoder_->uri();
+  const EncoderAddress& uri = connection_->uri();
   const Resolution resolution = uri.unit->resolution(uri.options);
   const host::SpeedLimit limit = speed_limit(uri);
   const Time longest = host::longest_gap(resolution, limit);

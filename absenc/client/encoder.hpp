@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder that is read for long: it may be unplugged and come back, and its position goes on past the end of its
-// counter. For read, record and monitor.
+// An encoder by its name: read once or for long, when it may be unplugged and come back and its position goes on past
+// the end of its counter, and told to run commands.
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "absenc/client/way/connection.hpp"
+#include "absenc/client/row.hpp"
+#include "absenc/client/trouble.hpp"
+#include "absenc/host/session.hpp"
+#include "absenc/host/statistics.hpp"
 #include "absenc/host/unwrap.hpp"
 #include "absenc/host/velocity.hpp"
 
@@ -40,24 +47,63 @@ struct Sample {
   std::string message{};  // lost, absent, back, restarted
 };
 
+class Connection;
+struct EncoderAddress;
+
+/// How an encoder is to be read.
+struct SampleChoices {
+  double rate_hz = 0;       // readings a second; 0: as fast as can be
+  std::uint64_t count = 0;  // 0: without end
+};
+
+class Samples;
+
+/// One thread at a time uses it; only `cancel` may come from another.
 class Encoder {
  public:
-  /// `period` is the distance of readings that is intended; 0: as near as can be. Nothing is opened yet.
-  Encoder(const EncoderAddress& uri, Time period);
+  /// Nothing is opened yet. `period` is the distance of readings that is intended; 0: as near as can be.
+  Encoder(const EncoderAddress& address, Time period);
+  Encoder(Encoder&&) noexcept;
+  Encoder& operator=(Encoder&&) noexcept;
+  ~Encoder();
 
-  /// Opens the port, so that a first failure can end the command instead of being waited out. Throws as
-  /// Connection::connect.
+  /// Opens the port, so that a first failure can end the program instead of being waited out. Throws os::Failure,
+  /// UsageError.
   void connect();
-  /// Reads once, or waits a quarter of a second and tries to open the port again. Throws os::Interrupted, UsageError
-  /// and Failure.
+
+  /// The position, with all alarms that the encoder can tell. A position that no second one confirmed is not valid. A
+  /// port that was lost is opened again. Throws EncoderFailure, os::Failure, Cancelled.
+  [[nodiscard]] Reading read();
+  /// For a loop over samples that goes on when the port is lost and comes back. Ends after `count`, or by `cancel`.
+  [[nodiscard]] Samples samples(const SampleChoices& choices = {});
+  /// One sample: reads once, or waits a quarter of a second and tries to open the port again. Throws os::Interrupted,
+  /// UsageError, Failure, Cancelled.
   Sample next();
+
+  /// A command of the unit by its name; of arguments that are left out the defaults count. Nobody is asked, even if it
+  /// changes the encoder, but what is written is read back. Throws EncoderFailure, os::Failure, UsageError, Cancelled.
+  Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
+  Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
+    return run(command, std::span(arguments.begin(), arguments.size()));
+  }
+
+  /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
+  void cancel();
+
   /// The position starts again from the next reading: after a command that moves the zero.
   void forget_position();
 
-  /// Connected unless the last sample said otherwise.
-  [[nodiscard]] Connection& encoder() { return *encoder_; }
-  [[nodiscard]] const Connection& encoder() const { return *encoder_; }
-  /// Good ones so far.
+  [[nodiscard]] const Unit& unit() const;
+  [[nodiscard]] const Options& options() const;
+  /// What could be better about the port, a sentence each.
+  [[nodiscard]] const std::vector<std::string>& notes() const;
+  /// Of all exchanges: good ones, errors by kind, repetitions.
+  [[nodiscard]] const host::Counters& counters() const;
+  /// From the end of a request to the end of its reply.
+  [[nodiscard]] const host::Latencies& latencies() const;
+  /// The last bad exchanges, the newest first, with times of os::now.
+  [[nodiscard]] std::vector<KeptExchange> bad_exchanges() const;
+  /// Good readings so far.
   [[nodiscard]] std::uint64_t readings() const { return readings_; }
   /// How often the port went away.
   [[nodiscard]] std::uint64_t losses() const { return losses_; }
@@ -65,17 +111,22 @@ class Encoder {
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
   /// Good readings a second.
   [[nodiscard]] double rate() const;
-  /// As Connection::bad_exchanges, with times of os::now.
-  [[nodiscard]] std::vector<KeptExchange> bad_exchanges() const;
   /// A sentence when the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;
 
+  /// Connected unless the last sample said otherwise.
+  [[nodiscard]] Connection& connection() { return *connection_; }
+  [[nodiscard]] const Connection& connection() const { return *connection_; }
+
  private:
+  friend class Samples;
+
   Sample search();
   Sample take(Reading reading);
   void note_restart(Sample& sample, const Reading& reading);
 
-  std::unique_ptr<Connection> encoder_;
+  std::unique_ptr<std::atomic<bool>> cancelled_;
+  std::unique_ptr<Connection> connection_;
   Time period_;
   host::Unwrapper unwrapper_;
   host::Velocity velocity_;
@@ -88,6 +139,50 @@ class Encoder {
   std::uint64_t losses_ = 0;
   Time unwrapped_at_{};  // of the last valid position
   std::uint64_t restarts_ = 0;
+};
+
+/// "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name of absenc.toml, connected; `settings` ("name=value") count
+/// as if they stood behind it. Throws os::Failure; UsageError, which names what is wrong and what is nearest.
+[[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
+
+/// An input range of samples, at equal distances that do not drift; one that was missed is left out.
+class Samples {
+ public:
+  struct End {};
+  class Iterator {
+   public:
+    using value_type = Sample;
+    using difference_type = std::ptrdiff_t;
+
+    explicit Iterator(Samples& samples) : samples_(&samples) {}
+    const Sample& operator*() const { return samples_->sample_; }
+    const Sample* operator->() const { return &samples_->sample_; }
+    Iterator& operator++() {
+      samples_->advance();
+      return *this;
+    }
+    void operator++(int) { samples_->advance(); }
+    bool operator==(End) const { return samples_->ended_; }
+
+   private:
+    Samples* samples_;
+  };
+
+  Samples(Encoder& encoder, const SampleChoices& choices) : encoder_(&encoder), choices_(choices) {}
+
+  /// Takes the first sample. Once.
+  [[nodiscard]] Iterator begin();
+  [[nodiscard]] static End end() { return {}; }
+
+ private:
+  void advance();
+
+  Encoder* encoder_;
+  SampleChoices choices_;
+  Sample sample_{};
+  std::uint64_t taken_ = 0;
+  Time next_{};
+  bool ended_ = false;
 };
 
 /// "" of a reading; "lost", "back"; of a failed attempt the name of the error

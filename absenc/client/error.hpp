@@ -4,6 +4,8 @@
 
 #include <stdexcept>
 
+#include "absenc/os/error.hpp"
+
 namespace absenc::client {
 
 /// The caller asked for something that cannot be: a sentence that names what and where.
@@ -15,5 +17,8 @@ struct UsageError : std::runtime_error {
 struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// Another thread asked for it, or its time is over.
+using Cancelled = os::Ended;
 
 }  // namespace absenc::client

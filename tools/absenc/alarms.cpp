@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "absenc/client/way/connection.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"

@@ -8,9 +8,9 @@
 #include <cmath>
 
 #include "absenc/capture/lines/can_line.hpp"
-#include "absenc/client/way/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/client/way/diagnosis.hpp"
 #include "tools/absenc/bit_text.hpp"
 #include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
@@ -51,11 +51,6 @@ std::string quoted(std::string_view text) {
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
   return quoted + '"';
-}
-
-bool has_fields(const Annotation& annotation) {
-  return annotation.error == Error::none && annotation.kind != Kind::noise && annotation.remark != Remark::cut &&
-         annotation.remark != Remark::undocumented;
 }
 
 std::string csv_columns(const Unit& unit, bool linear) {

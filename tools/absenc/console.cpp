@@ -111,10 +111,9 @@ std::string Console::condition(VirtualDevice& device, std::string_view line, Tim
 }
 
 std::string Console::alarms(VirtualDevice& device, std::string_view names, bool raise) const {
-  if (unit_.alarms == nullptr) throw UsageError(fmt::format("the encoders of {} have no alarms", unit_.id));
   std::vector<std::string> all;
   while (!is_blank(names)) all.emplace_back(take_word(names));
-  const std::uint32_t bits = require_flags(*unit_.alarms, all);
+  const std::uint32_t bits = require_alarms(unit_, all);
   if (bits == 0) {
     throw UsageError(fmt::format("which alarm? There are {}", fmt::join(flag_names(*unit_.alarms, ~0ull), ", ")));
   }

@@ -39,40 +39,4 @@ class Console {
   bool unheard_ = false;  // nobody reads the answers
 };
 
-/// Stands in front of the encoders and looks at the console between their steps: nothing else runs meanwhile.
-template <class Item>
-class Consoled final : public Machine<Item> {
- public:
-  Consoled(Machine<Item>& line, Console& console) : line_(line), console_(console) {}
-
-  void feed(const Event<Item>& event) override {
-    if (event.kind == Event<Item>::Kind::timer) {
-      if (event.at < timer_) return;  // only to look
-      timer_ = never;
-    }
-    line_.feed(event);
-  }
-
-  Step<Item> next(Time now) override {
-    using namespace std::chrono_literals;
-    constexpr Time between_looks = 20ms;
-    if (now >= look_at_ && !console_.ended()) {
-      console_.look(now);
-      look_at_ = now + between_looks;
-    }
-    Step<Item> step = line_.next(now);
-    if (step.kind != Step<Item>::Kind::wait) return step;
-    // As ports have it: a timer that was due in the moment of another event stays due.
-    timer_ = step.at > now || step.at == timer_ ? step.at : never;
-    if (!console_.ended() && look_at_ < timer_) step.at = look_at_;
-    return step;
-  }
-
- private:
-  Machine<Item>& line_;
-  Console& console_;
-  Time timer_ = never;  // of the line's last wait
-  Time look_at_{};
-};
-
 }  // namespace absenc::tool

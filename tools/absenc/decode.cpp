@@ -5,9 +5,9 @@
 
 #include "absenc/client/captures/run.hpp"
 #include "absenc/client/captures/sequence_watch.hpp"
-#include "absenc/client/way/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/client/way/diagnosis.hpp"
 #include "tools/absenc/annotation_text.hpp"
 #include "tools/absenc/bit_text.hpp"
 #include "tools/absenc/capture_choices.hpp"

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "absenc/client/emulation/attended.hpp"
 #include "absenc/client/memory/keeper.hpp"
 #include "absenc/client/memory/kept.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -158,12 +159,15 @@ struct Emulation {
     const Time start = os::now();
     line.power_on(start);
     Console console(line.unit(), line.devices());
-    Consoled<Item> consoled(line.machine(), console);
-    MemoryKeeper<Item> keeper(consoled, line.first(), file);
+    Attended<Item> attended(line.machine(), [&](Time now) {
+      console.look(now);
+      return !console.ended();
+    });
+    MemoryKeeper<Item> keeper(attended, line.first(), file);
     std::vector<std::string> notes;
     int status = exit_good;
     try {
-      notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : consoled);
+      notes = serve(keeps_memory ? static_cast<Machine<Item>&>(keeper) : attended);
       if (keeps_memory) keeper.finish();
     } catch (const Failure& failure) {
       print_message(failure.what());

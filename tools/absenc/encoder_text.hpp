@@ -6,6 +6,7 @@
 #include <string>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "tools/absenc/json.hpp"
 
 namespace absenc::tool {

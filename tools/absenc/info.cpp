@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 
-#include "absenc/client/way/connection.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"

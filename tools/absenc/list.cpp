@@ -4,9 +4,9 @@
 
 #include <array>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
 #include "absenc/client/way/named_encoder.hpp"
-#include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/field_text.hpp"

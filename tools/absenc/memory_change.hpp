@@ -2,8 +2,8 @@
 // Brings bytes of an encoder's memory to what they should be: shows, asks, writes what differs, reads back.
 #pragma once
 
-#include "absenc/client/way/address.hpp"
 #include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/way/address.hpp"
 #include "tools/absenc/json.hpp"
 #include "tools/absenc/subcommand.hpp"
 

@@ -7,6 +7,7 @@
 
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/encoder_text.hpp"
@@ -28,7 +29,7 @@ enum class Format : std::uint8_t { human, json, csv };
 class Display {
  public:
   Display(const Encoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
-    const EncoderAddress& uri = live.encoder().uri();
+    const EncoderAddress& uri = live.connection().uri();
     const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
     const std::string header = csv_header(*uri.unit, linear);
     if (format == Format::csv) print_line(fmt::format("{},event", header));
@@ -77,7 +78,7 @@ class Display {
   }
 
   void show_reading(const Sample& sample) {
-    const Unit& unit = live_->encoder().unit();
+    const Unit& unit = live_->connection().unit();
     const Reading& reading = sample.reading;
     if (sample.doubtful && !told_doubt_) {
       print_message("no two readings in a row agree as well as the fastest shaft allows");
@@ -141,7 +142,7 @@ int run_read(const Invocation& invocation) {
 
   Encoder live(uri, pace.period());
   live.connect();
-  print_notes(live.encoder());
+  print_notes(live.connection());
   Display display(live, format);
   Tally tally;
   if (count != 0) {
@@ -155,7 +156,7 @@ int run_read(const Invocation& invocation) {
   }
   print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}; the port went away: {}",
                             tally.good, tally.bad, to_text(os::now() - start),
-                            exchanges_text(live.encoder().counters(), live.readings()), live.losses()));
+                            exchanges_text(live.connection().counters(), live.readings()), live.losses()));
   return tally.last_good ? exit_good : exit_failed;
 }
 

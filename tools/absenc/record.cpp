@@ -5,6 +5,7 @@
 
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/encoder_text.hpp"
@@ -28,7 +29,7 @@ class Report {
     const Time now = os::now();
     if (!progress_.visible() || now < next_) return;
     next_ = now + std::chrono::seconds(1);
-    const bool connected = live.encoder().connected();
+    const bool connected = live.connection().connected();
     progress_.show(fmt::format("{}: {} readings, {}, {} failures, {} bytes", to_text(now - recording.start()),
                                recording.readings(),
                                connected ? fmt::format("{:.1f} a second", live.rate()) : "the port is away",
@@ -113,7 +114,7 @@ void summarize(const Recording& recording, const Encoder& live, bool whole) {
                         live.restarts());
   }
   if (live.losses() != 0) text += fmt::format("; the port went away: {}", live.losses());
-  print_message(fmt::format("{}; exchanges: {}", text, exchanges_text(live.encoder().counters(), live.readings())));
+  print_message(fmt::format("{}; exchanges: {}", text, exchanges_text(live.connection().counters(), live.readings())));
 }
 
 int run_record(const Invocation& invocation) {
@@ -126,12 +127,12 @@ int run_record(const Invocation& invocation) {
   Pace pace(settings.rate);
   Encoder live(uri, pace.period());
   live.connect();
-  print_notes(live.encoder());
+  print_notes(live.connection());
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
   Recording recording(settings, uri);
   pace.start_at(recording.start());
   const Limits limits{count, seconds > 0 ? recording.start() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never};
-  live.encoder().end_when([&limits] { return os::now() >= limits.end; });
+  live.connection().end_when([&limits] { return os::now() >= limits.end; });
   Report report;
   bool good = false;
   bool whole = true;

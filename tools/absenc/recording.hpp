@@ -7,6 +7,7 @@
 #include <string>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "absenc/os/line_file.hpp"
 
 namespace absenc::tool {

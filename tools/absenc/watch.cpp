@@ -117,7 +117,7 @@ void Watch::work(const std::stop_token& stop) {
   try {
     Pace pace(rate_, offset_);
     Encoder live(uri_, pace.period());
-    live.encoder().end_when([&] { return stop.stop_requested() && !command_runs_; });
+    live.connection().end_when([&] { return stop.stop_requested() && !command_runs_; });
     Time next = start_ + offset_;
     for (;;) {
       std::optional<Command> command;
@@ -177,7 +177,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
     case Sample::Kind::back:
       break;
   }
-  const Connection& encoder = live.encoder();
+  const Connection& encoder = live.connection();
   if (encoder.counters().bad() != known_.counters.bad()) known_.bad = live.bad_exchanges();
   known_.counters = encoder.counters();
   known_.losses = live.losses();
@@ -196,7 +196,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
 }
 
 void Watch::trace(const Encoder& live, const Sample& sample) {
-  const Unit& unit = live.encoder().unit();
+  const Unit& unit = live.connection().unit();
   switch (sample.kind) {
     case Sample::Kind::reading: {
       if (sample.restarted && !restarted_) add_line(sample.at, sample.message);
@@ -228,15 +228,15 @@ void Watch::add_line(Time at, const std::string& text) {
 
 void Watch::run_command(Encoder& live, const Command& command) {
   std::string notice;
-  if (!live.encoder().connected()) {
+  if (!live.connection().connected()) {
     notice = fmt::format("{} was not done: the port is away", command.name);
   } else {
     try {
-      const Outcome outcome = live.encoder().run(command, {});
+      const Outcome outcome = live.connection().run(command, {});
       live.forget_position();
       notice = outcome.error == Error::none
                    ? fmt::format("{}: done, and verified by reading back", command.name)
-                   : fmt::format("{} failed: {}", command.name, live.encoder().trouble(outcome).message);
+                   : fmt::format("{} failed: {}", command.name, live.connection().trouble(outcome).message);
     } catch (const os::Failure& failure) {  // the next reading will find the port lost
       notice = fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
     }
@@ -244,7 +244,7 @@ void Watch::run_command(Encoder& live, const Command& command) {
   add_line(os::now(), notice);
   const std::lock_guard lock(mutex_);
   known_.notice = notice;
-  known_.counters = live.encoder().counters();
+  known_.counters = live.connection().counters();
 }
 
 }  // namespace absenc::tool

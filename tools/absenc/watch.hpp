@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/way/connection.hpp"
 
 namespace absenc::tool {
 

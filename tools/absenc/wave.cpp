@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "absenc/capture/annotate/drawing.hpp"
-#include "absenc/client/way/address.hpp"
 #include "absenc/client/text/text_file.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/address.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"

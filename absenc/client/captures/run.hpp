@@ -46,6 +46,7 @@ class CaptureRun {
   CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
   ~CaptureRun();
 
+  [[nodiscard]] const Options& options() const { return options_; }
   /// 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
   /// What the user did not say and only the encoder could be asked for, taken from the frames of the capture; the

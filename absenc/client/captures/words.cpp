@@ -41,6 +41,11 @@ std::string_view name_of(Kind kind) {
   return names[static_cast<std::size_t>(kind)];
 }
 
+bool has_fields(const Annotation& annotation) {
+  return annotation.error == Error::none && annotation.kind != Kind::noise && annotation.remark != Remark::cut &&
+         annotation.remark != Remark::undocumented;
+}
+
 std::string message_of(const Unit& unit, const Options& options, const Annotation& annotation) {
   const bool is_bus_error = annotation.remark == Remark::damaged && annotation.reply.can != nullptr;
   const std::string_view remark =

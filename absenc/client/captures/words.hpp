@@ -34,6 +34,9 @@ class TickClock {
 /// "exchange"
 [[nodiscard]] std::string_view name_of(capture::Annotation::Kind kind);
 
+/// Whether its frames say something that may be shown.
+[[nodiscard]] bool has_fields(const capture::Annotation& annotation);
+
 /// What is wrong with it and what to try; "" of a good one that needs no words.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 

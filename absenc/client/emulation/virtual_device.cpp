@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "absenc/client/error.hpp"
-#include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/core/bits.hpp"
 
@@ -57,13 +56,6 @@ sim::FaultRates fault_rates(const DeviceSettings& settings) {
   return rates;
 }
 
-std::string unknown_condition(const Unit& unit, std::string_view name) {
-  if (unit.conditions.empty()) return fmt::format("the virtual encoder of {} has no conditions to be set", unit.id);
-  std::vector<std::string_view> names;
-  for (const Condition& condition : unit.conditions) names.push_back(condition.name);
-  return fmt::format("there is no condition \"{}\"{}", name, suggestion(name, names));
-}
-
 }  // namespace
 
 VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const DeviceSettings& settings)
@@ -74,17 +66,13 @@ VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const Dev
   if (device_.bytes == nullptr && device_.frames == nullptr) {
     throw UsageError(fmt::format("{} has no virtual encoder with these options", unit.id));
   }
-  if (!settings.alarms.empty() && unit.alarms == nullptr) {
-    throw UsageError(fmt::format("the encoders of {} have no alarms", unit.id));
-  }
-  if (unit.alarms != nullptr) alarms_ = require_flags(*unit.alarms, settings.alarms);
+  if (!settings.alarms.empty()) alarms_ = require_alarms(unit, settings.alarms);
   for (const Condition& condition : unit.conditions) conditions_.push_back(condition.normal);
   for (const std::string& text : settings.conditions) {
     const OptionText written = split_setting(text);
-    const Condition* condition = find_condition(unit, written.name);
-    if (condition == nullptr) throw UsageError(unknown_condition(unit, written.name));
-    conditions_[static_cast<std::size_t>(condition - unit.conditions.data())] =
-        require_value(*condition, written.value);
+    const Condition& condition = require_condition(unit, written.name);
+    conditions_[static_cast<std::size_t>(&condition - unit.conditions.data())] =
+        require_value(condition, written.value);
   }
   if (settings.faults.empty()) return;
   const sim::FaultRates rates = fault_rates(settings);

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 
+#include "absenc/client/captures/words.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
-#include "absenc/client/captures/words.hpp"
 
 namespace absenc::client {
 

@@ -4,8 +4,8 @@
 
 #include <functional>
 
-#include "absenc/client/way/connection.hpp"
 #include "absenc/client/memory/image.hpp"
+#include "absenc/client/way/connection.hpp"
 
 namespace absenc::client {
 

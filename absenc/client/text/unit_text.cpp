@@ -51,6 +51,25 @@ std::string sentence(const Unit& unit, const OptionError& error, std::span<const
   return fmt::format("{} has no option \"{}\"{}", unit.id, error.text, suggestion(error.text, names));
 }
 
+bool has(const Argument& argument, std::int64_t value) {
+  return value >= argument.minimum && value <= argument.maximum;
+}
+
+template <class Given>
+void require_few(const Command& command, std::span<const Given> given) {
+  if (given.size() <= command.arguments.size()) return;
+  const std::vector<std::string_view> names = names_of(command.arguments);
+  throw UsageError(fmt::format("{} takes {}, so \"{}\" is too much", command.name,
+                               names.empty() ? "no arguments" : fmt::format("only {}", fmt::join(names, ", ")),
+                               given[command.arguments.size()]));
+}
+
+template <class Given>
+[[noreturn]] void refuse(const Command& command, const Argument& argument, const Given& given) {
+  throw UsageError(fmt::format("{} of {} is \"{}\", but must be a number from {} to {}", argument.name, command.name,
+                               given, argument.minimum, argument.maximum));
+}
+
 }  // namespace
 
 const Unit& require_unit(std::string_view id) {
@@ -98,28 +117,30 @@ Options require_options(const Unit& unit, std::string_view model, std::span<cons
 }
 
 std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written) {
-  if (written.size() > command.arguments.size()) {
-    const std::vector<std::string_view> names = names_of(command.arguments);
-    throw UsageError(fmt::format("{} takes {}, so \"{}\" is too much", command.name,
-                                 names.empty() ? "no arguments" : fmt::format("only {}", fmt::join(names, ", ")),
-                                 written[command.arguments.size()]));
-  }
+  require_few(command, written);
   std::vector<std::int64_t> values;
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    const Result<std::int64_t> value = parse_number(written[i]);
+    const Argument& argument = command.arguments[i];
+    if (!value || !has(argument, *value)) refuse(command, argument, written[i]);
+    values.push_back(*value);
+  }
+  return complete_arguments(command, values);
+}
+
+std::vector<std::int64_t> complete_arguments(const Command& command, std::span<const std::int64_t> given) {
+  require_few(command, given);
+  std::vector<std::int64_t> values(given.begin(), given.end());
   for (std::size_t i = 0; i < command.arguments.size(); ++i) {
     const Argument& argument = command.arguments[i];
-    if (i >= written.size()) {
+    if (i >= given.size()) {
       if (argument.required) {
         throw UsageError(fmt::format("{} needs the argument {}: {}", command.name, argument.name, argument.meaning));
       }
       values.push_back(argument.default_value);
-      continue;
+    } else if (!has(argument, given[i])) {
+      refuse(command, argument, given[i]);
     }
-    const Result<std::int64_t> value = parse_number(written[i]);
-    if (!value || *value < argument.minimum || *value > argument.maximum) {
-      throw UsageError(fmt::format("{} of {} is \"{}\", but must be a number from {} to {}", argument.name,
-                                   command.name, written[i], argument.minimum, argument.maximum));
-    }
-    values.push_back(*value);
   }
   return values;
 }
@@ -140,6 +161,14 @@ const Condition* find_condition(const Unit& unit, std::string_view name) {
   return found == unit.conditions.end() ? nullptr : &*found;
 }
 
+const Condition& require_condition(const Unit& unit, std::string_view name) {
+  if (const Condition* condition = find_condition(unit, name)) return *condition;
+  if (unit.conditions.empty()) {
+    throw UsageError(fmt::format("the virtual encoder of {} has no conditions to be set", unit.id));
+  }
+  throw UsageError(fmt::format("there is no condition \"{}\"{}", name, suggestion(name, names_of(unit.conditions))));
+}
+
 std::int64_t require_value(const Condition& condition, std::string_view written) {
   const Result<std::int64_t> value = parse_number(written);
   if (value && *value >= condition.minimum && *value <= condition.maximum) return *value;
@@ -155,7 +184,9 @@ std::string to_text(const Condition& condition, std::int64_t value) {
   return fmt::format("{}{}{}", value, condition.unit.empty() ? "" : " ", condition.unit);
 }
 
-std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names) {
+std::uint32_t require_alarms(const Unit& unit, std::span<const std::string> names) {
+  if (unit.alarms == nullptr) throw UsageError(fmt::format("the encoders of {} have no alarms", unit.id));
+  const FieldInfo& field = *unit.alarms;
   std::uint32_t bits = 0;
   for (const std::string& name : names) {
     std::size_t bit = 0;

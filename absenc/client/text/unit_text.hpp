@@ -30,6 +30,9 @@ namespace absenc::client {
 /// One value for each argument of the command. Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written);
 
+/// The same of numbers; those that are left out have their defaults. Throws UsageError.
+[[nodiscard]] std::vector<std::int64_t> complete_arguments(const Command& command, std::span<const std::int64_t> given);
+
 struct RoleArgument {
   Role role;
   std::int64_t value;
@@ -39,10 +42,12 @@ struct RoleArgument {
                                                        std::initializer_list<RoleArgument> values);
 
 /// The bits of the flags with these names. Throws UsageError.
-[[nodiscard]] std::uint32_t require_flags(const FieldInfo& field, std::span<const std::string> names);
+[[nodiscard]] std::uint32_t require_alarms(const Unit& unit, std::span<const std::string> names);
 
 /// Null when the virtual encoder has no condition of this name.
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
+/// Throws UsageError, which names the nearest.
+[[nodiscard]] const Condition& require_condition(const Unit& unit, std::string_view name);
 /// Throws UsageError.
 [[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
 /// "-20 to 127 degC"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "absenc/client/error.hpp"
-#include "absenc/client/way/named_encoder.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/named_encoder.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/os/socketcan.hpp"
 #include "absenc/protocol/all.hpp"

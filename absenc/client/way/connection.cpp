@@ -5,12 +5,12 @@
 
 #include <algorithm>
 
-#include "absenc/client/way/aborting_port.hpp"
-#include "absenc/client/way/diagnosis.hpp"
 #include "absenc/client/error.hpp"
-#include "absenc/client/way/shared_link.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/client/way/aborting_port.hpp"
+#include "absenc/client/way/diagnosis.hpp"
+#include "absenc/client/way/shared_link.hpp"
 
 namespace absenc::client {
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "absenc/client/error.hpp"
+#include "absenc/client/trouble.hpp"
 #include "absenc/client/way/link.hpp"
 #include "absenc/host/session.hpp"
 
@@ -21,27 +21,6 @@ struct Outcome {
   std::string_view advice{};         // "": that of the error
   bool aborted = false;              // ended early because of a signal, and left the encoder as it was
   const Reading* reading = nullptr;  // null when it failed, or is no position
-};
-
-/// A failed command in words. The texts but `error` may be empty.
-struct Trouble {
-  Error error = Error::none;
-  std::string message{};   // what happened, and what the reply turns out to be
-  std::string exchange{};  // what was sent, what came back and when
-  std::string advice{};    // what to try
-  std::string sent{};      // hexadecimal or as the link's wire text
-  std::string received{};
-
-  /// Of several lines, without the last line end.
-  [[nodiscard]] std::string text() const;
-};
-
-/// A bad exchange that was kept.
-struct KeptExchange {
-  Error error = Error::none;
-  Time at{};           // on the clock of the readings
-  std::string sent{};  // as the link's wire text
-  std::string received{};
 };
 
 class Connection {
@@ -98,12 +77,6 @@ class Connection {
 
  private:
   EncoderAddress uri_;
-};
-
-/// A command that the encoder did not do, or a reading that failed.
-struct EncoderFailure : Failure {
-  explicit EncoderFailure(Trouble what_failed) : Failure(what_failed.text()), trouble(std::move(what_failed)) {}
-  Trouble trouble;
 };
 
 /// The fields that a command tells, into `sink`. Throws EncoderFailure, and as Connection::run.

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <map>
 
-#include "absenc/client/way/can_log.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/way/can_log.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/slcan_port.hpp"

@@ -6,9 +6,9 @@
 
 #include <algorithm>
 
-#include "absenc/client/way/address.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/address.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {

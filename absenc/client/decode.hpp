@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// A capture as rows: what was said on a line, request by request, with its times.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/client/row.hpp"
+#include "absenc/link/line.hpp"
+
+namespace absenc::client {
+
+/// What is said of a capture, and of the encoder whose frames are in it. What is left out is found in the capture, or
+/// is as the protocol has it.
+struct DecodeChoices {
+  std::vector<std::string> channels{};   // "D0", "clock=D0", or several of them with commas between
+  unsigned raw_channels = 0;             // 0: it is no file of raw samples
+  std::uint64_t samples_per_second = 0;  // 0: the file tells
+  double baud = 0;
+  std::optional<Parity> parity{};
+  std::string model{};
+  std::vector<std::string> options{};  // "name=value"
+};
+
+/// An input range of rows, in the order in which they ended, while the file is read: its size does not matter. The file
+/// is decoded in other threads, ahead of whoever takes the rows by some thousands of them.
+///
+/// Columns: `time_s` (of a capture without times `tick`), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
+/// "noise"), `request` and `reply` (bytes; of CAN and clocked links text, as "1FF:022B" and "0001"), `turnaround_us`,
+/// `angle_deg` (of linear encoders `position_mm`), then each field of the unit under its name, and `error` with
+/// `message`, which are empty in a good row. A row with an error has no other values than these, its times and frames.
+class Decoded {
+ public:
+  struct End {};
+  class Iterator {
+   public:
+    using value_type = Row;
+    using difference_type = std::ptrdiff_t;
+
+    explicit Iterator(Decoded& decoded) : decoded_(&decoded) {}
+    const Row& operator*() const { return *decoded_->row_; }
+    const Row* operator->() const { return decoded_->row_; }
+    Iterator& operator++() {
+      decoded_->advance();
+      return *this;
+    }
+    void operator++(int) { decoded_->advance(); }
+    bool operator==(End) const { return decoded_->row_ == nullptr; }
+
+   private:
+    Decoded* decoded_;
+  };
+
+  /// As `decode`.
+  Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices);
+  Decoded(Decoded&&) noexcept;
+  Decoded& operator=(Decoded&&) noexcept;
+  /// Ends the threads, also in the middle of the file.
+  ~Decoded();
+
+  /// Waits for the first row. Once. Throws, as each step does, UsageError, Failure.
+  [[nodiscard]] Iterator begin();
+  [[nodiscard]] static End end() { return {}; }
+
+  [[nodiscard]] std::span<const Column> columns() const;
+  /// When the range has ended: sentences about what is damaged or missing in the file, and what was found out.
+  [[nodiscard]] const std::vector<std::string>& notes() const;
+
+ private:
+  struct Work;
+  void advance();
+
+  std::unique_ptr<Work> work_;
+  const Row* row_ = nullptr;
+};
+
+/// `path` is a session of sigrok, VCD, CSV or binary export of a logic analyser, a log of candump, or bytes as text.
+/// Throws UsageError, Failure.
+[[nodiscard]] inline Decoded decode(const std::string& path, std::string_view protocol,
+                                    const DecodeChoices& choices = {}) {
+  return {path, protocol, choices};
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/emulate.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <condition_variable>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "absenc/client/emulation/attended.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/address.hpp"
+#include "absenc/host/drive.hpp"
+#include "absenc/os/emulator_port.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/os/slcan_port.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+EncoderAddress virtual_address(std::string_view text) {
+  EncoderAddress address = parse_address("sim:" + std::string(text));
+  const LinkKind link = address.unit->link;
+  if (link != LinkKind::exchange && link != LinkKind::clocked) return address;
+  throw UsageError(fmt::format("{} ({}) does not go over a pseudo-terminal: open it as sim:{}", address.unit->id,
+                               line_of(*address.unit), address.unit->id));
+}
+
+}  // namespace
+
+struct Emulation::Service {
+  Service(std::string_view text, const EmulateChoices& choices)
+      : address(virtual_address(text)),
+        device(*address.unit, address.options, address.device),
+        port(std::make_shared<os::EmulatorPort>(choices.link, choices.tcp)) {
+    device.power_on(os::now());
+    thread = std::jthread([this] { serve(); });
+  }
+
+  ~Service() {
+    const std::lock_guard lock(mutex);
+    stopped = true;
+  }
+
+  void serve() {
+    try {
+      if (device.frames() != nullptr) {
+        os::SlcanAdapter adapter(port, address.line);
+        serve_on(*device.frames(), adapter);
+      } else {
+        serve_on(*device.bytes(), *port);
+      }
+    } catch (const Cancelled&) {
+    } catch (...) {
+      thrown = std::current_exception();
+    }
+    const std::lock_guard lock(mutex);
+    stopped = true;
+    changed.notify_all();
+  }
+
+  template <class Item>
+  void serve_on(Machine<Item>& machine, Port<Item>& on) {
+    Attended<Item> attended(machine, [this](Time now) { return look(now); });
+    host::drive(attended, on, [] { return true; });
+  }
+
+  // Between two steps of the encoder.
+  bool look(Time now) {
+    const std::lock_guard lock(mutex);
+    if (stopped) throw Cancelled{};
+    if (!wish) return true;
+    wish(now);
+    wish = nullptr;
+    changed.notify_all();
+    return true;
+  }
+
+  /// Does the work there, and returns when it is done.
+  void carry_out(const std::function<void(Time)>& work) {
+    const std::lock_guard turn(wishes);
+    std::unique_lock lock(mutex);
+    wish = work;
+    changed.wait(lock, [&] { return !wish || stopped; });
+    if (!wish) return;
+    if (thrown) std::rethrow_exception(thrown);
+    throw Cancelled{};
+  }
+
+  template <class Ask>
+  auto ask(const Ask& question) {
+    decltype(question(*device.device().bytes)) answer{};
+    carry_out([&](Time) {
+      answer = device.device().bytes != nullptr ? question(*device.device().bytes) : question(*device.device().frames);
+    });
+    return answer;
+  }
+
+  EncoderAddress address;
+  VirtualDevice device;
+  std::shared_ptr<os::EmulatorPort> port;
+
+  std::mutex wishes;  // one at a time
+  std::mutex mutex;   // guards what follows
+  std::condition_variable changed;
+  std::function<void(Time)> wish;
+  bool stopped = false;
+  std::exception_ptr thrown;
+
+  std::jthread thread;  // last: it uses all of the others
+};
+
+Emulation::Emulation(std::string_view text, const EmulateChoices& choices)
+    : service_(std::make_unique<Service>(text, choices)) {}
+Emulation::Emulation(Emulation&&) noexcept = default;
+Emulation& Emulation::operator=(Emulation&&) noexcept = default;
+Emulation::~Emulation() = default;
+
+const std::string& Emulation::path() const { return service_->port->path(); }
+std::uint16_t Emulation::tcp_port() const { return service_->port->tcp_port(); }
+const Unit& Emulation::unit() const { return *service_->address.unit; }
+
+std::string Emulation::address() const {
+  return fmt::format("{}:{}{}", unit().id, unit().link == LinkKind::can ? "slcan:" : "", path());
+}
+
+void Emulation::power_off() {
+  service_->carry_out([this](Time now) { service_->device.switch_off(now); });
+}
+
+void Emulation::power_on(bool real) {
+  service_->carry_out([this, real](Time now) { service_->device.switch_on(now, real); });
+}
+
+void Emulation::raise_alarm(std::string_view name) {
+  const std::uint32_t bits = require_alarms(unit(), std::array{std::string(name)});
+  service_->carry_out([this, bits](Time) { service_->device.raise_alarms(bits); });
+}
+
+void Emulation::lower_alarm(std::string_view name) {
+  const std::uint32_t bits = require_alarms(unit(), std::array{std::string(name)});
+  service_->carry_out([this, bits](Time) { service_->device.lower_alarms(bits); });
+}
+
+void Emulation::set_condition(std::string_view name, std::int64_t value) {
+  const Condition& condition = require_condition(unit(), name);
+  static_cast<void>(require_value(condition, fmt::format("{}", value)));
+  const auto index = static_cast<std::size_t>(&condition - unit().conditions.data());
+  service_->carry_out([this, index, value](Time now) { service_->device.set_condition(index, value, now); });
+}
+
+std::uint64_t Emulation::answered() const {
+  return service_->ask([](const auto& device) { return device.answered(); });
+}
+
+std::uint32_t Emulation::violations() const {
+  return service_->ask([](const auto& device) { return device.violation_count(); });
+}
+
+std::string Emulation::first_violation() const {
+  return service_->ask([](const auto& device) {
+    return std::string(device.violations().empty() ? std::string_view{} : device.violations()[0].rule);
+  });
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// A virtual encoder that whoever opens it finds as a real one: for tests of programs that read encoders.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::client {
+
+/// Where it is found.
+struct EmulateChoices {
+  std::string link{};                  // a path that leads to the pseudo-terminal; "": only that itself
+  std::optional<std::uint16_t> tcp{};  // listens there on 127.0.0.1 as well; 0: on a free port
+};
+
+/// Serves in a thread of its own until it is destroyed. What is done to it is so when the call returns; any thread may.
+class Emulation {
+ public:
+  /// As `emulate`.
+  Emulation(std::string_view text, const EmulateChoices& choices);
+  Emulation(Emulation&&) noexcept;
+  Emulation& operator=(Emulation&&) noexcept;
+  ~Emulation();
+
+  /// The pseudo-terminal, or the link to it: of an encoder on a CAN bus that of an slcan adapter.
+  [[nodiscard]] const std::string& path() const;
+  /// 0 without.
+  [[nodiscard]] std::uint16_t tcp_port() const;
+  /// To open it by: "tformat:/dev/pts/3", "raa38-can:slcan:/dev/pts/3", without the options.
+  [[nodiscard]] std::string address() const;
+  [[nodiscard]] const Unit& unit() const;
+
+  void power_off();
+  /// `real`: with the document's start-up time.
+  void power_on(bool real = false);
+  /// By the names of the unit; throws UsageError, which names the nearest.
+  void raise_alarm(std::string_view name);
+  void lower_alarm(std::string_view name);
+  /// "temperature", "battery" ... as `absenc list` has them, in their units. Throws UsageError.
+  void set_condition(std::string_view name, std::int64_t value);
+
+  /// Requests that were answered.
+  [[nodiscard]] std::uint64_t answered() const;
+  /// Rules of the document that the host broke, and the first of them; "": none.
+  [[nodiscard]] std::uint32_t violations() const;
+  [[nodiscard]] std::string first_violation() const;
+
+ private:
+  struct Service;
+  std::unique_ptr<Service> service_;
+};
+
+/// `text` is what stands behind `sim:`, "tformat?model=23-bit&motion=rpm=60&fault=corrupt=0.01". Of what goes over
+/// characters or CAN. Throws UsageError, os::Failure.
+[[nodiscard]] inline Emulation emulate(std::string_view text, const EmulateChoices& choices = {}) {
+  return {text, choices};
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/row.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+std::size_t index_of(std::span<const Column> columns, std::string_view name) {
+  std::vector<std::string_view> names;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i].name == name) return i;
+    names.push_back(columns[i].name);
+  }
+  throw UsageError(fmt::format("there is no column \"{}\"{}", name, suggestion(name, names)));
+}
+
+struct Text {
+  std::string operator()(std::monostate) const { return {}; }
+  std::string operator()(bool value) const { return value ? "yes" : "no"; }
+  std::string operator()(const Flags& flags) const {
+    return fmt::format("{}", fmt::join(flag_names(*flags.field, flags.bits), " "));
+  }
+  std::string operator()(const std::string& text) const { return text; }
+  std::string operator()(const ByteVector& bytes) const { return to_hex(bytes); }
+  template <class Number>
+  std::string operator()(Number value) const {
+    return fmt::format("{}", value);
+  }
+};
+
+}  // namespace
+
+std::string to_text(const Value& value) { return std::visit(Text{}, value); }
+
+const Value& Row::operator[](std::string_view name) const { return values[index_of(columns, name)]; }
+const Value& Answer::operator[](std::string_view name) const { return values[index_of(columns, name)]; }
+
+Column column_of(const FieldInfo& field) {
+  static constexpr std::array types{Type::int64, Type::uint64, Type::boolean, Type::flags,
+                                    Type::real,  Type::text,   Type::bytes};
+  return {field.name, field.unit, types[static_cast<std::size_t>(field.kind)], field.meaning};
+}
+
+Value value_of(const FieldValue& value) {
+  switch (value.info->kind) {
+    case FieldInfo::Kind::counts:
+      return static_cast<std::uint64_t>(value.number);
+    case FieldInfo::Kind::boolean:
+      return value.number != 0;
+    case FieldInfo::Kind::flags:
+      return Flags{value.info, static_cast<std::uint32_t>(value.number)};
+    case FieldInfo::Kind::real:
+      return value.real;
+    case FieldInfo::Kind::text:
+      return printable(value.bytes);
+    case FieldInfo::Kind::bytes:
+      return ByteVector(value.bytes.begin(), value.bytes.end());
+    case FieldInfo::Kind::number:
+      break;
+  }
+  return value.number;
+}
+
+void AnswerSink::put(const FieldValue& value) {
+  const auto same = std::find(fields_.begin(), fields_.end(), value.info);
+  if (same != fields_.end()) {
+    answer.values[static_cast<std::size_t>(same - fields_.begin())] = value_of(value);
+    return;
+  }
+  fields_.push_back(value.info);
+  answer.columns.push_back(column_of(*value.info));
+  answer.values.push_back(value_of(value));
+}
+
+void AnswerSink::put_reading(const Reading& reading) {
+  for (std::size_t i = 0; i < fields_.size(); ++i) {
+    if (is_of_reading(fields_[i]->role) && !holds(*fields_[i], reading)) answer.values[i] = {};
+  }
+}
+
+}  // namespace absenc::client

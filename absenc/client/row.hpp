@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Named and typed values: what a command told, or one exchange of a capture.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "absenc/client/reading.hpp"
+
+namespace absenc::client {
+
+enum class Type : std::uint8_t { int64, uint64, real, boolean, flags, text, bytes };
+
+struct Column {
+  std::string_view name;
+  std::string_view unit;  // "" for a plain number
+  Type type;
+  std::string_view meaning;
+};
+
+using ByteVector = std::vector<std::uint8_t>;
+
+/// In the order of `Type`, behind nothing: it was not told, or does not hold. What does not hold is never shown.
+using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector>;
+
+/// "12.5", "yes", "over_heat battery_alarm", "1A 00"; "" for nothing.
+[[nodiscard]] std::string to_text(const Value& value);
+
+struct Row {
+  std::span<const Column> columns;  // of the maker of the row
+  std::vector<Value> values;        // one for each
+
+  /// Throws UsageError when there is no such column; it names the nearest.
+  [[nodiscard]] const Value& operator[](std::string_view name) const;
+  /// The same as a type of `Value`; throws std::bad_variant_access when it is another, or nothing.
+  template <class T>
+  [[nodiscard]] const T& get(std::string_view name) const {
+    return std::get<T>((*this)[name]);
+  }
+};
+
+[[nodiscard]] Column column_of(const FieldInfo& field);
+[[nodiscard]] Value value_of(const FieldValue& value);
+
+/// What a command told: a row that knows its columns.
+struct Answer {
+  std::vector<Column> columns;
+  std::vector<Value> values;
+
+  [[nodiscard]] Row row() const { return {columns, values}; }
+  [[nodiscard]] const Value& operator[](std::string_view name) const;
+};
+
+/// Makes an answer of fields; those of the position that does not hold are left empty. A field that comes again, as in
+/// a list, has its last value.
+class AnswerSink final : public FieldSink {
+ public:
+  void put(const FieldValue& value) override;
+  void put_reading(const Reading& reading) override;
+
+  Answer answer;
+
+ private:
+  std::vector<const FieldInfo*> fields_;
+};
+
+}  // namespace absenc::client

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Why an encoder did not do what it was asked, in words and with what went over the line.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/core/time.hpp"
+
+namespace absenc::client {
+
+/// A failed command in words. The texts but `error` may be empty.
+struct Trouble {
+  Error error = Error::none;
+  std::string message{};   // what happened, and what the reply turns out to be
+  std::string exchange{};  // what was sent, what came back and when
+  std::string advice{};    // what to try
+  std::string sent{};      // hexadecimal or as the link's wire text
+  std::string received{};
+
+  /// Of several lines, without the last line end.
+  [[nodiscard]] std::string text() const;
+};
+
+/// A bad exchange that was kept.
+struct KeptExchange {
+  Error error = Error::none;
+  Time at{};           // on the clock of the readings
+  std::string sent{};  // as the link's wire text
+  std::string received{};
+};
+
+/// A command that the encoder did not do, or a reading that failed.
+struct EncoderFailure : Failure {
+  explicit EncoderFailure(Trouble what_failed) : Failure(what_failed.text()), trouble(std::move(what_failed)) {}
+  Trouble trouble;
+};
+
+}  // namespace absenc::client

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any encoder by its name, as the command has it: tformat:/dev/ttyUSB0, ssi:spi:/dev/spidev0.0, sim:esl, elbow.
+#include <cstdio>
+#include <exception>
+
+#include "absenc/client/encoder.hpp"
+
+using namespace absenc;
+
+int main(int argc, char** argv) try {
+  client::Encoder encoder = client::open(argc > 1 ? argv[1] : "sim:tformat?motion=rpm=60");
+  for (const client::Sample& sample : encoder.samples({.rate_hz = 100, .count = 5})) {
+    if (sample.kind != client::Sample::Kind::reading) {
+      std::printf("%s%s\n", sample.message.c_str(), sample.trouble.text().c_str());
+      continue;
+    }
+    const Reading& reading = sample.reading;
+    if (!reading.singleturn_valid()) continue;  // nobody confirmed it, or the encoder says so itself
+    std::printf("%.4f degrees, %.1f rpm\n", degrees(reading.singleturn, reading.singleturn_bits), sample.speed);
+  }
+} catch (const std::exception& failure) {
+  std::fprintf(stderr, "%s\n", failure.what());
+  return 1;
+}
