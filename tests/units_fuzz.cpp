@@ -104,7 +104,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   Conversation<Item>* conversation = machine_of<Item>(unit.host(options, command, least_arguments(command), storage));
   if (conversation == nullptr) return;
   std::vector<Item> items = items_of<Item>(unit, input);
-  const bool clocks = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
+  const bool clocks = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
   Time now{};
   std::span<const Item> left{};
   bool unasked = true;
@@ -177,7 +177,7 @@ void run(const Unit& unit, const Options& options, const Command& command, Bytes
   const Bytes reply = input.first(std::min<std::size_t>(input.size(), command.verb == Verb::scan ? 8 : input.size()));
   converse<Item>(unit, options, command, reply, 1);
   converse<Item>(unit, options, command, reply, reply.size() + 1);
-  if (unit.link != LinkKind::exchange && unit.link != LinkKind::clocked) ask_device<Item>(unit, options, input);
+  if (unit.link != LinkKind::spi && unit.link != LinkKind::clocked) ask_device<Item>(unit, options, input);
 }
 
 }  // namespace

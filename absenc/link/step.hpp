@@ -19,7 +19,7 @@ template <class Item>
 struct Step {
   enum class Kind : std::uint8_t {
     wait,       // until the next event
-    transfer,   // not before `at`: send `out` (exchange: and receive max(out, expect) items; clocked: clock `bits`)
+    transfer,   // not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
     pulse,      // not before `at`: drive `line` active for `width`
     configure,  // switch this end of the line to the rate of `settings`; all else stays as it is
     emit,       // a result is ready to be looked at; ask again
@@ -42,7 +42,7 @@ struct Step {
 template <class Item>
 struct Event {
   enum class Kind : std::uint8_t {
-    sent,        // the transfer has left (exchange and clocked, device side: the host has stopped clocking)
+    sent,        // the transfer has left (spi and clocked, device side: the host has stopped clocking)
     received,    // `items` came
     silence,     // the `answer` or `gap` limit of the last step has passed
     timer,       // the `at` of the last wait has come
@@ -57,8 +57,8 @@ struct Event {
   std::size_t bits = 0;           // sent, device side of a clocked link: number of clocks seen
   Line line{};                    // triggered
   Time width{};                   // triggered: how long the pulse lasts; device side, selected on a clocked link and
-                                  // sent on an exchange: the period of the clock; 0: not known
-  Time lead{};                    // sent, device side of an exchange: from chip select to the first clock
+                                  // sent on an SPI link: the period of the clock; 0: not known
+  Time lead{};                    // sent, device side of an SPI link: from chip select to the first clock
 };
 
 /// After each `feed`, call `next` until it returns `wait` or `done`. Both in one context: interrupts queue events.

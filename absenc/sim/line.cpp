@@ -213,7 +213,7 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
   // A device asked by chip select or clock answers into the exchange that is going on.
   const bool driven = state.role == Role::device && step.kind == Step<Item>::Kind::transfer &&
-                      (kind_ == LinkKind::exchange || kind_ == LinkKind::clocked);
+                      (kind_ == LinkKind::spi || kind_ == LinkKind::clocked);
   if (!driven && state.doing != Step<Item>::Kind::wait) {
     throw std::logic_error("a machine began a transfer or pulse before its last one was sent");
   }

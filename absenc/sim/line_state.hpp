@@ -40,7 +40,7 @@ struct Line<Item>::State {
   std::size_t bits = 0;
   std::size_t expect = 0;
   Time width{};
-  Time lead{};  // exchange: from chip select to the first clock
+  Time lead{};  // spi: from chip select to the first clock
   absenc::Line pulse_line{};
   Time start{};             // of the transfer; CAN: of the frame
   std::size_t index = 0;    // the item on the wire

@@ -43,7 +43,7 @@ void Line<Item>::begin(Node node) {
       if (other == node) continue;
       feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .line = state.pulse_line, .width = state.width});
     }
-  } else if (kind_ == LinkKind::exchange || kind_ == LinkKind::clocked) {
+  } else if (kind_ == LinkKind::spi || kind_ == LinkKind::clocked) {
     begin_exchange(node);
   } else if (state.out.empty()) {
     schedule(Happening::Kind::finished, now_, node);
@@ -136,7 +136,7 @@ template <class Item>
 void Line<Item>::begin_exchange(Node node) {
   State& host = *nodes_[node];
   host.expect = kind_ == LinkKind::clocked ? (host.bits + 7) / 8 : std::max(host.out.size(), host.expect);
-  if (kind_ == LinkKind::exchange) host.bits = host.expect * 8;
+  if (kind_ == LinkKind::spi) host.bits = host.expect * 8;
   for (Node other = 0; other < nodes_.size(); ++other) {
     if (nodes_[other]->role == Role::host) continue;
     nodes_[other]->doing = Step<Item>::Kind::wait;
@@ -144,7 +144,7 @@ void Line<Item>::begin_exchange(Node node) {
     const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .width = period});
   }
-  if (kind_ == LinkKind::exchange) host.lead = host.settings.select_lead;
+  if (kind_ == LinkKind::spi) host.lead = host.settings.select_lead;
   schedule(Happening::Kind::exchanged, now_ + host.lead + host.settings.bits(host.bits), node);
 }
 
@@ -166,10 +166,10 @@ void Line<Item>::end_exchange(Node node) {
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (nodes_[other]->role == Role::host) continue;
       nodes_[other]->doing = Step<Item>::Kind::wait;
-      if (kind_ == LinkKind::exchange) {
+      if (kind_ == LinkKind::spi) {
         feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});
       }
-      const Time period = kind_ == LinkKind::exchange ? host.settings.bits(1) : Time{};
+      const Time period = kind_ == LinkKind::spi ? host.settings.bits(1) : Time{};
       feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period, .lead = host.lead});
     }
     finish(node);

@@ -52,7 +52,7 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings, Sink& sink)
     case LinkKind::full_duplex:
       wires_ = {{"host", true}, {"device", true}};
       break;
-    case LinkKind::exchange:
+    case LinkKind::spi:
       wires_ = {{"cs", true}, {"sck", (settings.spi_mode & 2) != 0}, {"mosi", false}, {"miso", true}};
       break;
     case LinkKind::clocked:

@@ -20,7 +20,7 @@ namespace absenc::sim {
 ///
 /// - half duplex: `line`; full duplex: `host` and `device`, by who drives the pair
 /// - beside these, when there were pulses: `trigger`, `clear`, which a pulse pulls to 0
-/// - exchange: `cs`, `sck`, `mosi`, `miso`; nobody on miso is 1
+/// - spi: `cs`, `sck`, `mosi`, `miso`; nobody on miso is 1
 /// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host takes each bit at the falling
 ///   edge behind. With `idle_clocks` that is so many clocks more than there are bits.
 /// - CAN: `can`, recessive is 1; every frame is acknowledged

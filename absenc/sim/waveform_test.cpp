@@ -56,7 +56,7 @@ std::string body(Picture& picture) {
 }
 
 TEST(Waveform, NamesItsWires) {
-  EXPECT_THAT(Picture(LinkKind::exchange, slow).vcd(),
+  EXPECT_THAT(Picture(LinkKind::spi, slow).vcd(),
               ::testing::StartsWith("$version absenc $end\n$timescale 1 ns $end\n$scope module test $end\n"
                                     "$var wire 1 ! cs $end\n$var wire 1 \" sck $end\n$var wire 1 # mosi $end\n"
                                     "$var wire 1 $ miso $end\n$upscope $end\n$enddefinitions $end\n#0\n"
@@ -71,7 +71,7 @@ TEST(Waveform, CommentsListTheItems) {
   waveform.character(Role::host, 5us, 15us, 0x1A);
   EXPECT_THAT(waveform.vcd(), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
                                         "$comment #7000 device 00 $end\n$scope"));
-  Picture spi(LinkKind::exchange, slow);
+  Picture spi(LinkKind::spi, slow);
   const std::array<std::uint8_t, 2> out{0x12, 0x34};
   const std::array<std::uint8_t, 2> in{0xAB, 0xCD};
   spi.exchange({0us, 16us, 16, out, in});
@@ -118,7 +118,7 @@ TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0x7F};
   const auto drawn = [&](std::uint8_t mode) {
-    Picture waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = mode});
+    Picture waveform(LinkKind::spi, {.rate = 1'000'000, .spi_mode = mode});
     waveform.exchange({1us, 9us, 8, out, in});
     return body(waveform);
   };
@@ -135,7 +135,7 @@ TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
 }
 
 TEST(Waveform, TheClockWaitsForTheChip) {
-  Picture waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us});
+  Picture waveform(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us});
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0xFF};
   waveform.exchange({1us, 14us, 8, out, in, 5us});
@@ -270,8 +270,8 @@ TEST_F(Sigrok, ReadsTheSamplesOfBiss) {
 TEST_F(Sigrok, ReadsAnExchangeInEveryMode) {
   for (std::uint8_t mode = 0; mode < 4; ++mode) {
     const LineSettings settings{.rate = 4'000'000, .spi_mode = mode};
-    Line<std::uint8_t> line(LinkKind::exchange, settings);
-    Picture waveform(LinkKind::exchange, settings);
+    Line<std::uint8_t> line(LinkKind::spi, settings);
+    Picture waveform(LinkKind::spi, settings);
     waveform.observe(line);
     toy::Toy<std::uint8_t> device([](auto& self, const Event<std::uint8_t>& event) {
       if (event.kind == Event<std::uint8_t>::Kind::selected) self.send({0xA1, 0x5E, 0xC3});

@@ -92,7 +92,7 @@ class Campaign {
   static sim::FaultRates rates_for(const Unit& unit, const Options& options, const Exchanges& wanted) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
-    if (unit.link == LinkKind::exchange) rates = {};                   // there a reply is as long as what is clocked
+    if (unit.link == LinkKind::spi) rates = {};                        // there a reply is as long as what is clocked
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum sees that
     if (wanted.requests_too) rates[FaultKind::request_corrupt] = 0.02;
     // Late enough to be given up, every other time. Nobody can tell how old it is what comes unasked.

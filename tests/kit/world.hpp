@@ -133,7 +133,7 @@ class World {
       const auto fault = static_cast<FaultKind>(kind);
       const bool keeps = fault == FaultKind::delay || fault == FaultKind::echo || fault == FaultKind::silence ||
                          fault == FaultKind::repeat;
-      if (!keeps || unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange) {
+      if (!keeps || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) {
         sum += faulty_->counts()[kind];
       }
     }
@@ -176,14 +176,14 @@ class World {
   // As host::Session has it.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
-    return unit_.link != LinkKind::exchange && unit_.link != LinkKind::clocked;
+    return unit_.link != LinkKind::spi && unit_.link != LinkKind::clocked;
   }
   void attach(Machine<Item>& machine) {
     if (node_ == none) {
       node_ = line_->attach(sim::Role::host, idle_, [this] { return !on_emit_ || on_emit_(); });
     }
     // How long a chip stays unselected between two conversations is up to who runs them.
-    if (unit_.link == LinkKind::exchange) pass(std::chrono::microseconds(20));
+    if (unit_.link == LinkKind::spi) pass(std::chrono::microseconds(20));
     line_->replace(node_, machine);
   }
 

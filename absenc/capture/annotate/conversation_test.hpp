@@ -131,7 +131,7 @@ class Talker {
                 .bits = exchange.bits + idle,
                 .in = std::vector<std::uint8_t>((exchange.bits + idle + 7) / 8),
                 .out = {}};
-    if (unit_.link == LinkKind::exchange) burst.out.assign(exchange.out.begin(), exchange.out.end());
+    if (unit_.link == LinkKind::spi) burst.out.assign(exchange.out.begin(), exchange.out.end());
     for (std::size_t i = 0; i < burst.bits; ++i) {
       const bool bit = i < idle || (exchange.in[(i - idle) / 8] >> (7 - (i - idle) % 8) & 1) != 0;
       if (bit) burst.in[i / 8] = static_cast<std::uint8_t>(burst.in[i / 8] | 0x80u >> i % 8);

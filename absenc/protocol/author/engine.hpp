@@ -52,7 +52,7 @@ class Engine : public Conversation<std::uint8_t> {
   void report(FieldSink&) const override {}
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
-  /// Begin of the last request, which a link that exchanges answers with what holds at that time.
+  /// Begin of the last request, which an SPI link answers with what holds at that time.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// End of the last request; of the last characters of its reply, before them that of the request.
   [[nodiscard]] Time sent_at() const { return sent_at_; }

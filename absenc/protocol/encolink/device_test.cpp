@@ -109,7 +109,7 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
             {fast, 5us, "clock faster than 4 MHz"},
             {early, 5us, "clock less than 5 us after NCS went low"}})) {
     Bench bench(testing::single, Wire::spi);
-    sim::Line<std::uint8_t> line{LinkKind::exchange, settings};
+    sim::Line<std::uint8_t> line{LinkKind::spi, settings};
     line.attach(sim::Role::device, bench.encoder);
     SpiHost host(pause);
     line.run(line.attach(sim::Role::host, host));

@@ -382,7 +382,7 @@ struct Definition {
   static constexpr std::string_view name = spi ? "RLS EncoLink (AksIM-2), SPI" : "RLS EncoLink (AksIM-2), UART";
   static constexpr std::string_view document =
       "Programming AksIM-2 encoders with EncoLink communication protocol, issue 2";
-  static constexpr LinkKind link = spi ? LinkKind::exchange : LinkKind::full_duplex;
+  static constexpr LinkKind link = spi ? LinkKind::spi : LinkKind::full_duplex;
   static constexpr LineSettings line(const Format&) { return spi ? spi_settings : uart_settings; }
   static constexpr LineTiming timing{.turnaround_limit = answer_limit};
   static constexpr auto& options = encolink::options;
