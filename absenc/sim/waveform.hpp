@@ -50,7 +50,7 @@ class Waveform {
 
   /// One asynchronous character.
   void character(Role sender, Time start, Time end, std::uint8_t byte);
-  void exchange(const Line<std::uint8_t>::Exchange& exchange);
+  void transfer(const Line<std::uint8_t>::Transfer& transfer);
   void frame(Time start, const CanFrame& frame);
   void pulse(absenc::Line line, Time start, Time end);
 
@@ -80,8 +80,8 @@ class Waveform {
   void drive(std::size_t wire, Time from, Time to);
   void comment(Time at, std::string words);
   std::size_t pulse_wire(std::string_view name);
-  void draw_clocked(const Line<std::uint8_t>::Exchange& exchange);
-  void draw_exchange(const Line<std::uint8_t>::Exchange& exchange);
+  void draw_clocked(const Line<std::uint8_t>::Transfer& transfer);
+  void draw_spi(const Line<std::uint8_t>::Transfer& transfer);
 
   LinkKind kind_;
   LineSettings settings_;

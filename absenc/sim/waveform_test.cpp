@@ -74,10 +74,10 @@ TEST(Waveform, CommentsListTheItems) {
   Picture spi(LinkKind::spi, slow);
   const std::array<std::uint8_t, 2> out{0x12, 0x34};
   const std::array<std::uint8_t, 2> in{0xAB, 0xCD};
-  spi.exchange({0us, 16us, 16, out, in});
+  spi.transfer({0us, 16us, 16, out, in});
   EXPECT_THAT(spi.vcd(), HasSubstr("$comment #0 mosi 12 34 miso AB CD $end\n"));
   Picture clocked(LinkKind::clocked, slow);
-  clocked.exchange({0us, 12us, 12, {}, in});
+  clocked.transfer({0us, 12us, 12, {}, in});
   EXPECT_THAT(clocked.vcd(), HasSubstr("$comment #0 12 bits AB CD $end\n"));
 }
 
@@ -114,12 +114,12 @@ TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   }
 }
 
-TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
+TEST(Waveform, SpiHasItsDataAtTheEdgeThatTheModeSays) {
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0x7F};
   const auto drawn = [&](std::uint8_t mode) {
     Picture waveform(LinkKind::spi, {.rate = 1'000'000, .spi_mode = mode});
-    waveform.exchange({1us, 9us, 8, out, in});
+    waveform.transfer({1us, 9us, 8, out, in});
     return body(waveform);
   };
   using ::testing::EndsWith;
@@ -138,7 +138,7 @@ TEST(Waveform, TheClockWaitsForTheChip) {
   Picture waveform(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us});
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0xFF};
-  waveform.exchange({1us, 14us, 8, out, in, 5us});
+  waveform.transfer({1us, 14us, 8, out, in, 5us});
   EXPECT_THAT(body(waveform),
               ::testing::StartsWith("#0\n1!\n0\"\n0#\n1$\n#1000\n0!\n#6000\n1\"\n1#\n#6500\n0\"\n#7000\n"));
 }
@@ -146,12 +146,12 @@ TEST(Waveform, TheClockWaitsForTheChip) {
 TEST(Waveform, ClockedBits) {
   Picture at_once(LinkKind::clocked, slow);
   const std::array<std::uint8_t, 1> bits{0x50};  // 010
-  at_once.exchange({1us, 4us, 3, {}, bits});
+  at_once.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(at_once),
             "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
             "#3500\n1!\n1\"\n#14000\n");
   Picture after_an_edge(LinkKind::clocked, {.rate = 1'000'000, .idle_clocks = 1});
-  after_an_edge.exchange({1us, 4us, 3, {}, bits});
+  after_an_edge.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(after_an_edge),
             "#0\n1!\n1\"\n#1000\n0!\n#1500\n1!\n0\"\n#2000\n0!\n#2500\n1!\n1\"\n#3000\n0!\n"
             "#3500\n1!\n0\"\n#4000\n0!\n#4500\n1!\n1\"\n#14500\n");
@@ -267,7 +267,7 @@ TEST_F(Sigrok, ReadsTheSamplesOfBiss) {
       bits);
 }
 
-TEST_F(Sigrok, ReadsAnExchangeInEveryMode) {
+TEST_F(Sigrok, ReadsSpiInEveryMode) {
   for (std::uint8_t mode = 0; mode < 4; ++mode) {
     const LineSettings settings{.rate = 4'000'000, .spi_mode = mode};
     Line<std::uint8_t> line(LinkKind::spi, settings);

@@ -341,13 +341,13 @@ std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked)
       frame.bytes.push_back(item);
     }
   });
-  world.line().observe_exchanges([&](const typename World<Item>::Line::Exchange& exchange) {
+  world.line().observe_transfers([&](const typename World<Item>::Line::Transfer& transfer) {
     if constexpr (!World<Item>::is_can) {
       const bool clocked = unit_.link == LinkKind::clocked;
-      Held reply{.link = unit_.link, .bytes = Wire(exchange.in.begin(), exchange.in.end())};
-      if (clocked) reply.bits = exchange.bits;
+      Held reply{.link = unit_.link, .bytes = Wire(transfer.in.begin(), transfer.in.end())};
+      if (clocked) reply.bits = transfer.bits;
       Held request{.link = unit_.link};
-      if (!clocked) request.bytes.assign(exchange.out.begin(), exchange.out.end());
+      if (!clocked) request.bytes.assign(transfer.out.begin(), transfer.out.end());
       frames.push_back({request, reply});
     }
   });
