@@ -293,7 +293,7 @@ TEST(Trigger, PulseBeforeEachFrame) {
       self.send({0xFF}, event.at + microseconds(30));
   });
   const auto pulse = [](ByteToy& toy, Time at, Time width) {
-    toy.push({.kind = Step<Byte>::Kind::pulse, .at = at, .width = width, .line = Line::trigger});
+    toy.push({.kind = Step<Byte>::Kind::pulse, .at = at, .width = width, .wire = ExtraWire::trigger});
   };
   ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));  // too short

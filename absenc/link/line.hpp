@@ -21,7 +21,7 @@ enum class LinkKind : std::uint8_t {
 enum class Parity : std::uint8_t { none, odd, even };
 
 /// Wires beside the data, each driven by the host.
-enum class Line : std::uint8_t { trigger, clear };
+enum class ExtraWire : std::uint8_t { trigger, clear };
 
 /// The rate of virtual encoders whose protocol leaves it open.
 inline constexpr std::uint32_t assumed_rate = 115'200;

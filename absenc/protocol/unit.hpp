@@ -188,7 +188,7 @@ struct Resolution {
 };
 
 /// Wires beside the data on which a host's pulses ask for something.
-struct ExtraLines {
+struct ExtraWires {
   bool trigger = false;  // each frame
   bool clear = false;    // the zero
 };
@@ -249,7 +249,7 @@ struct Unit {
   /// captures do not tell.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// What these options need beside the data; null: nothing.
-  ExtraLines (*extra_lines)(const Options& options) = nullptr;
+  ExtraWires (*extra_wires)(const Options& options) = nullptr;
   LineTiming timing{};
   /// Whether the encoder sends replies that nobody asks for; null: never. On clocked and CAN links it always may.
   bool (*streams)(const Options& options) = nullptr;

@@ -224,7 +224,7 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   state.bits = step.bits;
   state.expect = step.expect;
   state.width = step.width;
-  state.pulse_line = step.line;
+  state.pulse_wire = step.wire;
   ++state.begin_generation;
   // Not at once: whoever else is asked or attached at this time comes first, in whatever order.
   if (!driven) schedule(Happening::Kind::begin, step.at, node);

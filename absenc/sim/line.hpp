@@ -43,7 +43,7 @@ class Line {
   /// Called for every transfer of SPI or clocked bits, at its end.
   using TransferObserver = std::function<void(const Transfer& transfer)>;
   /// Called for every pulse, at its beginning.
-  using PulseObserver = std::function<void(absenc::Line line, Time start, Time end)>;
+  using PulseObserver = std::function<void(ExtraWire wire, Time start, Time end)>;
 
   Line(LinkKind kind, LineSettings settings);
   ~Line();

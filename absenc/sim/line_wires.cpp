@@ -38,10 +38,10 @@ void Line<Item>::begin(Node node) {
   state.index = 0;
   if (state.doing == Step<Item>::Kind::pulse) {
     schedule(Happening::Kind::finished, now_ + state.width, node);
-    if (pulse_observer_) pulse_observer_(state.pulse_line, now_, now_ + state.width);
+    if (pulse_observer_) pulse_observer_(state.pulse_wire, now_, now_ + state.width);
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (other == node) continue;
-      feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .line = state.pulse_line, .width = state.width});
+      feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .wire = state.pulse_wire, .width = state.width});
     }
   } else if (kind_ == LinkKind::spi || kind_ == LinkKind::clocked) {
     begin_transfer(node);

@@ -74,7 +74,7 @@ void Waveform::observe(Line<std::uint8_t>& observed) {
     transfer(seen);
     settle(observed.settled());
   });
-  observed.observe_pulses([this](absenc::Line by, Time start, Time end) { pulse(by, start, end); });
+  observed.observe_pulses([this](ExtraWire wire, Time start, Time end) { pulse(wire, start, end); });
 }
 
 void Waveform::observe(Line<CanFrame>& observed) {
@@ -164,8 +164,8 @@ void Waveform::frame(Time start, const CanFrame& frame) {
   end_ = std::max(end_, edge(count));
 }
 
-void Waveform::pulse(absenc::Line by, Time start, Time end) {
-  drive(pulse_wire(by == absenc::Line::trigger ? "trigger" : "clear"), start, end);
+void Waveform::pulse(ExtraWire wire, Time start, Time end) {
+  drive(pulse_wire(wire == ExtraWire::trigger ? "trigger" : "clear"), start, end);
 }
 
 std::size_t Waveform::pulse_wire(std::string_view name) {

@@ -52,7 +52,7 @@ class Waveform {
   void character(Role sender, Time start, Time end, std::uint8_t byte);
   void transfer(const Line<std::uint8_t>::Transfer& transfer);
   void frame(Time start, const CanFrame& frame);
-  void pulse(absenc::Line line, Time start, Time end);
+  void pulse(ExtraWire wire, Time start, Time end);
 
   /// The sink gets what is before `time`: nothing that is told later may begin before it.
   void settle(Time time);

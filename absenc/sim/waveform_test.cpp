@@ -159,8 +159,8 @@ TEST(Waveform, ClockedBits) {
 
 TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   Picture waveform(LinkKind::full_duplex, slow);
-  waveform.pulse(absenc::Line::trigger, 1us, 3us);
-  waveform.pulse(absenc::Line::clear, 5us, 6us);
+  waveform.pulse(ExtraWire::trigger, 1us, 3us);
+  waveform.pulse(ExtraWire::clear, 5us, 6us);
   EXPECT_THAT(waveform.vcd(), HasSubstr("$var wire 1 # trigger $end\n$var wire 1 $ clear $end\n"));
   EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
 }

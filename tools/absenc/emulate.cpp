@@ -123,14 +123,14 @@ void check_line(const Unit& unit, const Options& options, const Invocation& invo
   if (is_spi && chosen.empty()) {
     throw UsageError(fmt::format("{0} does not go over a serial line: use {1}, or sim:{0}", unit.id, instead));
   }
-  const ExtraLines lines = unit.extra_lines == nullptr ? ExtraLines{} : unit.extra_lines(options);
-  if (lines.trigger) {
+  const ExtraWires wires = unit.extra_wires == nullptr ? ExtraWires{} : unit.extra_wires(options);
+  if (wires.trigger) {
     throw UsageError(
         fmt::format("with these options a pulse asks {0} for each frame, and neither a pseudo-terminal nor TCP carries "
                     "pulses: use sim:{0} in place of a port, as in `absenc read \"sim:{0}?{1}\"`",
                     unit.id, fmt::join(invocation.texts("--option"), "&")));
   }
-  if (lines.clear) {
+  if (wires.clear) {
     print_message(fmt::format("note: nothing here carries the pulse that sets the zero: sim:{} does", unit.id));
   }
   if (!invocation.has("--also")) return;

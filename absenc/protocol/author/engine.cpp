@@ -74,7 +74,7 @@ ByteStep Engine::next(Time now) {
       size_ = 0;
       step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
       step.width = manner_.pulse;
-      step.line = manner_.line;
+      step.wire = manner_.wire;
       step.out = out_;
       step.expect = manner_.answered ? expected({}) : 0;
       step.at = std::max(earliest_, wire_.silence != Time{} ? now : Time{});

@@ -32,8 +32,8 @@ struct Manner {
                            // at, and that it ends by silence is enough
   Time answer_limit{};     // in place of that of the wire; 0: that
   Time hold{};             // after an error: so long the encoder may be busy with it all the same
-  Time pulse{};            // in place of bytes a pulse so long on `line`, whose edge is the request
-  Line line{};
+  Time pulse{};            // in place of bytes a pulse so long on `wire`, whose edge is the request
+  ExtraWire wire{};
 };
 
 /// A subclass says what a whole reply is, and what becomes of it. LineOf makes one from a protocol.

@@ -56,7 +56,7 @@ struct Declares {
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
 /// is none; `status`, `alarms`, `conditions`, `timing`, `covered`, `bits`, `memory`, `registers`, `over_spi`, `probe`,
-/// `streams`, `extra_lines` as in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they
+/// `streams`, `extra_wires` as in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they
 /// have there.
 template <class Definition>
 struct UnitOf {
@@ -448,7 +448,7 @@ struct UnitOf {
     if constexpr (requires { Definition::over_spi; }) unit.over_spi = Definition::over_spi;
     if constexpr (requires { Definition::probe; }) unit.probe = Definition::probe;
     if constexpr (requires { Definition::streams; }) unit.streams = Definition::streams;
-    if constexpr (requires { Definition::extra_lines; }) unit.extra_lines = Definition::extra_lines;
+    if constexpr (requires { Definition::extra_wires; }) unit.extra_wires = Definition::extra_wires;
     if constexpr (requires { Definition::explain(Format{}, Error::none, items({}), items({})); }) {
       unit.explain = explain;
     }

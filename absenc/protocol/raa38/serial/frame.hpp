@@ -215,9 +215,9 @@ struct Protocol {
   static constexpr author::Manner manner(const Format&, const Request& request) {
     switch (request.kind) {
       case Request::Kind::trigger:
-        return {.pulse = trigger_width, .line = Line::trigger};
+        return {.pulse = trigger_width, .wire = ExtraWire::trigger};
       case Request::Kind::clear:
-        return {.answered = false, .pulse = clear_width, .line = Line::clear};
+        return {.answered = false, .pulse = clear_width, .wire = ExtraWire::clear};
       default:
         return {.answered = request.kind == Request::Kind::read};
     }

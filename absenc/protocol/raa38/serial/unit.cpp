@@ -158,7 +158,7 @@ struct Definition : author::Declares<Definition, Protocol> {
     const Result<Request> asked = decode_request(request.bytes);
     return asked && asked->kind == Request::Kind::read;
   }
-  static ExtraLines extra_lines(const Options& values) {
+  static ExtraWires extra_wires(const Options& values) {
     const Format format = options.format(values);
     return {.trigger = format.mode == Mode::handshake, .clear = format.zeroing == Zeroing::line};
   }
