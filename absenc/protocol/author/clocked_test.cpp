@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absenc/protocol/author/clocked_device.hpp"
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 
 namespace absenc::author {
 namespace {

@@ -8,7 +8,7 @@
 #include <span>
 #include <string_view>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/make.hpp"
 #include "absenc/protocol/sentence.hpp"
 #include "absenc/protocol/unit.hpp"

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::author {
 

@@ -36,7 +36,7 @@ struct Manner {
   ExtraWire wire{};
 };
 
-/// A subclass says what a whole reply is, and what becomes of it. LineOf makes one from a protocol.
+/// A subclass says what a whole reply is, and what becomes of it. DialogOf makes one from a protocol.
 class Engine : public Conversation<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) final;

@@ -10,11 +10,11 @@
 #include <type_traits>
 
 #include "absenc/core/hex.hpp"
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/author/command.hpp"
 #include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/field.hpp"
-#include "absenc/protocol/author/line.hpp"
 #include "absenc/protocol/author/option.hpp"
 #include "absenc/protocol/author/text.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -38,7 +38,7 @@ struct Declares {
 
 /// A Definition has these, all static and constexpr:
 ///
-/// - `Protocol` (line.hpp, device.hpp; clocked_line.hpp), and `Encoder`, the virtual one, made of (format, shaft):
+/// - `Protocol` (dialog.hpp, device.hpp; clocked_host.hpp), and `Encoder`, the virtual one, made of (format, shaft):
 ///   BusDevice, ClockedDevice
 /// - `id`, `name`, `document`, `link`
 /// - `options`: OptionsOf (option.hpp), whose defaults are those of Format; or `Format format(const Options&)`

@@ -2,7 +2,7 @@
 // Host side of BiSS-C: the host drives MA and samples SLO.
 #pragma once
 
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/biss/frame.hpp"
 
 namespace absenc::biss {

@@ -10,7 +10,7 @@
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/hex.hpp"
 #include "absenc/core/text.hpp"
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/biss/frame.hpp"
 #include "absenc/protocol/e201/text.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
@@ -156,7 +156,7 @@ struct Reply {
   return reply;
 }
 
-/// author/line.hpp says what each of these is.
+/// author/dialog.hpp says what each of these is.
 struct Protocol {
   using Format = e201::Format;
   using Request = e201::Request;

@@ -6,7 +6,7 @@
 #include <array>
 #include <optional>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
 
 namespace absenc::encolink {
@@ -19,7 +19,7 @@ enum class Ask : std::uint8_t {
   identity,
 };
 
-/// author/line.hpp says what each of these is.
+/// author/dialog.hpp says what each of these is.
 struct Frames {
   using Format = encolink::Format;
   struct Request {

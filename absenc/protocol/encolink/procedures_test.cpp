@@ -284,17 +284,17 @@ TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
 }
 
 // After a refusal bytes of data may follow: the next access must not begin among them.
-author::Procedure read_twice(Line& line, Found& found) {
-  const Fate refused = co_await attempt_read(line, found, 0x1234, 20);
+author::Procedure read_twice(Dialog& dialog, Found& found) {
+  const Fate refused = co_await attempt_read(dialog, found, 0x1234, 20);
   if (refused != Fate::refused) co_return found.why;
-  const Fate good = co_await attempt_read(line, found, registers[temperature].address, 2);
+  const Fate good = co_await attempt_read(dialog, found, registers[temperature].address, 2);
   co_return good == Fate::good ? author::done : found.why;
 }
 
 struct Twice {
   using Format = encolink::Format;
-  using Line = encolink::Line;
-  static void put(FieldSink&, const Line&) {}
+  using Dialog = encolink::Dialog;
+  static void put(FieldSink&, const Dialog&) {}
 };
 
 TEST_P(EncolinkRegister, AnAccessAfterARefusal) {

@@ -63,7 +63,7 @@ struct Request {
 struct Protocol {
   using Format = encolink::Format;
   using Request = encolink::Request;
-  using Line = encolink::Line;
+  using Dialog = encolink::Dialog;
 
   static AccessBytes encode(const Format&, const Request& request) {
     if (request.access) return encode_access(*request.access);
@@ -154,7 +154,7 @@ struct Report {
   static void put(FieldSink& sink, const Run& run) {
     put_found(sink, run, run.found());
   }
-  static void put_found(FieldSink& sink, const Line& line, const Found& found) {
+  static void put_found(FieldSink& sink, const Dialog& dialog, const Found& found) {
     if (found.identity) {
       frame_fields.put(sink, {.identity = found.identity});
       if (found.identity->protocol_version == version::aksim4) {
@@ -164,7 +164,7 @@ struct Report {
     } else if (found.address) {
       put_register(sink, *found.address, found.data);
     } else {
-      put_position(sink, line.format(), line.last(), found.tells_status ? found.status : std::nullopt);
+      put_position(sink, dialog.format(), dialog.last(), found.tells_status ? found.status : std::nullopt);
     }
     for (const Found::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
     if (found.running) sink.put({&running_field, *found.running ? 1 : 0});

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "absenc/core/angle.hpp"
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/esl/frame.hpp"
 #include "absenc/protocol/esl/timing.hpp"
 

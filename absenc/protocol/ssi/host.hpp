@@ -2,7 +2,7 @@
 // Host side of SSI.
 #pragma once
 
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
 
 namespace absenc::ssi {

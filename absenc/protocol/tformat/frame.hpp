@@ -16,7 +16,7 @@
 #include "absenc/core/crc.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/protocol/author/device.hpp"
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::tformat {
 
