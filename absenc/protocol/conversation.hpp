@@ -84,7 +84,7 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
   /// Requests answered so far.
-  [[nodiscard]] virtual std::uint64_t answered() const = 0;
+  [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 
  protected:
   ~Device() = default;

@@ -71,11 +71,12 @@ class Campaign {
     raise_an_alarm();
     learn();
     if (asked_.empty()) return;
-    const std::uint64_t end = world_.device().answered() + exchanges;
-    const std::uint64_t begin = world_.device().answered();
-    for (unsigned idle = 0; world_.device().answered() < end && findings_.count() == 0 && idle < 10'000; ++idle) one();
+    const std::uint64_t end = world_.device().answer_count() + exchanges;
+    const std::uint64_t begin = world_.device().answer_count();
+    for (unsigned idle = 0; world_.device().answer_count() < end && findings_.count() == 0 && idle < 10'000; ++idle)
+      one();
     if (way_.is_model) change();
-    tally_.exchanges += world_.device().answered() - begin;
+    tally_.exchanges += world_.device().answer_count() - begin;
     tally_.misheard += world_.faulty().counts()[static_cast<std::size_t>(sim::FaultKind::request_corrupt)];
   }
 

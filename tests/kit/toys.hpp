@@ -153,7 +153,7 @@ struct Toy {
         before_ = now;
         at_ = event.at + std::chrono::microseconds(3);
         speaks_ = true;
-        ++answered_;
+        ++answer_count_;
       }
     }
     Step<std::uint8_t> next(Time) override {
@@ -173,7 +173,7 @@ struct Toy {
     [[nodiscard]] std::uint32_t memory_version() const override { return 0; }
     [[nodiscard]] std::span<const Violation> violations() const override { return {}; }
     [[nodiscard]] std::uint32_t violation_count() const override { return 0; }
-    [[nodiscard]] std::uint64_t answered() const override { return answered_; }
+    [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }
 
    private:
     const Shaft& shaft_;
@@ -182,7 +182,7 @@ struct Toy {
     unsigned before_ = 0;
     Time at_{};
     bool speaks_ = false;
-    std::uint64_t answered_ = 0;
+    std::uint64_t answer_count_ = 0;
     std::array<std::uint8_t, length> reply_{};
   };
 

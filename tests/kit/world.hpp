@@ -96,7 +96,7 @@ class World {
     result.made = true;
     const std::uint64_t changed = changed_bytes();
     const std::uint64_t faults = all_faults();
-    const std::uint64_t answered = device_->answered();
+    const std::uint64_t answered = device_->answer_count();
     const bool is_guarded = guarded(command);
     if (is_guarded) guard_.attach(*conversation, unit_, options_, !command.changes_encoder);
     on_emit_ = [&] {
@@ -114,7 +114,7 @@ class World {
     if (conversation->reading() != nullptr) result.seen.reading = *conversation->reading();
     result.damaged = changed_bytes() - changed;
     result.faults = all_faults() - faults;
-    result.asked = device_->answered() - answered;
+    result.asked = device_->answer_count() - answered;
     if constexpr (!is_can) {
       const auto exchange = conversation->exchange();
       result.sent.assign(exchange.sent.begin(), exchange.sent.end());

@@ -47,7 +47,7 @@ std::string fault_counts(const sim::FaultCounts& faults) {
 
 template <class Item>
 void print_rules(const Device<Item>& encoder, const VirtualDevice& device, std::string_view name, Time start) {
-  print_message(fmt::format("{}{} requests answered in {}", name, encoder.answered(), to_text(os::now() - start)));
+  print_message(fmt::format("{}{} requests answered in {}", name, encoder.answer_count(), to_text(os::now() - start)));
   if (device.faults() != nullptr) print_note(fmt::format("  faults injected: {}", fault_counts(*device.faults())));
   if (encoder.violation_count() == 0) return;
   print_note(fmt::format("  rules that the host broke: {}", encoder.violation_count()));

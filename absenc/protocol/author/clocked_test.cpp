@@ -136,7 +136,7 @@ TEST(ClockedDevice, DrivesOnceForEachSelectionWhileItIsOn) {
   };
   const auto clocked = [&device](Time at, std::size_t bits) {
     device.feed({.kind = Kind::sent, .at = at, .bits = bits});
-    return device.answered();
+    return device.answer_count();
   };
   EXPECT_FALSE(select(0us));
   device.power_on(0us, Device::PowerOn::real);

@@ -141,7 +141,7 @@ TEST_P(EncolinkRegister, WhatCannotBeAskedIsTheCallersFault) {
   EXPECT_EQ(bench.run("memory-read", {0x1234}).error, Error::invalid_argument);
   EXPECT_EQ(bench.run("memory-write", {0x2E, 256}).error, Error::invalid_argument);
   EXPECT_EQ(bench.run("memory-write", {0x49, 0x63}).error, Error::invalid_argument);
-  EXPECT_EQ(bench.device.answered(), 0u);
+  EXPECT_EQ(bench.device.answer_count(), 0u);
 }
 
 TEST_P(EncolinkRegister, BusyForEverEndsWhilePositionsGoOn) {

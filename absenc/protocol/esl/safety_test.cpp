@@ -396,7 +396,7 @@ TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
   line.attach(sim::Role::device, faulty);
   host::testing::GuardedHost<std::uint8_t> host(unit, line);
   unsigned safe = 0;
-  while (encoder.answered() < 50'000) {
+  while (encoder.answer_count() < 50'000) {
     shaft.put(static_cast<std::int64_t>(random.below(65536)), static_cast<std::int64_t>(random.below(1 << 24)));
     if (random.chance(0.05)) encoder.raise_alarms(1u << random.below(8));
     if (random.chance(0.05)) encoder.lower_alarms(0xFF);
