@@ -254,7 +254,7 @@ struct Unit {
   /// Whether the encoder sends replies that nobody asks for; null: never. On clocked and CAN links it always may.
   bool (*streams)(const Options& options) = nullptr;
   /// Whether this request, a good one, is answered; null: every one is.
-  bool (*answered)(const Options& options, Frame request) = nullptr;
+  bool (*is_answered)(const Options& options, Frame request) = nullptr;
   /// How long after what was last heard this good request may be sent again; null: at once.
   Time (*pause)(const Options& options, Frame request) = nullptr;
   std::span<const Condition> conditions{};  // that can be set of the virtual encoder, also while it runs

@@ -35,8 +35,8 @@ class Judge {
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
   }
 
-  [[nodiscard]] bool answered(const Frame& request) const {
-    return unit_->answered == nullptr || unit_->answered(options_, request);
+  [[nodiscard]] bool is_answered(const Frame& request) const {
+    return unit_->is_answered == nullptr || unit_->is_answered(options_, request);
   }
   [[nodiscard]] bool streams() const { return unit_->streams != nullptr && unit_->streams(options_); }
 

@@ -56,8 +56,8 @@ struct Declares {
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
 /// is none; `status`, `alarms`, `conditions`, `timing`, `covered`, `bits`, `memory`, `registers`, `over_spi`, `probe`,
-/// `streams`, `extra_wires` as in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they
-/// have there.
+/// `streams`, `extra_wires` as in Unit; and `decode`, `delimit`, `is_answered` themselves, with the parameters that
+/// they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -216,9 +216,9 @@ struct UnitOf {
   }
   static constexpr LineSettings settings(const Options& values) { return line_of(format(values)); }
 
-  static bool answered(const Options& values, Frame asked) {
-    if constexpr (requires { Definition::answered(values, asked); }) {
-      return Definition::answered(values, asked);
+  static bool is_answered(const Options& values, Frame asked) {
+    if constexpr (requires { Definition::is_answered(values, asked); }) {
+      return Definition::is_answered(values, asked);
     } else {
       const Format f = format(values);
       const Result<Request> request = P::decode_request(f, items(asked));
@@ -435,7 +435,7 @@ struct UnitOf {
       P::decode_request(Format{}, Bytes{});
       P::manner(Format{}, Request{});
     };
-    if constexpr (by_manner || requires { &Definition::answered; }) unit.answered = answered;
+    if constexpr (by_manner || requires { &Definition::is_answered; }) unit.is_answered = is_answered;
     if constexpr (by_manner && requires { P::manner(Format{}, Request{}).pause; }) unit.pause = pause;
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;

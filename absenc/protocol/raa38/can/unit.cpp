@@ -141,7 +141,7 @@ struct Definition : author::Declares<Definition, Protocol> {
     return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
   }
   // Nothing answers NMT, SYNC and emergencies, nor the command that enters the configuration.
-  static bool answered(const Options&, Frame request) {
+  static bool is_answered(const Options&, Frame request) {
     const Function function = function_of(*request.can);
     if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;
     const OrderInfo* const asked = order_of(*request.can);

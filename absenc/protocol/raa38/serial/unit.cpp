@@ -154,7 +154,7 @@ struct Definition : author::Declares<Definition, Protocol> {
   static constexpr Request guess_request(const Format&, Bytes) { return {Request::Kind::trigger}; }
   // A pulse is no byte either.
   static bool streams(const Options& values) { return options.format(values).mode != Mode::bus; }
-  static bool answered(const Options&, Frame request) {
+  static bool is_answered(const Options&, Frame request) {
     const Result<Request> asked = decode_request(request.bytes);
     return asked && asked->kind == Request::Kind::read;
   }
