@@ -30,7 +30,7 @@ struct Toy {
   static Manner manner(const Format& format, const Request& request) {
     return {.attempts = 3,
             .pause = 2ms,
-            .answered = request != 0x7F,
+            .expects_reply = request != 0x7F,
             .ends_by_silence = format.ends_by_silence,
             .hold = 5ms};
   }

@@ -76,7 +76,7 @@ ByteStep Engine::next(Time now) {
       step.width = manner_.pulse;
       step.wire = manner_.wire;
       step.out = out_;
-      step.expect = manner_.answered ? expected({}) : 0;
+      step.expect = manner_.expects_reply ? expected({}) : 0;
       step.at = std::max(earliest_, wire_.silence != Time{} ? now : Time{});
       begun_at_ = std::max(now, earliest_);
       break;
@@ -142,7 +142,7 @@ void Engine::sent(Time at) {
   sent_at_ = at - manner_.pulse;
   received_at_ = at;
   if (state_ != State::sending) return;
-  if (!manner_.answered) return conclude_with(Error::none);
+  if (!manner_.expects_reply) return conclude_with(Error::none);
   state_ = disturbed_ ? State::settling : State::receiving;
   if (size_ != 0) received({});  // what came during a pulse
 }

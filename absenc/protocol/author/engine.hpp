@@ -26,7 +26,7 @@ struct Wire {
 struct Manner {
   unsigned attempts = 1;         // how often it is sent before its error counts
   Time pause{};                  // before it is repeated: from what was last sent or heard
-  bool answered = true;          // false: no reply is due, and none is waited for
+  bool expects_reply = true;     // false: no reply is due, and none is waited for
   bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
   bool any_reply = false;  // no document says what its reply is, or whether there is one: what comes is not looked
                            // at, and that it ends by silence is enough

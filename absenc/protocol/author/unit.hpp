@@ -224,7 +224,7 @@ struct UnitOf {
       const Result<Request> request = P::decode_request(f, items(asked));
       if (!request) return true;
       const Manner manner = P::manner(f, *request);
-      return manner.answered && !manner.any_reply;
+      return manner.expects_reply && !manner.any_reply;
     }
   }
 

@@ -217,9 +217,9 @@ struct Protocol {
       case Request::Kind::trigger:
         return {.pulse = trigger_width, .wire = ExtraWire::trigger};
       case Request::Kind::clear:
-        return {.answered = false, .pulse = clear_width, .wire = ExtraWire::clear};
+        return {.expects_reply = false, .pulse = clear_width, .wire = ExtraWire::clear};
       default:
-        return {.answered = request.kind == Request::Kind::read};
+        return {.expects_reply = request.kind == Request::Kind::read};
     }
   }
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
