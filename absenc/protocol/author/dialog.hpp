@@ -112,7 +112,7 @@ class ReadPosition : public HostOf<P> {
   }
 
  private:
-  void answered(Error error) final {
+  void concluded(Error error) final {
     if (error == Error::none) reading_ = this->last_reading();
     this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
   }
@@ -241,7 +241,7 @@ class DialogOf : public HostOf<P>, public Routine {
     must_ = must;
     HostOf<P>::ask(next_, asking_, earliest_);
   }
-  void answered(Error error) final {
+  void concluded(Error error) final {
     failure_ = error;
     if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
     resume();

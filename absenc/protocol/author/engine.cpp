@@ -176,7 +176,7 @@ void Engine::conclude_with(Error error) {
     return start(manner_.pause == Time{} ? Time{} : received_at_ + manner_.pause);
   }
   state_ = State::over;  // unless the subclass goes on
-  answered(error);
+  concluded(error);
 }
 
 void Engine::end_noise(State before) {

@@ -95,7 +95,7 @@ class Engine : public Conversation<std::uint8_t> {
   /// that is wrong more may be coming, which must not meet the next request.
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
   /// `none`, or why the last attempt failed. Calls `send`, `sleep` or `finish`.
-  virtual void answered(Error error) = 0;
+  virtual void concluded(Error error) = 0;
   virtual void woken() {}
   /// While it listens; nothing: a damaged character.
   virtual void heard(Bytes) {}

@@ -68,7 +68,7 @@ ReadPosition::ReadPosition(const Format& format) : HostOf(format) {
   ask({format.known() ? Ask::position : Ask::identify});
 }
 
-void ReadPosition::answered(Error error) {
+void ReadPosition::concluded(Error error) {
   if (error != Error::none) return finish({.error = error});
   if (request().ask == Ask::identify) return go_on(Ask::identity);
   if (request().ask == Ask::identity) {

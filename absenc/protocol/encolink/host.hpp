@@ -71,7 +71,7 @@ class ReadPosition : public author::HostOf<Frames> {
   [[nodiscard]] const Channels& channels() const { return channels_; }
 
  private:
-  void answered(Error error) final;
+  void concluded(Error error) final;
   void go_on(Ask next) { ask({next}, received_at() + Frames::pause(format())); }
 
   Channels channels_;

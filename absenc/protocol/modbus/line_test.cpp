@@ -62,7 +62,7 @@ class ToyClient final : public author::Engine {
     return crc_order(bytes) == CrcOrder::low_first ? Error::none : Error::bad_checksum;
   }
   bool is_whole(Error) const override { return false; }
-  void answered(Error error) override {
+  void concluded(Error error) override {
     if (error != Error::none || --left_ == 0) return finish({.error = error});
     send(frame_, {}, {});
   }
