@@ -150,7 +150,7 @@ struct EvidenceSink {
   ~EvidenceSink() = default;
 };
 
-/// Where a value, or a part of it, stands in a frame. Bits count as those of `Unit::covered`: on lines of characters
+/// Where a value, or a part of it, stands in a frame. Bits count as those of `Unit::is_checked`: on lines of characters
 /// the last of a range is the most significant, on clocked links the first.
 struct BitRange {
   std::size_t first = 0;
@@ -234,7 +234,7 @@ struct Unit {
   Resolution (*resolution)(const Options& options);
   /// Whether a flip of this bit of this good reply must be noticed; null: every bit. Bits count from the least
   /// significant of the first byte on; on clocked links in the order of the wire.
-  bool (*covered)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
+  bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// Where this good reply has a field that it carries: no ranges where it has it in no fixed place, or makes it of
   /// something else. Null: not told of any.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;

@@ -25,7 +25,7 @@ class Decoding {
   void good_reply() {
     std::size_t flipped = 0;
     for (std::size_t bit = 0; bit < reply_.bit_count(); ++bit) {
-      if (unit_.covered != nullptr && !unit_.covered(options_, request_.frame(), reply_.frame(), bit)) continue;
+      if (unit_.is_checked != nullptr && !unit_.is_checked(options_, request_.frame(), reply_.frame(), bit)) continue;
       ++flipped;
       refused(reply_.flipped(bit), [&] { return "with bit " + std::to_string(bit) + " flipped"; });
     }

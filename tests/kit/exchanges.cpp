@@ -283,9 +283,9 @@ class Campaign {
     if (unchecked) return *unchecked;
     const auto frames = frames_of(asked);
     const auto open = [&](const std::pair<Held, Held>& one) {
-      if (unit_.covered == nullptr) return false;
+      if (unit_.is_checked == nullptr) return false;
       for (std::size_t bit = 0; bit < one.second.bit_count(); ++bit) {
-        if (unit_.covered(world_.options(), one.first.frame(), one.second.frame(), bit)) return false;
+        if (unit_.is_checked(world_.options(), one.first.frame(), one.second.frame(), bit)) return false;
       }
       return true;
     };

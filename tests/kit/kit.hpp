@@ -9,7 +9,7 @@
 
 namespace absenc::kit {
 
-/// Every vector through `decode` and `delimit`: whole, cut at each element, with each bit flipped that is covered, one
+/// Every vector through `decode` and `delimit`: whole, cut at each element, with each bit flipped that is checked, one
 /// reply too many.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 

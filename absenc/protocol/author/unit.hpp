@@ -55,9 +55,9 @@ struct Declares {
 /// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
-/// is none; `status`, `alarms`, `conditions`, `timing`, `covered`, `bits`, `memory`, `registers`, `over_spi`, `probe`,
-/// `streams`, `extra_wires` as in Unit; and `decode`, `delimit`, `is_answered` themselves, with the parameters that
-/// they have there.
+/// is none; `status`, `alarms`, `conditions`, `timing`, `is_checked`, `bits`, `memory`, `registers`, `over_spi`,
+/// `probe`, `streams`, `extra_wires` as in Unit; and `decode`, `delimit`, `is_answered` themselves, with the parameters
+/// that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -442,7 +442,7 @@ struct UnitOf {
     if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
     if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
-    if constexpr (requires { Definition::covered; }) unit.covered = Definition::covered;
+    if constexpr (requires { Definition::is_checked; }) unit.is_checked = Definition::is_checked;
     if constexpr (requires { &Definition::bits; }) unit.bits = Definition::bits;
     if constexpr (requires { Definition::registers; }) unit.registers = Definition::registers;
     if constexpr (requires { Definition::over_spi; }) unit.over_spi = Definition::over_spi;

@@ -137,7 +137,7 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
 
 // The byte of channel 2 stands behind the checksum of a position frame; one that means nothing may stand behind that of
 // the identity.
-bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
+bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = options.format(values);
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
@@ -404,7 +404,7 @@ struct Definition {
   static constexpr auto& registers = register_infos;
   static constexpr const Unit* over_spi = spi ? nullptr : &spi_unit;
   static constexpr auto probe = encolink::probe;
-  static constexpr auto covered = encolink::covered;
+  static constexpr auto is_checked = encolink::is_checked;
   static bool streams(const Options& values) { return format(values).stream_rate > 0; }
 
   static constexpr Format format(const Options& values) {

@@ -135,7 +135,7 @@ struct Definition : author::Declares<Definition, Protocol> {
     return {Delimit::Kind::complete, bytes.size()};
   }
   // The CRC of CAN is the controller's: here only what must be as it is.
-  static bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
+  static bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
     if (is_only_named(function_of(*reply.can))) return false;
     const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
     return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
