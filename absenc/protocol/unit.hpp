@@ -164,7 +164,7 @@ using BitRanges = Buffer<BitRange, 8>;
 enum class Direction : std::uint8_t { request, reply };
 
 /// Where a frame ends in a run of bytes.
-struct Delimit {
+struct FrameEnd {
   enum class Kind : std::uint8_t {
     complete,    // the first `size` bytes are one frame
     incomplete,  // a frame may have begun; at least `size` bytes in all are needed
@@ -226,7 +226,7 @@ struct Unit {
   /// The request of a command; on CAN links its text, as in vectors. Errors: invalid_argument, buffer_too_small.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
-  Delimit (*delimit)(const Options& options, Direction direction, Bytes bytes);
+  FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);

@@ -111,8 +111,8 @@ struct Feeding {
     }
     if (whole.error == Error::none && vector.error == Error::none) require_report(whole);
     // A byte after a complete good reply belongs to whatever comes next: it is found there.
-    const Delimit end = unit.delimit(options, Direction::reply, vector.reply);
-    if (end.kind != Delimit::Kind::complete || end.size >= reply.bytes.size()) {
+    const FrameEnd end = unit.frame_end(options, Direction::reply, vector.reply);
+    if (end.kind != FrameEnd::Kind::complete || end.size >= reply.bytes.size()) {
       const Outcome pieces = converse(bytewise(reply.bytes));
       require(pieces.error == whole.error && pieces.seen.fields == whole.seen.fields,
               [] { return "another result when it comes byte by byte"; });

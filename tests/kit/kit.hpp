@@ -9,8 +9,8 @@
 
 namespace absenc::kit {
 
-/// Every vector through `decode` and `delimit`: whole, cut at each element, with each bit flipped that is checked, one
-/// reply too many.
+/// Every vector through `decode` and `frame_end`: whole, cut at each element, with each bit flipped that is checked,
+/// one reply too many.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
 /// Where the unit says that the fields of good replies stand: vectors, those that a flip makes of them, and what the

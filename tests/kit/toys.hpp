@@ -206,9 +206,9 @@ struct Toy {
     request[0] = ask;
     return std::size_t{1};
   }
-  static Delimit delimit(const Options&, Direction direction, Bytes bytes) {
+  static FrameEnd frame_end(const Options&, Direction direction, Bytes bytes) {
     const std::size_t size = direction == Direction::request ? 1 : length;
-    return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
+    return {bytes.size() < size ? FrameEnd::Kind::incomplete : FrameEnd::Kind::complete, size};
   }
   static BitRanges places(const Options&, Frame, Frame, const FieldInfo& field) {
     BitRanges ranges;
@@ -252,7 +252,7 @@ inline constexpr Unit unit = [] {
   made.device_storage = sizeof(typename Made::Encoder);
   made.decode = Made::decode;
   made.encode = Made::encode;
-  made.delimit = Made::delimit;
+  made.frame_end = Made::frame_end;
   made.host = Made::host;
   made.bits = Made::places;
   made.device = Made::device;

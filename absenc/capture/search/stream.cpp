@@ -16,11 +16,10 @@ constexpr std::size_t least_frames = 3;  // good ones
 
 // The size of the good reply that the first byte begins, or 0.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
-  const Delimit delimit = unit.delimit(options, Direction::reply, bytes);
-  if (delimit.kind != Delimit::Kind::complete || delimit.size == 0 || delimit.size > bytes.size()) return 0;
-  const HeardExchange reply{
-      .reply = {.bytes = {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(delimit.size)}}};
-  return explains(unit, options, reply) ? delimit.size : 0;
+  const FrameEnd end = unit.frame_end(options, Direction::reply, bytes);
+  if (end.kind != FrameEnd::Kind::complete || end.size == 0 || end.size > bytes.size()) return 0;
+  const HeardExchange reply{.reply = {.bytes = {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end.size)}}};
+  return explains(unit, options, reply) ? end.size : 0;
 }
 
 // How often noise has a good reply where one is looked for.

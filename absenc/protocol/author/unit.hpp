@@ -56,8 +56,8 @@ struct Declares {
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
 /// is none; `status`, `alarms`, `conditions`, `timing`, `is_checked`, `bits`, `memory`, `registers`, `over_spi`,
-/// `probe`, `streams`, `extra_wires` as in Unit; and `decode`, `delimit`, `is_answered` themselves, with the parameters
-/// that they have there.
+/// `probe`, `streams`, `extra_wires` as in Unit; and `decode`, `frame_end`, `is_answered` themselves, with the
+/// parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -169,17 +169,17 @@ struct UnitOf {
     }
   }
 
-  static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
-    if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
-      return Definition::delimit(values, direction, bytes);
+  static constexpr FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
+    if constexpr (requires { Definition::frame_end(values, direction, bytes); }) {
+      return Definition::frame_end(values, direction, bytes);
     } else if constexpr (Clocked<P>) {
-      return {Delimit::Kind::complete, bytes.size()};  // the pause of the clock ends a frame
+      return {FrameEnd::Kind::complete, bytes.size()};  // the pause of the clock ends a frame
     } else {
-      if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
+      if (bytes.empty()) return {FrameEnd::Kind::incomplete, 1};
       const std::size_t size =
           direction == Direction::request ? request_size(values, bytes) : reply_size(values, bytes);
-      if (size == 0) return {Delimit::Kind::no_frame};
-      return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
+      if (size == 0) return {FrameEnd::Kind::no_frame};
+      return {bytes.size() < size ? FrameEnd::Kind::incomplete : FrameEnd::Kind::complete, size};
     }
   }
 
@@ -426,7 +426,7 @@ struct UnitOf {
               .device_storage = sizeof(typename Definition::Encoder),
               .decode = decode,
               .encode = encode,
-              .delimit = delimit,
+              .frame_end = frame_end,
               .host = host,
               .device = device,
               .resolution = resolution,

@@ -131,8 +131,8 @@ struct Definition : author::Declares<Definition, Protocol> {
     return values.error();
   }
   // The controller of the bus does it.
-  static constexpr Delimit delimit(const Options&, Direction, Bytes bytes) {
-    return {Delimit::Kind::complete, bytes.size()};
+  static constexpr FrameEnd frame_end(const Options&, Direction, Bytes bytes) {
+    return {FrameEnd::Kind::complete, bytes.size()};
   }
   // The CRC of CAN is the controller's: here only what must be as it is.
   static bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {

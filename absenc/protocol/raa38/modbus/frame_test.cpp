@@ -106,10 +106,10 @@ TEST(Raa38ModbusFrame, EndsAreFoundInARun) {
   struct Row {
     Direction way;
     Wire bytes;
-    Delimit::Kind kind;
+    FrameEnd::Kind kind;
     std::size_t size = 0;
   };
-  using enum Delimit::Kind;
+  using enum FrameEnd::Kind;
   const Row rows[]{
       {Direction::request, {0x01, 0x03, 0, 0, 0, 1, 0x84, 0x0A, 0x01}, complete, 8},
       {Direction::request, {0xFF, 0xA0, 0x40, 0x38, 0x01}, complete, 4},
@@ -121,7 +121,7 @@ TEST(Raa38ModbusFrame, EndsAreFoundInARun) {
       {Direction::reply, {0x01, 0x03, 0x04, 0x1F, 0xAB, 0xCD, 0xCB, 0x99, 0x00}, complete, 8},
   };
   for (const Row& row : rows) {
-    const Delimit end = modbus_unit.delimit(options_of({}), row.way, row.bytes);
+    const FrameEnd end = modbus_unit.frame_end(options_of({}), row.way, row.bytes);
     EXPECT_EQ(end.kind, row.kind);
     EXPECT_TRUE(row.size == 0 || end.size == row.size) << end.size;
   }
