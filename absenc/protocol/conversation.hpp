@@ -25,7 +25,7 @@ struct Exchange {
 
 /// An error in words: more than its own text has. Either may be empty.
 struct Explanation {
-  std::string_view found{};   // which step failed, what was found
+  std::string_view detail{};  // which step failed, what was found
   std::string_view advice{};  // what to do, in place of the error's own advice
 };
 

@@ -43,7 +43,7 @@ class Engine : public Conversation<std::uint8_t> {
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override {
-    return outcome_.detail.empty() ? noise_.explanation().found : outcome_.detail;
+    return outcome_.detail.empty() ? noise_.explanation().detail : outcome_.detail;
   }
   [[nodiscard]] std::string_view advice() const override {
     return outcome_.advice.empty() ? noise_.explanation().advice : outcome_.advice;

@@ -140,7 +140,7 @@ namespace {
 // The last exchange in words, for when others have followed.
 Outcome failure(const Dialog& dialog, Error error) {
   const Explanation what = explain(dialog.format(), error, dialog.exchange().sent, dialog.reply());
-  return {error, dialog.is_noisy() ? endless_noise.found : what.found,
+  return {error, dialog.is_noisy() ? endless_noise.detail : what.detail,
           what.advice.empty() ? text_of(error).advice : what.advice};
 }
 

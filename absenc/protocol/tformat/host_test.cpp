@@ -76,7 +76,7 @@ TEST(TformatHost, ARefusalIsExplained) {
   struct Row {
     std::uint8_t alarm;
     std::string_view command;
-    std::string_view found;
+    std::string_view detail;
     bool again;
   };
   for (const Row& row : {Row{status::parity_error, "position", "ca0: it received", true},
@@ -86,7 +86,7 @@ TEST(TformatHost, ARefusalIsExplained) {
     Bench bench(refuse(0, 9, row.alarm));
     const auto read = bench.run(row.command);
     EXPECT_EQ(read.error, Error::request_rejected);
-    EXPECT_TRUE(read.says(row.found)) << read.detail;
+    EXPECT_TRUE(read.says(row.detail)) << read.detail;
     EXPECT_EQ(read.advice.starts_with("send the same request again"), row.again);
     EXPECT_EQ(read.advice.empty(), !row.again);
     EXPECT_EQ(bench.encoder.answer_count(), 1u);

@@ -94,7 +94,7 @@ Part<Look> look(Dialog& dialog, Time pause = {}) {
   // Other frames follow before the end is told.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
-  co_return Look{counts ? done : only(counts.error(), words.found, words.advice), *counts};
+  co_return Look{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
 }
 
 // ---- Commands whose answer looks like a position: no position counts until the time for the answer is over. The node

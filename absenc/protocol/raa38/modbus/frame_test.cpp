@@ -64,7 +64,7 @@ TEST(Raa38ModbusFrame, AnAddressIsFrom1To247AndEveryRefusalHasWords) {
     EXPECT_EQ(error_of({}, ask, {0xFF, 0xA0, byte}), i >= 1 && i <= 247 ? Error::none : Error::out_of_range) << i;
     const Wire refusal = framed({1, 0x83, byte});
     EXPECT_EQ(decode_reply({}, one_register, refusal).error(), Error::request_rejected) << i;
-    EXPECT_TRUE(says(explain({}, Error::request_rejected, hex<"010300000001840a">, refusal).found, "exception")) << i;
+    EXPECT_TRUE(says(explain({}, Error::request_rejected, hex<"010300000001840a">, refusal).detail, "exception")) << i;
   }
   EXPECT_EQ(error_of({}, ask, {0x01, 0xA0, 0x01}), Error::unexpected_reply);
   EXPECT_EQ(error_of({}, one_register, {2, 0x83, 2}), Error::unexpected_reply);

@@ -119,7 +119,7 @@ Part<Result<Reply>> look(Dialog& dialog, std::uint8_t address, unsigned attempts
   Request request = read_request(dialog.format());
   request.address = address;
   if (request.registers == 1 && dialog.format().bits > 16) {
-    co_await dialog.stop(only(Error::invalid_argument, too_few_registers.found, too_few_registers.advice));
+    co_await dialog.stop(only(Error::invalid_argument, too_few_registers.detail, too_few_registers.advice));
   }
   Result<Reply> reply = Error::timeout;
   for (unsigned i = 0; i < attempts; ++i) {
@@ -211,7 +211,7 @@ Procedure find_baud(Dialog& dialog, Found& found) {
     co_return {there ? Error::none : reply.error()};
   }
   dialog.set_rate(bauds[own]);
-  if (first.error() != Error::timeout) co_return only(first.error(), reason.found, reason.advice);
+  if (first.error() != Error::timeout) co_return only(first.error(), reason.detail, reason.advice);
   co_return only(Error::timeout, "nobody answers at this address at any of the five baud rates",
                  "`absenc scan` asks every address; then check supply and A/B");
 }

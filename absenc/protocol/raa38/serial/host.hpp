@@ -38,7 +38,7 @@ class Listen final : public Conversation<std::uint8_t> {
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] bool streams() const override { return true; }
   [[nodiscard]] Error error() const override { return error_; }
-  [[nodiscard]] std::string_view detail() const override { return words_.found; }
+  [[nodiscard]] std::string_view detail() const override { return words_.detail; }
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
