@@ -311,14 +311,14 @@ class Attempt {
     }
     read_all(read, options, exchanges);
     ++findings_.searches;
-    std::vector<Hypothesis> found = capture::explain(unit_, known, exchanges);
+    std::vector<Hypothesis> found = capture::find_hypotheses(unit_, known, exchanges);
     // What explains more than what was asked with may also ask better.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
       std::vector<HeardExchange> again;
       read_all(read, found.front().options, again);
       ++findings_.searches;
-      std::vector<Hypothesis> better = capture::explain(unit_, known, again);
+      std::vector<Hypothesis> better = capture::find_hypotheses(unit_, known, again);
       if (!better.empty() && better.front().chance() < found.front().chance()) found = std::move(better);
     }
     keep(found, settings, encoder);

@@ -114,7 +114,7 @@ std::vector<HeardExchange> split_stream(const Unit& unit, const Options& options
   return replies;
 }
 
-std::vector<Hypothesis> explain_stream(const Unit& unit, Bytes bytes, Time duration) {
+std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Time duration) {
   std::vector<Hypothesis> found;
   if (bytes.empty()) return found;
   const std::vector<Options> all = stream_options(unit);
