@@ -59,7 +59,7 @@ struct Difference {
 template <class Item>
 class Campaign {
  public:
-  Campaign(const Unit& unit, const Configuration& way, const Exchanges& wanted, std::uint64_t seed, Tally& tally,
+  Campaign(const Unit& unit, const Configuration& way, const ExchangeTest& wanted, std::uint64_t seed, Tally& tally,
            Findings& findings)
       : unit_(unit), way_(way), random_(seed), world_(unit, way.options, seed), tally_(tally), findings_(findings) {
     rates_ = rates_for(unit, way.options, wanted);
@@ -90,7 +90,7 @@ class Campaign {
     std::vector<std::string> varying{};  // fields that are not the same each time
   };
 
-  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const Exchanges& wanted) {
+  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const ExchangeTest& wanted) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
     if (unit.link == LinkKind::spi) rates = {};                        // there a reply is as long as what is clocked
@@ -376,7 +376,7 @@ void judge_weights(const Tally& tally, Findings& findings) {
 }
 
 template <class Item>
-void exchange(const Unit& unit, const Exchanges& wanted, Tally& tally, Findings& findings) {
+void exchange(const Unit& unit, const ExchangeTest& wanted, Tally& tally, Findings& findings) {
   const std::vector<Configuration> ways = configurations(unit);
   for (std::uint64_t round = 0; tally.exchanges < wanted.count && findings.count() == 0; ++round) {
     if (round > 100 + wanted.count / 100) {
@@ -398,7 +398,7 @@ void exchange(const Unit& unit, const Exchanges& wanted, Tally& tally, Findings&
 
 }  // namespace
 
-Findings check_exchanges(const Unit& unit, const Exchanges& wanted) {
+Findings check_exchanges(const Unit& unit, const ExchangeTest& wanted) {
   Findings findings;
   Tally tally;
   if (unit.link == LinkKind::can) {

@@ -50,11 +50,11 @@ namespace absenc::kit {
 /// Host against virtual encoder in virtual time, over a line with every kind of fault. The shaft's place is known, and
 /// so is what each command says of it on an undamaged line: anything else is an error where no byte of the conversation
 /// was damaged, and elsewhere so rare as the check of the frames allows.
-struct Exchanges {
+struct ExchangeTest {
   std::uint64_t count = 100'000;
   std::uint64_t seed = 0;
   bool requests_too = false;  // also what the encoder hears is damaged
 };
-[[nodiscard]] Findings check_exchanges(const Unit& unit, const Exchanges& exchanges);
+[[nodiscard]] Findings check_exchanges(const Unit& unit, const ExchangeTest& test);
 
 }  // namespace absenc::kit

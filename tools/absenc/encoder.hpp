@@ -38,8 +38,8 @@ struct Trouble {
   [[nodiscard]] Json json() const;
 };
 
-/// A bad exchange that was kept.
-struct KeptExchange {
+/// A bad exchange that was kept (host::BadExchange), for people.
+struct BadExchangeText {
   Error error = Error::none;
   Time at{};           // on the clock of the readings
   std::string sent{};  // as the link's wire text
@@ -79,7 +79,7 @@ class Encoder {
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
   /// The last bad exchanges, the newest first.
-  [[nodiscard]] virtual std::vector<KeptExchange> bad_exchanges() const = 0;
+  [[nodiscard]] virtual std::vector<BadExchangeText> bad_exchanges() const = 0;
   /// Bytes or frames over the line so far, both ways.
   [[nodiscard]] virtual std::uint64_t items() const = 0;
   /// The clock of the readings.

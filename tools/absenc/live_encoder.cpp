@@ -90,9 +90,9 @@ Sample LiveEncoder::search() {
 
 double LiveEncoder::rate() const { return rate_.per_second(os::now()); }
 
-std::vector<KeptExchange> LiveEncoder::bad_exchanges() const {
-  std::vector<KeptExchange> exchanges = encoder_->bad_exchanges();
-  for (KeptExchange& exchange : exchanges) exchange.at += offset_;
+std::vector<BadExchangeText> LiveEncoder::bad_exchanges() const {
+  std::vector<BadExchangeText> exchanges = encoder_->bad_exchanges();
+  for (BadExchangeText& exchange : exchanges) exchange.at += offset_;
   return exchanges;
 }
 

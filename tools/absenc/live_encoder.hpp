@@ -66,7 +66,7 @@ class LiveEncoder {
   /// Good readings a second.
   [[nodiscard]] double rate() const;
   /// As Encoder::bad_exchanges, with times of os::now.
-  [[nodiscard]] std::vector<KeptExchange> bad_exchanges() const;
+  [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
   /// A sentence when the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;
 

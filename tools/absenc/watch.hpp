@@ -41,9 +41,9 @@ struct Snapshot {
   Time median{};               // of the latencies
   Time percentile_99{};
   Time longest{};
-  std::vector<std::string> trace{};   // only with details; the newest last
-  std::vector<KeptExchange> bad{};    // only with details; the newest first
-  std::vector<std::string> fields{};  // only with details: "name value", of the last reply what the reading lacks
+  std::vector<std::string> trace{};    // only with details; the newest last
+  std::vector<BadExchangeText> bad{};  // only with details; the newest first
+  std::vector<std::string> fields{};   // only with details: "name value", of the last reply what the reading lacks
 };
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);
@@ -93,7 +93,7 @@ class Watch {
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
-  bool restarted_ = false;  // by the reading before
+  bool restarted_ = false;     // by the reading before
   bool command_runs_ = false;  // it is not broken off
 
   std::jthread thread_;  // last: it uses all of the others
