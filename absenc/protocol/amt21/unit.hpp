@@ -58,7 +58,7 @@ struct Protocol {
   using Reply = amt21::Reply;
   static constexpr std::size_t longest_reply = 2;
 
-  static constexpr author::Wire wire(const Format& format) {
+  static constexpr author::HostTimes host_times(const Format& format) {
     const Time character = format.line().character();
     return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
   }

@@ -24,7 +24,7 @@ struct Toy {
   using Request = std::uint8_t;
   using Reply = std::uint8_t;
   static constexpr std::size_t longest_reply = 1;
-  static Wire wire(const Format& format) {
+  static HostTimes host_times(const Format& format) {
     return {.answer_limit = 1ms, .gap_limit = 100us, .silence = format.silence};
   }
   static Manner manner(const Format& format, const Request& request) {

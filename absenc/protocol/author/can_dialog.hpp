@@ -5,7 +5,7 @@
 //   struct Protocol {
 //     using Item = CanFrame;
 //     using Format, Request = CanFrame;
-//     static CanWire wire(const Format&);
+//     static CanHostTimes host_times(const Format&);
 //     static ByteBuffer<N> encode(const Format&, const CanFrame&);   // the text of a frame, as in vectors
 //   };
 #pragma once
@@ -29,7 +29,7 @@ class DialogOf<P> : public CanEngine, public Routine {
   [[nodiscard]] const Format& format() const { return format_; }
 
   // What is heard begins with one of these.
-  void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::wire(format_), pause); }
+  void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;

@@ -22,7 +22,7 @@ struct Toy {
   };
   using Reply = std::uint8_t;
   static constexpr unsigned most_clocks = 20;
-  static ClockedWire wire(const Format& format) { return {format.rate, 30us}; }
+  static ClockedHostTimes host_times(const Format& format) { return {format.rate, 30us}; }
   static unsigned clocks(const Format& format) { return format.first_clocks; }
   static Result<Reply> decode(const Format&, BitView bits) {
     if (bits.load(0, 8) == 0xFF) return Error::line_stuck;

@@ -20,7 +20,7 @@ namespace absenc::author {
 ///   struct Protocol {
 ///     using Format, Request, Reply;                                  // Format: what the options make of them
 ///     static constexpr std::size_t longest_reply;                    // bytes
-///     static Wire wire(const Format&);
+///     static HostTimes host_times(const Format&);
 ///     static Manner manner(const Format&, const Request&);
 ///     static ByteBuffer<N> encode(const Format&, const Request&);
 ///     static std::size_t reply_size(const Format&, const Request&);              // 0: it is not answered
@@ -55,7 +55,7 @@ class HostOf : public Engine {
   }
 
  protected:
-  explicit HostOf(const Format& format) : Engine(P::wire(format), storage_), format_(format) {}
+  explicit HostOf(const Format& format) : Engine(P::host_times(format), storage_), format_(format) {}
   ~HostOf() = default;
 
   /// What was not known of the encoder it has told.
@@ -195,10 +195,11 @@ class DialogOf : public HostOf<P>, public Routine {
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
   /// This end of the line speaks at `rate` from here on; where the times of the line follow the rate, the protocol has
-  /// `wire(format, rate)`.
+  /// `host_times(format, rate)`.
   void set_rate(std::uint32_t rate) {
     HostOf<P>::set_rate(rate);
-    if constexpr (requires { P::wire(this->format(), rate); }) this->set_wire(P::wire(this->format(), rate));
+    if constexpr (requires { P::host_times(this->format(), rate); })
+      this->set_times(P::host_times(this->format(), rate));
   }
   /// Nothing is sent for so long, which what is awaited next begins: `heard` tells what comes, until it is over.
   void listen(Time duration) {

@@ -62,12 +62,12 @@ ByteStep Engine::next(Time now) {
   }
   if (state_ == State::ending && now < earliest_) return {.at = earliest_};
   ByteStep step{.at = never,
-                .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : wire_.answer_limit,
-                .gap = wire_.gap_limit};
+                .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : times_.answer_limit,
+                .gap = times_.gap_limit};
   switch (state_) {
     case State::ready: {
-      const Time quiet = received_at_ + wire_.silence;
-      if (wire_.silence != Time{} && now < std::max(quiet, earliest_)) return {.at = std::max(quiet, earliest_)};
+      const Time quiet = received_at_ + times_.silence;
+      if (times_.silence != Time{} && now < std::max(quiet, earliest_)) return {.at = std::max(quiet, earliest_)};
       state_ = State::sending;
       disturbed_ = false;
       noise_.clear();
@@ -77,7 +77,7 @@ ByteStep Engine::next(Time now) {
       step.wire = manner_.wire;
       step.out = out_;
       step.expect = manner_.expects_reply ? expected({}) : 0;
-      step.at = std::max(earliest_, wire_.silence != Time{} ? now : Time{});
+      step.at = std::max(earliest_, times_.silence != Time{} ? now : Time{});
       begun_at_ = std::max(now, earliest_);
       break;
     }

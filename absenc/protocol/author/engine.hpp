@@ -14,8 +14,8 @@
 
 namespace absenc::author {
 
-/// The times of a line, as its document has them.
-struct Wire {
+/// The times of a host on its line, as the document has them.
+struct HostTimes {
   Time answer_limit{};          // from the end of a request to the first character of its reply, at the most
   Time gap_limit{};             // between two characters of it, at the most
   Time silence{};               // of the line before each request; what is heard meanwhile begins it anew
@@ -30,7 +30,7 @@ struct Manner {
   bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
   bool any_reply = false;  // no document says what its reply is, or whether there is one: what comes is not looked
                            // at, and that it ends by silence is enough
-  Time answer_limit{};     // in place of that of the wire; 0: that
+  Time answer_limit{};     // in place of that of the line; 0: that
   Time hold{};             // after an error: so long the encoder may be busy with it all the same
   Time pulse{};            // in place of bytes a pulse so long on `wire`, whose edge is the request
   ExtraWire wire{};
@@ -66,7 +66,7 @@ class Engine : public Conversation<std::uint8_t> {
 
  protected:
   /// `storage`: for a reply, longer than the longest, so that one that is too long is noticed.
-  Engine(const Wire& wire, MutableBytes storage) : wire_(wire), noise_(wire.patience), storage_(storage) {}
+  Engine(const HostTimes& times, MutableBytes storage) : times_(times), noise_(times.patience), storage_(storage) {}
   ~Engine() = default;
 
   /// Sends `request`, which must stay until it is answered, not before `earliest`.
@@ -76,7 +76,7 @@ class Engine : public Conversation<std::uint8_t> {
   /// This end of the line is set to `rate` before anything else is sent, and before the end.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
   /// Its times are others from here on, as they are at another rate.
-  void set_wire(const Wire& wire) { wire_ = wire; }
+  void set_times(const HostTimes& times) { times_ = times; }
   /// Nothing is sent until `time`; then `woken`.
   void sleep(Time time);
   /// Nothing is sent for `duration`, which the next step begins: `heard` for all that comes, `woken` at the end.
@@ -121,7 +121,7 @@ class Engine : public Conversation<std::uint8_t> {
   void end_noise(State before);
   void start(Time earliest);
 
-  Wire wire_;
+  HostTimes times_;
   Noise noise_;
   MutableBytes storage_;
   std::size_t size_ = 0;

@@ -163,7 +163,7 @@ struct Protocol {
   using Reply = e201::Reply;
   static constexpr std::size_t longest_reply = 32;  // nobody says how long a line may be: three times that is kept
 
-  static constexpr author::Wire wire(const Format&) {
+  static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
   }
   static constexpr author::Manner manner(const Format&, const Request& request) {

@@ -29,7 +29,9 @@ struct Frames {
   using Reply = Position;  // of the identity nothing
   static constexpr std::size_t longest_reply = identity_bytes;
 
-  static constexpr author::Wire wire(const Format&) { return {.answer_limit = answer_limit, .gap_limit = gap_limit}; }
+  static constexpr author::HostTimes host_times(const Format&) {
+    return {.answer_limit = answer_limit, .gap_limit = gap_limit};
+  }
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   static std::size_t expected(const Format& format, const Request& request, Bytes);

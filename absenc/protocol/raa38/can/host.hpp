@@ -23,7 +23,7 @@ struct Protocol {
   using Format = can::Format;
   using Request = CanFrame;
 
-  static constexpr author::CanWire wire(const Format&) { return {answer_limit, busy_limit}; }
+  static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
   /// "220:8020000000000000"
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
     constexpr std::string_view digits = "0123456789abcdef";

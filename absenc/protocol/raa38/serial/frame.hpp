@@ -207,7 +207,7 @@ struct Protocol {
   using Reply = Position;
   static constexpr std::size_t longest_reply = frame_capacity;
 
-  static constexpr author::Wire wire(const Format& format) {
+  static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = format.acquisition > Time{} ? format.acquisition + answer_slack : answer_limit,
             .gap_limit = std::max(format.transmission, gap_limit),
             .patience = patience};
