@@ -80,7 +80,7 @@ TEST_F(SpiEncoder, Biss) {
 }
 
 TEST_F(SpiEncoder, Encolink) {
-  const encolink::Format format{.resolution = 20, .multiturn_bits = 16, .wire = encolink::Wire::spi};
+  const encolink::Format format{.resolution = 20, .multiturn_bits = 16, .interface = encolink::Interface::spi};
   const auto read = [&](encolink::VirtualEncoder& encoder, const SpiChoice& choice) {
     FakeSpi controller;
     encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);
@@ -111,7 +111,7 @@ TEST_F(SpiEncoder, Encolink) {
 
 TEST_F(SpiEncoder, EncolinkNoticesAClockTooSoonAfterChipSelect) {
   encolink::Format format = encolink::virtual_format;
-  format.wire = encolink::Wire::spi;
+  format.interface = encolink::Interface::spi;
   for (const Time lead : {Time{}, Time{4000}, Time{5000}}) {
     encolink::VirtualEncoder encoder(format, shaft);
     encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);

@@ -38,9 +38,9 @@ struct Frames {
   /// Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of decode_identity.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
   /// SPI has brought all there is; on a UART more may be coming.
-  static bool is_whole(const Format& format, Error) { return format.wire == Wire::spi; }
+  static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
   /// How long after a frame the next one may begin.
-  static Time pause(const Format& format) { return format.wire == Wire::spi ? spi_pause : Time{}; }
+  static Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
 /// What the frames of a conversation say together: the position, and cycles of channel 2, a byte a frame, from a reset

@@ -249,7 +249,7 @@ constexpr CommandOf<Protocol> listen(const Command& info) {
           .size = sizeof(Listen)};
 }
 
-constexpr bool streams(const Format& format) { return format.wire == Wire::uart && format.stream_rate > 0; }
+constexpr bool streams(const Format& format) { return format.interface == Interface::uart && format.stream_rate > 0; }
 
 constexpr Command read_position{"position", Verb::read, 0, "position, turns, and the alarms when there are any"};
 constexpr std::array commands_of_unit{
@@ -372,12 +372,12 @@ struct FieldTable {
   std::span<const FieldInfo> infos;
 };
 
-/// What the document says of both wires, and of each.
-template <Wire wire>
+/// What the document says of both interfaces, and of each.
+template <Interface interface>
 struct Definition {
   using Protocol = encolink::Protocol;
   using Encoder = VirtualEncoder;
-  static constexpr bool spi = wire == Wire::spi;
+  static constexpr bool spi = interface == Interface::spi;
   static constexpr std::string_view id = spi ? "encolink-spi" : "encolink";
   static constexpr std::string_view name = spi ? "RLS EncoLink (AksIM-2), SPI" : "RLS EncoLink (AksIM-2), UART";
   static constexpr std::string_view document =
@@ -409,7 +409,7 @@ struct Definition {
 
   static constexpr Format format(const Options& values) {
     Format made = options.format(values);
-    made.wire = wire;
+    made.interface = interface;
     return made;
   }
   // Those of the virtual encoder where they are asked from the real one.
@@ -431,7 +431,7 @@ struct Definition {
 
 }  // namespace
 
-constinit const Unit unit = author::UnitOf<Definition<Wire::uart>>::make();
-constinit const Unit spi_unit = author::UnitOf<Definition<Wire::spi>>::make();
+constinit const Unit unit = author::UnitOf<Definition<Interface::uart>>::make();
+constinit const Unit spi_unit = author::UnitOf<Definition<Interface::spi>>::make();
 
 }  // namespace absenc::encolink
