@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shape Step, Event, Machine (link/step.hpp) carries every kind of wire: toy machines in virtual time, with
+// The shape Step, Event, Machine (link/step.hpp) carries every kind of link: toy machines in virtual time, with
 // exact times. Host and device of every conversation are machines of the same kind.
 #include <gtest/gtest.h>
 

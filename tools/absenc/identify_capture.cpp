@@ -119,7 +119,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
       for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // it is spoken on another kind of wire
+    } catch (const UsageError& error) {  // it is spoken on another kind of link
       findings.refusals.emplace_back(error.what());
     } catch (const ToolFailure& failure) {
       findings.refusals.emplace_back(failure.what());
