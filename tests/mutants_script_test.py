@@ -43,9 +43,9 @@ void Device::hear(Time at) {
   }
 }
 
-Procedure zero(Line& line) {
-  co_await line.ask({Ask::zero});
-  if (!near((co_await line.ask({Ask::position}).after(210ms)).counts, 0)) co_return {Error::cross_check_failed, "no"};
+Procedure zero(Dialog& dialog) {
+  co_await dialog.ask({Ask::zero});
+  if (!near((co_await dialog.ask({Ask::position}).after(210ms)).counts, 0)) co_return {Error::cross_check_failed, "no"};
 }
 """
 
@@ -68,7 +68,7 @@ class Rules(unittest.TestCase):
             ("never", "|| bytes[0] != format.id", ""),
             ("never", "format.strict && (bytes[1] & 0x0F) != 0", "false"),
             ("never", "bytes[2] == 7", "true"),
-            ("never", "!near((co_await line.ask({Ask::position}).after(210ms)).counts, 0)", "false"),
+            ("never", "!near((co_await dialog.ask({Ask::position}).after(210ms)).counts, 0)", "false"),
             ("drop", "format.strict &&", ""),
             ("drop", "&& (bytes[1] & 0x0F) != 0", ""),
             ("edge", "<", "<="),
@@ -104,7 +104,7 @@ class Rules(unittest.TestCase):
         self.assertEqual(sum(rule == "half" and "character" in before for rule, before, _ in self.found), 1)
 
     def test_steps_of_procedures(self):
-        self.assertIn(("skip", "co_await line.ask({Ask::zero})", ""), self.found)
+        self.assertIn(("skip", "co_await dialog.ask({Ask::zero})", ""), self.found)
 
     def test_constants(self):
         for change in (("number", "8", "(8 + 1)"), ("number", "3", "(3 + 1)"), ("bit", "0x0F", "(0x0F ^ 1)")):

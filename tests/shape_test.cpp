@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shape Step, Event, Machine (link/step.hpp) carries every kind of wire: toy machines in virtual time, with
+// The shape Step, Event, Machine (link/step.hpp) carries every kind of link: toy machines in virtual time, with
 // exact times. Host and device of every conversation are machines of the same kind.
 #include <gtest/gtest.h>
 
@@ -104,7 +104,7 @@ TEST(Stream, ManyResultsWithoutARequest) {
 
 // (c) Full-duplex SPI, EncoLink's way: every frame brings position, its check and one byte of a register access;
 // the host's second byte carries the request for it. The access needs four frames, each of which is a reading too.
-class ExchangeDevice final : public Machine<Byte> {
+class SpiDevice final : public Machine<Byte> {
  public:
   void feed(const Event<Byte>& event) override {
     if (event.kind == Kind::selected) {
@@ -139,7 +139,7 @@ class ExchangeDevice final : public Machine<Byte> {
   Byte address_ = 0;
 };
 
-class ExchangeHost final : public Machine<Byte> {
+class SpiHost final : public Machine<Byte> {
  public:
   void read_register(Byte address) { requests_ = {0xCD, address}; }
   void feed(const Event<Byte>& event) override {
@@ -175,10 +175,10 @@ class ExchangeHost final : public Machine<Byte> {
   bool value_next_ = false;
 };
 
-TEST(Exchange, RegisterAccessRidesInPositionFrames) {
-  sim::Line<Byte> line(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1});
-  ExchangeDevice device;
-  ExchangeHost host;
+TEST(Spi, RegisterAccessRidesInPositionFrames) {
+  sim::Line<Byte> line(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1});
+  SpiDevice device;
+  SpiHost host;
   std::string results;
   line.attach(Role::device, device);
   const auto node = line.attach(Role::host, host, [&] {
@@ -293,7 +293,7 @@ TEST(Trigger, PulseBeforeEachFrame) {
       self.send({0xFF}, event.at + microseconds(30));
   });
   const auto pulse = [](ByteToy& toy, Time at, Time width) {
-    toy.push({.kind = Step<Byte>::Kind::pulse, .at = at, .width = width, .line = Line::trigger});
+    toy.push({.kind = Step<Byte>::Kind::pulse, .at = at, .width = width, .wire = ExtraWire::trigger});
   };
   ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));  // too short

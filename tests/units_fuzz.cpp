@@ -64,11 +64,11 @@ void decode(const Unit& unit, const Options& options, Bytes input) {
   }
 }
 
-void delimit(const Unit& unit, const Options& options, Bytes input) {
+void find_frame_end(const Unit& unit, const Options& options, Bytes input) {
   for (const Direction direction : {Direction::request, Direction::reply}) {
-    const Delimit end = unit.delimit(options, direction, input);
-    if (end.kind == Delimit::Kind::complete) require(end.size <= input.size() && (end.size > 0 || input.empty()));
-    if (end.kind == Delimit::Kind::incomplete) require(end.size > input.size() || end.size == 0);
+    const FrameEnd end = unit.frame_end(options, direction, input);
+    if (end.kind == FrameEnd::Kind::complete) require(end.size <= input.size() && (end.size > 0 || input.empty()));
+    if (end.kind == FrameEnd::Kind::incomplete) require(end.size > input.size() || end.size == 0);
   }
 }
 
@@ -104,7 +104,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   Conversation<Item>* conversation = machine_of<Item>(unit.host(options, command, least_arguments(command), storage));
   if (conversation == nullptr) return;
   std::vector<Item> items = items_of<Item>(unit, input);
-  const bool clocks = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
+  const bool clocks = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
   Time now{};
   std::span<const Item> left{};
   bool unasked = true;
@@ -177,7 +177,7 @@ void run(const Unit& unit, const Options& options, const Command& command, Bytes
   const Bytes reply = input.first(std::min<std::size_t>(input.size(), command.verb == Verb::scan ? 8 : input.size()));
   converse<Item>(unit, options, command, reply, 1);
   converse<Item>(unit, options, command, reply, reply.size() + 1);
-  if (unit.link != LinkKind::exchange && unit.link != LinkKind::clocked) ask_device<Item>(unit, options, input);
+  if (unit.link != LinkKind::spi && unit.link != LinkKind::clocked) ask_device<Item>(unit, options, input);
 }
 
 }  // namespace
@@ -191,7 +191,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Command& command = unit.commands[data[2] % unit.commands.size()];
   const Bytes input(data + 3, size - 3);
   decode(unit, options, input);
-  delimit(unit, options, input);
+  find_frame_end(unit, options, input);
   probe(unit, options, input);
   if (unit.link == LinkKind::can) {
     run<CanFrame>(unit, options, command, input);

@@ -47,7 +47,7 @@ struct Character {
   bool is_break = false;
 };
 
-/// A run of clocks: an SPI exchange between two edges of chip select, or a clocked word between two pauses.
+/// A run of clocks: an SPI transfer between two edges of chip select, or a clocked word between two pauses.
 struct Burst {
   Tick begin = 0;
   Tick end = 0;

@@ -27,7 +27,7 @@ namespace {
 EncoderAddress virtual_address(std::string_view text) {
   EncoderAddress address = parse_address("sim:" + std::string(text));
   const LinkKind link = address.unit->link;
-  if (link != LinkKind::exchange && link != LinkKind::clocked) return address;
+  if (link != LinkKind::spi && link != LinkKind::clocked) return address;
   throw UsageError(fmt::format("{} ({}) does not go over a pseudo-terminal: open it as sim:{}", address.unit->id,
                                line_of(*address.unit), address.unit->id));
 }
@@ -155,8 +155,8 @@ void Emulation::set_condition(std::string_view name, std::int64_t value) {
   service_->carry_out([this, index, value](Time now) { service_->device.set_condition(index, value, now); });
 }
 
-std::uint64_t Emulation::answered() const {
-  return service_->ask([](const auto& device) { return device.answered(); });
+std::uint64_t Emulation::answer_count() const {
+  return service_->ask([](const auto& device) { return device.answer_count(); });
 }
 
 std::uint32_t Emulation::violations() const {

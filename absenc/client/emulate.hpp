@@ -46,7 +46,7 @@ class Emulation {
   void set_condition(std::string_view name, std::int64_t value);
 
   /// Requests that were answered.
-  [[nodiscard]] std::uint64_t answered() const;
+  [[nodiscard]] std::uint64_t answer_count() const;
   /// Rules of the document that the host broke, and the first of them; "": none.
   [[nodiscard]] std::uint32_t violations() const;
   [[nodiscard]] std::string first_violation() const;

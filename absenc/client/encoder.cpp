@@ -166,9 +166,9 @@ Sample Encoder::search() {
 
 double Encoder::rate() const { return rate_.per_second(os::now()); }
 
-std::vector<KeptExchange> Encoder::bad_exchanges() const {
-  std::vector<KeptExchange> exchanges = connection_->bad_exchanges();
-  for (KeptExchange& exchange : exchanges) exchange.at += offset_;
+std::vector<BadExchangeText> Encoder::bad_exchanges() const {
+  std::vector<BadExchangeText> exchanges = connection_->bad_exchanges();
+  for (BadExchangeText& exchange : exchanges) exchange.at += offset_;
   return exchanges;
 }
 

@@ -102,7 +102,7 @@ class Encoder {
   /// From the end of a request to the end of its reply.
   [[nodiscard]] const host::Latencies& latencies() const;
   /// The last bad exchanges, the newest first, with times of os::now.
-  [[nodiscard]] std::vector<KeptExchange> bad_exchanges() const;
+  [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
   /// Good readings so far.
   [[nodiscard]] std::uint64_t readings() const { return readings_; }
   /// How often the port went away.

@@ -25,7 +25,7 @@ struct Trouble {
 };
 
 /// A bad exchange that was kept.
-struct KeptExchange {
+struct BadExchangeText {
   Error error = Error::none;
   Time at{};           // on the clock of the readings
   std::string sent{};  // as the link's wire text

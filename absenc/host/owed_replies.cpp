@@ -18,7 +18,7 @@ Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty()
 
 template <class Item>
 bool OwedReplies<Item>::is_answered(Items request) const {
-  return unit_->answered == nullptr || unit_->answered(*options_, to_frame(request));
+  return unit_->is_answered == nullptr || unit_->is_answered(*options_, to_frame(request));
 }
 
 template <class Item>

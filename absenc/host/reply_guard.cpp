@@ -39,7 +39,7 @@ void ReplyGuard<Item>::close() {
 template <class Item>
 bool ReplyGuard<Item>::is_request(const Step<Item>& step) const {
   using Kind = typename Step<Item>::Kind;
-  if (step.kind == Kind::pulse) return step.line == Line::trigger;
+  if (step.kind == Kind::pulse) return step.wire == ExtraWire::trigger;
   if (step.kind != Kind::transfer || step.out.empty() || step.out.size() > Request::capacity()) return false;
   return owed_.is_answered(step.out);
 }

@@ -151,7 +151,7 @@ class Session {
   // hears everything.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
-    return unit_->link != LinkKind::exchange && unit_->link != LinkKind::clocked;
+    return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
   }
 
   // What the port carries: the conversation, behind what keeps replies with their requests and what removes echo.

@@ -178,11 +178,11 @@ TEST(EchoFilter, AReplyLikeItsRequestIsNotTakenForAnEchoAlone) {
 TEST(Session, RepeatsWhatMayBeRepeated) {
   Bench bench(EchoMode::off, always(sim::FaultKind::truncate));
   EXPECT_EQ(bench.session->run(*find_command(bench.unit, Verb::read))->error(), Error::wrong_length);
-  EXPECT_EQ(bench.device->answered(), 3u);
+  EXPECT_EQ(bench.device->answer_count(), 3u);
   EXPECT_EQ(bench.session->counters().repeated, 2u);
   EXPECT_EQ(bench.session->counters().errors[static_cast<std::size_t>(Error::wrong_length)], 3u);
   bench.session->run(*find_command(bench.unit, Verb::zero));
-  EXPECT_EQ(bench.device->answered(), 6u);  // one look at the position, tried three times; the reset itself never
+  EXPECT_EQ(bench.device->answer_count(), 6u);  // one look at the position, tried three times; the reset itself never
 }
 
 // Request, 3 us, 11 characters: 51 us a reading are what the document allows.
@@ -217,17 +217,17 @@ TEST(Session, LeavesTheBusNoIdleTime) {
 TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   Bench bench(EchoMode::off);
   EXPECT_EQ(bench.read().error(), Error::none);
-  EXPECT_EQ(bench.device->answered(), 2u);
+  EXPECT_EQ(bench.device->answer_count(), 2u);
   EXPECT_TRUE(bench.session->confirmed());
   bench.read();
-  EXPECT_EQ(bench.device->answered(), 3u);
+  EXPECT_EQ(bench.device->answer_count(), 3u);
   bench.faulty->set_rates(always(sim::FaultKind::silence));
   EXPECT_EQ(bench.read().error(), Error::timeout);
   EXPECT_FALSE(bench.session->confirmed());
   bench.faulty->set_rates({});
-  const auto before = bench.device->answered();
+  const auto before = bench.device->answer_count();
   EXPECT_EQ(bench.read().error(), Error::none);
-  EXPECT_EQ(bench.device->answered(), before + 3);  // the first could have been the late reply to one of before
+  EXPECT_EQ(bench.device->answer_count(), before + 3);  // the first could have been the late reply to one of before
 }
 
 // What explains the silence is told after each attempt, also when a late reply may still come.

@@ -12,7 +12,7 @@ namespace absenc {
 enum class LinkKind : std::uint8_t {
   half_duplex,  // one pair for both directions (RS-485): never send while the other side does
   full_duplex,  // a pair for each direction (RS-422, RS-232, USB serial)
-  exchange,     // SPI: every byte out brings one byte in
+  spi,          // every byte out brings one byte in
   clocked,      // the host clocks bits out of the encoder (SSI, BiSS); packed MSB first, the last byte left-aligned;
                 // the clock idles high, its rising edge brings the next bit
   can,
@@ -21,7 +21,7 @@ enum class LinkKind : std::uint8_t {
 enum class Parity : std::uint8_t { none, odd, even };
 
 /// Wires beside the data, each driven by the host.
-enum class Line : std::uint8_t { trigger, clear };
+enum class ExtraWire : std::uint8_t { trigger, clear };
 
 /// The rate of virtual encoders whose protocol leaves it open.
 inline constexpr std::uint32_t assumed_rate = 115'200;
@@ -30,9 +30,9 @@ struct LineSettings {
   std::uint32_t rate = 0;  // bits a second: baud, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;
   std::uint8_t stop_bits = 1;
-  std::uint8_t spi_mode = 0;     // exchange, clocked: 2 * CPOL + CPHA
+  std::uint8_t spi_mode = 0;     // spi, clocked: 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  // clocked: clocks that show the idle line before the first bit
-  Time select_lead{};            // exchange: from chip select to the first clock, at least
+  Time select_lead{};            // spi: from chip select to the first clock, at least
 
   /// The same; with `assumed_rate` where there is none.
   [[nodiscard]] constexpr LineSettings with_some_rate() const {

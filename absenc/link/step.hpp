@@ -19,8 +19,8 @@ template <class Item>
 struct Step {
   enum class Kind : std::uint8_t {
     wait,       // until the next event
-    transfer,   // not before `at`: send `out` (exchange: and receive max(out, expect) items; clocked: clock `bits`)
-    pulse,      // not before `at`: drive `line` active for `width`
+    transfer,   // not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
+    pulse,      // not before `at`: drive `wire` active for `width`
     configure,  // switch this end of the line to the rate of `settings`; all else stays as it is
     emit,       // a result is ready to be looked at; ask again
     done,       // the conversation is over
@@ -34,7 +34,7 @@ struct Step {
   Time answer{};                // transfer, wait: `silence` when nothing has come this long after `sent`; 0: no limit
   Time gap{};               // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
   Time width{};             // pulse
-  Line line{};              // pulse
+  ExtraWire wire{};         // pulse
   LineSettings settings{};  // configure: `rate`
 };
 
@@ -42,12 +42,12 @@ struct Step {
 template <class Item>
 struct Event {
   enum class Kind : std::uint8_t {
-    sent,        // the transfer has left (exchange and clocked, device side: the host has stopped clocking)
+    sent,        // the transfer has left (spi and clocked, device side: the host has stopped clocking)
     received,    // `items` came
     silence,     // the `answer` or `gap` limit of the last step has passed
     timer,       // the `at` of the last wait has come
     selected,    // device side: chip select or first clock edge; the next step should be what it drives
-    triggered,   // device side: a pulse on `line` has begun
+    triggered,   // device side: a pulse on `wire` has begun
     line_error,  // a character with a wrong stop or parity bit, or sent at another rate, came
   };
 
@@ -55,10 +55,10 @@ struct Event {
   Time at{};
   std::span<const Item> items{};  // received: valid during the call
   std::size_t bits = 0;           // sent, device side of a clocked link: number of clocks seen
-  Line line{};                    // triggered
+  ExtraWire wire{};               // triggered
   Time width{};                   // triggered: how long the pulse lasts; device side, selected on a clocked link and
-                                  // sent on an exchange: the period of the clock; 0: not known
-  Time lead{};                    // sent, device side of an exchange: from chip select to the first clock
+                                  // sent on an SPI link: the period of the clock; 0: not known
+  Time lead{};                    // sent, device side of an SPI link: from chip select to the first clock
 };
 
 /// After each `feed`, call `next` until it returns `wait` or `done`. Both in one context: interrupts queue events.

@@ -36,7 +36,7 @@ class EmulatorPort final : public StreamPort {
  private:
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;
-  void drive(Line, bool) override {}
+  void drive(ExtraWire, bool) override {}
   void change_rate(std::uint32_t rate) override { device_rate_ = rate; }
 
   void open_terminal();

@@ -27,7 +27,7 @@ class FakeSpi final : public SpiKernel {
 
   FakeSpi() {
     std::ofstream{file_};
-    connect(LinkKind::exchange, {.rate = 500'000, .spi_mode = 1}, nobody_);
+    connect(LinkKind::spi, {.rate = 500'000, .spi_mode = 1}, nobody_);
   }
 
   /// What stands at the far side, instead of nothing.

@@ -31,7 +31,7 @@ WireKernel& system_wires() {
   return kernel;
 }
 
-PulseLine::PulseLine(PulseWire wire, int descriptor, std::string path, WireKernel& kernel)
+PulseOutput::PulseOutput(PulseWire wire, int descriptor, std::string path, WireKernel& kernel)
     : wire_(std::move(wire)), descriptor_(descriptor), path_(std::move(path)), kernel_(&kernel) {
   if (wire_.kind == PulseWire::Kind::gpio) {
     open_gpio();
@@ -40,11 +40,11 @@ PulseLine::PulseLine(PulseWire wire, int descriptor, std::string path, WireKerne
   }
 }
 
-PulseLine::~PulseLine() {
+PulseOutput::~PulseOutput() {
   if (line_ != nullptr) kernel_->release_gpio(line_);
 }
 
-void PulseLine::open_gpio() {
+void PulseOutput::open_gpio() {
   const std::string what = "the GPIO line " + wire_.name;
   const auto refused = [&](int error) {
     if (error == EACCES || error == EPERM) {
@@ -68,7 +68,7 @@ void PulseLine::open_gpio() {
   throw refused(error);
 }
 
-void PulseLine::drive(bool active) {
+void PulseOutput::drive(bool active) {
   if (line_ != nullptr) {
     if (kernel_->set_gpio(line_, active ? 1 : 0) < 0)
       throw system_failure("setting the GPIO line " + wire_.name, errno);

@@ -20,14 +20,14 @@ struct PulseWire {
   std::optional<Time> width{};  // instead of what the protocol asks for
 };
 
-/// For Line::trigger and Line::clear.
+/// For ExtraWire::trigger and ExtraWire::clear.
 struct PulseWires {
   PulseWire trigger{};
   PulseWire clear{};
 };
 
-/// The calls behind a PulseLine. Few machines that test this have such wires, and no kernel offers virtual ones: a test
-/// overrides these, and sees exactly what is asked of the system. Each fails with errno.
+/// The calls behind a PulseOutput. Few machines that test this have such wires, and no kernel offers virtual ones: a
+/// test overrides these, and sees exactly what is asked of the system. Each fails with errno.
 struct WireKernel {
   virtual ~WireKernel() = default;
   /// ioctl(2) with TIOCMBIS or TIOCMBIC.
@@ -41,14 +41,14 @@ struct WireKernel {
 [[nodiscard]] WireKernel& system_wires();
 
 /// A wire that is held at rest from the beginning.
-class PulseLine {
+class PulseOutput {
  public:
   /// `descriptor`: of the serial port `path`. Throws Failure: `not_found`, `no_permission` and `in_use` for a GPIO
   /// line, `unsupported` when the port has no such wire, `system`.
-  PulseLine(PulseWire wire, int descriptor, std::string path, WireKernel& kernel);
-  PulseLine(const PulseLine&) = delete;
-  PulseLine& operator=(const PulseLine&) = delete;
-  ~PulseLine();
+  PulseOutput(PulseWire wire, int descriptor, std::string path, WireKernel& kernel);
+  PulseOutput(const PulseOutput&) = delete;
+  PulseOutput& operator=(const PulseOutput&) = delete;
+  ~PulseOutput();
 
   void drive(bool active);
   [[nodiscard]] const PulseWire& wire() const { return wire_; }

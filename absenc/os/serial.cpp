@@ -186,17 +186,17 @@ void SerialPort::take_wires(const PulseWires& wires, WireKernel& kernel) {
   if (wires.clear.kind != PulseWire::Kind::none) clear_.emplace(wires.clear, descriptor(), path_, kernel);
 }
 
-void SerialPort::drive(Line line, bool active) {
-  std::optional<PulseLine>& wire = line == Line::trigger ? trigger_ : clear_;
-  if (wire) return wire->drive(active);
-  const std::string name = line == Line::trigger ? "trigger" : "clear";
+void SerialPort::drive(ExtraWire wire, bool active) {
+  std::optional<PulseOutput>& output = wire == ExtraWire::trigger ? trigger_ : clear_;
+  if (output) return output->drive(active);
+  const std::string name = wire == ExtraWire::trigger ? "trigger" : "clear";
   throw Failure(Failure::Kind::unsupported, "nothing says which wire carries the pulse: set " + name + "=rts, " + name +
                                                 "=dtr or " + name + "=gpio:NAME");
 }
 
-Time SerialPort::pulse_width(Line line, Time asked) const {
-  const std::optional<PulseLine>& wire = pulse_line(line);
-  return wire ? wire->wire().width.value_or(asked) : asked;
+Time SerialPort::pulse_width(ExtraWire wire, Time asked) const {
+  const std::optional<PulseOutput>& output = pulse_output(wire);
+  return output ? output->wire().width.value_or(asked) : asked;
 }
 
 }  // namespace absenc::os

@@ -40,12 +40,12 @@ class SerialPort final : public DescriptorPort {
   [[nodiscard]] bool kernel_direction() const { return kernel_direction_; }
 
  private:
-  void drive(Line line, bool active) override;
-  [[nodiscard]] Time pulse_width(Line line, Time asked) const override;
+  void drive(ExtraWire wire, bool active) override;
+  [[nodiscard]] Time pulse_width(ExtraWire wire, Time asked) const override;
   void change_rate(std::uint32_t rate) override;
 
-  [[nodiscard]] const std::optional<PulseLine>& pulse_line(Line line) const {
-    return line == Line::trigger ? trigger_ : clear_;
+  [[nodiscard]] const std::optional<PulseOutput>& pulse_output(ExtraWire wire) const {
+    return wire == ExtraWire::trigger ? trigger_ : clear_;
   }
   void apply(const LineSettings& settings);
   void lock() const;
@@ -59,8 +59,8 @@ class SerialPort final : public DescriptorPort {
   bool kernel_direction_ = false;
   TerminalState before_{};
   LineSettings line_{};
-  std::optional<PulseLine> trigger_;
-  std::optional<PulseLine> clear_;
+  std::optional<PulseOutput> trigger_;
+  std::optional<PulseOutput> clear_;
   std::vector<std::string> notes_;
 };
 

@@ -28,13 +28,13 @@ std::uint8_t mask_of(std::size_t bit, bool lsb_first) {
 
 SpiDevice::SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device)
     : kind_(kind), settings_(settings), device_(&device) {
-  if (kind != LinkKind::exchange && kind != LinkKind::clocked) {
+  if (kind != LinkKind::spi && kind != LinkKind::clocked) {
     throw std::invalid_argument("behind an SPI controller bytes are exchanged or bits clocked");
   }
 }
 
 Time SpiDevice::message(std::span<const SpiTransfer> transfers, Time start) {
-  const bool chip_select = kind_ == LinkKind::exchange;
+  const bool chip_select = kind_ == LinkKind::spi;
   Time at = start;
   bool suited = true;
   if (chip_select && !selected_) select(at, {});
@@ -145,7 +145,7 @@ bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   std::size_t shifts = clock;
   if (samples_at_trailing_edge(mode) && shifts_at_leading_edge(mode)) ++shifts;
   std::size_t before_first_bit = settings_.idle_clocks;
-  if (kind_ == LinkKind::exchange) {
+  if (kind_ == LinkKind::spi) {
     before_first_bit = samples_at_trailing_edge(settings_.spi_mode) ? 1 : 0;
   } else if (!idles_high(mode) && shifts > 0) {
     --shifts;  // a rising edge before the first falling one, which latches

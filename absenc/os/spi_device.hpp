@@ -29,7 +29,7 @@ struct SpiTransfer {
 /// once, with the times at which its parts will be.
 class SpiDevice {
  public:
-  /// `kind`: exchange or clocked, otherwise std::invalid_argument. `device` must outlive it.
+  /// `kind`: spi or clocked, otherwise std::invalid_argument. `device` must outlive it.
   SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device);
 
   /// Asks the device for its first step, as every carrier does before the first event: it may want a timer.

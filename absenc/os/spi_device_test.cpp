@@ -105,7 +105,7 @@ TEST(SpiDevice, EveryModeOnEveryChip) {
     for (std::uint8_t mode = 0; mode < 4; ++mode) {
       Data heard;
       ByteToy toy = chip(&heard);
-      SpiDevice device(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = chip_mode}, toy);
+      SpiDevice device(LinkKind::spi, {.rate = 1'000'000, .spi_mode = chip_mode}, toy);
       Data in(sent.size());
       const SpiTransfer transfer{.size = in.size(), .out = sent, .in = in, .rate = 1'000'000, .mode = mode};
       device.message({&transfer, 1}, 1ms);
@@ -149,11 +149,11 @@ TEST(SpiDevice, EveryModeOnAClockedDevice) {
 TEST(SpiDevice, TellsAChipWhenItIsSelectedAndWhenNot) {
   const SpiTransfer wait{.rate = 1, .mode = 1, .delay = 5us};
   const SpiTransfer bytes{.size = 2, .rate = 500'000, .mode = 1, .delay = 3us};
-  EXPECT_EQ(ask(LinkKind::exchange, chip_settings, {wait, bytes}).log,
+  EXPECT_EQ(ask(LinkKind::spi, chip_settings, {wait, bytes}).log,
             "1000000 selected, 1040000 received 00 00, 1040000 sent 16 2000");
   SpiTransfer apart = bytes;
   apart.deselect = true;
-  EXPECT_EQ(ask(LinkKind::exchange, chip_settings, {apart, bytes}).log,
+  EXPECT_EQ(ask(LinkKind::spi, chip_settings, {apart, bytes}).log,
             "1000000 selected, 1035000 received 00 00, 1035000 sent 16 2000, 1045000 selected, "
             "1080000 received 00 00, 1080000 sent 16 2000");
 }
@@ -178,13 +178,13 @@ TEST(SpiDevice, TellsAClockedDeviceThePeriodAndThePauses) {
 TEST(SpiDevice, TheFastestClockOfAFrameCounts) {
   const SpiTransfer slow{.size = 1, .rate = 500'000, .mode = 1};
   const SpiTransfer fast{.size = 1, .rate = 4'000'000, .mode = 1};
-  EXPECT_THAT(ask(LinkKind::exchange, chip_settings, {slow, fast, slow}).log, HasSubstr("1034000 sent 24 250"));
+  EXPECT_THAT(ask(LinkKind::spi, chip_settings, {slow, fast, slow}).log, HasSubstr("1034000 sent 24 250"));
 }
 
 TEST(SpiDevice, AChipThatStaysSelectedGoesOn) {
   Data heard;
   ByteToy toy = chip(&heard);
-  SpiDevice device(LinkKind::exchange, chip_settings, toy);
+  SpiDevice device(LinkKind::spi, chip_settings, toy);
   Data in(3);
   SpiTransfer first{
       .size = 1, .out = Bytes(sent).first(1), .in = MutableBytes(in).first(1), .rate = 1'000'000, .mode = 1};
@@ -201,7 +201,7 @@ TEST(SpiDevice, AChipThatStaysSelectedGoesOn) {
 TEST(SpiDevice, AChipThatStaysSelectedForEverIsNotKeptInMind) {
   Data heard;
   ByteToy toy = chip(&heard);
-  SpiDevice device(LinkKind::exchange, chip_settings, toy);
+  SpiDevice device(LinkKind::spi, chip_settings, toy);
   const Data out(4000, 0xA5);
   SpiTransfer transfer{.size = out.size(), .out = out, .rate = 1'000'000, .mode = 1, .deselect = true};
   for (int i = 0; i < 3; ++i) device.message({&transfer, 1}, 1ms);
@@ -214,7 +214,7 @@ TEST(SpiDevice, AChipThatStaysSelectedForEverIsNotKeptInMind) {
 TEST(SpiDevice, BitsInTheOtherOrder) {
   Data heard;
   ByteToy toy = chip(&heard);
-  SpiDevice device(LinkKind::exchange, chip_settings, toy);
+  SpiDevice device(LinkKind::spi, chip_settings, toy);
   Data in(3);
   const SpiTransfer transfer{.size = in.size(), .out = sent, .in = in, .rate = 1'000'000, .mode = 1, .lsb_first = true};
   device.message({&transfer, 1}, 1ms);
@@ -224,7 +224,7 @@ TEST(SpiDevice, BitsInTheOtherOrder) {
 
 TEST(SpiDevice, WithoutBuffersNothingIsClocked) {
   ByteToy toy = chip();
-  SpiDevice device(LinkKind::exchange, chip_settings, toy);
+  SpiDevice device(LinkKind::spi, chip_settings, toy);
   const SpiTransfer transfer{.size = 5, .rate = 1'000'000, .mode = 1, .delay = 4us};
   EXPECT_EQ(device.message({&transfer, 1}, 1ms), 1ms + 4us);
   EXPECT_EQ(toy.log, "1000000 selected, 1004000 received, 1004000 sent");
@@ -232,7 +232,7 @@ TEST(SpiDevice, WithoutBuffersNothingIsClocked) {
 
 TEST(SpiDevice, WakesTheDeviceOnceWhenItWants) {
   ByteToy toy = chip();
-  SpiDevice device(LinkKind::exchange, chip_settings, toy);
+  SpiDevice device(LinkKind::spi, chip_settings, toy);
   EXPECT_EQ(device.timer(), never);
   toy.idle.at = 5ms;
   const SpiTransfer transfer{.size = 1, .out = Bytes(sent).first(1), .rate = 1'000'000, .mode = 1};

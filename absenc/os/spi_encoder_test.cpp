@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hosts of biss and ssi, and one of an exchange, on an SPI port whose far side is a virtual encoder.
+// The hosts of biss and ssi, and one of SPI, on an SPI port whose far side is a virtual encoder.
 #include <gtest/gtest.h>
 
 #include "absenc/host/drive.hpp"
@@ -80,12 +80,12 @@ TEST_F(SpiEncoder, Biss) {
 }
 
 TEST_F(SpiEncoder, Encolink) {
-  const encolink::Format format{.resolution = 20, .multiturn_bits = 16, .wire = encolink::Wire::spi};
+  const encolink::Format format{.resolution = 20, .multiturn_bits = 16, .interface = encolink::Interface::spi};
   const auto read = [&](encolink::VirtualEncoder& encoder, const SpiChoice& choice) {
     FakeSpi controller;
     encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);
-    controller.connect(LinkKind::exchange, encolink::spi_settings, encoder);
-    SpiPort port(FakeSpi::path, LinkKind::exchange, encolink::spi_settings, choice, controller);
+    controller.connect(LinkKind::spi, encolink::spi_settings, encoder);
+    SpiPort port(FakeSpi::path, LinkKind::spi, encolink::spi_settings, choice, controller);
     encolink::ReadPosition conversation(format);
     EXPECT_TRUE(run(conversation, port));
     if (conversation.error() == Error::none) {
@@ -111,15 +111,15 @@ TEST_F(SpiEncoder, Encolink) {
 
 TEST_F(SpiEncoder, EncolinkNoticesAClockTooSoonAfterChipSelect) {
   encolink::Format format = encolink::virtual_format;
-  format.wire = encolink::Wire::spi;
+  format.interface = encolink::Interface::spi;
   for (const Time lead : {Time{}, Time{4000}, Time{5000}}) {
     encolink::VirtualEncoder encoder(format, shaft);
     encoder.power_on(os::now(), Device<std::uint8_t>::PowerOn::skip);
     LineSettings settings = encolink::spi_settings;
     settings.select_lead = lead;
     FakeSpi controller;
-    controller.connect(LinkKind::exchange, settings, encoder);
-    SpiPort port(FakeSpi::path, LinkKind::exchange, settings, {}, controller);
+    controller.connect(LinkKind::spi, settings, encoder);
+    SpiPort port(FakeSpi::path, LinkKind::spi, settings, {}, controller);
     encolink::ReadPosition conversation(format);
     ASSERT_TRUE(run(conversation, port));
     if (lead == encolink::spi_lead) {
@@ -138,12 +138,12 @@ TEST_F(SpiEncoder, NobodyThere) {
   EXPECT_EQ(read.error(), Error::line_stuck);
 }
 
-TEST_F(SpiEncoder, Exchange) {
+TEST_F(SpiEncoder, BytesBothWays) {
   toy::Toy<std::uint8_t> device([](auto& self, const ByteEvent& event) {
     if (event.kind == ByteEvent::Kind::selected) self.send({0xA1, 0xB2, 0xC3});
   });
-  kernel.connect(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1}, device);
-  SpiPort port(FakeSpi::path, LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1}, {}, kernel);
+  kernel.connect(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1}, device);
+  SpiPort port(FakeSpi::path, LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1}, {}, kernel);
   Data heard;
   toy::Toy<std::uint8_t> host([&](auto& self, const ByteEvent& event) {
     if (event.kind != ByteEvent::Kind::received) return;

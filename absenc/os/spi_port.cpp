@@ -86,7 +86,7 @@ std::vector<std::string> spi_devices(const std::filesystem::path& sys) {
 SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice,
                  SpiKernel& kernel)
     : path_(path), kind_(kind), choice_(choice), kernel_(&kernel), descriptor_(kernel.open(path)) {
-  if (kind != LinkKind::exchange && kind != LinkKind::clocked) {
+  if (kind != LinkKind::spi && kind != LinkKind::clocked) {
     throw std::invalid_argument("an SPI controller exchanges bytes or clocks bits");
   }
   if (!descriptor_) throw spi_failure(path, errno);

@@ -33,13 +33,13 @@ struct SpiChoice {
 
 /// Every function throws Failure or Interrupted (os/signals.hpp). Locked against other programs that lock it.
 ///
-/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. `expect` says on an `exchange` link
+/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. `expect` says on an `spi` link
 /// how many bytes come at least; on a `clocked` one nothing is sent but clocks. A controller clocks whole bytes: after
 /// `idle_clocks` the first `bits` bits are handed out, and up to seven clocks more are given.
 /// `timer` is reported as by StreamPort.
 class SpiPort final : public Port<std::uint8_t> {
  public:
-  /// `path`: /dev/spidevB.C. `kind` is exchange or clocked. `kernel` must outlive the port.
+  /// `path`: /dev/spidevB.C. `kind` is spi or clocked. `kernel` must outlive the port.
   SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice = {},
           SpiKernel& kernel = system_kernel());
   SpiPort(const SpiPort&) = delete;

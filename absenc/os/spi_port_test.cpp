@@ -27,12 +27,12 @@ constexpr LineSettings biss_settings{.rate = 1'000'000, .spi_mode = 3};
 ByteStep clocks(std::size_t bits) { return {.kind = ByteStep::Kind::transfer, .bits = bits}; }
 
 struct SpiPortTest : ::testing::Test {
-  SpiPort open(LinkKind link = LinkKind::exchange, const LineSettings& settings = encoder_settings,
+  SpiPort open(LinkKind link = LinkKind::spi, const LineSettings& settings = encoder_settings,
                const SpiChoice& choice = {}) {
-    if (link == LinkKind::exchange || link == LinkKind::clocked) kernel.connect(link, settings, device);
+    if (link == LinkKind::spi || link == LinkKind::clocked) kernel.connect(link, settings, device);
     return SpiPort(FakeSpi::path, link, settings, choice, kernel);
   }
-  std::string refusal(Kind kind, LinkKind link = LinkKind::exchange, const LineSettings& settings = encoder_settings) {
+  std::string refusal(Kind kind, LinkKind link = LinkKind::spi, const LineSettings& settings = encoder_settings) {
     const Failure failure = failure_of([&] { open(link, settings); });
     EXPECT_EQ(failure.kind(), kind) << failure.what();
     return failure.what();
@@ -99,7 +99,7 @@ TEST_F(SpiPortTest, ExchangesAsManyBytesAsAreSentOrExpected) {
 TEST_F(SpiPortTest, WaitsBetweenChipSelectAndClock) {
   LineSettings slow = encoder_settings;
   slow.select_lead = 4'500ns;  // rounded up
-  SpiPort port = open(LinkKind::exchange, slow);
+  SpiPort port = open(LinkKind::spi, slow);
   kernel.log.clear();
   port.begin({.kind = ByteStep::Kind::transfer, .expect = 3});
   EXPECT_EQ(kernel.log, "0 bytes in then 5 us, 3 bytes, ");
@@ -223,7 +223,7 @@ TEST_F(SpiPortTest, SaysThatAMessageIsRefused) {
 
 TEST_F(SpiPortTest, SaysWhyItDoesNotOpen) {
   const auto failure = [&](const std::string& path) {
-    return failure_of([&] { const SpiPort port(path, LinkKind::exchange, encoder_settings, {}, kernel); });
+    return failure_of([&] { const SpiPort port(path, LinkKind::spi, encoder_settings, {}, kernel); });
   };
   EXPECT_EQ(failure("/dev/spidev9.9").kind(), Kind::not_found);
   EXPECT_THAT(failure("/dev/spidev9.9").what(), HasSubstr("there is no SPI device /dev/spidev9.9"));
@@ -239,7 +239,7 @@ TEST_F(SpiPortTest, SaysWhyItDoesNotOpen) {
 
 TEST(SpiPortOfTheSystem, OpensNoOtherFile) {
   const auto failure = [](const char* path) {
-    return failure_of([&] { const SpiPort port(path, LinkKind::exchange, encoder_settings); });
+    return failure_of([&] { const SpiPort port(path, LinkKind::spi, encoder_settings); });
   };
   EXPECT_EQ(failure("/dev/spidev255.255").kind(), Kind::not_found);
   EXPECT_EQ(failure("/dev/null").kind(), Kind::unsupported);

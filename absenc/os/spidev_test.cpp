@@ -74,7 +74,7 @@ struct SpidevTest : ::testing::Test {
   toy::Toy<std::uint8_t> toy{[](auto& self, const ByteEvent& event) {
     if (event.kind == ByteEvent::Kind::selected) self.send({0x12, 0x34, 0x56});
   }};
-  SpiDevice device{LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1}, toy};
+  SpiDevice device{LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1}, toy};
   Spidev spidev{device};
 };
 

@@ -91,14 +91,14 @@ void StreamPort::reach(Time time) {
 }
 
 void StreamPort::pulse(const ByteStep& step) {
-  drive(step.line, true);
+  drive(step.wire, true);
   try {
-    reach(os::now() + pulse_width(step.line, step.width));
+    reach(os::now() + pulse_width(step.wire, step.width));
   } catch (...) {
-    drive(step.line, false);
+    drive(step.wire, false);
     throw;
   }
-  drive(step.line, false);
+  drive(step.wire, false);
   mark_sent(os::now());
 }
 
@@ -110,11 +110,11 @@ void StreamPort::mark_sent(Time at) {
   silence_told_ = false;
 }
 
-void StreamPort::drive(Line, bool) {
+void StreamPort::drive(ExtraWire, bool) {
   throw Failure(Failure::Kind::unsupported, "this kind of port has no trigger and clear lines: use a serial port");
 }
 
-Time StreamPort::pulse_width(Line, Time asked) const { return asked; }
+Time StreamPort::pulse_width(ExtraWire, Time asked) const { return asked; }
 
 void StreamPort::change_rate(std::uint32_t rate) {
   throw Failure(Failure::Kind::unsupported,

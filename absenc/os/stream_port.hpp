@@ -58,10 +58,10 @@ class StreamPort : public Port<std::uint8_t> {
   virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
   virtual void write_all(Bytes bytes) = 0;
   /// Both throw `unsupported` unless overridden.
-  virtual void drive(Line line, bool active);
+  virtual void drive(ExtraWire wire, bool active);
   virtual void change_rate(std::uint32_t rate);
   /// How long a pulse lasts: as asked, unless overridden.
-  [[nodiscard]] virtual Time pulse_width(Line line, Time asked) const;
+  [[nodiscard]] virtual Time pulse_width(ExtraWire wire, Time asked) const;
 
  private:
   Event<std::uint8_t> tell(const Event<std::uint8_t>& event);

@@ -243,8 +243,8 @@ class PulsePort : public DescriptorPort {
   Time applied{};
 
  private:
-  void drive(Line line, bool active) override {
-    EXPECT_EQ(line, Line::clear);
+  void drive(ExtraWire wire, bool active) override {
+    EXPECT_EQ(wire, ExtraWire::clear);
     EXPECT_EQ(active, edges.size() % 2 == 0);
     edges.push_back(os::now());
   }
@@ -254,7 +254,7 @@ class PulsePort : public DescriptorPort {
 TEST_F(StreamPortTest, DrivesAPulse) {
   PulsePort port(std::move(peer_), "the line");
   const Time at = now() + 1ms;
-  port.begin({.kind = ByteStep::Kind::pulse, .at = at, .width = 50us, .line = Line::clear});
+  port.begin({.kind = ByteStep::Kind::pulse, .at = at, .width = 50us, .wire = ExtraWire::clear});
   ASSERT_EQ(port.edges.size(), 2u);
   EXPECT_GE(port.edges[0], at);
   EXPECT_GE(port.edges[1], port.edges[0] + 50us);
@@ -266,7 +266,7 @@ TEST_F(StreamPortTest, DrivesAPulse) {
 TEST_F(StreamPortTest, ReleasesTheWireOfAPulseThatIsCutShort) {
   PulsePort port(std::move(peer_), "the line");
   port.set_end(now() + 3ms);
-  EXPECT_THROW(port.begin({.kind = ByteStep::Kind::pulse, .width = 1h, .line = Line::clear}), Ended);
+  EXPECT_THROW(port.begin({.kind = ByteStep::Kind::pulse, .width = 1h, .wire = ExtraWire::clear}), Ended);
   EXPECT_EQ(port.edges.size(), 2u);
 }
 

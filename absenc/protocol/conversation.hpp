@@ -25,7 +25,7 @@ struct Exchange {
 
 /// An error in words: more than its own text has. Either may be empty.
 struct Explanation {
-  std::string_view found{};   // which step failed, what was found
+  std::string_view detail{};  // which step failed, what was found
   std::string_view advice{};  // what to do, in place of the error's own advice
 };
 
@@ -84,7 +84,7 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
   /// Requests answered so far.
-  [[nodiscard]] virtual std::uint64_t answered() const = 0;
+  [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 
  protected:
   ~Device() = default;

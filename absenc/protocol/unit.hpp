@@ -150,7 +150,7 @@ struct EvidenceSink {
   ~EvidenceSink() = default;
 };
 
-/// Where a value, or a part of it, stands in a frame. Bits count as those of `Unit::covered`: on lines of characters
+/// Where a value, or a part of it, stands in a frame. Bits count as those of `Unit::is_checked`: on lines of characters
 /// the last of a range is the most significant, on clocked links the first.
 struct BitRange {
   std::size_t first = 0;
@@ -164,7 +164,7 @@ using BitRanges = Buffer<BitRange, 8>;
 enum class Direction : std::uint8_t { request, reply };
 
 /// Where a frame ends in a run of bytes.
-struct Delimit {
+struct FrameEnd {
   enum class Kind : std::uint8_t {
     complete,    // the first `size` bytes are one frame
     incomplete,  // a frame may have begun; at least `size` bytes in all are needed
@@ -188,7 +188,7 @@ struct Resolution {
 };
 
 /// Wires beside the data on which a host's pulses ask for something.
-struct ExtraLines {
+struct ExtraWires {
   bool trigger = false;  // each frame
   bool clear = false;    // the zero
 };
@@ -226,7 +226,7 @@ struct Unit {
   /// The request of a command; on CAN links its text, as in vectors. Errors: invalid_argument, buffer_too_small.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
-  Delimit (*delimit)(const Options& options, Direction direction, Bytes bytes);
+  FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
@@ -234,7 +234,7 @@ struct Unit {
   Resolution (*resolution)(const Options& options);
   /// Whether a flip of this bit of this good reply must be noticed; null: every bit. Bits count from the least
   /// significant of the first byte on; on clocked links in the order of the wire.
-  bool (*covered)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
+  bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// Where this good reply has a field that it carries: no ranges where it has it in no fixed place, or makes it of
   /// something else. Null: not told of any.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
@@ -249,12 +249,12 @@ struct Unit {
   /// captures do not tell.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// What these options need beside the data; null: nothing.
-  ExtraLines (*extra_lines)(const Options& options) = nullptr;
+  ExtraWires (*extra_wires)(const Options& options) = nullptr;
   LineTiming timing{};
   /// Whether the encoder sends replies that nobody asks for; null: never. On clocked and CAN links it always may.
   bool (*streams)(const Options& options) = nullptr;
   /// Whether this request, a good one, is answered; null: every one is.
-  bool (*answered)(const Options& options, Frame request) = nullptr;
+  bool (*is_answered)(const Options& options, Frame request) = nullptr;
   /// How long after what was last heard this good request may be sent again; null: at once.
   Time (*pause)(const Options& options, Frame request) = nullptr;
   std::span<const Condition> conditions{};  // that can be set of the virtual encoder, also while it runs

@@ -61,8 +61,8 @@ void Line<Item>::observe(Observer observer) {
 }
 
 template <class Item>
-void Line<Item>::observe_exchanges(ExchangeObserver observer) {
-  exchange_observer_ = std::move(observer);
+void Line<Item>::observe_transfers(TransferObserver observer) {
+  transfer_observer_ = std::move(observer);
 }
 
 template <class Item>
@@ -136,8 +136,8 @@ bool Line<Item>::step() {
     case Kind::character:
       if (current) end_character(node);
       break;
-    case Kind::exchanged:
-      if (current) end_exchange(node);
+    case Kind::transferred:
+      if (current) end_transfer(node);
       break;
     case Kind::finished:
       if (current) finish(node);
@@ -211,9 +211,9 @@ void Line<Item>::serve(Node node) {
 template <class Item>
 void Line<Item>::take_up(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
-  // A device asked by chip select or clock answers into the exchange that is going on.
+  // A device asked by chip select or clock answers into the transfer that is going on.
   const bool driven = state.role == Role::device && step.kind == Step<Item>::Kind::transfer &&
-                      (kind_ == LinkKind::exchange || kind_ == LinkKind::clocked);
+                      (kind_ == LinkKind::spi || kind_ == LinkKind::clocked);
   if (!driven && state.doing != Step<Item>::Kind::wait) {
     throw std::logic_error("a machine began a transfer or pulse before its last one was sent");
   }
@@ -224,7 +224,7 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   state.bits = step.bits;
   state.expect = step.expect;
   state.width = step.width;
-  state.pulse_line = step.line;
+  state.pulse_wire = step.wire;
   ++state.begin_generation;
   // Not at once: whoever else is asked or attached at this time comes first, in whatever order.
   if (!driven) schedule(Happening::Kind::begin, step.at, node);

@@ -30,9 +30,9 @@ class Line {
   using OnEmit = std::function<bool()>;
   /// Called for every character or CAN frame that was on the wire, at its end.
   using Observer = std::function<void(Node sender, Time start, Time end, const Item& item)>;
-  /// Of an exchange or of `bits` clocks: what the host sent and what it received, the last byte left-aligned. `lead` is
+  /// Of SPI bytes or of `bits` clocks: what the host sent and what it received, the last byte left-aligned. `lead` is
   /// the time from `start`, when the chip was selected, to the first clock.
-  struct Exchange {
+  struct Transfer {
     Time start;
     Time end;
     std::size_t bits;
@@ -40,10 +40,10 @@ class Line {
     std::span<const Item> in;
     Time lead{};
   };
-  /// Called for every exchange, at its end.
-  using ExchangeObserver = std::function<void(const Exchange& exchange)>;
+  /// Called for every transfer of SPI or clocked bits, at its end.
+  using TransferObserver = std::function<void(const Transfer& transfer)>;
   /// Called for every pulse, at its beginning.
-  using PulseObserver = std::function<void(absenc::Line line, Time start, Time end)>;
+  using PulseObserver = std::function<void(ExtraWire wire, Time start, Time end)>;
 
   Line(LinkKind kind, LineSettings settings);
   ~Line();
@@ -58,7 +58,7 @@ class Line {
   void wake(Node node);
   void set_echo(Node node, bool echo);
   void observe(Observer observer);
-  void observe_exchanges(ExchangeObserver observer);
+  void observe_transfers(TransferObserver observer);
   void observe_pulses(PulseObserver observer);
 
   [[nodiscard]] Time now() const { return now_; }
@@ -79,7 +79,7 @@ class Line {
  private:
   struct State;
   struct Happening {
-    enum class Kind : std::uint8_t { begin, character, frame, exchanged, finished, arbitrate } kind;
+    enum class Kind : std::uint8_t { begin, character, frame, transferred, finished, arbitrate } kind;
     Time at;
     std::uint64_t order;  // the first scheduled comes first
     Node node;
@@ -106,8 +106,8 @@ class Line {
   void frame_character(Node sender);
   void end_character(Node node);
   void hear(Node node, Node sender, const Item& item, bool garbled);
-  void begin_exchange(Node node);
-  void end_exchange(Node node);
+  void begin_transfer(Node node);
+  void end_transfer(Node node);
   void arbitrate();
   void end_frame(Node node);
   [[nodiscard]] bool hears(const State& receiver, const State& sender) const;
@@ -120,7 +120,7 @@ class Line {
   std::vector<std::unique_ptr<State>> nodes_;
   std::priority_queue<Happening, std::vector<Happening>, std::greater<>> happenings_;
   Observer observer_;
-  ExchangeObserver exchange_observer_;
+  TransferObserver transfer_observer_;
   PulseObserver pulse_observer_;
   bool frame_on_bus_ = false;
 };

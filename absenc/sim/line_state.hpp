@@ -40,8 +40,8 @@ struct Line<Item>::State {
   std::size_t bits = 0;
   std::size_t expect = 0;
   Time width{};
-  Time lead{};  // exchange: from chip select to the first clock
-  absenc::Line pulse_line{};
+  Time lead{};  // spi: from chip select to the first clock
+  ExtraWire pulse_wire{};
   Time start{};             // of the transfer; CAN: of the frame
   std::size_t index = 0;    // the item on the wire
   std::size_t on_wire = 0;  // items of `out` that were, are or will be on the wire

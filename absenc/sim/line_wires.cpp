@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What happens on the wires of sim::Line: characters, exchanges, clocked bits, CAN frames, pulses.
+// What happens on the wires of sim::Line: characters, SPI transfers, clocked bits, CAN frames, pulses.
 #include <algorithm>
 #include <stdexcept>
 #include <type_traits>
@@ -38,13 +38,13 @@ void Line<Item>::begin(Node node) {
   state.index = 0;
   if (state.doing == Step<Item>::Kind::pulse) {
     schedule(Happening::Kind::finished, now_ + state.width, node);
-    if (pulse_observer_) pulse_observer_(state.pulse_line, now_, now_ + state.width);
+    if (pulse_observer_) pulse_observer_(state.pulse_wire, now_, now_ + state.width);
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (other == node) continue;
-      feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .line = state.pulse_line, .width = state.width});
+      feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .wire = state.pulse_wire, .width = state.width});
     }
-  } else if (kind_ == LinkKind::exchange || kind_ == LinkKind::clocked) {
-    begin_exchange(node);
+  } else if (kind_ == LinkKind::spi || kind_ == LinkKind::clocked) {
+    begin_transfer(node);
   } else if (state.out.empty()) {
     schedule(Happening::Kind::finished, now_, node);
   } else if (kind_ == LinkKind::can) {
@@ -133,10 +133,10 @@ void Line<Item>::hear(Node node, Node sender, const Item& item, bool garbled) {
 
 // SPI and clocked links: the host's transfer moves everything at once; only its duration is simulated.
 template <class Item>
-void Line<Item>::begin_exchange(Node node) {
+void Line<Item>::begin_transfer(Node node) {
   State& host = *nodes_[node];
   host.expect = kind_ == LinkKind::clocked ? (host.bits + 7) / 8 : std::max(host.out.size(), host.expect);
-  if (kind_ == LinkKind::exchange) host.bits = host.expect * 8;
+  if (kind_ == LinkKind::spi) host.bits = host.expect * 8;
   for (Node other = 0; other < nodes_.size(); ++other) {
     if (nodes_[other]->role == Role::host) continue;
     nodes_[other]->doing = Step<Item>::Kind::wait;
@@ -144,12 +144,12 @@ void Line<Item>::begin_exchange(Node node) {
     const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .width = period});
   }
-  if (kind_ == LinkKind::exchange) host.lead = host.settings.select_lead;
-  schedule(Happening::Kind::exchanged, now_ + host.lead + host.settings.bits(host.bits), node);
+  if (kind_ == LinkKind::spi) host.lead = host.settings.select_lead;
+  schedule(Happening::Kind::transferred, now_ + host.lead + host.settings.bits(host.bits), node);
 }
 
 template <class Item>
-void Line<Item>::end_exchange(Node node) {
+void Line<Item>::end_transfer(Node node) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     State& host = *nodes_[node];
     std::vector<Item> in(host.expect, 0xFF);  // nobody drives: pulled up
@@ -162,14 +162,14 @@ void Line<Item>::end_exchange(Node node) {
     std::vector<Item> out = host.out;
     out.resize(host.expect, 0);
     const std::size_t bits = host.bits;
-    if (exchange_observer_ && bits > 0) exchange_observer_({host.start, now_, bits, out, in, host.lead});
+    if (transfer_observer_ && bits > 0) transfer_observer_({host.start, now_, bits, out, in, host.lead});
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (nodes_[other]->role == Role::host) continue;
       nodes_[other]->doing = Step<Item>::Kind::wait;
-      if (kind_ == LinkKind::exchange) {
+      if (kind_ == LinkKind::spi) {
         feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});
       }
-      const Time period = kind_ == LinkKind::exchange ? host.settings.bits(1) : Time{};
+      const Time period = kind_ == LinkKind::spi ? host.settings.bits(1) : Time{};
       feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period, .lead = host.lead});
     }
     finish(node);
@@ -235,8 +235,8 @@ template bool Line<std::uint8_t>::busy_towards(const State&) const;
 template void Line<std::uint8_t>::begin_characters(Node);
 template void Line<std::uint8_t>::frame_character(Node);
 template void Line<std::uint8_t>::end_character(Node);
-template void Line<std::uint8_t>::begin_exchange(Node);
-template void Line<std::uint8_t>::end_exchange(Node);
+template void Line<std::uint8_t>::begin_transfer(Node);
+template void Line<std::uint8_t>::end_transfer(Node);
 template void Line<std::uint8_t>::arbitrate();
 template void Line<std::uint8_t>::end_frame(Node);
 template void Line<std::uint8_t>::hear(Node, Node, const std::uint8_t&, bool);
@@ -246,8 +246,8 @@ template bool Line<CanFrame>::busy_towards(const State&) const;
 template void Line<CanFrame>::begin_characters(Node);
 template void Line<CanFrame>::frame_character(Node);
 template void Line<CanFrame>::end_character(Node);
-template void Line<CanFrame>::begin_exchange(Node);
-template void Line<CanFrame>::end_exchange(Node);
+template void Line<CanFrame>::begin_transfer(Node);
+template void Line<CanFrame>::end_transfer(Node);
 template void Line<CanFrame>::arbitrate();
 template void Line<CanFrame>::end_frame(Node);
 template void Line<CanFrame>::hear(Node, Node, const CanFrame&, bool);

@@ -52,7 +52,7 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings, Sink& sink)
     case LinkKind::full_duplex:
       wires_ = {{"host", true}, {"device", true}};
       break;
-    case LinkKind::exchange:
+    case LinkKind::spi:
       wires_ = {{"cs", true}, {"sck", (settings.spi_mode & 2) != 0}, {"mosi", false}, {"miso", true}};
       break;
     case LinkKind::clocked:
@@ -70,11 +70,11 @@ void Waveform::observe(Line<std::uint8_t>& observed) {
     character(observed.role(sender), start, end, byte);
     settle(observed.settled());
   });
-  observed.observe_exchanges([this, &observed](const Line<std::uint8_t>::Exchange& seen) {
-    exchange(seen);
+  observed.observe_transfers([this, &observed](const Line<std::uint8_t>::Transfer& seen) {
+    transfer(seen);
     settle(observed.settled());
   });
-  observed.observe_pulses([this](absenc::Line by, Time start, Time end) { pulse(by, start, end); });
+  observed.observe_pulses([this](ExtraWire wire, Time start, Time end) { pulse(wire, start, end); });
 }
 
 void Waveform::observe(Line<CanFrame>& observed) {
@@ -113,18 +113,18 @@ void Waveform::character(Role sender, Time start, Time end, std::uint8_t byte) {
   end_ = std::max(end_, end);
 }
 
-void Waveform::exchange(const Line<std::uint8_t>::Exchange& seen) {
+void Waveform::transfer(const Line<std::uint8_t>::Transfer& seen) {
   if (kind_ == LinkKind::clocked) {
     draw_clocked(seen);
     comment(seen.start, std::to_string(seen.bits) + " bits " + to_hex(seen.in));
   } else {
-    draw_exchange(seen);
+    draw_spi(seen);
     comment(seen.start, "mosi " + to_hex(seen.out) + " miso " + to_hex(seen.in));
   }
   end_ = std::max(end_, seen.end);
 }
 
-void Waveform::draw_clocked(const Line<std::uint8_t>::Exchange& seen) {
+void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   const auto bits = static_cast<std::int64_t>(seen.bits);
   const std::int64_t idle = settings_.idle_clocks;
   const Scale half{seen.start, seen.end - seen.start, 2 * bits};
@@ -137,7 +137,7 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Exchange& seen) {
 }
 
 // CPHA 0: data stands before the leading edge, which takes it. CPHA 1: it comes with the leading edge.
-void Waveform::draw_exchange(const Line<std::uint8_t>::Exchange& seen) {
+void Waveform::draw_spi(const Line<std::uint8_t>::Transfer& seen) {
   const std::int64_t phase = (settings_.spi_mode & 1) != 0 ? 0 : 1;
   const Time first = seen.start + seen.lead;
   const Scale half{first, seen.end - first, static_cast<std::int64_t>(2 * seen.bits)};
@@ -164,8 +164,8 @@ void Waveform::frame(Time start, const CanFrame& frame) {
   end_ = std::max(end_, edge(count));
 }
 
-void Waveform::pulse(absenc::Line by, Time start, Time end) {
-  drive(pulse_wire(by == absenc::Line::trigger ? "trigger" : "clear"), start, end);
+void Waveform::pulse(ExtraWire wire, Time start, Time end) {
+  drive(pulse_wire(wire == ExtraWire::trigger ? "trigger" : "clear"), start, end);
 }
 
 std::size_t Waveform::pulse_wire(std::string_view name) {

@@ -20,7 +20,7 @@ namespace absenc::sim {
 ///
 /// - half duplex: `line`; full duplex: `host` and `device`, by who drives the pair
 /// - beside these, when there were pulses: `trigger`, `clear`, which a pulse pulls to 0
-/// - exchange: `cs`, `sck`, `mosi`, `miso`; nobody on miso is 1
+/// - spi: `cs`, `sck`, `mosi`, `miso`; nobody on miso is 1
 /// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host takes each bit at the falling
 ///   edge behind. With `idle_clocks` that is so many clocks more than there are bits.
 /// - CAN: `can`, recessive is 1; every frame is acknowledged
@@ -50,9 +50,9 @@ class Waveform {
 
   /// One asynchronous character.
   void character(Role sender, Time start, Time end, std::uint8_t byte);
-  void exchange(const Line<std::uint8_t>::Exchange& exchange);
+  void transfer(const Line<std::uint8_t>::Transfer& transfer);
   void frame(Time start, const CanFrame& frame);
-  void pulse(absenc::Line line, Time start, Time end);
+  void pulse(ExtraWire wire, Time start, Time end);
 
   /// The sink gets what is before `time`: nothing that is told later may begin before it.
   void settle(Time time);
@@ -80,8 +80,8 @@ class Waveform {
   void drive(std::size_t wire, Time from, Time to);
   void comment(Time at, std::string words);
   std::size_t pulse_wire(std::string_view name);
-  void draw_clocked(const Line<std::uint8_t>::Exchange& exchange);
-  void draw_exchange(const Line<std::uint8_t>::Exchange& exchange);
+  void draw_clocked(const Line<std::uint8_t>::Transfer& transfer);
+  void draw_spi(const Line<std::uint8_t>::Transfer& transfer);
 
   LinkKind kind_;
   LineSettings settings_;

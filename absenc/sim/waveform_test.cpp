@@ -56,7 +56,7 @@ std::string body(Picture& picture) {
 }
 
 TEST(Waveform, NamesItsWires) {
-  EXPECT_THAT(Picture(LinkKind::exchange, slow).vcd(),
+  EXPECT_THAT(Picture(LinkKind::spi, slow).vcd(),
               ::testing::StartsWith("$version absenc $end\n$timescale 1 ns $end\n$scope module test $end\n"
                                     "$var wire 1 ! cs $end\n$var wire 1 \" sck $end\n$var wire 1 # mosi $end\n"
                                     "$var wire 1 $ miso $end\n$upscope $end\n$enddefinitions $end\n#0\n"
@@ -71,13 +71,13 @@ TEST(Waveform, CommentsListTheItems) {
   waveform.character(Role::host, 5us, 15us, 0x1A);
   EXPECT_THAT(waveform.vcd(), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
                                         "$comment #7000 device 00 $end\n$scope"));
-  Picture spi(LinkKind::exchange, slow);
+  Picture spi(LinkKind::spi, slow);
   const std::array<std::uint8_t, 2> out{0x12, 0x34};
   const std::array<std::uint8_t, 2> in{0xAB, 0xCD};
-  spi.exchange({0us, 16us, 16, out, in});
+  spi.transfer({0us, 16us, 16, out, in});
   EXPECT_THAT(spi.vcd(), HasSubstr("$comment #0 mosi 12 34 miso AB CD $end\n"));
   Picture clocked(LinkKind::clocked, slow);
-  clocked.exchange({0us, 12us, 12, {}, in});
+  clocked.transfer({0us, 12us, 12, {}, in});
   EXPECT_THAT(clocked.vcd(), HasSubstr("$comment #0 12 bits AB CD $end\n"));
 }
 
@@ -114,12 +114,12 @@ TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   }
 }
 
-TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
+TEST(Waveform, SpiHasItsDataAtTheEdgeThatTheModeSays) {
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0x7F};
   const auto drawn = [&](std::uint8_t mode) {
-    Picture waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = mode});
-    waveform.exchange({1us, 9us, 8, out, in});
+    Picture waveform(LinkKind::spi, {.rate = 1'000'000, .spi_mode = mode});
+    waveform.transfer({1us, 9us, 8, out, in});
     return body(waveform);
   };
   using ::testing::EndsWith;
@@ -135,10 +135,10 @@ TEST(Waveform, ExchangeHasItsDataAtTheEdgeThatTheModeSays) {
 }
 
 TEST(Waveform, TheClockWaitsForTheChip) {
-  Picture waveform(LinkKind::exchange, {.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us});
+  Picture waveform(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us});
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0xFF};
-  waveform.exchange({1us, 14us, 8, out, in, 5us});
+  waveform.transfer({1us, 14us, 8, out, in, 5us});
   EXPECT_THAT(body(waveform),
               ::testing::StartsWith("#0\n1!\n0\"\n0#\n1$\n#1000\n0!\n#6000\n1\"\n1#\n#6500\n0\"\n#7000\n"));
 }
@@ -146,12 +146,12 @@ TEST(Waveform, TheClockWaitsForTheChip) {
 TEST(Waveform, ClockedBits) {
   Picture at_once(LinkKind::clocked, slow);
   const std::array<std::uint8_t, 1> bits{0x50};  // 010
-  at_once.exchange({1us, 4us, 3, {}, bits});
+  at_once.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(at_once),
             "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
             "#3500\n1!\n1\"\n#14000\n");
   Picture after_an_edge(LinkKind::clocked, {.rate = 1'000'000, .idle_clocks = 1});
-  after_an_edge.exchange({1us, 4us, 3, {}, bits});
+  after_an_edge.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(after_an_edge),
             "#0\n1!\n1\"\n#1000\n0!\n#1500\n1!\n0\"\n#2000\n0!\n#2500\n1!\n1\"\n#3000\n0!\n"
             "#3500\n1!\n0\"\n#4000\n0!\n#4500\n1!\n1\"\n#14500\n");
@@ -159,8 +159,8 @@ TEST(Waveform, ClockedBits) {
 
 TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   Picture waveform(LinkKind::full_duplex, slow);
-  waveform.pulse(absenc::Line::trigger, 1us, 3us);
-  waveform.pulse(absenc::Line::clear, 5us, 6us);
+  waveform.pulse(ExtraWire::trigger, 1us, 3us);
+  waveform.pulse(ExtraWire::clear, 5us, 6us);
   EXPECT_THAT(waveform.vcd(), HasSubstr("$var wire 1 # trigger $end\n$var wire 1 $ clear $end\n"));
   EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
 }
@@ -267,11 +267,11 @@ TEST_F(Sigrok, ReadsTheSamplesOfBiss) {
       bits);
 }
 
-TEST_F(Sigrok, ReadsAnExchangeInEveryMode) {
+TEST_F(Sigrok, ReadsSpiInEveryMode) {
   for (std::uint8_t mode = 0; mode < 4; ++mode) {
     const LineSettings settings{.rate = 4'000'000, .spi_mode = mode};
-    Line<std::uint8_t> line(LinkKind::exchange, settings);
-    Picture waveform(LinkKind::exchange, settings);
+    Line<std::uint8_t> line(LinkKind::spi, settings);
+    Picture waveform(LinkKind::spi, settings);
     waveform.observe(line);
     toy::Toy<std::uint8_t> device([](auto& self, const Event<std::uint8_t>& event) {
       if (event.kind == Event<std::uint8_t>::Kind::selected) self.send({0xA1, 0x5E, 0xC3});

@@ -11,7 +11,7 @@ namespace absenc::protocol_name {
 namespace {
 
 using namespace author;
-using Line = LineOf<Protocol>;
+using Dialog = DialogOf<Protocol>;
 using Found = Looked<Protocol>;
 
 template <Ask ask>
@@ -21,13 +21,13 @@ constexpr Request request(const Format& format, Arguments = {}) {
 
 // ---- Procedures: each reads like its paragraph
 
-Procedure set_zero(Line& line, Found& found) {
-  const Request position = request<Ask::position>(line.format());
-  const bool still = co_await stands_still(line, found, position);
+Procedure set_zero(Dialog& dialog, Found& found) {
+  const Request position = request<Ask::position>(dialog.format());
+  const bool still = co_await stands_still(dialog, found, position);
   if (!still) co_return {Error::invalid_argument, "the shaft is turning: nothing was sent"};
-  co_await line.ask(request<Ask::zero>(line.format())).or_say("whether the encoder obeyed is not known");
-  co_await line.rest(20ms);  // it writes its memory
-  const std::uint64_t now = co_await look(line, found, position);
+  co_await dialog.ask(request<Ask::zero>(dialog.format())).or_say("whether the encoder obeyed is not known");
+  co_await dialog.rest(20ms);  // it writes its memory
+  const std::uint64_t now = co_await look(dialog, found, position);
   if (!is_near(now, 0, 16)) co_return {Error::cross_check_failed, "the position is still not zero"};
   co_return done;
 }

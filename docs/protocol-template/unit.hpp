@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maker and encoder: its frames. README.md draws them. What stands here is an invented encoder: put the document's own in
-// its place.
+// Maker and encoder: its frames. README.md draws them. What stands here is an invented encoder: put the document's own
+// in its place.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ struct Protocol {
   using Reply = protocol_name::Reply;
   static constexpr std::size_t longest_reply = 3;
 
-  static constexpr author::Wire wire(const Format&) { return {.answer_limit = 100us, .gap_limit = 50us}; }
+  static constexpr author::HostTimes host_times(const Format&) { return {.answer_limit = 100us, .gap_limit = 50us}; }
   /// What changes the encoder is never sent twice.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {.attempts = request.ask == Ask::position ? 3u : 1u};

@@ -25,7 +25,7 @@ class Decoding {
   void good_reply() {
     std::size_t flipped = 0;
     for (std::size_t bit = 0; bit < reply_.bit_count(); ++bit) {
-      if (unit_.covered != nullptr && !unit_.covered(options_, request_.frame(), reply_.frame(), bit)) continue;
+      if (unit_.is_checked != nullptr && !unit_.is_checked(options_, request_.frame(), reply_.frame(), bit)) continue;
       ++flipped;
       refused(reply_.flipped(bit), [&] { return "with bit " + std::to_string(bit) + " flipped"; });
     }
@@ -75,11 +75,11 @@ class Decoding {
 
   void ends() {
     const Held with_more = reply_.between({}, std::array<std::uint8_t, 1>{0});
-    const Delimit whole = unit_.delimit(options_, Direction::reply, with_more.bytes);
-    require(whole.kind == Delimit::Kind::complete && whole.size == reply_.bytes.size(),
+    const FrameEnd whole = unit_.frame_end(options_, Direction::reply, with_more.bytes);
+    require(whole.kind == FrameEnd::Kind::complete && whole.size == reply_.bytes.size(),
             [] { return "does not end where it ends, with another byte behind it"; });
     for (std::size_t size = 0; size < reply_.bytes.size(); ++size) {
-      require(unit_.delimit(options_, Direction::reply, reply_.cut(size).bytes).kind == Delimit::Kind::incomplete,
+      require(unit_.frame_end(options_, Direction::reply, reply_.cut(size).bytes).kind == FrameEnd::Kind::incomplete,
               [&] { return "seems not to go on after " + std::to_string(size); });
     }
   }

@@ -59,7 +59,7 @@ struct Difference {
 template <class Item>
 class Campaign {
  public:
-  Campaign(const Unit& unit, const Configuration& way, const Exchanges& wanted, std::uint64_t seed, Tally& tally,
+  Campaign(const Unit& unit, const Configuration& way, const ExchangeTest& wanted, std::uint64_t seed, Tally& tally,
            Findings& findings)
       : unit_(unit), way_(way), random_(seed), world_(unit, way.options, seed), tally_(tally), findings_(findings) {
     rates_ = rates_for(unit, way.options, wanted);
@@ -71,11 +71,12 @@ class Campaign {
     raise_an_alarm();
     learn();
     if (asked_.empty()) return;
-    const std::uint64_t end = world_.device().answered() + exchanges;
-    const std::uint64_t begin = world_.device().answered();
-    for (unsigned idle = 0; world_.device().answered() < end && findings_.count() == 0 && idle < 10'000; ++idle) one();
+    const std::uint64_t end = world_.device().answer_count() + exchanges;
+    const std::uint64_t begin = world_.device().answer_count();
+    for (unsigned idle = 0; world_.device().answer_count() < end && findings_.count() == 0 && idle < 10'000; ++idle)
+      one();
     if (way_.is_model) change();
-    tally_.exchanges += world_.device().answered() - begin;
+    tally_.exchanges += world_.device().answer_count() - begin;
     tally_.misheard += world_.faulty().counts()[static_cast<std::size_t>(sim::FaultKind::request_corrupt)];
   }
 
@@ -89,10 +90,10 @@ class Campaign {
     std::vector<std::string> varying{};  // fields that are not the same each time
   };
 
-  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const Exchanges& wanted) {
+  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const ExchangeTest& wanted) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
-    if (unit.link == LinkKind::exchange) rates = {};                   // there a reply is as long as what is clocked
+    if (unit.link == LinkKind::spi) rates = {};                        // there a reply is as long as what is clocked
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum sees that
     if (wanted.requests_too) rates[FaultKind::request_corrupt] = 0.02;
     // Late enough to be given up, every other time. Nobody can tell how old it is what comes unasked.
@@ -282,9 +283,9 @@ class Campaign {
     if (unchecked) return *unchecked;
     const auto frames = frames_of(asked);
     const auto open = [&](const std::pair<Held, Held>& one) {
-      if (unit_.covered == nullptr) return false;
+      if (unit_.is_checked == nullptr) return false;
       for (std::size_t bit = 0; bit < one.second.bit_count(); ++bit) {
-        if (unit_.covered(world_.options(), one.first.frame(), one.second.frame(), bit)) return false;
+        if (unit_.is_checked(world_.options(), one.first.frame(), one.second.frame(), bit)) return false;
       }
       return true;
     };
@@ -341,13 +342,13 @@ std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked)
       frame.bytes.push_back(item);
     }
   });
-  world.line().observe_exchanges([&](const typename World<Item>::Line::Exchange& exchange) {
+  world.line().observe_transfers([&](const typename World<Item>::Line::Transfer& transfer) {
     if constexpr (!World<Item>::is_can) {
       const bool clocked = unit_.link == LinkKind::clocked;
-      Held reply{.link = unit_.link, .bytes = Wire(exchange.in.begin(), exchange.in.end())};
-      if (clocked) reply.bits = exchange.bits;
+      Held reply{.link = unit_.link, .bytes = Wire(transfer.in.begin(), transfer.in.end())};
+      if (clocked) reply.bits = transfer.bits;
       Held request{.link = unit_.link};
-      if (!clocked) request.bytes.assign(exchange.out.begin(), exchange.out.end());
+      if (!clocked) request.bytes.assign(transfer.out.begin(), transfer.out.end());
       frames.push_back({request, reply});
     }
   });
@@ -375,7 +376,7 @@ void judge_weights(const Tally& tally, Findings& findings) {
 }
 
 template <class Item>
-void exchange(const Unit& unit, const Exchanges& wanted, Tally& tally, Findings& findings) {
+void exchange(const Unit& unit, const ExchangeTest& wanted, Tally& tally, Findings& findings) {
   const std::vector<Configuration> ways = configurations(unit);
   for (std::uint64_t round = 0; tally.exchanges < wanted.count && findings.count() == 0; ++round) {
     if (round > 100 + wanted.count / 100) {
@@ -397,7 +398,7 @@ void exchange(const Unit& unit, const Exchanges& wanted, Tally& tally, Findings&
 
 }  // namespace
 
-Findings check_exchanges(const Unit& unit, const Exchanges& wanted) {
+Findings check_exchanges(const Unit& unit, const ExchangeTest& wanted) {
   Findings findings;
   Tally tally;
   if (unit.link == LinkKind::can) {

@@ -28,7 +28,7 @@ struct Held {
   [[nodiscard]] std::size_t bit_count() const;
   /// The first `count` elements.
   [[nodiscard]] Held cut(std::size_t count) const;
-  /// With one bit inverted, counted as for Unit::covered.
+  /// With one bit inverted, counted as for Unit::is_checked.
   [[nodiscard]] Held flipped(std::size_t bit) const;
   /// With these bytes before and behind it; bytes only.
   [[nodiscard]] Held between(Bytes before, Bytes after) const;

@@ -111,8 +111,8 @@ struct Feeding {
     }
     if (whole.error == Error::none && vector.error == Error::none) require_report(whole);
     // A byte after a complete good reply belongs to whatever comes next: it is found there.
-    const Delimit end = unit.delimit(options, Direction::reply, vector.reply);
-    if (end.kind != Delimit::Kind::complete || end.size >= reply.bytes.size()) {
+    const FrameEnd end = unit.frame_end(options, Direction::reply, vector.reply);
+    if (end.kind != FrameEnd::Kind::complete || end.size >= reply.bytes.size()) {
       const Outcome pieces = converse(bytewise(reply.bytes));
       require(pieces.error == whole.error && pieces.seen.fields == whole.seen.fields,
               [] { return "another result when it comes byte by byte"; });
@@ -129,7 +129,7 @@ struct Feeding {
       refused(reply.cut(size), [&] { return "takes a reply cut after " + std::to_string(size); });
     }
     for (std::size_t bit = 0; bit < reply.bit_count(); ++bit) {
-      if (unit.covered != nullptr && !unit.covered(options, request.frame(), reply.frame(), bit)) continue;
+      if (unit.is_checked != nullptr && !unit.is_checked(options, request.frame(), reply.frame(), bit)) continue;
       refused(reply.flipped(bit), [&] { return "takes a reply with bit " + std::to_string(bit) + " flipped"; });
     }
     for (const std::uint8_t byte : std::to_array<std::uint8_t>({0x00, 0x1A, 0x55, 0xFF})) {
@@ -163,7 +163,7 @@ struct Feeding {
       stream_with(reply.cut(size), [&] { return "with one cut after " + std::to_string(size); });
     }
     for (std::size_t bit = 0; bit < reply.bit_count(); ++bit) {
-      if (unit.covered != nullptr && !unit.covered(options, request.frame(), reply.frame(), bit)) continue;
+      if (unit.is_checked != nullptr && !unit.is_checked(options, request.frame(), reply.frame(), bit)) continue;
       stream_with(reply.flipped(bit), [&] { return "with one whose bit " + std::to_string(bit) + " is flipped"; });
     }
     for (const std::uint8_t byte : std::to_array<std::uint8_t>({0x00, 0x1A, 0x55, 0xFF})) {

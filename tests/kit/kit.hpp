@@ -9,8 +9,8 @@
 
 namespace absenc::kit {
 
-/// Every vector through `decode` and `delimit`: whole, cut at each element, with each bit flipped that is covered, one
-/// reply too many.
+/// Every vector through `decode` and `frame_end`: whole, cut at each element, with each bit flipped that is checked,
+/// one reply too many.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
 /// Where the unit says that the fields of good replies stand: vectors, those that a flip makes of them, and what the
@@ -50,11 +50,11 @@ namespace absenc::kit {
 /// Host against virtual encoder in virtual time, over a line with every kind of fault. The shaft's place is known, and
 /// so is what each command says of it on an undamaged line: anything else is an error where no byte of the conversation
 /// was damaged, and elsewhere so rare as the check of the frames allows.
-struct Exchanges {
+struct ExchangeTest {
   std::uint64_t count = 100'000;
   std::uint64_t seed = 0;
   bool requests_too = false;  // also what the encoder hears is damaged
 };
-[[nodiscard]] Findings check_exchanges(const Unit& unit, const Exchanges& exchanges);
+[[nodiscard]] Findings check_exchanges(const Unit& unit, const ExchangeTest& test);
 
 }  // namespace absenc::kit

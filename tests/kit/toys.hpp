@@ -153,7 +153,7 @@ struct Toy {
         before_ = now;
         at_ = event.at + std::chrono::microseconds(3);
         speaks_ = true;
-        ++answered_;
+        ++answer_count_;
       }
     }
     Step<std::uint8_t> next(Time) override {
@@ -173,7 +173,7 @@ struct Toy {
     [[nodiscard]] std::uint32_t memory_version() const override { return 0; }
     [[nodiscard]] std::span<const Violation> violations() const override { return {}; }
     [[nodiscard]] std::uint32_t violation_count() const override { return 0; }
-    [[nodiscard]] std::uint64_t answered() const override { return answered_; }
+    [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }
 
    private:
     const Shaft& shaft_;
@@ -182,7 +182,7 @@ struct Toy {
     unsigned before_ = 0;
     Time at_{};
     bool speaks_ = false;
-    std::uint64_t answered_ = 0;
+    std::uint64_t answer_count_ = 0;
     std::array<std::uint8_t, length> reply_{};
   };
 
@@ -206,9 +206,9 @@ struct Toy {
     request[0] = ask;
     return std::size_t{1};
   }
-  static Delimit delimit(const Options&, Direction direction, Bytes bytes) {
+  static FrameEnd frame_end(const Options&, Direction direction, Bytes bytes) {
     const std::size_t size = direction == Direction::request ? 1 : length;
-    return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
+    return {bytes.size() < size ? FrameEnd::Kind::incomplete : FrameEnd::Kind::complete, size};
   }
   static BitRanges places(const Options&, Frame, Frame, const FieldInfo& field) {
     BitRanges ranges;
@@ -252,7 +252,7 @@ inline constexpr Unit unit = [] {
   made.device_storage = sizeof(typename Made::Encoder);
   made.decode = Made::decode;
   made.encode = Made::encode;
-  made.delimit = Made::delimit;
+  made.frame_end = Made::frame_end;
   made.host = Made::host;
   made.bits = Made::places;
   made.device = Made::device;

@@ -16,7 +16,7 @@ using testing::IsEmpty;
 using testing::Not;
 using toy::Mistake;
 
-constexpr Exchanges few{.count = 20'000};
+constexpr ExchangeTest few{.count = 20'000};
 
 template <Mistake mistake>
 void expect_no_finding() {

@@ -96,7 +96,7 @@ class World {
     result.made = true;
     const std::uint64_t changed = changed_bytes();
     const std::uint64_t faults = all_faults();
-    const std::uint64_t answered = device_->answered();
+    const std::uint64_t answered = device_->answer_count();
     const bool is_guarded = guarded(command);
     if (is_guarded) guard_.attach(*conversation, unit_, options_, !command.changes_encoder);
     on_emit_ = [&] {
@@ -114,7 +114,7 @@ class World {
     if (conversation->reading() != nullptr) result.seen.reading = *conversation->reading();
     result.damaged = changed_bytes() - changed;
     result.faults = all_faults() - faults;
-    result.asked = device_->answered() - answered;
+    result.asked = device_->answer_count() - answered;
     if constexpr (!is_can) {
       const auto exchange = conversation->exchange();
       result.sent.assign(exchange.sent.begin(), exchange.sent.end());
@@ -133,7 +133,7 @@ class World {
       const auto fault = static_cast<FaultKind>(kind);
       const bool keeps = fault == FaultKind::delay || fault == FaultKind::echo || fault == FaultKind::silence ||
                          fault == FaultKind::repeat;
-      if (!keeps || unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange) {
+      if (!keeps || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) {
         sum += faulty_->counts()[kind];
       }
     }
@@ -176,14 +176,14 @@ class World {
   // As host::Session has it.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
-    return unit_.link != LinkKind::exchange && unit_.link != LinkKind::clocked;
+    return unit_.link != LinkKind::spi && unit_.link != LinkKind::clocked;
   }
   void attach(Machine<Item>& machine) {
     if (node_ == none) {
       node_ = line_->attach(sim::Role::host, idle_, [this] { return !on_emit_ || on_emit_(); });
     }
     // How long a chip stays unselected between two conversations is up to who runs them.
-    if (unit_.link == LinkKind::exchange) pass(std::chrono::microseconds(20));
+    if (unit_.link == LinkKind::spi) pass(std::chrono::microseconds(20));
     line_->replace(node_, machine);
   }
 

@@ -66,7 +66,7 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
   const Diagnosis diagnosis = diagnose(unit, options, sent, received);
   const Explanation explanation =
       unit.explain == nullptr ? Explanation{} : unit.explain(options, error, sent, received);
-  std::string message = describe(error, explanation.found, diagnosis.finding);
+  std::string message = describe(error, explanation.detail, diagnosis.finding);
   const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
   if (!advice.empty()) message += fmt::format(": {}", advice);
   if (json) {

@@ -48,7 +48,7 @@ std::string fault_counts(const sim::FaultCounts& faults) {
 
 template <class Item>
 void print_rules(const Device<Item>& encoder, const VirtualDevice& device, std::string_view name, Time start) {
-  print_message(fmt::format("{}{} requests answered in {}", name, encoder.answered(), to_text(os::now() - start)));
+  print_message(fmt::format("{}{} requests answered in {}", name, encoder.answer_count(), to_text(os::now() - start)));
   if (device.faults() != nullptr) print_note(fmt::format("  faults injected: {}", fault_counts(*device.faults())));
   if (encoder.violation_count() == 0) return;
   print_note(fmt::format("  rules that the host broke: {}", encoder.violation_count()));
@@ -99,7 +99,7 @@ void check_gap(const Unit& unit, const Invocation& invocation) {
 }
 
 void check_line(const Unit& unit, const Options& options, const Invocation& invocation) {
-  const bool is_spi = unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
+  const bool is_spi = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
   const bool is_can = unit.link == LinkKind::can;
   const std::array<Where, 5> places{{{"--pty", "a serial line", !is_spi},
                                      {"--tcp", "a serial line", !is_spi},
@@ -124,14 +124,14 @@ void check_line(const Unit& unit, const Options& options, const Invocation& invo
   if (is_spi && chosen.empty()) {
     throw UsageError(fmt::format("{0} does not go over a serial line: use {1}, or sim:{0}", unit.id, instead));
   }
-  const ExtraLines lines = unit.extra_lines == nullptr ? ExtraLines{} : unit.extra_lines(options);
-  if (lines.trigger) {
+  const ExtraWires wires = unit.extra_wires == nullptr ? ExtraWires{} : unit.extra_wires(options);
+  if (wires.trigger) {
     throw UsageError(
         fmt::format("with these options a pulse asks {0} for each frame, and neither a pseudo-terminal nor TCP carries "
                     "pulses: use sim:{0} in place of a port, as in `absenc read \"sim:{0}?{1}\"`",
                     unit.id, fmt::join(invocation.texts("--option"), "&")));
   }
-  if (lines.clear) {
+  if (wires.clear) {
     print_message(fmt::format("note: nothing here carries the pulse that sets the zero: sim:{} does", unit.id));
   }
   if (!invocation.has("--also")) return;

@@ -66,7 +66,7 @@ int identify_frames(const Invocation& invocation) {
       const std::vector<HeardExchange> exchanges = frames_for(*unit, invocation);
       readable = true;
       ++searches;
-      for (capture::Hypothesis& one : capture::explain(*unit, {}, exchanges)) {
+      for (capture::Hypothesis& one : capture::find_hypotheses(*unit, {}, exchanges)) {
         candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
     } catch (const UsageError& error) {  // of another kind of link, perhaps

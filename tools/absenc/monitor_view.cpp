@@ -264,7 +264,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
 // The last bad exchanges: what was sent and what came, repeated attempts included.
 void draw_errors(Screen& screen, int row, int end, const Shown& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
-  for (const KeptExchange& bad : shown.snapshot.bad) {
+  for (const BadExchangeText& bad : shown.snapshot.bad) {
     const double seconds = std::chrono::duration<double>(bad.at - shown.watch->start()).count();
     const std::string text = fmt::format("{:9.3f}  {}: {} -> {}", seconds, text_of(bad.error).name, bad.sent,
                                          bad.received.empty() ? "nothing" : bad.received);

@@ -44,9 +44,9 @@ struct Snapshot {
   Time median{};               // of the latencies
   Time percentile_99{};
   Time longest{};
-  std::vector<std::string> trace{};   // only with details; the newest last
-  std::vector<KeptExchange> bad{};    // only with details; the newest first
-  std::vector<std::string> fields{};  // only with details: "name value", of the last reply what the reading lacks
+  std::vector<std::string> trace{};    // only with details; the newest last
+  std::vector<BadExchangeText> bad{};  // only with details; the newest first
+  std::vector<std::string> fields{};   // only with details: "name value", of the last reply what the reading lacks
 };
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);

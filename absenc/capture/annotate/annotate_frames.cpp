@@ -70,7 +70,7 @@ void CanAnnotator::put(const CanRecord& record) {
   if (judge_.decode(frame, {}) != Error::none) {
     return answers_badly(record) ? void() : tell(Kind::noise, record, as_reply, Remark::none);
   }
-  if (!judge_.answered(frame)) return tell(Kind::request, record, Error::none, Remark::none);
+  if (!judge_.is_answered(frame)) return tell(Kind::request, record, Error::none, Remark::none);
   end_waits(record.frame);
   if (waiting_ == capacity) give_up(0, Remark::unanswered);
   asked_[waiting_++] = record;

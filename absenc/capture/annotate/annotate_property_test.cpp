@@ -80,7 +80,7 @@ class Truth {
         ++i;
       } else {
         const bool bad = judge_.decode({.bytes = said[i].bytes}, {}) != Error::none;
-        const bool may = !bad && !judge_.answered({.bytes = said[i].bytes});
+        const bool may = !bad && !judge_.is_answered({.bytes = said[i].bytes});
         add(Kind::request, may ? Remark::none : Remark::unanswered, may ? Error::none : Error::timeout, said[i], {});
       }
     }
@@ -155,7 +155,7 @@ class Truth {
     }
     one.error = judge_.decode({.bytes = asked.bytes}, {.bytes = reply});
     one.reply = reply;
-    if (one.error == Error::unsupported && !judge_.answered({.bytes = asked.bytes})) {
+    if (one.error == Error::unsupported && !judge_.is_answered({.bytes = asked.bytes})) {
       one.error = Error::none;
       one.remark = Remark::undocumented;
     }

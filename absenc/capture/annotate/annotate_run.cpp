@@ -198,7 +198,7 @@ bool Annotator::is_request(std::size_t size) {
   if (as_reply != 0 && (!answered || channel.last_size != 0)) return false;
   if (answered) return true;
   const auto waiting = exchanges_.waiting();
-  const bool expects_reply = !waiting.empty() && judge_.answered({.bytes = waiting.back().bytes()});
+  const bool expects_reply = !waiting.empty() && judge_.is_answered({.bytes = waiting.back().bytes()});
   return turns && channel.in_step && exchanges_.has_asked() && !expects_reply && !judge_.streams();
 }
 

@@ -201,9 +201,9 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
   const auto begins_nothing = [&](std::uint8_t byte) {
     for (const Direction direction : {Direction::request, Direction::reply}) {
       const Wire many(64, byte);
-      const Delimit delimit = unit.delimit(options, direction, Bytes(many).first(1));
-      const bool may = delimit.kind == Delimit::Kind::complete ||
-                       unit.delimit(options, direction, many).kind == Delimit::Kind::complete;
+      const FrameEnd end = unit.frame_end(options, direction, Bytes(many).first(1));
+      const bool may = end.kind == FrameEnd::Kind::complete ||
+                       unit.frame_end(options, direction, many).kind == FrameEnd::Kind::complete;
       if (may) return false;
     }
     return true;

@@ -63,9 +63,9 @@ class Talker {
       if (waveform_ != nullptr) waveform_->character(line_.role(sender), start, end, byte);
       hear(line_.role(sender), static_cast<Tick>(start.count()), static_cast<Tick>(end.count()), byte);
     });
-    line_.observe_exchanges([this](const auto& exchange) {
-      if (waveform_ != nullptr) waveform_->exchange(exchange);
-      hear(exchange);
+    line_.observe_transfers([this](const auto& transfer) {
+      if (waveform_ != nullptr) waveform_->transfer(transfer);
+      hear(transfer);
     });
     for (const Command& command : unit.commands) {
       if (!command.changes_encoder && command.repeatable) commands_.push_back(&command);
@@ -124,16 +124,16 @@ class Talker {
     }
   }
 
-  void hear(const sim::Line<std::uint8_t>::Exchange& exchange) {
+  void hear(const sim::Line<std::uint8_t>::Transfer& transfer) {
     const std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
-    Burst burst{.begin = static_cast<Tick>(exchange.start.count()),
-                .end = static_cast<Tick>(exchange.end.count()),
-                .bits = exchange.bits + idle,
-                .in = std::vector<std::uint8_t>((exchange.bits + idle + 7) / 8),
+    Burst burst{.begin = static_cast<Tick>(transfer.start.count()),
+                .end = static_cast<Tick>(transfer.end.count()),
+                .bits = transfer.bits + idle,
+                .in = std::vector<std::uint8_t>((transfer.bits + idle + 7) / 8),
                 .out = {}};
-    if (unit_.link == LinkKind::exchange) burst.out.assign(exchange.out.begin(), exchange.out.end());
+    if (unit_.link == LinkKind::spi) burst.out.assign(transfer.out.begin(), transfer.out.end());
     for (std::size_t i = 0; i < burst.bits; ++i) {
-      const bool bit = i < idle || (exchange.in[(i - idle) / 8] >> (7 - (i - idle) % 8) & 1) != 0;
+      const bool bit = i < idle || (transfer.in[(i - idle) / 8] >> (7 - (i - idle) % 8) & 1) != 0;
       if (bit) burst.in[i / 8] = static_cast<std::uint8_t>(burst.in[i / 8] | 0x80u >> i % 8);
     }
     talk_.bursts.push_back(std::move(burst));

@@ -55,7 +55,7 @@ void Exchanges::answer(std::size_t which, const Piece& reply, Error error, Remar
                         .reading = reading};
   if (reply.begin >= asked.end) annotation.turnaround = reply.begin - asked.end;
   const bool whole = remark == Remark::none || remark == Remark::echo;
-  if (error == Error::unsupported && whole && !judge_.answered(annotation.request)) {
+  if (error == Error::unsupported && whole && !judge_.is_answered(annotation.request)) {
     annotation.error = Error::none;
     annotation.remark = Remark::undocumented;
   } else if (error == Error::none && remark != Remark::cut && overdue(asked, reply.begin)) {
@@ -88,7 +88,7 @@ void Exchanges::tell_unanswered(const Asked& asked, bool cut) {
   const Piece piece{asked.bytes(), asked.begin, asked.end};
   if (asked.error != Error::none) {
     alone(asked.is_request ? Annotation::Kind::request : Annotation::Kind::noise, piece, asked.error, asked.remark);
-  } else if (!judge_.answered({.bytes = asked.bytes()})) {
+  } else if (!judge_.is_answered({.bytes = asked.bytes()})) {
     alone(Annotation::Kind::request, piece, Error::none, Remark::none);
   } else if (cut || asked.remark == Remark::cut) {
     alone(Annotation::Kind::request, piece, Error::none, Remark::cut);

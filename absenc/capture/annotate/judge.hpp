@@ -26,8 +26,8 @@ class Judge {
 
   /// The size of the frame that the first byte begins, or 0.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
-    const Delimit delimit = unit_->delimit(options_, direction, bytes);
-    return delimit.kind == Delimit::Kind::complete && delimit.size <= bytes.size() ? delimit.size : 0;
+    const FrameEnd end = unit_->frame_end(options_, direction, bytes);
+    return end.kind == FrameEnd::Kind::complete && end.size <= bytes.size() ? end.size : 0;
   }
   /// The size of the good request that the first byte begins, or 0.
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
@@ -35,8 +35,8 @@ class Judge {
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
   }
 
-  [[nodiscard]] bool answered(const Frame& request) const {
-    return unit_->answered == nullptr || unit_->answered(options_, request);
+  [[nodiscard]] bool is_answered(const Frame& request) const {
+    return unit_->is_answered == nullptr || unit_->is_answered(options_, request);
   }
   [[nodiscard]] bool streams() const { return unit_->streams != nullptr && unit_->streams(options_); }
 

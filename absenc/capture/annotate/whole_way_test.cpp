@@ -56,7 +56,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
   const Options options = testing::options_of(unit);
   const LineSettings line = testing::line_of(unit);
-  const bool clocked = unit.link == LinkKind::clocked || unit.link == LinkKind::exchange;
+  const bool clocked = unit.link == LinkKind::clocked || unit.link == LinkKind::spi;
   Annotator::Settings settings;
 
   void SetUp() override {
@@ -84,7 +84,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     };
     if (clocked) {
       ClockedLine wires{.rising = line.spi_mode == 0 || line.spi_mode == 3};
-      const bool spi = unit.link == LinkKind::exchange;
+      const bool spi = unit.link == LinkKind::spi;
       wires.clock = channel(spi ? "sck" : "clock");
       wires.in = channel(spi ? "miso" : "data");
       if (spi) wires.out = channel("mosi");

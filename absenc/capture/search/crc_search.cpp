@@ -72,7 +72,7 @@ class Search {
       Firsts solutions;
       for (std::size_t first = 0; first < frames_.shortest - shape.trailing - shape.check_size; ++first) {
         ++shapes_;
-        explain(shape, first, solutions);
+        find_solutions(shape, first, solutions);
       }
       for (const auto& [poly, keys] : solutions) keep(shape, poly, keys);
     }
@@ -128,7 +128,7 @@ class Search {
     return true;
   }
 
-  void explain(const Shape& shape, std::size_t first, Firsts& solutions) {
+  void find_solutions(const Shape& shape, std::size_t first, Firsts& solutions) {
     const bool differences = frames_.lengths.size() < frames_.all.size();
     if (differences) {
       for (const std::uint32_t poly : polynomials(shape, first, std::nullopt)) fit(shape, first, poly, solutions);

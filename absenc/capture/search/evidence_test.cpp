@@ -125,7 +125,7 @@ TEST_P(RandomStream, IsNobodys) {
       std::mt19937_64 random(seed);
       std::vector<std::uint8_t> bytes(std::array<std::size_t, 4>{12, 100, 600, 2048}[seed % 4]);
       for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
-      for (const Hypothesis& one : explain_stream(*unit, bytes, std::chrono::milliseconds(100))) {
+      for (const Hypothesis& one : find_stream_hypotheses(*unit, bytes, std::chrono::milliseconds(100))) {
         EXPECT_GT(one.chance(), is_found)
             << unit->id << ", seed " << seed << ": " << one.evidence.explained << " of " << one.evidence.tried;
       }
@@ -142,7 +142,7 @@ TEST(Hypotheses, WhatMeansTheSameIsListedOnce) {
   Unit unit = Toy::unit();
   unit.options = options;
   const std::vector<HeardExchange> all{heard(254), heard(253), heard(250), heard(3, 8)};
-  const std::vector<Hypothesis> found = explain(unit, {}, all);
+  const std::vector<Hypothesis> found = find_hypotheses(unit, {}, all);
   ASSERT_FALSE(found.empty());
   for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
 }
@@ -157,7 +157,7 @@ TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
 
 TEST(Hypotheses, ModelsComeFirst) {
   const std::vector<HeardExchange> small{heard(1), heard(2)};
-  const std::vector<Hypothesis> found = explain(Toy::unit(), {}, small);
+  const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, small);
   ASSERT_EQ(found.size(), 1u);
   ASSERT_NE(found[0].options.model, nullptr);
   EXPECT_EQ(found[0].options.model->name, "four");
@@ -166,7 +166,7 @@ TEST(Hypotheses, ModelsComeFirst) {
 
 TEST(Hypotheses, TheFewestBitsWhereNoModelFits) {
   const std::vector<HeardExchange> large{heard(1), heard(40)};
-  const std::vector<Hypothesis> found = explain(Toy::unit(), {}, large);
+  const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, large);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].options.model, nullptr);
   EXPECT_EQ(found[0].options[0], 6);
@@ -176,14 +176,14 @@ TEST(Hypotheses, TheFewestBitsWhereNoModelFits) {
 
 TEST(Hypotheses, ASingleChoiceThatExplainsMore) {
   const std::vector<HeardExchange> downwards{heard(254), heard(253), heard(250)};
-  const std::vector<Hypothesis> found = explain(Toy::unit(), {}, downwards);
+  const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, downwards);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].options[1], 1);
 }
 
 TEST(Hypotheses, NothingWhereNothingIsExplained) {
   const std::vector<HeardExchange> other{heard(1, 8)};
-  EXPECT_TRUE(explain(Toy::unit(), {}, other).empty());
+  EXPECT_TRUE(find_hypotheses(Toy::unit(), {}, other).empty());
 }
 
 TEST(Hypotheses, EveryVectorOfEveryUnitIsFoundByItsUnit) {
@@ -193,7 +193,7 @@ TEST(Hypotheses, EveryVectorOfEveryUnitIsFoundByItsUnit) {
       if (vector.error != Error::none || vector.reply.empty() || !vector.options.empty()) continue;
       const HeardExchange one{.request = {.bytes = {vector.request.begin(), vector.request.end()}},
                               .reply = {.bytes = {vector.reply.begin(), vector.reply.end()}}};
-      EXPECT_FALSE(explain(*unit, {}, {&one, 1}).empty()) << vector.id;
+      EXPECT_FALSE(find_hypotheses(*unit, {}, {&one, 1}).empty()) << vector.id;
     }
   }
 }
@@ -210,7 +210,7 @@ TEST(Stream, FramesAreCutOutOfWhatIsAroundThem) {
   Options options;
   ASSERT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
   EXPECT_EQ(split_stream(unit, options, bytes).size(), 8u);
-  const std::vector<Hypothesis> found = explain_stream(unit, bytes, std::chrono::milliseconds(100));
+  const std::vector<Hypothesis> found = find_stream_hypotheses(unit, bytes, std::chrono::milliseconds(100));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_TRUE(found[0].evidence.explains_all());
   EXPECT_LE(found[0].chance(), is_found);
@@ -226,7 +226,7 @@ TEST(Stream, NoiseIsNotFound) {
   }
   for (const Unit* unit : all_units()) {
     if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
-    for (const Hypothesis& one : explain_stream(*unit, noise, std::chrono::milliseconds(100))) {
+    for (const Hypothesis& one : find_stream_hypotheses(*unit, noise, std::chrono::milliseconds(100))) {
       EXPECT_GT(one.chance(), is_found) << unit->id;
     }
   }

@@ -233,8 +233,8 @@ std::vector<Options> likely_options(const Unit& unit, std::span<const OptionText
   return all;
 }
 
-std::vector<Hypothesis> explain(const Unit& unit, std::span<const OptionText> settings,
-                                std::span<const HeardExchange> exchanges) {
+std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
+                                        std::span<const HeardExchange> exchanges) {
   if (exchanges.empty()) return {};
   Search search(unit, exchanges);
   const std::vector<Options> likely = likely_options(unit, settings);

@@ -16,11 +16,10 @@ constexpr std::size_t least_frames = 3;  // good ones
 
 // The size of the good reply that the first byte begins, or 0.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
-  const Delimit delimit = unit.delimit(options, Direction::reply, bytes);
-  if (delimit.kind != Delimit::Kind::complete || delimit.size == 0 || delimit.size > bytes.size()) return 0;
-  const HeardExchange reply{
-      .reply = {.bytes = {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(delimit.size)}}};
-  return explains(unit, options, reply) ? delimit.size : 0;
+  const FrameEnd end = unit.frame_end(options, Direction::reply, bytes);
+  if (end.kind != FrameEnd::Kind::complete || end.size == 0 || end.size > bytes.size()) return 0;
+  const HeardExchange reply{.reply = {.bytes = {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end.size)}}};
+  return explains(unit, options, reply) ? end.size : 0;
 }
 
 // How often noise has a good reply where one is looked for.
@@ -115,7 +114,7 @@ std::vector<HeardExchange> split_stream(const Unit& unit, const Options& options
   return replies;
 }
 
-std::vector<Hypothesis> explain_stream(const Unit& unit, Bytes bytes, Time duration) {
+std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Time duration) {
   std::vector<Hypothesis> found;
   if (bytes.empty()) return found;
   const std::vector<Options> all = stream_options(unit);

@@ -14,8 +14,8 @@ namespace absenc::capture {
 /// of its own: it was a chance for a good one. Only what may be a reply that the beginning or the end cuts is left out.
 [[nodiscard]] std::vector<HeardExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes);
 
-/// As `explain`. The options then say that the encoder sends by itself, and how often when they can: as often as in the
-/// time in which the bytes came.
-[[nodiscard]] std::vector<Hypothesis> explain_stream(const Unit& unit, Bytes bytes, Time duration);
+/// As `find_hypotheses`. The options then say that the encoder sends by itself, and how often when they can: as often
+/// as in the time in which the bytes came.
+[[nodiscard]] std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Time duration);
 
 }  // namespace absenc::capture

@@ -54,7 +54,7 @@ std::vector<std::string_view> split(std::span<const std::string> wanted) {
   return parts;
 }
 
-bool is_clocked(LinkKind link) { return link == LinkKind::clocked || link == LinkKind::exchange; }
+bool is_clocked(LinkKind link) { return link == LinkKind::clocked || link == LinkKind::spi; }
 
 bool is_needed(LinkKind link, std::string_view wire) {
   if (link == LinkKind::full_duplex) return false;  // one of them is enough
@@ -88,7 +88,7 @@ void assign(WireChannels& found, LinkKind link, std::span<const std::string> cha
 std::span<const std::string_view> wires_of(LinkKind link) {
   static constexpr std::array<std::string_view, 1> half_duplex{"line"};
   static constexpr std::array<std::string_view, 2> full_duplex{"host", "device"};
-  static constexpr std::array<std::string_view, 4> exchange{"clock", "miso", "mosi", "cs"};
+  static constexpr std::array<std::string_view, 4> spi{"clock", "miso", "mosi", "cs"};
   static constexpr std::array<std::string_view, 2> clocked{"clock", "data"};
   static constexpr std::array<std::string_view, 1> can{"bus"};
   switch (link) {
@@ -96,8 +96,8 @@ std::span<const std::string_view> wires_of(LinkKind link) {
       return half_duplex;
     case LinkKind::full_duplex:
       return full_duplex;
-    case LinkKind::exchange:
-      return exchange;
+    case LinkKind::spi:
+      return spi;
     case LinkKind::clocked:
       return clocked;
     case LinkKind::can:

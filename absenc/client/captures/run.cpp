@@ -121,7 +121,7 @@ std::uint64_t CaptureRun::ticks_per_second() const { return reader_->layout().ti
 
 CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const Content content = reader_->layout().content;
-  const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange;
+  const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi;
   CaptureOutcome outcome = content == Content::bytes     ? run_bytes(sink, progress)
                            : content == Content::frames  ? run_frames(sink, progress)
                            : clocked                     ? run_bursts(sink, progress)
@@ -197,11 +197,11 @@ CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const s
 
 CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
-  const bool exchange = unit_.link == LinkKind::exchange;
+  const bool spi = unit_.link == LinkKind::spi;
   const capture::ClockedLine line{.clock = *wires.wires[0],
                                   .in = wires.wires[1],
-                                  .out = exchange ? wires.wires[2] : std::nullopt,
-                                  .select = exchange ? wires.wires[3] : std::nullopt,
+                                  .out = spi ? wires.wires[2] : std::nullopt,
+                                  .select = spi ? wires.wires[3] : std::nullopt,
                                   .rising = line_.spi_mode == 0 || line_.spi_mode == 3};
   CaptureOutcome outcome;
   Guard guard;

@@ -57,7 +57,7 @@ std::string message_of(const Unit& unit, const Options& options, const Annotatio
                                       ? unit.explain(options, annotation.error, annotation.request, annotation.reply)
                                       : Explanation{};
   if (!remark.empty()) return std::string(remark);
-  std::string message = describe(annotation.error, explanation.found, diagnosis.finding);
+  std::string message = describe(annotation.error, explanation.detail, diagnosis.finding);
   const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
   return advice.empty() ? message : fmt::format("{}: {}", message, advice);
 }

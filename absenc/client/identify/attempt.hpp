@@ -51,7 +51,7 @@ inline Way way_of(const LineSearch& search) {
 inline bool fits(const Unit& unit, const LineSearch& search) {
   const Way way = way_of(search);
   if (way == Way::can) return unit.link == LinkKind::can;
-  if (way == Way::spi) return unit.link == LinkKind::exchange || unit.link == LinkKind::clocked;
+  if (way == Way::spi) return unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
@@ -224,7 +224,7 @@ class Attempt {
 
   // What was asked before may be answered only now: that is no answer to what will be asked.
   void settle() {
-    if (!std::exchange(asked_, true) || unit_.link == LinkKind::clocked || unit_.link == LinkKind::exchange) return;
+    if (!std::exchange(asked_, true) || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) return;
     const Time end = port().now() + longest_settling;
     while (port().now() < end) {
       const Step<Item> step{.at = port().now() + settled};
@@ -246,7 +246,7 @@ class Attempt {
 
   // Whether anybody sent it: what nobody drives is clocked in all the same.
   [[nodiscard]] bool is_alive(const HeardExchange& exchange) const {
-    if (unit_.link != LinkKind::clocked && unit_.link != LinkKind::exchange) return true;
+    if (unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi) return true;
     const auto& bytes = exchange.reply.bytes;
     const auto same_as = [&](std::uint8_t value) {
       return std::all_of(bytes.begin(), bytes.end(), [value](std::uint8_t byte) { return byte == value; });
@@ -311,14 +311,14 @@ class Attempt {
     }
     read_all(read, options, exchanges);
     ++findings_.searches;
-    std::vector<Hypothesis> found = capture::explain(unit_, known, exchanges);
+    std::vector<Hypothesis> found = capture::find_hypotheses(unit_, known, exchanges);
     // What explains more than what was asked with may also ask better.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
       std::vector<HeardExchange> again;
       read_all(read, found.front().options, again);
       ++findings_.searches;
-      std::vector<Hypothesis> better = capture::explain(unit_, known, again);
+      std::vector<Hypothesis> better = capture::find_hypotheses(unit_, known, again);
       if (!better.empty() && better.front().chance() < found.front().chance()) found = std::move(better);
     }
     keep(found, settings, encoder);

@@ -96,13 +96,13 @@ std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choi
   for (const Options& options : bases(unit)) {
     if (options.model == nullptr && !best.empty() && best.front().chance() <= capture::is_found) break;
     ++searches;
-    std::vector<Hypothesis> found = capture::explain(unit, {}, heard_as(unit, options, choices, damages));
+    std::vector<Hypothesis> found = capture::find_hypotheses(unit, {}, heard_as(unit, options, choices, damages));
     if (!better(found)) continue;
     const Hypothesis first = found.front();
     best = std::move(found);
     if (first.options.values == options.values) continue;
     ++searches;
-    std::vector<Hypothesis> again = capture::explain(unit, {}, heard_as(unit, first.options, choices, damages));
+    std::vector<Hypothesis> again = capture::find_hypotheses(unit, {}, heard_as(unit, first.options, choices, damages));
     if (better(again)) best = std::move(again);
   }
   return best;
@@ -119,7 +119,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
       for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // it is spoken on another kind of wire
+    } catch (const UsageError& error) {  // it is spoken on another kind of link
       findings.refusals.emplace_back(error.what());
     } catch (const Failure& failure) {
       findings.refusals.emplace_back(failure.what());

@@ -184,7 +184,7 @@ class Search {
         ++findings_.searches;
         std::vector<OptionText> settings;
         if (sender.option != nullptr) settings.push_back({sender.option->name, sender.number});
-        for (Hypothesis& one : capture::explain(*unit, settings, sender.exchanges)) {
+        for (Hypothesis& one : capture::find_hypotheses(*unit, settings, sender.exchanges)) {
           findings_.candidates.push_back({unit, std::move(one), search_.settings, true, line, sender.name()});
         }
       }
@@ -197,7 +197,7 @@ class Search {
                              other->line.parity == line.parity && other->line.stop_bits == line.stop_bits;
       if (!same_line || bytes.empty()) continue;
       ++findings_.searches;
-      for (Hypothesis& one : capture::explain_stream(*other, bytes, listening)) {
+      for (Hypothesis& one : capture::find_stream_hypotheses(*other, bytes, listening)) {
         Settings settings = search_.settings;
         const bool needs_rate = other->line.rate != line.rate && way_of(search_) == Way::serial &&
                                 !has_setting(settings, rate_setting) && !os::is_pseudo_terminal(search_.place);

@@ -52,7 +52,7 @@ class RecordedConversation final : public Machine<Item> {
     if (begun_ == Time{}) begun_ = now;
     if (now >= limits_.deadline) throw Stop::out_of_time;
     const Step<Item> step = inner_->next(now);
-    if (step.kind == Kind::pulse && step.line == Line::clear) throw Stop::harmful;
+    if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw Stop::harmful;
     if (!good_ && now - begun_ >= (heard == 0 ? limits_.quiet : limits_.nonsense)) {
       good_ = !exchanges.empty() && is_good_(exchanges.back());
       if (!good_) throw Stop::silent;

@@ -144,7 +144,7 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
 bool goes_over_serial(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
-bool goes_over_spi(const Unit& unit) { return unit.link == LinkKind::exchange || unit.link == LinkKind::clocked; }
+bool goes_over_spi(const Unit& unit) { return unit.link == LinkKind::spi || unit.link == LinkKind::clocked; }
 
 std::string examples(const Unit& unit) {
   const auto first = [](const std::vector<std::string>& ports, const char* otherwise) {

@@ -82,8 +82,8 @@ class ConnectionOn final : public Connection {
   const host::Counters& counters() const override { return session_.counters(); }
   const host::Latencies& latencies() const override { return statistics_.latencies(); }
 
-  std::vector<KeptExchange> bad_exchanges() const override {
-    std::vector<KeptExchange> kept;
+  std::vector<BadExchangeText> bad_exchanges() const override {
+    std::vector<BadExchangeText> kept;
     for (std::size_t i = 0; i < statistics_.kept(); ++i) {
       const host::BadExchange<Item>& bad = statistics_.bad(i);
       kept.push_back({bad.error, bad.at, wire_text(bad.sent), wire_text(bad.received)});

@@ -56,7 +56,7 @@ class Connection {
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
   /// The last bad exchanges, the newest first.
-  [[nodiscard]] virtual std::vector<KeptExchange> bad_exchanges() const = 0;
+  [[nodiscard]] virtual std::vector<BadExchangeText> bad_exchanges() const = 0;
   /// Bytes or frames over the line so far, both ways.
   [[nodiscard]] virtual std::uint64_t items() const = 0;
   /// The clock of the readings.

@@ -27,8 +27,8 @@ void take(Link& link, std::shared_ptr<os::StreamPort> port, const EncoderAddress
   link.owner = std::move(port);
 }
 
-ExtraLines extra_lines(const EncoderAddress& uri) {
-  return uri.unit->extra_lines == nullptr ? ExtraLines{} : uri.unit->extra_lines(uri.options);
+ExtraWires extra_wires(const EncoderAddress& uri) {
+  return uri.unit->extra_wires == nullptr ? ExtraWires{} : uri.unit->extra_wires(uri.options);
 }
 
 // A port that was not there when its address was looked at may turn out to be a pseudo-terminal.
@@ -41,7 +41,7 @@ LineSettings line_of_serial(const EncoderAddress& uri) {
 }
 
 Link open_serial(const EncoderAddress& uri) {
-  if (extra_lines(uri).trigger && uri.wires.trigger.kind == os::PulseWire::Kind::none) {
+  if (extra_wires(uri).trigger && uri.wires.trigger.kind == os::PulseWire::Kind::none) {
     throw UsageError(
         fmt::format("with these options a pulse asks {} for each frame: say which wire carries it, trigger=rts, "
                     "trigger=dtr or trigger=gpio:NAME",
@@ -57,7 +57,7 @@ Link open_serial(const EncoderAddress& uri) {
 }
 
 Link open_tcp(const EncoderAddress& uri) {
-  if (extra_lines(uri).trigger) {
+  if (extra_wires(uri).trigger) {
     throw UsageError(
         fmt::format("with these options a pulse asks {} for each frame, which TCP does not carry: use a "
                     "serial port",

@@ -13,7 +13,7 @@ namespace absenc::amt21 {
 namespace {
 
 using namespace author;
-using Line = LineOf<Protocol>;
+using Dialog = DialogOf<Protocol>;
 
 // ---- Procedures
 
@@ -29,12 +29,12 @@ constexpr Request request_to(std::size_t node) { return {Ask::position, static_c
 constexpr std::size_t addresses = 64;
 
 // Position and turns are asked for one after the other: between two positions on the same side of zero the turns hold.
-Procedure read_both(Line& line, Found& found) {
-  const Format format = line.format();
-  std::uint64_t before = co_await look(line, found, request<Ask::position>(format));
+Procedure read_both(Dialog& dialog, Found& found) {
+  const Format format = dialog.format();
+  std::uint64_t before = co_await look(dialog, found, request<Ask::position>(format));
   for (int tries = 0; tries < 3; ++tries) {
-    const Reply counted = co_await line.ask(request<Ask::turns>(format));
-    const std::uint64_t now = co_await look(line, found, request<Ask::position>(format));
+    const Reply counted = co_await dialog.ask(request<Ask::turns>(format));
+    const std::uint64_t now = co_await look(dialog, found, request<Ask::position>(format));
     const bool passed_zero = (now < before) != (wrapped_difference(now, before, format.singleturn_bits) < 0);
     before = now;
     if (passed_zero) continue;
@@ -47,17 +47,17 @@ Procedure read_both(Line& line, Found& found) {
   co_return {Error::cross_check_failed, "the shaft passed zero between position and turns, three times"};
 }
 
-Procedure restart(Line& line, Found& found, Ask act) {
-  const bool still = co_await stands_still(line, found, request<Ask::position>(line.format()));
+Procedure restart(Dialog& dialog, Found& found, Ask act) {
+  const bool still = co_await stands_still(dialog, found, request<Ask::position>(dialog.format()));
   if (act == Ask::zero && !still) {
     co_return {Error::invalid_argument, "the shaft is turning: zero needs it standing still; nothing was sent"};
   }
-  co_await line.ask({act, line.format().address});
-  co_await line.rest(restart_time + between_looks);
-  const Result<Reply> answer = co_await line.attempt(request<Ask::position>(line.format()));
+  co_await dialog.ask({act, dialog.format().address});
+  co_await dialog.rest(restart_time + between_looks);
+  const Result<Reply> answer = co_await dialog.attempt(request<Ask::position>(dialog.format()));
   if (!answer) co_return {answer.error(), "it was sent, but whether the encoder obeyed could not be read"};
-  const std::uint64_t now = co_await look(line, found, request<Ask::position>(line.format()));
-  if (act == Ask::zero && !is_near(now, 0, line.format().singleturn_bits)) {
+  const std::uint64_t now = co_await look(dialog, found, request<Ask::position>(dialog.format()));
+  if (act == Ask::zero && !is_near(now, 0, dialog.format().singleturn_bits)) {
     co_return {Error::cross_check_failed, "the position is still not zero"};
   }
   co_return done;

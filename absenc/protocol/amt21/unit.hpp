@@ -58,13 +58,14 @@ struct Protocol {
   using Reply = amt21::Reply;
   static constexpr std::size_t longest_reply = 2;
 
-  static constexpr author::Wire wire(const Format& format) {
+  static constexpr author::HostTimes host_times(const Format& format) {
     const Time character = format.line().character();
     return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
   }
   /// One wrong reply in four passes the two parity bits: it must be one of two bytes, with silence behind it.
   static constexpr author::Manner manner(const Format&, const Request& request) {
-    return {.attempts = request.is_answered() ? 3u : 1u, .answered = request.is_answered(), .ends_by_silence = true};
+    return {
+        .attempts = request.is_answered() ? 3u : 1u, .expects_reply = request.is_answered(), .ends_by_silence = true};
   }
   static constexpr std::size_t request_size(Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/scan.hpp"
 #include "absenc/protocol/author/standstill.hpp"
 
@@ -24,13 +24,13 @@ struct Toy {
   using Request = std::uint8_t;
   using Reply = std::uint8_t;
   static constexpr std::size_t longest_reply = 1;
-  static Wire wire(const Format& format) {
+  static HostTimes host_times(const Format& format) {
     return {.answer_limit = 1ms, .gap_limit = 100us, .silence = format.silence};
   }
   static Manner manner(const Format& format, const Request& request) {
     return {.attempts = 3,
             .pause = 2ms,
-            .answered = request != 0x7F,
+            .expects_reply = request != 0x7F,
             .ends_by_silence = format.ends_by_silence,
             .hold = 5ms};
   }
@@ -50,7 +50,7 @@ struct Toy {
   static bool is_whole(Error error) { return error == Error::busy; }
 };
 
-using ToyLine = LineOf<Toy>;
+using ToyDialog = DialogOf<Toy>;
 struct Found {
   unsigned sum = 0;
 };
@@ -118,10 +118,10 @@ struct Case {
   Bench bench;
 };
 
-Procedure two_questions(ToyLine& line, Found& found) {
-  const std::uint8_t first = co_await line.ask(1);
+Procedure two_questions(ToyDialog& dialog, Found& found) {
+  const std::uint8_t first = co_await dialog.ask(1);
   found.sum += first;
-  const std::uint8_t second = co_await line.ask(2).after(10ms).or_say("the second");
+  const std::uint8_t second = co_await dialog.ask(2).after(10ms).or_say("the second");
   found.sum += second;
   co_return done;
 }
@@ -167,13 +167,13 @@ TEST(Engine, TheLineIsSilentBeforeEachRequest) {
   EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);  // the longer of the two
 }
 
-Procedure attempts(ToyLine& line, Found& found) {
-  const Result<std::uint8_t> first = co_await line.attempt(1).once();
+Procedure attempts(ToyDialog& dialog, Found& found) {
+  const Result<std::uint8_t> first = co_await dialog.attempt(1).once();
   if (first) co_return {Error::invalid_argument};
-  co_await line.ask(0x7F);  // is not answered
-  line.emit();
-  line.set_rate(9600);
-  const std::uint8_t last = co_await line.ask(3);
+  co_await dialog.ask(0x7F);  // is not answered
+  dialog.emit();
+  dialog.set_rate(9600);
+  const std::uint8_t last = co_await dialog.ask(3);
   found.sum = last;
   co_return done;
 }
@@ -188,19 +188,19 @@ TEST(Procedures, AttemptsMayFail) {
   EXPECT_EQ(good.bench.log, "rate=9600 emit ");
 }
 
-Part<unsigned> deeper(ToyLine& line, unsigned depth) {
+Part<unsigned> deeper(ToyDialog& dialog, unsigned depth) {
   if (depth == 0) {
-    const std::uint8_t reply = co_await line.ask(5);
+    const std::uint8_t reply = co_await dialog.ask(5);
     co_return reply;
   }
-  const unsigned below = co_await deeper(line, depth - 1);
-  if (below > 1000) co_await line.stop({Error::out_of_range, "too deep"});
+  const unsigned below = co_await deeper(dialog, depth - 1);
+  if (below > 1000) co_await dialog.stop({Error::out_of_range, "too deep"});
   co_return below + 100;
 }
 
-Procedure many_parts(ToyLine& line, Found& found, Arguments arguments) {
+Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
   for (int i = 0; i < 500; ++i) {  // more than would fit together
-    const unsigned sum = co_await deeper(line, static_cast<unsigned>(arguments[0]));
+    const unsigned sum = co_await deeper(dialog, static_cast<unsigned>(arguments[0]));
     found.sum = sum;
   }
   co_return done;
@@ -231,13 +231,13 @@ TEST(Procedures, SayWhenTheStorageIsTooSmall) {
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);          // for the procedure
 }
 
-Procedure endless(ToyLine& line, Found& found) {
-  line.restores();
-  while (!line.is_aborted()) {
-    co_await line.ask(1);
-    if (++found.sum == 10) line.abort();
+Procedure endless(ToyDialog& dialog, Found& found) {
+  dialog.restores();
+  while (!dialog.is_aborted()) {
+    co_await dialog.ask(1);
+    if (++found.sum == 10) dialog.abort();
   }
-  co_await line.rest(1s);
+  co_await dialog.rest(1s);
   co_return done;
 }
 

@@ -8,9 +8,9 @@ using FrameEvent = Event<CanFrame>;
 
 // ---- For the subclass
 
-void CanEngine::ask(const CanFrame& frame, const CanWire& wire, Time pause) {
-  ask_for(frame, wire.busy_limit);
-  silence_ = wire.answer_limit;
+void CanEngine::ask(const CanFrame& frame, const CanHostTimes& times, Time pause) {
+  ask_for(frame, times.busy_limit);
+  silence_ = times.answer_limit;
   until_ = relevant_at_ + pause;
 }
 

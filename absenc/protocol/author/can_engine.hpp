@@ -12,7 +12,7 @@
 namespace absenc::author {
 
 /// How long a host hears for an answer.
-struct CanWire {
+struct CanHostTimes {
   Time answer_limit{};  // without any frame on the bus
   Time busy_limit{};    // on a bus that others keep busy
 };
@@ -46,7 +46,7 @@ class CanEngine : public Conversation<CanFrame> {
   ~CanEngine() = default;
 
   /// Sends `frame`, `pause` after the last answer or request, and hears until nothing has come for the answer limit.
-  void ask(const CanFrame& frame, const CanWire& wire, Time pause = {});
+  void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
   /// Sends `frame` and hears for exactly so long.
   void ask_for(const CanFrame& frame, Time duration);
   /// From here on what comes before a frame that is asked has left is told too: answers to those before it.

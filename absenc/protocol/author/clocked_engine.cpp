@@ -27,8 +27,8 @@ ByteStep ClockedEngine::next(Time now) {
   if (state_ == State::over) return {.kind = ByteStep::Kind::done};
   if (!begun_) {
     begun_ = true;
-    rested_at_ = now + wire_.rest;  // somebody may have clocked just before
-    if (wire_.rate != 0) return {.kind = ByteStep::Kind::configure, .settings = {.rate = wire_.rate}};
+    rested_at_ = now + times_.rest;  // somebody may have clocked just before
+    if (times_.rate != 0) return {.kind = ByteStep::Kind::configure, .settings = {.rate = times_.rate}};
   }
   ByteStep step{.expect = (count_ + 7) / 8, .bits = count_, .at = never};
   if (state_ == State::ready) {
@@ -47,11 +47,11 @@ void ClockedEngine::feed(const ByteEvent& event) {
   if (event.kind == ByteEvent::Kind::sent) {
     sent_at_ = event.at;
     // 32 bits: a processor without division spends long on 64.
-    if (wire_.rate != 0) begun_at_ = event.at - Time(count_ * (1'000'000'000u / wire_.rate));
+    if (times_.rate != 0) begun_at_ = event.at - Time(count_ * (1'000'000'000u / times_.rate));
   }
   if (event.kind != ByteEvent::Kind::received) return;
   received_at_ = event.at;
-  rested_at_ = event.at + wire_.rest;
+  rested_at_ = event.at + times_.rest;
   received(event.items);
 }
 

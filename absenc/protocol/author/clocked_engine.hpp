@@ -14,7 +14,7 @@
 namespace absenc::author {
 
 /// How an encoder is clocked, as its document has it.
-struct ClockedWire {
+struct ClockedHostTimes {
   std::uint32_t rate = 0;  // of the clock, Hz, which is set first; 0: it stays as the line has it
   Time rest{};             // of the clock before each transfer, after which the encoder takes a new position
 };
@@ -41,7 +41,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
 
  protected:
   /// `storage`: for the bits of the longest transfer.
-  ClockedEngine(const ClockedWire& wire, MutableBytes storage) : wire_(wire), storage_(storage) {}
+  ClockedEngine(const ClockedHostTimes& times, MutableBytes storage) : times_(times), storage_(storage) {}
   ~ClockedEngine() = default;
 
   /// Gives so many clocks, when the clock has rested. More than there is storage for end the conversation:
@@ -58,7 +58,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   enum class State : std::uint8_t { ready, clocking, over };
   void received(Bytes bytes);
 
-  ClockedWire wire_;
+  ClockedHostTimes times_;
   MutableBytes storage_;
   std::size_t size_ = 0;
   unsigned count_ = 0;  // clocks of this transfer

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absenc/protocol/author/clocked_device.hpp"
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 
 namespace absenc::author {
 namespace {
@@ -22,7 +22,7 @@ struct Toy {
   };
   using Reply = std::uint8_t;
   static constexpr unsigned most_clocks = 20;
-  static ClockedWire wire(const Format& format) { return {format.rate, 30us}; }
+  static ClockedHostTimes host_times(const Format& format) { return {format.rate, 30us}; }
   static unsigned clocks(const Format& format) { return format.first_clocks; }
   static Result<Reply> decode(const Format&, BitView bits) {
     if (bits.load(0, 8) == 0xFF) return Error::line_stuck;
@@ -136,7 +136,7 @@ TEST(ClockedDevice, DrivesOnceForEachSelectionWhileItIsOn) {
   };
   const auto clocked = [&device](Time at, std::size_t bits) {
     device.feed({.kind = Kind::sent, .at = at, .bits = bits});
-    return device.answered();
+    return device.answer_count();
   };
   EXPECT_FALSE(select(0us));
   device.power_on(0us, Device::PowerOn::real);

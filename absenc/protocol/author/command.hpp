@@ -8,7 +8,7 @@
 #include <span>
 #include <string_view>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/make.hpp"
 #include "absenc/protocol/sentence.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -75,11 +75,11 @@ class Told final : public Base {
     words_.clear();
     const std::string_view own = Base::detail();
     if (this->error() != Error::none && this->is_noisy()) {
-      if (own != endless_noise.found) words_.add(endless_noise.found);
+      if (own != endless_noise.detail) words_.add(endless_noise.detail);
     } else if constexpr (requires { Definition::tell(words_, this->format(), *this); }) {
       if (this->error() != Error::none) Definition::tell(words_, this->format(), *this);
     } else {
-      words_.add(explained().found);
+      words_.add(explained().detail);
     }
     words_.add_part(own).add_part(left());
     return words_.view();

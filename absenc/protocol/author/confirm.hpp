@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::author {
 
@@ -23,7 +23,7 @@ class ReadConfirmed : public HostOf<P> {
   }
 
  private:
-  void answered(Error error) final {
+  void concluded(Error error) final {
     if (error == Error::none && first_) {
       error = P::agree(this->format(), *first_, this->last(), this->received_at() - first_at_);
     } else if (error == Error::none && P::needs_another(this->format(), this->last())) {

@@ -91,7 +91,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   Interruption interruption_;
 };
 
-/// A virtual encoder of a protocol with requests and replies (line.hpp), with `memory_size` bytes that survive power
+/// A virtual encoder of a protocol with requests and replies (dialog.hpp), with `memory_size` bytes that survive power
 /// off. Of the protocol it needs besides:
 ///
 ///   static DeviceTimes device_times(const Format&);

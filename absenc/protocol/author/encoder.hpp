@@ -28,7 +28,7 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
   [[nodiscard]] std::span<const Violation> violations() const final { return violations_; }
   [[nodiscard]] std::uint32_t violation_count() const final { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const final { return answered_; }
+  [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
   /// `start_time`: from power on to the first request that is answered.
@@ -54,7 +54,7 @@ class EncoderOn : public Device<Item> {
   }
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
   void change_memory() { ++memory_version_; }
-  void count_answer() { ++answered_; }
+  void count_answer() { ++answer_count_; }
 
   /// Power has come, and the start-up is over, at the time at which it was.
   virtual void started(Time) {}
@@ -70,7 +70,7 @@ class EncoderOn : public Device<Item> {
   std::uint32_t memory_version_ = 0;
   Buffer<Violation, 16> violations_;
   std::uint32_t violation_count_ = 0;
-  std::uint64_t answered_ = 0;
+  std::uint64_t answer_count_ = 0;
 };
 
 }  // namespace absenc::author

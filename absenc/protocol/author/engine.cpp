@@ -62,22 +62,22 @@ ByteStep Engine::next(Time now) {
   }
   if (state_ == State::ending && now < earliest_) return {.at = earliest_};
   ByteStep step{.at = never,
-                .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : wire_.answer_limit,
-                .gap = wire_.gap_limit};
+                .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : times_.answer_limit,
+                .gap = times_.gap_limit};
   switch (state_) {
     case State::ready: {
-      const Time quiet = received_at_ + wire_.silence;
-      if (wire_.silence != Time{} && now < std::max(quiet, earliest_)) return {.at = std::max(quiet, earliest_)};
+      const Time quiet = received_at_ + times_.silence;
+      if (times_.silence != Time{} && now < std::max(quiet, earliest_)) return {.at = std::max(quiet, earliest_)};
       state_ = State::sending;
       disturbed_ = false;
       noise_.clear();
       size_ = 0;
       step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
       step.width = manner_.pulse;
-      step.line = manner_.line;
+      step.wire = manner_.wire;
       step.out = out_;
-      step.expect = manner_.answered ? expected({}) : 0;
-      step.at = std::max(earliest_, wire_.silence != Time{} ? now : Time{});
+      step.expect = manner_.expects_reply ? expected({}) : 0;
+      step.at = std::max(earliest_, times_.silence != Time{} ? now : Time{});
       begun_at_ = std::max(now, earliest_);
       break;
     }
@@ -142,7 +142,7 @@ void Engine::sent(Time at) {
   sent_at_ = at - manner_.pulse;
   received_at_ = at;
   if (state_ != State::sending) return;
-  if (!manner_.answered) return conclude_with(Error::none);
+  if (!manner_.expects_reply) return conclude_with(Error::none);
   state_ = disturbed_ ? State::settling : State::receiving;
   if (size_ != 0) received({});  // what came during a pulse
 }
@@ -176,7 +176,7 @@ void Engine::conclude_with(Error error) {
     return start(manner_.pause == Time{} ? Time{} : received_at_ + manner_.pause);
   }
   state_ = State::over;  // unless the subclass goes on
-  answered(error);
+  concluded(error);
 }
 
 void Engine::end_noise(State before) {

@@ -14,8 +14,8 @@
 
 namespace absenc::author {
 
-/// The times of a line, as its document has them.
-struct Wire {
+/// The times of a host on its line, as the document has them.
+struct HostTimes {
   Time answer_limit{};          // from the end of a request to the first character of its reply, at the most
   Time gap_limit{};             // between two characters of it, at the most
   Time silence{};               // of the line before each request; what is heard meanwhile begins it anew
@@ -26,24 +26,24 @@ struct Wire {
 struct Manner {
   unsigned attempts = 1;         // how often it is sent before its error counts
   Time pause{};                  // before it is repeated: from what was last sent or heard
-  bool answered = true;          // false: no reply is due, and none is waited for
+  bool expects_reply = true;     // false: no reply is due, and none is waited for
   bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
   bool any_reply = false;  // no document says what its reply is, or whether there is one: what comes is not looked
                            // at, and that it ends by silence is enough
-  Time answer_limit{};     // in place of that of the wire; 0: that
+  Time answer_limit{};     // in place of that of the line; 0: that
   Time hold{};             // after an error: so long the encoder may be busy with it all the same
-  Time pulse{};            // in place of bytes a pulse so long on `line`, whose edge is the request
-  Line line{};
+  Time pulse{};            // in place of bytes a pulse so long on `wire`, whose edge is the request
+  ExtraWire wire{};
 };
 
-/// A subclass says what a whole reply is, and what becomes of it. LineOf makes one from a protocol.
+/// A subclass says what a whole reply is, and what becomes of it. DialogOf makes one from a protocol.
 class Engine : public Conversation<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override {
-    return outcome_.detail.empty() ? noise_.explanation().found : outcome_.detail;
+    return outcome_.detail.empty() ? noise_.explanation().detail : outcome_.detail;
   }
   [[nodiscard]] std::string_view advice() const override {
     return outcome_.advice.empty() ? noise_.explanation().advice : outcome_.advice;
@@ -52,7 +52,7 @@ class Engine : public Conversation<std::uint8_t> {
   void report(FieldSink&) const override {}
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
-  /// Begin of the last request, which a link that exchanges answers with what holds at that time.
+  /// Begin of the last request, which an SPI link answers with what holds at that time.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// End of the last request; of the last characters of its reply, before them that of the request.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
@@ -66,7 +66,7 @@ class Engine : public Conversation<std::uint8_t> {
 
  protected:
   /// `storage`: for a reply, longer than the longest, so that one that is too long is noticed.
-  Engine(const Wire& wire, MutableBytes storage) : wire_(wire), noise_(wire.patience), storage_(storage) {}
+  Engine(const HostTimes& times, MutableBytes storage) : times_(times), noise_(times.patience), storage_(storage) {}
   ~Engine() = default;
 
   /// Sends `request`, which must stay until it is answered, not before `earliest`.
@@ -76,7 +76,7 @@ class Engine : public Conversation<std::uint8_t> {
   /// This end of the line is set to `rate` before anything else is sent, and before the end.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
   /// Its times are others from here on, as they are at another rate.
-  void set_wire(const Wire& wire) { wire_ = wire; }
+  void set_times(const HostTimes& times) { times_ = times; }
   /// Nothing is sent until `time`; then `woken`.
   void sleep(Time time);
   /// Nothing is sent for `duration`, which the next step begins: `heard` for all that comes, `woken` at the end.
@@ -95,7 +95,7 @@ class Engine : public Conversation<std::uint8_t> {
   /// that is wrong more may be coming, which must not meet the next request.
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
   /// `none`, or why the last attempt failed. Calls `send`, `sleep` or `finish`.
-  virtual void answered(Error error) = 0;
+  virtual void concluded(Error error) = 0;
   virtual void woken() {}
   /// While it listens; nothing: a damaged character.
   virtual void heard(Bytes) {}
@@ -121,7 +121,7 @@ class Engine : public Conversation<std::uint8_t> {
   void end_noise(State before);
   void start(Time earliest);
 
-  Wire wire_;
+  HostTimes times_;
   Noise noise_;
   MutableBytes storage_;
   std::size_t size_ = 0;

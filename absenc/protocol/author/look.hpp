@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/standstill.hpp"
 
 namespace absenc::author {
@@ -34,19 +34,19 @@ struct Looked {
 
 /// Asks once; `found` is what came, with its times. The result is the position in counts.
 template <class P>
-Part<std::uint64_t> look(LineOf<P>& line, Looked<P>& found, typename P::Request request) {
-  found.reply = co_await line.ask(request);
+Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
+  found.reply = co_await dialog.ask(request);
   found.request = request;
-  found.reading = line.last_reading();
+  found.reading = dialog.last_reading();
   co_return found.reading.singleturn;
 }
 
 /// Looks twice.
 template <class P>
-Part<bool> stands_still(LineOf<P>& line, Looked<P>& found, typename P::Request request) {
-  const std::uint64_t first = co_await look(line, found, request);
-  co_await line.rest(between_looks);
-  const std::uint64_t second = co_await look(line, found, request);
+Part<bool> stands_still(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
+  const std::uint64_t first = co_await look(dialog, found, request);
+  co_await dialog.rest(between_looks);
+  const std::uint64_t second = co_await look(dialog, found, request);
   co_return is_near(second, first, found.reading.singleturn_bits);
 }
 

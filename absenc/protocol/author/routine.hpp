@@ -63,7 +63,7 @@ class Routine {
   /// Bytes of storage that its frames took at the most.
   [[nodiscard]] std::size_t frames_size() const { return most_used_; }
 
-  /// Ends the procedure from any depth: `co_await line.stop({Error::busy, "..."})`.
+  /// Ends the procedure from any depth: `co_await dialog.stop({Error::busy, "..."})`.
   [[nodiscard]] auto stop(const Outcome& outcome) {
     struct Stop {
       Routine& routine;
@@ -125,7 +125,7 @@ struct FrameInRoutine {
   Routine& routine;
 };
 
-/// The result of a coroutine that is a whole command: `Procedure name(Line& line, Found& found, ...)`. Ends by
+/// The result of a coroutine that is a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Ends by
 /// `co_return done;` or `co_return {Error::..., "..."};`.
 struct Procedure {
   struct promise_type : FrameInRoutine {
@@ -138,7 +138,7 @@ struct Procedure {
   std::coroutine_handle<> handle{};
 };
 
-/// A part of a procedure, with a result: `const Reply reply = co_await look(line);`. At most one of a procedure runs.
+/// A part of a procedure, with a result: `const Reply reply = co_await look(dialog);`. At most one of a procedure runs.
 template <class T>
 struct [[nodiscard]] Part {
   struct promise_type : FrameInRoutine {

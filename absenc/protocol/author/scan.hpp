@@ -5,7 +5,7 @@
 #include <array>
 #include <cstddef>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::author {
 
@@ -18,18 +18,18 @@ struct Nodes {
 /// `request_to(i)` asks the address of this index. Each that is not silent is asked twice: one answer may be noise.
 /// What answers at every address is no encoder.
 template <class P, std::size_t addresses, auto request_to>
-Procedure scan(LineOf<P>& line, Nodes<addresses>& nodes) {
+Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
   constexpr unsigned most_in_a_row = 8;
   bool any = false;
   unsigned noise = 0;
   for (std::size_t i = 0; i < addresses; ++i) {
-    const Result<typename P::Reply> first = co_await line.attempt(request_to(i)).once();
-    if (line.is_noisy()) co_return {first.error()};
+    const Result<typename P::Reply> first = co_await dialog.attempt(request_to(i)).once();
+    if (dialog.is_noisy()) co_return {first.error()};
     if (!first && first.error() == Error::timeout) {
       noise = 0;
       continue;
     }
-    const Result<typename P::Reply> second = co_await line.attempt(request_to(i)).once();
+    const Result<typename P::Reply> second = co_await dialog.attempt(request_to(i)).once();
     if (!first && !second && second.error() == Error::timeout) continue;
     nodes.there[i] = any = true;
     nodes.clash[i] = !first && !second;

@@ -10,11 +10,11 @@
 #include <type_traits>
 
 #include "absenc/core/hex.hpp"
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/author/command.hpp"
 #include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/field.hpp"
-#include "absenc/protocol/author/line.hpp"
 #include "absenc/protocol/author/option.hpp"
 #include "absenc/protocol/author/text.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -38,7 +38,7 @@ struct Declares {
 
 /// A Definition has these, all static and constexpr:
 ///
-/// - `Protocol` (line.hpp, device.hpp; clocked_line.hpp), and `Encoder`, the virtual one, made of (format, shaft):
+/// - `Protocol` (dialog.hpp, device.hpp; clocked_host.hpp), and `Encoder`, the virtual one, made of (format, shaft):
 ///   BusDevice, ClockedDevice
 /// - `id`, `name`, `document`, `link`
 /// - `options`: OptionsOf (option.hpp), whose defaults are those of Format; or `Format format(const Options&)`
@@ -55,9 +55,9 @@ struct Declares {
 /// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
-/// is none; `status`, `alarms`, `conditions`, `timing`, `covered`, `bits`, `memory`, `registers`, `over_spi`, `probe`,
-/// `streams`, `extra_lines` as in Unit; and `decode`, `delimit`, `answered` themselves, with the parameters that they
-/// have there.
+/// is none; `status`, `alarms`, `conditions`, `timing`, `is_checked`, `bits`, `memory`, `registers`, `over_spi`,
+/// `probe`, `streams`, `extra_wires` as in Unit; and `decode`, `frame_end`, `is_answered` themselves, with the
+/// parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -169,17 +169,17 @@ struct UnitOf {
     }
   }
 
-  static constexpr Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
-    if constexpr (requires { Definition::delimit(values, direction, bytes); }) {
-      return Definition::delimit(values, direction, bytes);
+  static constexpr FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
+    if constexpr (requires { Definition::frame_end(values, direction, bytes); }) {
+      return Definition::frame_end(values, direction, bytes);
     } else if constexpr (Clocked<P>) {
-      return {Delimit::Kind::complete, bytes.size()};  // the pause of the clock ends a frame
+      return {FrameEnd::Kind::complete, bytes.size()};  // the pause of the clock ends a frame
     } else {
-      if (bytes.empty()) return {Delimit::Kind::incomplete, 1};
+      if (bytes.empty()) return {FrameEnd::Kind::incomplete, 1};
       const std::size_t size =
           direction == Direction::request ? request_size(values, bytes) : reply_size(values, bytes);
-      if (size == 0) return {Delimit::Kind::no_frame};
-      return {bytes.size() < size ? Delimit::Kind::incomplete : Delimit::Kind::complete, size};
+      if (size == 0) return {FrameEnd::Kind::no_frame};
+      return {bytes.size() < size ? FrameEnd::Kind::incomplete : FrameEnd::Kind::complete, size};
     }
   }
 
@@ -216,15 +216,15 @@ struct UnitOf {
   }
   static constexpr LineSettings settings(const Options& values) { return line_of(format(values)); }
 
-  static bool answered(const Options& values, Frame asked) {
-    if constexpr (requires { Definition::answered(values, asked); }) {
-      return Definition::answered(values, asked);
+  static bool is_answered(const Options& values, Frame asked) {
+    if constexpr (requires { Definition::is_answered(values, asked); }) {
+      return Definition::is_answered(values, asked);
     } else {
       const Format f = format(values);
       const Result<Request> request = P::decode_request(f, items(asked));
       if (!request) return true;
       const Manner manner = P::manner(f, *request);
-      return manner.answered && !manner.any_reply;
+      return manner.expects_reply && !manner.any_reply;
     }
   }
 
@@ -426,7 +426,7 @@ struct UnitOf {
               .device_storage = sizeof(typename Definition::Encoder),
               .decode = decode,
               .encode = encode,
-              .delimit = delimit,
+              .frame_end = frame_end,
               .host = host,
               .device = device,
               .resolution = resolution,
@@ -435,20 +435,20 @@ struct UnitOf {
       P::decode_request(Format{}, Bytes{});
       P::manner(Format{}, Request{});
     };
-    if constexpr (by_manner || requires { &Definition::answered; }) unit.answered = answered;
+    if constexpr (by_manner || requires { &Definition::is_answered; }) unit.is_answered = is_answered;
     if constexpr (by_manner && requires { P::manner(Format{}, Request{}).pause; }) unit.pause = pause;
     if constexpr (requires { Definition::status; }) unit.status = Definition::status;
     if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
     if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;
     if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
     if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
-    if constexpr (requires { Definition::covered; }) unit.covered = Definition::covered;
+    if constexpr (requires { Definition::is_checked; }) unit.is_checked = Definition::is_checked;
     if constexpr (requires { &Definition::bits; }) unit.bits = Definition::bits;
     if constexpr (requires { Definition::registers; }) unit.registers = Definition::registers;
     if constexpr (requires { Definition::over_spi; }) unit.over_spi = Definition::over_spi;
     if constexpr (requires { Definition::probe; }) unit.probe = Definition::probe;
     if constexpr (requires { Definition::streams; }) unit.streams = Definition::streams;
-    if constexpr (requires { Definition::extra_lines; }) unit.extra_lines = Definition::extra_lines;
+    if constexpr (requires { Definition::extra_wires; }) unit.extra_wires = Definition::extra_wires;
     if constexpr (requires { Definition::explain(Format{}, Error::none, items({}), items({})); }) {
       unit.explain = explain;
     }

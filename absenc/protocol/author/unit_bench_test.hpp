@@ -191,7 +191,7 @@ struct UnitBench {
   Told run(Conversation<std::uint8_t>& conversation, const OnEmit& on_emit = {}) {
     Told told;
     const Time begin = line.now();
-    const std::uint64_t before = device.answered();
+    const std::uint64_t before = device.answer_count();
     line.on_emit = [&] {
       ++told.emits;
       if (on_emit) on_emit(conversation);
@@ -200,7 +200,7 @@ struct UnitBench {
     told.finished = line.converse(conversation);
     line.on_emit = {};
     told.take(conversation);
-    told.frames = device.answered() - before;
+    told.frames = device.answer_count() - before;
     told.took = line.now() - begin;
     return told;
   }

@@ -18,7 +18,7 @@ TEST(BissDevice, PutsExample4OnTheLine) {
   bench.shaft.state.position = std::int64_t{275087} << 13;
   EXPECT_EQ(bench.clock(44, 1ms, 1'000'000), "11000000000000010100001100101000111111110011");
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
-  EXPECT_EQ(bench.encoder.answered(), 1u);
+  EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
 TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
@@ -36,7 +36,7 @@ TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
   soon.clock(64, 1ms, 1'000'000);
   EXPECT_EQ(soon.clock(16, 19us, 1'000'000), "0000000000000000");
   EXPECT_EQ(soon.last_rule(), "clocked before the BiSS timeout has passed");
-  EXPECT_EQ(soon.encoder.answered(), 1u);
+  EXPECT_EQ(soon.encoder.answer_count(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
   EXPECT_EQ(soon.encoder.violation_count(), 2u);  // and that frame was too short
 }

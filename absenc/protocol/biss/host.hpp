@@ -2,7 +2,7 @@
 // Host side of BiSS-C: the host drives MA and samples SLO.
 #pragma once
 
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/biss/frame.hpp"
 
 namespace absenc::biss {
@@ -14,7 +14,9 @@ struct Protocol {
   using Reply = biss::Reply;
   static constexpr unsigned most_clocks = 512;
 
-  static constexpr author::ClockedWire wire(const Format& format) { return {format.ma_khz * 1000, timeout_maximum}; }
+  static constexpr author::ClockedHostTimes host_times(const Format& format) {
+    return {format.ma_khz * 1000, timeout_maximum};
+  }
   static constexpr unsigned clocks(const Format& format) {
     return biss::clocks(format, format.latency, format.period());
   }

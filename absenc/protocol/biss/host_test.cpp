@@ -81,7 +81,7 @@ TEST(BissHost, SaysWhatToDo) {
     for (std::size_t i = 0; i < unit.options.size(); ++i) {
       if (unit.options[i].name == "latency_us") options.values[i] = latency_ns;
     }
-    return unit.explain(options, error, {}, {}).found;
+    return unit.explain(options, error, {}, {}).detail;
   };
   EXPECT_NE(found(Error::truncated, 10'000).find("raise it"), std::string_view::npos);
   EXPECT_NE(found(Error::bad_checksum, 10'000).find("try another one"), std::string_view::npos);

@@ -93,7 +93,7 @@ struct Definition {
 
   // Around the end of the idle line a flip only changes the length of the ACK. Within the ACK, and at the start bit, it
   // moves the frame, which a CRC of 6 bits misses once in 64 times.
-  static bool covered(const Options&, Frame, Frame reply, std::size_t bit) {
+  static bool is_checked(const Options&, Frame, Frame reply, std::size_t bit) {
     const BitView samples = to_bits(reply);
     const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
     return bit + 1 < idle || bit > samples.end_of_run(idle);

@@ -50,7 +50,7 @@ TEST(E201Device, AnswersEveryCommand) {
   expect("n", "");
   EXPECT_EQ(bench.raw("4").substr(0, 1), "c");
   EXPECT_EQ(bench.device.violation_count(), 0u);
-  EXPECT_EQ(bench.device.answered(), 23u);
+  EXPECT_EQ(bench.device.answer_count(), 23u);
   EXPECT_TRUE(bench.device.memory().empty());
 }
 

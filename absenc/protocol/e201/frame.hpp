@@ -10,7 +10,7 @@
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/hex.hpp"
 #include "absenc/core/text.hpp"
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/biss/frame.hpp"
 #include "absenc/protocol/e201/text.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
@@ -156,14 +156,14 @@ struct Reply {
   return reply;
 }
 
-/// author/line.hpp says what each of these is.
+/// author/dialog.hpp says what each of these is.
 struct Protocol {
   using Format = e201::Format;
   using Request = e201::Request;
   using Reply = e201::Reply;
   static constexpr std::size_t longest_reply = 32;  // nobody says how long a line may be: three times that is kept
 
-  static constexpr author::Wire wire(const Format&) {
+  static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
   }
   static constexpr author::Manner manner(const Format&, const Request& request) {

@@ -27,32 +27,32 @@ bool is_too_old(const Reply& reply) {
 
 }  // namespace
 
-Procedure read(Line& line, Found& found) {
-  Result<Reply> reply = co_await line.attempt({letter::samples});
+Procedure read(Dialog& dialog, Found& found) {
+  Result<Reply> reply = co_await dialog.attempt({letter::samples});
   const bool unusable = reply.error() == Error::timeout || reply.error() == Error::wrong_length;
-  if (unusable && !line.is_noisy()) {
-    const Result<Reply> version = co_await line.attempt({letter::version});
+  if (unusable && !dialog.is_noisy()) {
+    const Result<Reply> version = co_await dialog.attempt({letter::version});
     if (version && is_too_old(*version)) co_return too_old;
     if (!version && reply.error() == Error::timeout) co_return {version.error()};
-    reply = co_await line.attempt({letter::samples});
+    reply = co_await dialog.attempt({letter::samples});
     if (version && reply.error() == Error::timeout) {
       co_return {Error::timeout, "the interface answers `v` but not `4`", check_firmware};
     }
   }
   if (!reply) co_return {reply.error()};
   found.samples = reply->samples;
-  found.reading = Protocol::reading(line.format(), {letter::samples}, *reply);
-  found.reading.latched = line.sent_at();  // clocking begins when the command is there
-  found.reading.received = line.received_at();
+  found.reading = Protocol::reading(dialog.format(), {letter::samples}, *reply);
+  found.reading.latched = dialog.sent_at();  // clocking begins when the command is there
+  found.reading.received = dialog.received_at();
   co_return done;
 }
 
 // Nothing in a text tells which question it answers: one that comes twice must not be there for the next.
-Procedure inform(Line& line, Found& found) {
+Procedure inform(Dialog& dialog, Found& found) {
   static constexpr std::array letters{letter::version, letter::serial, letter::supply, letter::clock};
   for (const std::uint8_t asked : letters) {
-    const Result<Reply> reply = co_await line.attempt({asked}).until_silence();
-    if (!reply && (asked == letter::version || line.is_noisy())) co_return {reply.error()};
+    const Result<Reply> reply = co_await dialog.attempt({asked}).until_silence();
+    if (!reply && (asked == letter::version || dialog.is_noisy())) co_return {reply.error()};
     if (reply) found.take(asked, *reply);
   }
   co_return done;
@@ -63,27 +63,27 @@ Procedure inform(Line& line, Found& found) {
 namespace {
 
 // `none`, why that could not be done or read back, or cross_check_failed: it is another one.
-Part<Error> switch_clock(Line& line, unsigned clock) {
-  const Result<Reply> told = co_await line.attempt({letter::set_clock, clock});
+Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
+  const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock});
   if (!told) co_return told.error();
-  const Result<Reply> now = co_await line.attempt({letter::clock});
+  const Result<Reply> now = co_await dialog.attempt({letter::clock});
   if (!now) co_return now.error();
   co_return now->number == clock ? Error::none : Error::cross_check_failed;
 }
 
 }  // namespace
 
-Procedure set_clock(Line& line, Found& found, Arguments arguments) {
+Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments) {
   const unsigned clock = clock_of(arguments[0]);
-  const Error error = co_await switch_clock(line, clock);
+  const Error error = co_await switch_clock(dialog, clock);
   if (error == Error::cross_check_failed) co_return {error, "the interface has another setting than it was given"};
   found.clock = clock;
   co_return {error};
 }
 
-Procedure switch_supply(Line& line, Found& found, bool on) {
-  co_await line.ask({on ? letter::supply_on : letter::supply_off});
-  const Reply reply = co_await line.ask({letter::supply}).after(supply_time);
+Procedure switch_supply(Dialog& dialog, Found& found, bool on) {
+  co_await dialog.ask({on ? letter::supply_on : letter::supply_off});
+  const Reply reply = co_await dialog.ask({letter::supply}).after(supply_time);
   found.supply = reply.text;
   const std::optional<unsigned> voltage = find_milli(reply.text, 'V');
   if (voltage && (*voltage > supplied_above) != on) {
@@ -96,8 +96,8 @@ Procedure switch_supply(Line& line, Found& found, bool on) {
 namespace {
 
 // `?` counts turns too, so nothing is wrapped.
-bool is_near(const Line& line, std::int64_t counts, std::int64_t other) {
-  const unsigned bits = line.format().word.bits_of(Meaning::position);
+bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
+  const unsigned bits = dialog.format().word.bits_of(Meaning::position);
   const auto to = static_cast<std::uint64_t>(counts);
   const auto from = static_cast<std::uint64_t>(other);
   return (counts > other ? to - from : from - to) <= static_cast<std::uint64_t>(author::counts_of_angle(bits));
@@ -105,15 +105,15 @@ bool is_near(const Line& line, std::int64_t counts, std::int64_t other) {
 
 }  // namespace
 
-Procedure set_zero(Line& line, Found& found) {
-  const Reply first = co_await line.ask({letter::decimal});
-  const Reply second = co_await line.ask({letter::decimal}).after(author::between_looks);
-  if (!is_near(line, second.number, first.number)) {
+Procedure set_zero(Dialog& dialog, Found& found) {
+  const Reply first = co_await dialog.ask({letter::decimal});
+  const Reply second = co_await dialog.ask({letter::decimal}).after(author::between_looks);
+  if (!is_near(dialog, second.number, first.number)) {
     co_return {Error::invalid_argument, "the encoder moves: it must stand still"};
   }
-  co_await line.ask({letter::zero});
-  const Reply now = co_await line.ask({letter::decimal});
-  if (!is_near(line, now.number, 0)) {
+  co_await dialog.ask({letter::zero});
+  const Reply now = co_await dialog.ask({letter::decimal});
+  if (!is_near(dialog, now.number, 0)) {
     co_return {Error::cross_check_failed, "the position is not zero afterwards"};
   }
   found.counts = now.number;
@@ -138,30 +138,30 @@ unsigned Found::recommended() const {
 namespace {
 
 // The last exchange in words, for when others have followed.
-Outcome failure(const Line& line, Error error) {
-  const Explanation what = explain(line.format(), error, line.exchange().sent, line.reply());
-  return {error, line.is_noisy() ? endless_noise.found : what.found,
+Outcome failure(const Dialog& dialog, Error error) {
+  const Explanation what = explain(dialog.format(), error, dialog.exchange().sent, dialog.reply());
+  return {error, dialog.is_noisy() ? endless_noise.detail : what.detail,
           what.advice.empty() ? text_of(error).advice : what.advice};
 }
 
 // Ends early when the sweep is aborted, or cannot go on.
-Part<Outcome> try_clocks(Line& line, Found& found) {
+Part<Outcome> try_clocks(Dialog& dialog, Found& found) {
   Outcome bad = done;  // the last frame that was
-  if (line.is_aborted()) co_return done;
+  if (dialog.is_aborted()) co_return done;
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
     found.left = clock;
-    const Error error = co_await switch_clock(line, clock);
+    const Error error = co_await switch_clock(dialog, clock);
     if (error == Error::cross_check_failed) co_return {error, "the interface has another clock than it was given"};
-    if (error != Error::none) co_return failure(line, error);
-    for (unsigned read = 0; read < found.frames && !line.is_aborted(); ++read) {
-      const Result<Reply> frame = co_await line.attempt({letter::samples});
-      if (!frame) bad = failure(line, frame.error());
-      if (!frame && line.is_noisy()) co_return bad;
+    if (error != Error::none) co_return failure(dialog, error);
+    for (unsigned read = 0; read < found.frames && !dialog.is_aborted(); ++read) {
+      const Result<Reply> frame = co_await dialog.attempt({letter::samples});
+      if (!frame) bad = failure(dialog, frame.error());
+      if (!frame && dialog.is_noisy()) co_return bad;
       if (frame) ++found.valid[clock - 1];
     }
-    if (line.is_aborted()) co_return done;
+    if (dialog.is_aborted()) co_return done;
     ++found.measured;
-    line.emit();
+    dialog.emit();
   }
   if (found.recommended() != 0) co_return done;
   bad.detail = "no MA clock gave good frames only";
@@ -170,16 +170,16 @@ Part<Outcome> try_clocks(Line& line, Found& found) {
 
 }  // namespace
 
-Procedure sweep_clocks(Line& line, Found& found, Arguments arguments) {
-  line.restores();
+Procedure sweep_clocks(Dialog& dialog, Found& found, Arguments arguments) {
+  dialog.restores();
   found.frames = static_cast<unsigned>(arguments[0]);
-  const Reply version = co_await line.ask({letter::version});
+  const Reply version = co_await dialog.ask({letter::version});
   if (is_too_old(version)) co_return too_old;
-  const Reply clock = co_await line.ask({letter::clock}).or_say("the interface does not say which clock it has");
+  const Reply clock = co_await dialog.ask({letter::clock}).or_say("the interface does not say which clock it has");
   found.previous = static_cast<unsigned>(clock.number);
-  const Outcome outcome = co_await try_clocks(line, found);
+  const Outcome outcome = co_await try_clocks(dialog, found);
   found.left = found.previous;
-  const Error error = co_await switch_clock(line, found.previous);
+  const Error error = co_await switch_clock(dialog, found.previous);
   if (error == Error::cross_check_failed) {
     co_return {error, "the clock that was set before could not be restored", check_clocks};
   }
@@ -187,7 +187,7 @@ Procedure sweep_clocks(Line& line, Found& found, Arguments arguments) {
     co_return {error, "it is not known whether the clock that was set before is restored", check_clocks};
   }
   found.restored = true;
-  found.aborted = line.is_aborted();
+  found.aborted = dialog.is_aborted();
   co_return outcome;
 }
 

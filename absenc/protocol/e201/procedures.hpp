@@ -6,13 +6,13 @@
 #include <cstdint>
 #include <optional>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/conversation.hpp"
 #include "absenc/protocol/e201/frame.hpp"
 
 namespace absenc::e201 {
 
-using Line = author::LineOf<Protocol>;
+using Dialog = author::DialogOf<Protocol>;
 
 /// What comes of it: what was not asked or not answered is not there.
 struct Found {
@@ -50,19 +50,19 @@ struct Found {
 
 /// `4`. When nothing usable comes, the firmware is asked: before 1.16 it is `unsupported`, otherwise `4` is sent once
 /// more.
-author::Procedure read(Line& line, Found& found);
+author::Procedure read(Dialog& dialog, Found& found);
 /// Version, serial number, supply and clock. Only the version must be answered.
-author::Procedure inform(Line& line, Found& found);
+author::Procedure inform(Dialog& dialog, Found& found);
 /// `M`, 1 to 8 or kHz, and `m`, which must show it (cross_check_failed).
-author::Procedure set_clock(Line& line, Found& found, Arguments arguments);
+author::Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments);
 /// `n` or `f`, then `e` after the supply had its time: where a voltage can be read it must agree (cross_check_failed).
-author::Procedure switch_supply(Line& line, Found& found, bool on);
+author::Procedure switch_supply(Dialog& dialog, Found& found, bool on);
 /// `z`: what `?` gives counts from here. The encoder must stand still (invalid_argument), and `?` must be 0 then
 /// (cross_check_failed).
-author::Procedure set_zero(Line& line, Found& found);
+author::Procedure set_zero(Dialog& dialog, Found& found);
 /// Reads frames at each clock, emits after each what was found so far, and sets the clock back, also after an error and
 /// after `abort`.
-author::Procedure sweep_clocks(Line& line, Found& found, Arguments arguments);
+author::Procedure sweep_clocks(Dialog& dialog, Found& found, Arguments arguments);
 
 inline constexpr std::string_view check_stream = "check that it is an E201-9S and does not stream (stream-off)";
 

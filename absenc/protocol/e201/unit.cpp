@@ -244,7 +244,7 @@ struct Definition : Declares<Definition, e201::Protocol> {
   }
 
   // What follows the CRC is ignored, capitals are the same digits, and SSI has no checksum.
-  static bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
+  static bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
     const Format f = format(values);
     if (!request.bytes.empty() && request.bytes[0] != letter::samples) return false;  // text
     const Result<std::uint64_t> samples = decode_samples(reply.bytes);

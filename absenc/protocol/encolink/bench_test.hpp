@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a virtual AksIM-2 and a host on one wire in virtual time.
+// For tests: a virtual AksIM-2 and a host on one line in virtual time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,11 +19,12 @@ inline constexpr Format single_format{.resolution = 20, .multiturn_bits = 0};
 inline constexpr Format multi_format{.resolution = 20, .multiturn_bits = 16};
 
 struct Bench : author::testing::UnitBench<20> {
-  explicit Bench(std::string_view settings = multi, Wire wire = Wire::uart)
-      : UnitBench(wire == Wire::spi ? spi_unit : encolink::unit, settings) {
+  explicit Bench(std::string_view settings = multi, Interface interface = Interface::uart)
+      : UnitBench(interface == Interface::spi ? spi_unit : encolink::unit, settings) {
     shaft.put(7, 0x12345);
   }
-  /// Requests one after the other, filled up to `size` where the wire brings as much at the same time; and the replies.
+  /// Requests one after the other, filled up to `size` where the interface brings as much at the same time; and the
+  /// replies.
   std::vector<RawBytes> ask(std::vector<RawBytes> requests, std::size_t size = 0) {
     std::vector<RawBytes> replies;
     for (RawBytes& request : requests) {
@@ -35,10 +36,10 @@ struct Bench : author::testing::UnitBench<20> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
-/// What is so on both wires.
-class OnBothWires : public ::testing::TestWithParam<Wire> {
+/// What is so on both interfaces.
+class OnBothInterfaces : public ::testing::TestWithParam<Interface> {
  protected:
-  const Wire wire = GetParam();
+  const Interface interface = GetParam();
 };
 
 inline bool says(const std::string& text, std::string_view words) { return text.find(words) != std::string::npos; }

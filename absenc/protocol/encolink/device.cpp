@@ -49,7 +49,7 @@ VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
 // ---- The line
 
 ByteStep VirtualEncoder::next(Time now) {
-  const bool streams = format_.stream_rate > 0 && format_.wire == Wire::uart;
+  const bool streams = format_.stream_rate > 0 && format_.interface == Interface::uart;
   update(now);
   if (streams && is_on(now) && !is_transmitting()) {
     if (now < next_frame_) return {.at = next_frame_};
@@ -63,7 +63,7 @@ ByteStep VirtualEncoder::next(Time now) {
 void VirtualEncoder::feed(const ByteEvent& event) {
   update(event.at);
   const bool received = event.kind == ByteEvent::Kind::received;
-  if (format_.wire == Wire::uart) {
+  if (format_.interface == Interface::uart) {
     if (!received || format_.stream_rate == 0) Responder::feed(event);
     return;
   }

@@ -25,10 +25,10 @@ TEST(EncolinkDevice, AnswersFiveMicrosecondsAfterTheRequest) {
 }
 
 TEST(EncolinkDevice, TheIdentityComesInTheFrameAfterItsRequest) {
-  for (const Wire wire : {Wire::uart, Wire::spi}) {
-    Bench bench(testing::multi, wire);
+  for (const Interface interface : {Interface::uart, Interface::spi}) {
+    Bench bench(testing::multi, interface);
     const auto replies =
-        bench.ask({{0xBB, 0x00}, position_request, position_request}, wire == Wire::spi ? identity_bytes : 0);
+        bench.ask({{0xBB, 0x00}, position_request, position_request}, interface == Interface::spi ? identity_bytes : 0);
     for (const std::size_t i : {0u, 2u}) {
       EXPECT_TRUE(decode_position(testing::multi_format, Bytes(replies[i]).first(7)).has_value());
     }
@@ -108,8 +108,8 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
             {spi_settings, 4999ns, "NCS high for less than 5 us"},
             {fast, 5us, "clock faster than 4 MHz"},
             {early, 5us, "clock less than 5 us after NCS went low"}})) {
-    Bench bench(testing::single, Wire::spi);
-    sim::Line<std::uint8_t> line{LinkKind::exchange, settings};
+    Bench bench(testing::single, Interface::spi);
+    sim::Line<std::uint8_t> line{LinkKind::spi, settings};
     line.attach(sim::Role::device, bench.encoder);
     SpiHost host(pause);
     line.run(line.attach(sim::Role::host, host));

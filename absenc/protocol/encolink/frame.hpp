@@ -71,7 +71,7 @@ inline constexpr unsigned maximum_multiturn_bits = 16;
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 /// A transfer on SPI brings the frame of the moment at which it begins; a UART answers afterwards.
-enum class Wire : std::uint8_t { uart, spi };
+enum class Interface : std::uint8_t { uart, spi };
 /// Whether the position offset is added to what the sensor measures or taken off. The register map does not say.
 enum class OffsetSign : std::uint8_t { add, subtract };
 /// What the position offset counts. The map does not say it either; the vendor's example shows FFFFFFFF refused.
@@ -83,7 +83,7 @@ struct Format {
   unsigned resolution = 0;  // bits of the turn, 1 to 22; 0: unknown
   int multiturn_bits = -1;  // 0 to 16; -1: unknown
   bool has_ch2 = true;      // false: frames as those of an AksIM-1, without the last byte
-  Wire wire = Wire::uart;
+  Interface interface = Interface::uart;
   OffsetSign offset_sign = OffsetSign::add;
   OffsetUnit offset_unit = OffsetUnit::counts;
   std::uint32_t stream_rate = 0;                // frames a second that it sends by itself; 0: it answers requests

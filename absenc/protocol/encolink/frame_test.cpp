@@ -105,10 +105,10 @@ TEST(EncolinkFrame, BadAccessesAreNamed) {
 
 TEST(EncolinkUnit, AFrameEndsWhereItsChecksumSays) {
   const Options values = author::testing::options_of(unit, "multiturn_bits=0");
-  const Delimit broken = unit.delimit(values, Direction::reply, hex<"00000000000000000000000000000000000000">);
-  EXPECT_EQ(broken.kind, Delimit::Kind::no_frame);
-  EXPECT_EQ(unit.delimit(values, Direction::request, hex<"AA00">).size, 2u);
-  EXPECT_EQ(unit.delimit(values, Direction::request, hex<"A900">).kind, Delimit::Kind::no_frame);
+  const FrameEnd broken = unit.frame_end(values, Direction::reply, hex<"00000000000000000000000000000000000000">);
+  EXPECT_EQ(broken.kind, FrameEnd::Kind::no_frame);
+  EXPECT_EQ(unit.frame_end(values, Direction::request, hex<"AA00">).size, 2u);
+  EXPECT_EQ(unit.frame_end(values, Direction::request, hex<"A900">).kind, FrameEnd::Kind::no_frame);
 }
 
 TEST(EncolinkUnit, EncodesTheBytesThatDoTheWork) {

@@ -19,13 +19,13 @@ std::array<std::uint8_t, request_bytes> Frames::encode(const Format&, const Requ
 std::size_t Frames::expected(const Format& format, const Request& request, Bytes) {
   const bool identifies = request.ask == Ask::identify || request.ask == Ask::identity;
   if (!identifies) return format.frame_bytes();
-  return format.wire == Wire::spi ? identity_bytes : 0;
+  return format.interface == Interface::spi ? identity_bytes : 0;
 }
 
 Result<Position> Frames::decode(const Format& format, const Request& request, Bytes reply) {
   if (reply.empty()) return Error::timeout;
   const bool flat = std::all_of(reply.begin(), reply.end(), [&](std::uint8_t byte) { return byte == reply[0]; });
-  if (format.wire == Wire::spi && flat && (reply[0] == 0x00 || reply[0] == 0xFF)) return Error::line_stuck;
+  if (format.interface == Interface::spi && flat && (reply[0] == 0x00 || reply[0] == 0xFF)) return Error::line_stuck;
   if (request.ask == Ask::identify) return Position{};
   if (request.ask != Ask::identity) return decode_position(format, reply);
   const Error error = decode_identity(reply).error();
@@ -58,7 +58,7 @@ void Channels::take(const author::HostOf<Frames>& host) {
   reading = to_reading(format, position, status);
   // On SPI the position is taken when NCS falls. The document does not say when it is on a UART: at the end of the
   // request at the latest.
-  reading.latched = format.wire == Wire::spi ? host.begun_at() : host.sent_at();
+  reading.latched = format.interface == Interface::spi ? host.begun_at() : host.sent_at();
   reading.received = host.received_at();
 }
 
@@ -68,7 +68,7 @@ ReadPosition::ReadPosition(const Format& format) : HostOf(format) {
   ask({format.known() ? Ask::position : Ask::identify});
 }
 
-void ReadPosition::answered(Error error) {
+void ReadPosition::concluded(Error error) {
   if (error != Error::none) return finish({.error = error});
   if (request().ask == Ask::identify) return go_on(Ask::identity);
   if (request().ask == Ask::identity) {

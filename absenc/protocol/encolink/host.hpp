@@ -6,7 +6,7 @@
 #include <array>
 #include <optional>
 
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
 
 namespace absenc::encolink {
@@ -19,7 +19,7 @@ enum class Ask : std::uint8_t {
   identity,
 };
 
-/// author/line.hpp says what each of these is.
+/// author/dialog.hpp says what each of these is.
 struct Frames {
   using Format = encolink::Format;
   struct Request {
@@ -29,16 +29,18 @@ struct Frames {
   using Reply = Position;  // of the identity nothing
   static constexpr std::size_t longest_reply = identity_bytes;
 
-  static constexpr author::Wire wire(const Format&) { return {.answer_limit = answer_limit, .gap_limit = gap_limit}; }
+  static constexpr author::HostTimes host_times(const Format&) {
+    return {.answer_limit = answer_limit, .gap_limit = gap_limit};
+  }
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   static std::size_t expected(const Format& format, const Request& request, Bytes);
   /// Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of decode_identity.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
   /// SPI has brought all there is; on a UART more may be coming.
-  static bool is_whole(const Format& format, Error) { return format.wire == Wire::spi; }
+  static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
   /// How long after a frame the next one may begin.
-  static Time pause(const Format& format) { return format.wire == Wire::spi ? spi_pause : Time{}; }
+  static Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
 /// What the frames of a conversation say together: the position, and cycles of channel 2, a byte a frame, from a reset
@@ -71,7 +73,7 @@ class ReadPosition : public author::HostOf<Frames> {
   [[nodiscard]] const Channels& channels() const { return channels_; }
 
  private:
-  void answered(Error error) final;
+  void concluded(Error error) final;
   void go_on(Ask next) { ask({next}, received_at() + Frames::pause(format())); }
 
   Channels channels_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions, the identity, channel 2 and listening against the virtual AksIM-2, on both wires.
+// Positions, the identity, channel 2 and listening against the virtual AksIM-2, on both interfaces.
 #include "absenc/protocol/encolink/host.hpp"
 
 #include "absenc/core/hex.hpp"
@@ -15,8 +15,8 @@ using testing::RawBytes;
 using testing::says;
 using testing::Told;
 using PowerOn = Bench::PowerOn;
-class EncolinkHost : public testing::OnBothWires {};
-INSTANTIATE_TEST_SUITE_P(Wires, EncolinkHost, ::testing::Values(Wire::uart, Wire::spi));
+class EncolinkHost : public testing::OnBothInterfaces {};
+INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkHost, ::testing::Values(Interface::uart, Interface::spi));
 
 TEST(EncolinkHostUart, ReadsAPositionInTheTimeOfTheWire) {
   Bench bench;
@@ -30,7 +30,7 @@ TEST(EncolinkHostUart, ReadsAPositionInTheTimeOfTheWire) {
 }
 
 TEST(EncolinkHostSpi, ThePositionIsTakenWhenNcsFalls) {
-  Bench bench(testing::single, Wire::spi);
+  Bench bench(testing::single, Interface::spi);
   bench.pass(1ms);
   const Told read = bench.run("position");
   ASSERT_TRUE(read.reading);
@@ -45,7 +45,7 @@ TEST_P(EncolinkHost, WhatIsWrongIsSaid) {
     return [byte](unsigned, RawBytes& reply) { reply.assign(reply.size(), byte); };
   };
   struct Case {
-    std::string_view wires;
+    std::string_view interfaces;
     std::string_view told;
     author::testing::Tamper tamper;
     Error error;
@@ -62,8 +62,8 @@ TEST_P(EncolinkHost, WhatIsWrongIsSaid) {
             "did not identify itself"},
            {"s", testing::multi, all(0x00), Error::line_stuck, "MISO stayed low"},
            {"s", testing::multi, all(0xFF), Error::line_stuck, "MISO stayed high"}}) {
-    if (one.wires.find(wire == Wire::uart ? 'u' : 's') == std::string_view::npos) continue;
-    Bench bench(testing::multi, wire);
+    if (one.interfaces.find(interface == Interface::uart ? 'u' : 's') == std::string_view::npos) continue;
+    Bench bench(testing::multi, interface);
     bench.tampered.replies(one.tamper);
     bench.tell(one.told);
     const Told read = bench.run("position");
@@ -83,7 +83,7 @@ TEST(EncolinkHostUart, NothingComes) {
 
 TEST_P(EncolinkHost, WhatIsNotKnownIsAskedFirst) {
   for (const std::string_view real : {testing::single, testing::multi, std::string_view("resolution=17")}) {
-    Bench bench(real, wire);
+    Bench bench(real, interface);
     bench.tell("");
     const Told read = bench.run("position");
     ASSERT_EQ(read.error, Error::none) << read.detail;
@@ -96,7 +96,7 @@ TEST_P(EncolinkHost, WhatIsNotKnownIsAskedFirst) {
 }
 
 TEST_P(EncolinkHost, TheIdentityCountsAgainstTheOptionsWhereItIsAskedFor) {
-  Bench bench("resolution=17 multiturn_bits=0", wire);
+  Bench bench("resolution=17 multiturn_bits=0", interface);
   bench.tell("resolution=20 multiturn_bits=0");
   const Told info = bench.run("info");
   ASSERT_TRUE(info.reading) << info.detail;
@@ -108,7 +108,7 @@ TEST_P(EncolinkHost, TheIdentityCountsAgainstTheOptionsWhereItIsAskedFor) {
   EXPECT_EQ(identify.numbers.at("frame_bytes"), 5);
   EXPECT_EQ(identify.texts.at("part_number"), "MB080SLA17MENT00");
 
-  Bench coarse("resolution=20 multiturn_bits=12", wire);  // which it cannot say
+  Bench coarse("resolution=20 multiturn_bits=12", interface);  // which it cannot say
   const Told turns = coarse.run("info");
   ASSERT_TRUE(turns.reading);
   EXPECT_EQ(turns.reading->multiturn_bits, 12u);
@@ -117,7 +117,7 @@ TEST_P(EncolinkHost, TheIdentityCountsAgainstTheOptionsWhereItIsAskedFor) {
 
 TEST_P(EncolinkHost, TheIdentityMayHaveAByteBehindIt) {
   for (const std::string_view told : {std::string_view(""), testing::multi}) {
-    Bench bench("resolution=20 multiturn_bits=16 identity_bytes=20", wire);
+    Bench bench("resolution=20 multiturn_bits=16 identity_bytes=20", interface);
     bench.tell(told);
     for (int i = 0; i < 3; ++i) {
       const Told position = bench.run("position");
@@ -135,7 +135,7 @@ TEST_P(EncolinkHost, TheIdentityMayHaveAByteBehindIt) {
 TEST_P(EncolinkHost, TheIdentityIsAskedForThreeTimes) {
   for (const auto& [bad, error] :
        std::to_array<std::pair<unsigned, Error>>({{2, Error::none}, {3, Error::bad_checksum}})) {
-    Bench bench("resolution=20 multiturn_bits=16", wire);
+    Bench bench("resolution=20 multiturn_bits=16", interface);
     unsigned left = bad;
     bench.tampered.replies([&](unsigned, RawBytes& reply) {
       if (reply.size() == identity_bytes && left > 0) --left, reply[3] ^= 0x01;
@@ -147,7 +147,7 @@ TEST_P(EncolinkHost, TheIdentityIsAskedForThreeTimes) {
 }
 
 TEST_P(EncolinkHost, TheIdentityOfVersion4LeavesRegistersAlone) {
-  Bench bench("resolution=20 multiturn_bits=16 protocol_version=4", wire);
+  Bench bench("resolution=20 multiturn_bits=16 protocol_version=4", interface);
   for (const std::string_view told : {std::string_view(""), testing::multi}) {
     bench.tell(told);
     EXPECT_EQ(bench.run("position").error, Error::none);
@@ -178,7 +178,7 @@ TEST_P(EncolinkHost, TheIdentityOfVersion4LeavesRegistersAlone) {
 TEST_P(EncolinkHost, TheDetailedStatusTakesOneCycle) {
   constexpr std::uint16_t raised = status::temperature | status::multiturn_mismatch;
   for (const std::string_view settings : {testing::single, testing::multi}) {
-    Bench bench(settings, wire);
+    Bench bench(settings, interface);
     bench.shaft.spin(3000, bench.line.now());  // each frame another position: the first of the cycle counts
     bench.device.raise_alarms(raised);
     const Told read = bench.run("alarms");
@@ -192,7 +192,7 @@ TEST_P(EncolinkHost, TheDetailedStatusTakesOneCycle) {
 }
 
 TEST_P(EncolinkHost, AnAlarmBitIsFollowedByItsWords) {
-  Bench bench(testing::single, wire);
+  Bench bench(testing::single, interface);
   for (const auto& [alarm, general, valid] : std::to_array<std::tuple<std::uint16_t, std::uint32_t, bool>>(
            {{status::temperature, general::warning, true}, {status::signal_lost, general::error, false}})) {
     bench.device.lower_alarms(0xFFFF);
@@ -207,7 +207,7 @@ TEST_P(EncolinkHost, AnAlarmBitIsFollowedByItsWords) {
 }
 
 TEST_P(EncolinkHost, Channel2ThatDisagreesIsAnErrorOfItsOwn) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   bench.condition(condition_channels_disagree, 1);
   const Told status = bench.run("alarms");
   EXPECT_EQ(status.error, Error::cross_check_failed);
@@ -240,7 +240,7 @@ TEST_P(EncolinkHost, ACycleThatIsNotGoodIsReadAgain) {
                                            {at(3, 0), Error::none, 3 + 1 + 10},  // the frame
                                            {turned, Error::cross_check_failed, 3 * 10},
                                            {damaged, Error::bad_checksum, 3 * 10}}) {
-    Bench bench(testing::multi, wire);
+    Bench bench(testing::multi, interface);
     bench.tampered.replies(one.tamper);
     const Told read = bench.run("alarms");
     EXPECT_EQ(read.error, one.error);
@@ -249,7 +249,7 @@ TEST_P(EncolinkHost, ACycleThatIsNotGoodIsReadAgain) {
 }
 
 TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
-  Bench bench(testing::single, wire);
+  Bench bench(testing::single, interface);
   bench.restart(PowerOn::real);
   bench.line.wake(0);
   const Told early = bench.run("position");
@@ -263,7 +263,7 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
 }
 
 TEST_P(EncolinkHost, WithoutChannel2ThereAreOnlyPositions) {
-  Bench bench("resolution=20 multiturn_bits=0 has_ch2=false", wire);
+  Bench bench("resolution=20 multiturn_bits=0 has_ch2=false", interface);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x12345u);
   for (const auto& [command, arguments] : std::vector<std::pair<std::string_view, std::vector<std::int64_t>>>{
            {"alarms", {}}, {"memory-read", {0x4C}}, {"save", {}}}) {

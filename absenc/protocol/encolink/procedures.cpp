@@ -30,11 +30,11 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 // ---- Frames
 
 // One that is lost or damaged ends the step of channel 2.
-Part<Error> frame(Line& line, Found& found, Frames::Request request) {
-  if (found.emits && found.is_new) line.emit();
+Part<Error> frame(Dialog& dialog, Found& found, Frames::Request request) {
+  if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
   found.ended.reset();
-  const Result<Position> position = co_await line.attempt(request).after(Frames::pause(line.format()));
+  const Result<Position> position = co_await dialog.attempt(request).after(Frames::pause(dialog.format()));
   if (!position) {
     found.in_step = false;
     ++found.lost;
@@ -42,12 +42,12 @@ Part<Error> frame(Line& line, Found& found, Frames::Request request) {
   }
   if (request.ask != Ask::identify) found.lost = 0;
   if (request.ask != Ask::position && request.ask != Ask::reset) co_return Error::none;
-  found.take(line);
+  found.take(dialog);
   found.is_new = true;
   co_return Error::none;
 }
 
-bool is_gone(const Line& line, const Found& found) { return found.lost >= frame_attempts || line.is_noisy(); }
+bool is_gone(const Dialog& dialog, const Found& found) { return found.lost >= frame_attempts || dialog.is_noisy(); }
 
 Outcome stopped(const Found& found, Error error) {
   const bool in_access = error == Error::timeout && !found.access.empty();
@@ -56,29 +56,29 @@ Outcome stopped(const Found& found, Error error) {
 
 // With `trusted` it counts also against the options. Asking for it resets the channels. Ends the procedure when it does
 // not come.
-Part<Identity> identify(Line& line, Found& found, bool trusted) {
+Part<Identity> identify(Dialog& dialog, Found& found, bool trusted) {
   for (;;) {
-    Error error = co_await frame(line, found, {Ask::identify});
-    if (error == Error::none) error = co_await frame(line, found, {Ask::identity});
+    Error error = co_await frame(dialog, found, {Ask::identify});
+    if (error == Error::none) error = co_await frame(dialog, found, {Ask::identity});
     if (error == Error::none) break;
-    if (is_gone(line, found)) co_await line.stop(stopped(found, error));
+    if (is_gone(dialog, found)) co_await dialog.stop(stopped(found, error));
   }
   found.in_step = false;
-  const Identity identity = *decode_identity(line.reply());
-  const Result<Format> known = trusted ? as_identified(line.format(), identity) : complete(line.format(), identity);
-  if (!known) co_await line.stop({known.error()});
-  line.set_format(*known);
+  const Identity identity = *decode_identity(dialog.reply());
+  const Result<Format> known = trusted ? as_identified(dialog.format(), identity) : complete(dialog.format(), identity);
+  if (!known) co_await dialog.stop({known.error()});
+  dialog.set_format(*known);
   found.protocol_version = identity.protocol_version;
   co_return identity;
 }
 
 // The next good frame; out of step it is asked for by `ask`. Ends the procedure when none comes.
-Part<bool> next_frame(Line& line, Found& found, Ask ask = Ask::position) {
-  if (!line.format().known()) co_await identify(line, found, false);
+Part<bool> next_frame(Dialog& dialog, Found& found, Ask ask = Ask::position) {
+  if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {
-    const Error error = co_await frame(line, found, {found.in_step ? Ask::position : ask});
+    const Error error = co_await frame(dialog, found, {found.in_step ? Ask::position : ask});
     if (error == Error::none) co_return true;
-    if (is_gone(line, found)) co_await line.stop({error});
+    if (is_gone(dialog, found)) co_await dialog.stop({error});
   }
 }
 
@@ -90,22 +90,22 @@ Error damage(const Found& found, Error error) {
 }
 
 // The bytes of the request, one a frame.
-Part<Error> send(Line& line, Found& found) {
+Part<Error> send(Dialog& dialog, Found& found) {
   found.was_asked = false;
   for (std::size_t sent = 0; !found.was_asked;) {
     Frames::Request request{Ask::reset};
     if (found.in_step) request = {Ask::position, found.access[sent++]};
     found.was_asked = sent == found.access.size();
-    const Error error = co_await frame(line, found, request);
+    const Error error = co_await frame(dialog, found, request);
     if (damage(found, error) != Error::none) co_return damage(found, error);
   }
   co_return Error::none;
 }
 
 // The next cycle: its byte of channel 3 is one of the answer.
-Part<Error> receive(Line& line, Found& found) {
+Part<Error> receive(Dialog& dialog, Found& found) {
   do {
-    const Error error = co_await frame(line, found, {});
+    const Error error = co_await frame(dialog, found, {});
     if (damage(found, error) != Error::none) co_return damage(found, error);
   } while (!found.ended);
   co_return Error::none;
@@ -119,15 +119,15 @@ Fate lost(Found& found, Error error, std::string_view detail = {}) {
   return found.end(Fate::lost, {error, detail}, !found.writes || !found.was_asked);
 }
 
-Part<Fate> try_to_execute(Line& line, Found& found) {
+Part<Fate> try_to_execute(Dialog& dialog, Found& found) {
   found.data.clear();
-  const Error unasked = co_await send(line, found);
+  const Error unasked = co_await send(dialog, found);
   if (unasked != Error::none) co_return lost(found, unasked);
-  const Time asked = line.received_at();
+  const Time asked = dialog.received_at();
   const std::uint8_t ready = found.writes ? channel3::write_ready : channel3::read_ready;
   unsigned idle = 0;
   do {
-    const Error error = co_await receive(line, found);
+    const Error error = co_await receive(dialog, found);
     if (error != Error::none) co_return lost(found, error);
     const bool is_idle = found.channel3 == channel3::idle;
     const bool is_busy = found.channel3 == channel3::busy;
@@ -137,18 +137,18 @@ Part<Fate> try_to_execute(Line& line, Found& found) {
     if (is_idle && ++idle > idle_cycles_allowed) {
       co_return lost(found, Error::timeout, "the encoder ignores register accesses: positions go on");
     }
-    if (is_busy && line.received_at() - asked > busy_limit) {
+    if (is_busy && dialog.received_at() - asked > busy_limit) {
       co_return found.end(Fate::refused, {Error::busy, busy_too_long});
     }
   } while (found.channel3 != ready);
-  const Error unsaid = co_await receive(line, found);
+  const Error unsaid = co_await receive(dialog, found);
   if (unsaid != Error::none) co_return lost(found, unsaid);
   const auto status = static_cast<AccessStatus>(found.channel3);
   if (status != AccessStatus::ok) {
     co_return found.end(Fate::refused, {Error::request_rejected, text_of(status)}, is_damaged(status));
   }
   while (!found.writes && found.data.size() < found.length) {
-    const Error error = co_await receive(line, found);
+    const Error error = co_await receive(dialog, found);
     if (error != Error::none) co_return lost(found, error);
     found.data.push_back(found.channel3);
   }
@@ -156,102 +156,103 @@ Part<Fate> try_to_execute(Line& line, Found& found) {
 }
 
 // The identity is asked first: an encoder with other registers is left alone.
-Part<Fate> execute(Line& line, Found& found) {
-  if (!line.format().has_ch2) co_await line.stop({Error::unsupported, no_channel2});
-  if (found.protocol_version == 0) co_await identify(line, found, false);
-  if (found.protocol_version == version::aksim4) co_await line.stop({Error::unsupported, not_described});
+Part<Fate> execute(Dialog& dialog, Found& found) {
+  if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});
+  if (found.protocol_version == 0) co_await identify(dialog, found, false);
+  if (found.protocol_version == version::aksim4) co_await dialog.stop({Error::unsupported, not_described});
   for (unsigned left = access_attempts - 1;; --left) {
-    const Fate fate = co_await try_to_execute(line, found);
+    const Fate fate = co_await try_to_execute(dialog, found);
     if (fate != Fate::good) found.in_step = false;  // more of the answer may be coming
-    if (is_gone(line, found)) co_return found.end(Fate::gone, stopped(found, found.why.error));
+    if (is_gone(dialog, found)) co_return found.end(Fate::gone, stopped(found, found.why.error));
     if (!found.again || left == 0) co_return fate;
   }
 }
 
 }  // namespace
 
-Part<Fate> attempt_read(Line& line, Found& found, std::uint32_t address, std::uint16_t size) {
+Part<Fate> attempt_read(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
   found.begin(read_request(address, size));
-  return execute(line, found);
+  return execute(dialog, found);
 }
 
-Part<Fate> attempt_write(Line& line, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+Part<Fate> attempt_write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
   found.begin(write_request(address, size, value));
-  return execute(line, found);
+  return execute(dialog, found);
 }
 
 namespace {
 
 // The bytes of a register, as `data`. Ends the procedure when there are none.
-Part<bool> read(Line& line, Found& found, std::uint32_t address, std::uint16_t size) {
-  const Fate fate = co_await attempt_read(line, found, address, size);
-  if (fate != Fate::good) co_await line.stop(found.why);
+Part<bool> read(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
+  const Fate fate = co_await attempt_read(dialog, found, address, size);
+  if (fate != Fate::good) co_await dialog.stop(found.why);
   co_return true;
 }
 
-Part<bool> read(Line& line, Found& found, RegisterIndex index) {
-  return read(line, found, registers[index].address, registers[index].size);
+Part<bool> read(Dialog& dialog, Found& found, RegisterIndex index) {
+  return read(dialog, found, registers[index].address, registers[index].size);
 }
 
 // A write whose answer is lost is repeated only if reading back shows that it was not executed.
-Part<bool> write(Line& line, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+Part<bool> write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
   constexpr std::string_view in_the_middle =
       "the encoder stopped answering in the middle of a register write: read it to see whether it was written";
   for (unsigned left = write_attempts; left > 0; --left) {
-    Fate fate = co_await attempt_write(line, found, address, size, value);
+    Fate fate = co_await attempt_write(dialog, found, address, size, value);
     const bool untouched = fate == Fate::gone && !found.was_asked;
-    if (fate == Fate::refused || untouched) co_await line.stop(found.why);
-    if (fate != Fate::gone) fate = co_await attempt_read(line, found, address, size);
-    if (fate == Fate::gone) co_await line.stop({found.why.error, in_the_middle});
+    if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
+    if (fate != Fate::gone) fate = co_await attempt_read(dialog, found, address, size);
+    if (fate == Fate::gone) co_await dialog.stop({found.why.error, in_the_middle});
     if (fate != Fate::good) {
-      co_await line.stop({found.why.error, "the register may be written: it could not be read back"});
+      co_await dialog.stop({found.why.error, "the register may be written: it could not be read back"});
     }
     if (load_big_endian(found.data) == value) co_return true;
   }
-  co_await line.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
+  co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
   co_return false;
 }
 
-Part<bool> write(Line& line, Found& found, RegisterIndex index, std::uint64_t value) {
-  return write(line, found, registers[index].address, registers[index].size, value);
+Part<bool> write(Dialog& dialog, Found& found, RegisterIndex index, std::uint64_t value) {
+  return write(dialog, found, registers[index].address, registers[index].size, value);
 }
 
-Part<bool> command(Line& line, Found& found, std::uint8_t code) {
-  const Fate fate = co_await attempt_write(line, found, registers[command_register].address, 1, code);
+Part<bool> command(Dialog& dialog, Found& found, std::uint8_t code) {
+  const Fate fate = co_await attempt_write(dialog, found, registers[command_register].address, 1, code);
   const bool untouched = fate == Fate::gone && !found.was_asked;
-  if (fate == Fate::refused || untouched) co_await line.stop(found.why);
+  if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
   if (fate == Fate::gone) {
-    co_await line.stop({found.why.error, "the encoder stopped answering: the command may have been executed"});
+    co_await dialog.stop({found.why.error, "the encoder stopped answering: the command may have been executed"});
   }
   if (fate == Fate::lost) {
-    co_await line.stop({found.why.error, "the answer to the command was lost: it may have been executed"});
+    co_await dialog.stop({found.why.error, "the answer to the command was lost: it may have been executed"});
   }
   co_return true;
 }
 
-bool is_near(const Line& line, std::uint32_t singleturn, std::uint32_t millidegrees = author::standstill_millidegrees) {
-  return author::is_near(line.last().singleturn, singleturn, line.format().resolution, millidegrees);
+bool is_near(const Dialog& dialog, std::uint32_t singleturn,
+             std::uint32_t millidegrees = author::standstill_millidegrees) {
+  return author::is_near(dialog.last().singleturn, singleturn, dialog.format().resolution, millidegrees);
 }
 
-Part<bool> stands_still(Line& line, Found& found) {
-  co_await next_frame(line, found);
-  const std::uint32_t first = line.last().singleturn;
-  const Time looked = line.received_at();
-  while (line.received_at() - looked < author::between_looks) co_await next_frame(line, found);
-  co_return is_near(line, first);
+Part<bool> stands_still(Dialog& dialog, Found& found) {
+  co_await next_frame(dialog, found);
+  const std::uint32_t first = dialog.last().singleturn;
+  const Time looked = dialog.received_at();
+  while (dialog.received_at() - looked < author::between_looks) co_await next_frame(dialog, found);
+  co_return is_near(dialog, first);
 }
 
 }  // namespace
 
 // ---- What is read
 
-Procedure read_alarms(Line& line, Found& found) {
-  if (!line.format().has_ch2) co_return {Error::unsupported, no_channel2};
+Procedure read_alarms(Dialog& dialog, Found& found) {
+  if (!dialog.format().has_ch2) co_return {Error::unsupported, no_channel2};
   found.tells_status = true;
   for (unsigned left = cycle_attempts; left > 0; --left) {
     found.in_step = false;
     do {
-      co_await next_frame(line, found, Ask::reset);
+      co_await next_frame(dialog, found, Ask::reset);
     } while (!found.ended);
     if (*found.ended == Error::none) co_return done;
   }
@@ -259,22 +260,22 @@ Procedure read_alarms(Line& line, Found& found) {
   co_return {error, error == Error::cross_check_failed ? channels_disagree : std::string_view{}};
 }
 
-Procedure read_identity(Line& line, Found& found) {
-  const Identity identity = co_await identify(line, found, true);
+Procedure read_identity(Dialog& dialog, Found& found) {
+  const Identity identity = co_await identify(dialog, found, true);
   found.identity = identity;
   co_return done;
 }
 
-Procedure read_info(Line& line, Found& found) {
-  const Identity identity = co_await identify(line, found, true);
+Procedure read_info(Dialog& dialog, Found& found) {
+  const Identity identity = co_await identify(dialog, found, true);
   found.identity = identity;
-  if (!line.format().has_ch2 || identity.protocol_version == version::aksim4) {
-    co_await next_frame(line, found);
+  if (!dialog.format().has_ch2 || identity.protocol_version == version::aksim4) {
+    co_await next_frame(dialog, found);
     co_return done;
   }
   for (std::size_t i = 0; i < registers.size(); ++i) {
     if (!registers[i].in_info) continue;
-    const Fate fate = co_await attempt_read(line, found, registers[i].address, registers[i].size);
+    const Fate fate = co_await attempt_read(dialog, found, registers[i].address, registers[i].size);
     if (found.why.error == Error::request_rejected) continue;
     if (fate != Fate::good) co_return found.why;
     found.tell(i, found.data);
@@ -284,15 +285,15 @@ Procedure read_info(Line& line, Found& found) {
 
 namespace {
 
-Procedure read_at(Line& line, Found& found, std::uint32_t address, std::uint16_t size) {
+Procedure read_at(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
   if (size == 0 || size > access_capacity) co_return {Error::invalid_argument, size_needed};
   found.emits = true;
-  co_await read(line, found, address, size);
+  co_await read(dialog, found, address, size);
   found.address = address;
   co_return done;
 }
 
-Procedure write_at(Line& line, Found& found, std::uint32_t address, std::uint16_t size, std::int64_t argument) {
+Procedure write_at(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::int64_t argument) {
   const auto value = static_cast<std::uint64_t>(argument);
   if (size == 0 || size > 8) co_return {Error::invalid_argument, size_needed};
   if (value > low_mask(8u * size)) {
@@ -302,97 +303,97 @@ Procedure write_at(Line& line, Found& found, std::uint32_t address, std::uint16_
     co_return {Error::invalid_argument, "the command register is written by save, reset and self-calibrate"};
   }
   found.emits = true;
-  co_await write(line, found, address, size, value);
+  co_await write(dialog, found, address, size, value);
   found.address = address;
   co_return done;
 }
 
 }  // namespace
 
-Procedure read_register(Line& line, Found& found, std::size_t index) {
-  return read_at(line, found, registers[index].address, registers[index].size);
+Procedure read_register(Dialog& dialog, Found& found, std::size_t index) {
+  return read_at(dialog, found, registers[index].address, registers[index].size);
 }
 
-Procedure read_memory(Line& line, Found& found, Arguments arguments) {
+Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  return read_at(line, found, address, size_of(address, arguments[1]));
+  return read_at(dialog, found, address, size_of(address, arguments[1]));
 }
 
 // ---- What is written
 
-Procedure write_register(Line& line, Found& found, std::size_t index, Arguments arguments) {
-  return write_at(line, found, registers[index].address, registers[index].size, arguments[0]);
+Procedure write_register(Dialog& dialog, Found& found, std::size_t index, Arguments arguments) {
+  return write_at(dialog, found, registers[index].address, registers[index].size, arguments[0]);
 }
 
-Procedure write_memory(Line& line, Found& found, Arguments arguments) {
+Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  return write_at(line, found, address, size_of(address, arguments[2]), arguments[1]);
+  return write_at(dialog, found, address, size_of(address, arguments[2]), arguments[1]);
 }
 
-Procedure send_command(Line& line, Found& found, std::uint8_t code) {
+Procedure send_command(Dialog& dialog, Found& found, std::uint8_t code) {
   found.emits = true;
-  co_await command(line, found, code);
+  co_await command(dialog, found, code);
   co_return done;
 }
 
-Procedure zero(Line& line, Found& found, Arguments arguments) {
+Procedure zero(Dialog& dialog, Found& found, Arguments arguments) {
   found.emits = true;
-  co_await read(line, found, position_offset);
+  co_await read(dialog, found, position_offset);
   const auto old = static_cast<std::uint32_t>(load_big_endian(found.data));
-  const bool still = co_await stands_still(line, found);
-  if (line.last().error) {
+  const bool still = co_await stands_still(dialog, found);
+  if (dialog.last().error) {
     co_return {Error::invalid_argument, "the position is not valid: read the alarms, mend their cause"};
   }
   if (!still) co_return {Error::invalid_argument, "the shaft turns: hold it still"};
-  const std::uint32_t offset = line.format().moved_offset(old, line.last().singleturn);
-  co_await write(line, found, position_offset, offset);
-  if (!is_near(line, 0, author::zero_millidegrees)) {
-    co_await write(line, found, position_offset, old);
+  const std::uint32_t offset = dialog.format().moved_offset(old, dialog.last().singleturn);
+  co_await write(dialog, found, position_offset, offset);
+  if (!is_near(dialog, 0, author::zero_millidegrees)) {
+    co_await write(dialog, found, position_offset, old);
     co_return {Error::cross_check_failed,
                "the position did not become zero, the old offset is back: hold the shaft still, or change the option "
                "offset_sign or offset_unit"};
   }
   found.tell(position_offset, found.data);
-  if (arguments[0] != 0) co_await command(line, found, commands::save);
+  if (arguments[0] != 0) co_await command(dialog, found, commands::save);
   co_return done;
 }
 
-Procedure preset_multiturn(Line& line, Found& found, Arguments arguments) {
+Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments) {
   found.emits = true;
-  co_await identify(line, found, false);
-  const auto bits = static_cast<unsigned>(line.format().multiturn_bits);
+  co_await identify(dialog, found, false);
+  const auto bits = static_cast<unsigned>(dialog.format().multiturn_bits);
   const auto turns = static_cast<std::uint64_t>(arguments[0]);
   if (bits == 0) co_return {Error::unsupported, "this encoder counts no turns"};
   if (turns > low_mask(bits)) co_return {Error::invalid_argument, "the turn counter has not so many bits"};
-  co_await write(line, found, multiturn_preset, turns);
-  if (line.last().multiturn != turns) {
+  co_await write(dialog, found, multiturn_preset, turns);
+  if (dialog.last().multiturn != turns) {
     co_return {Error::cross_check_failed, "the preset is written, but the turns are others: hold the shaft still"};
   }
-  if (arguments[1] != 0) co_await command(line, found, commands::save);
+  if (arguments[1] != 0) co_await command(dialog, found, commands::save);
   co_return done;
 }
 
 // It has ended when its counter moved on, or it shows a failure that was not there before.
-Procedure self_calibrate(Line& line, Found& found) {
-  co_await read(line, found, calibration_status);
+Procedure self_calibrate(Dialog& dialog, Found& found) {
+  co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];
-  co_await command(line, found, commands::self_calibrate);
+  co_await command(dialog, found, commands::self_calibrate);
   found.running = true;
   std::uint8_t status = before;
-  const Time started = line.received_at();
+  const Time started = dialog.received_at();
   for (Time look = started + calibration_poll; *found.running;) {
-    while (line.received_at() < look) co_await next_frame(line, found);
-    look = line.received_at() + calibration_poll;
-    co_await read(line, found, calibration_status);
+    while (dialog.received_at() < look) co_await next_frame(dialog, found);
+    look = dialog.received_at() + calibration_poll;
+    co_await read(dialog, found, calibration_status);
     status = found.data[0];
     found.values.clear();
     found.tell(calibration_status, found.data);
     const unsigned failures = calibration::timed_out | calibration::out_of_range;
     found.running = ((status ^ before) & calibration::count) == 0 && (status & ~before & failures) == 0;
-    if (*found.running && line.received_at() - started > calibration_limit) {
+    if (*found.running && dialog.received_at() - started > calibration_limit) {
       co_return {Error::timeout, "the self-calibration does not end: positions go on"};
     }
-    if (*found.running) line.emit();
+    if (*found.running) dialog.emit();
   }
   if ((status & calibration::timed_out) != 0) {
     co_return {Error::cross_check_failed, "the self-calibration gave up: turn the shaft evenly, more than one turn"};

@@ -12,7 +12,7 @@
 
 namespace absenc::encolink {
 
-using Line = author::LineOf<Frames>;
+using Dialog = author::DialogOf<Frames>;
 
 /// How a register access ended.
 enum class Fate : std::uint8_t {
@@ -63,39 +63,39 @@ struct Found : Channels {
 };
 
 /// One access while positions go on. Ends the procedure where the encoder has no registers, or others.
-author::Part<Fate> attempt_read(Line& line, Found& found, std::uint32_t address, std::uint16_t size);
-author::Part<Fate> attempt_write(Line& line, Found& found, std::uint32_t address, std::uint16_t size,
+author::Part<Fate> attempt_read(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size);
+author::Part<Fate> attempt_write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size,
                                  std::uint64_t value);
 
 /// A cycle of channel 2, checked against channel 1.
-author::Procedure read_alarms(Line& line, Found& found);
-author::Procedure read_identity(Line& line, Found& found);
+author::Procedure read_alarms(Dialog& dialog, Found& found);
+author::Procedure read_identity(Dialog& dialog, Found& found);
 /// The identity and every register of the table that is in_info. One that the encoder does not have is left out.
-author::Procedure read_info(Line& line, Found& found);
+author::Procedure read_info(Dialog& dialog, Found& found);
 
 /// Errors of these: request_rejected (the detail has the encoder's words), busy, timeout, cross_check_failed (channel 2
 /// disagrees with channel 1), unsupported (no channel 2, or other registers), or that of a frame.
-author::Procedure read_register(Line& line, Found& found, std::size_t index);
+author::Procedure read_register(Dialog& dialog, Found& found, std::size_t index);
 /// Arguments: address, length (0: as the table says). Error also: invalid_argument (a length is needed).
-author::Procedure read_memory(Line& line, Found& found, Arguments arguments);
+author::Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments);
 
 /// Errors of these also: cross_check_failed (another value is there now).
-author::Procedure write_register(Line& line, Found& found, std::size_t index, Arguments arguments);
+author::Procedure write_register(Dialog& dialog, Found& found, std::size_t index, Arguments arguments);
 /// Arguments: address, value, size (0: as the table says). The command register cannot be read back: `save` and others
 /// write it.
-author::Procedure write_memory(Line& line, Found& found, Arguments arguments);
+author::Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments);
 /// Writes a command: only its status tells whether it was executed, so it is not repeated.
-author::Procedure send_command(Line& line, Found& found, std::uint8_t command);
+author::Procedure send_command(Dialog& dialog, Found& found, std::uint8_t command);
 
 /// Makes this position the zero of the turn, by the position offset. Argument: 1: saved. Errors also: invalid_argument
 /// (the shaft turns, or the position is not valid), cross_check_failed (it is not zero afterwards; the old offset is
 /// back).
-author::Procedure zero(Line& line, Found& found, Arguments arguments);
+author::Procedure zero(Dialog& dialog, Found& found, Arguments arguments);
 /// Sets the turn counter. Arguments: turns, 1: saved. Error also: unsupported (the encoder has none).
-author::Procedure preset_multiturn(Line& line, Found& found, Arguments arguments);
+author::Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments);
 /// Starts the self-calibration and watches it while the shaft is turned; emits whenever its status was read. Errors
 /// also: cross_check_failed (it failed; the detail says how), timeout (it does not end).
-author::Procedure self_calibrate(Line& line, Found& found);
+author::Procedure self_calibrate(Dialog& dialog, Found& found);
 
 /// How many bytes an access has: `wanted`, or where that is 0 what the table says; 0: nobody knows.
 [[nodiscard]] std::uint16_t size_of(std::uint32_t address, std::int64_t wanted);

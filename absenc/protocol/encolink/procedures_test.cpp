@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Registers and what is done with them against the virtual AksIM-2, on both wires.
+// Registers and what is done with them against the virtual AksIM-2, on both interfaces.
 #include "absenc/protocol/encolink/procedures.hpp"
 
 #include "absenc/protocol/author/command.hpp"
@@ -13,8 +13,8 @@ using testing::RawBytes;
 using testing::says;
 using testing::Told;
 using PowerOn = Bench::PowerOn;
-class EncolinkRegister : public testing::OnBothWires {};
-INSTANTIATE_TEST_SUITE_P(Wires, EncolinkRegister, ::testing::Values(Wire::uart, Wire::spi));
+class EncolinkRegister : public testing::OnBothInterfaces {};
+INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkRegister, ::testing::Values(Interface::uart, Interface::spi));
 
 /// Damages these frames, counted from 0.
 author::testing::Tamper damaging(std::vector<unsigned> frames) {
@@ -35,7 +35,7 @@ author::testing::Tamper mishearing(std::uint8_t right, std::uint8_t wrong, int t
 // Positions a second while the longest register is read: channel 3 must not cost a single frame.
 TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
   for (const std::string_view settings : {testing::single, testing::multi}) {
-    Bench bench(settings, wire);
+    Bench bench(settings, interface);
     bench.shaft.spin(600, bench.line.now());
     bench.shaft.put(0, 0x12345);
     std::uint64_t last = 0;
@@ -55,7 +55,7 @@ TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
     EXPECT_EQ(read.emits, read.frames - 2 - 1);  // without the identity's, and the last one is the end
     EXPECT_EQ(bench.first_violation(), "");
     const auto size = static_cast<std::int64_t>(bench.encoder.format().frame_bytes());
-    const Time frame = wire == Wire::uart
+    const Time frame = interface == Interface::uart
                            ? (2 + size) * uart_settings.character() + answer_time
                            : spi_lead + spi_settings.bits(static_cast<std::uint64_t>(8 * size)) + spi_pause;
     const Time ideal = static_cast<std::int64_t>(read.frames - 2 - 1) * frame;
@@ -64,7 +64,7 @@ TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
 }
 
 TEST_P(EncolinkRegister, EveryRegisterIsReadAsTheTableSays) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   bench.condition(condition_temperature, -12);
   bench.shaft.spin(-60, bench.line.now());
   for (const Register& one : registers) {
@@ -80,7 +80,7 @@ TEST_P(EncolinkRegister, EveryRegisterIsReadAsTheTableSays) {
 }
 
 TEST_P(EncolinkRegister, InfoTellsEverything) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   bench.tell("");
   const Told info = bench.run("info");
   ASSERT_EQ(info.error, Error::none) << info.detail;
@@ -97,7 +97,7 @@ TEST_P(EncolinkRegister, InfoTellsEverything) {
 }
 
 TEST_P(EncolinkRegister, WritesAreReadBackAndKeptWhenSaved) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   const Told write = bench.run("memory-write", {0, 0x10000});
   ASSERT_EQ(write.error, Error::none) << write.detail;
   EXPECT_EQ(write.numbers.at("position_offset"), 0x10000);
@@ -117,7 +117,7 @@ TEST_P(EncolinkRegister, WritesAreReadBackAndKeptWhenSaved) {
 }
 
 TEST_P(EncolinkRegister, EachRefusalHasItsSentence) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   const auto refusal = [&](std::int64_t address, std::int64_t size, std::int64_t value) {
     const Told write = bench.run("memory-write", {address, value, size});
     EXPECT_EQ(write.error, Error::request_rejected);
@@ -137,15 +137,15 @@ TEST_P(EncolinkRegister, EachRefusalHasItsSentence) {
 }
 
 TEST_P(EncolinkRegister, WhatCannotBeAskedIsTheCallersFault) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   EXPECT_EQ(bench.run("memory-read", {0x1234}).error, Error::invalid_argument);
   EXPECT_EQ(bench.run("memory-write", {0x2E, 256}).error, Error::invalid_argument);
   EXPECT_EQ(bench.run("memory-write", {0x49, 0x63}).error, Error::invalid_argument);
-  EXPECT_EQ(bench.device.answered(), 0u);
+  EXPECT_EQ(bench.device.answer_count(), 0u);
 }
 
 TEST_P(EncolinkRegister, BusyForEverEndsWhilePositionsGoOn) {
-  Bench bench(testing::single, wire);
+  Bench bench(testing::single, interface);
   bench.condition(condition_busy, 1);
   const Told read = bench.run("memory-read", {0x4C});
   EXPECT_EQ(read.error, Error::busy);
@@ -162,7 +162,7 @@ TEST_P(EncolinkRegister, AnAccessThatIsMisheardIsRepeated) {
            {{0xEF, 0xEE, Error::timeout, "the encoder ignores register accesses: positions go on"},
             {0x4C, 0x4D, Error::request_rejected, text_of(AccessStatus::read_checksum)}})) {
     for (const auto& [times, good] : std::to_array<std::pair<int, bool>>({{4, true}, {5, false}})) {
-      Bench bench(testing::single, wire);
+      Bench bench(testing::single, interface);
       bench.tampered.requests(mishearing(right, wrong, times));
       const Told read = bench.run("memory-read", {0x4C});
       EXPECT_EQ(read.error, good ? Error::none : error) << times;
@@ -177,7 +177,7 @@ TEST_P(EncolinkRegister, DamagedFramesBeginTheAccessAnew) {
            {{9, 10, 40, 70}, Error::none},
            {{9, 10, 40, 70, 100}, Error::bad_checksum},  // the fifth try
            {{9, 10, 11}, Error::bad_checksum}}) {        // as often as a frame is asked for
-    Bench bench(testing::single, wire);
+    Bench bench(testing::single, interface);
     bench.tampered.replies(damaging(frames));
     const Told read = bench.run("memory-read", {0x4C});
     EXPECT_EQ(read.error, error) << read.detail;
@@ -186,19 +186,19 @@ TEST_P(EncolinkRegister, DamagedFramesBeginTheAccessAnew) {
 }
 
 TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
-  const Error gone = wire == Wire::uart ? Error::timeout : Error::line_stuck;
+  const Error gone = interface == Interface::uart ? Error::timeout : Error::line_stuck;
   struct Case {
     std::string_view command;
     std::vector<std::int64_t> arguments;
     unsigned after;  // positions
     std::string_view words;
   };
-  for (const Case& one :
-       std::vector<Case>{{"memory-write", {0, 0x10000000}, 18, "stopped answering in the middle of a register write"},
-                         {"memory-write", {0, 0x10000000}, 5, wire == Wire::uart ? "during a register access" : "MISO"},
-                         {"save", {}, 100, "the answer to the command was lost: it may have been executed"},
-                         {"save", {}, 5, wire == Wire::uart ? "during a register access" : "MISO"}}) {
-    Bench bench(testing::single, wire);
+  for (const Case& one : std::vector<Case>{
+           {"memory-write", {0, 0x10000000}, 18, "stopped answering in the middle of a register write"},
+           {"memory-write", {0, 0x10000000}, 5, interface == Interface::uart ? "during a register access" : "MISO"},
+           {"save", {}, 100, "the answer to the command was lost: it may have been executed"},
+           {"save", {}, 5, interface == Interface::uart ? "during a register access" : "MISO"}}) {
+    Bench bench(testing::single, interface);
     unsigned emits = 0;
     const Told told = bench.run(one.command, one.arguments, [&](const auto&) {
       if (++emits == one.after) bench.device.power_off(bench.line.now());
@@ -209,7 +209,7 @@ TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
     EXPECT_EQ(bench.device.memory_version(), 0u);
   }
   // Not even the identity came: nothing was written.
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   bench.tampered.replies([](unsigned, RawBytes& reply) { reply.clear(); });
   const Told save = bench.run("save");
   EXPECT_NE(save.error, Error::none);
@@ -218,7 +218,7 @@ TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
 
 // The answer to the write is lost, so it must be read back before it is written again.
 TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
-  Bench bench(testing::single, wire);
+  Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({22}));
   unsigned written = 0;
   bench.tampered.requests([&](unsigned, RawBytes& request) {
@@ -234,7 +234,7 @@ TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
 TEST_P(EncolinkRegister, AWriteThatWasNotExecutedIsRepeated) {
   for (const auto& [times, error] :
        std::to_array<std::pair<int, Error>>({{2, Error::none}, {3, Error::cross_check_failed}})) {
-    Bench bench(testing::single, wire);
+    Bench bench(testing::single, interface);
     bench.tampered.requests(mishearing(0x58, 0x5A, times));
     EXPECT_EQ(bench.run("memory-write", {0, 0x10000}).error, error);
     EXPECT_EQ(bench.encoder.offset(), error == Error::none ? 0x10000u : 0u);
@@ -245,7 +245,7 @@ TEST_P(EncolinkRegister, AWriteThatWasNotExecutedIsRepeated) {
 // ends says idle as well.
 TEST_P(EncolinkRegister, AnAnswerMayCome8CyclesLate) {
   for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
-    Bench bench(testing::single, wire);
+    Bench bench(testing::single, interface);
     std::vector<std::uint8_t> answer;
     RawBytes cycle(7);
     unsigned left = more;
@@ -273,7 +273,7 @@ TEST_P(EncolinkRegister, AnAnswerMayCome8CyclesLate) {
 }
 
 TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
-  Bench bench(testing::single, wire);
+  Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({100}));  // while it is busy
   const Told save = bench.run("save");
   EXPECT_EQ(save.error, Error::bad_checksum);
@@ -284,21 +284,21 @@ TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
 }
 
 // After a refusal bytes of data may follow: the next access must not begin among them.
-author::Procedure read_twice(Line& line, Found& found) {
-  const Fate refused = co_await attempt_read(line, found, 0x1234, 20);
+author::Procedure read_twice(Dialog& dialog, Found& found) {
+  const Fate refused = co_await attempt_read(dialog, found, 0x1234, 20);
   if (refused != Fate::refused) co_return found.why;
-  const Fate good = co_await attempt_read(line, found, registers[temperature].address, 2);
+  const Fate good = co_await attempt_read(dialog, found, registers[temperature].address, 2);
   co_return good == Fate::good ? author::done : found.why;
 }
 
 struct Twice {
   using Format = encolink::Format;
-  using Line = encolink::Line;
-  static void put(FieldSink&, const Line&) {}
+  using Dialog = encolink::Dialog;
+  static void put(FieldSink&, const Dialog&) {}
 };
 
 TEST_P(EncolinkRegister, AnAccessAfterARefusal) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   std::array<std::byte, 4000> frames{};
   author::Told<Twice, author::Run<Twice, Found, read_twice>> twice(bench.encoder.format(), {}, frames);
   EXPECT_EQ(bench.run(twice).error, Error::none);
@@ -309,7 +309,7 @@ TEST_P(EncolinkRegister, AnAccessAfterARefusal) {
 // ---- Procedures
 
 TEST_P(EncolinkRegister, ZeroIsHereAndSurvivesPowerOffWhenSaved) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   const Told zero = bench.run("zero");
   ASSERT_EQ(zero.error, Error::none) << zero.detail;
   EXPECT_EQ(zero.reading->singleturn, 0u);
@@ -333,7 +333,7 @@ TEST_P(EncolinkRegister, ZeroIsHereWhereverTheShaftStandsAndWhateverTheOffsetWas
   for (const std::string_view settings :
        {"", "offset_sign=subtract", "offset_unit=turn_fraction", "offset_unit=turn_fraction offset_sign=subtract"}) {
     for (const std::int64_t place : {0, 1, 0x7FFFF, 0x80000, 0xFFFFF}) {
-      Bench bench(settings, wire);
+      Bench bench(settings, interface);
       bench.shaft.put(-3, place);
       const bool fraction = bench.encoder.format().offset_unit == OffsetUnit::turn_fraction;
       ASSERT_EQ(bench.run("memory-write", {0, fraction ? 0xFFFFFFFF : 0xFEDCB}).error, Error::none);
@@ -344,7 +344,7 @@ TEST_P(EncolinkRegister, ZeroIsHereWhereverTheShaftStandsAndWhateverTheOffsetWas
 }
 
 TEST_P(EncolinkRegister, ZeroWithTheWrongSignPutsTheOldOffsetBack) {
-  Bench bench("resolution=20 multiturn_bits=0 offset_sign=subtract", wire);
+  Bench bench("resolution=20 multiturn_bits=0 offset_sign=subtract", interface);
   bench.tell(testing::single);
   ASSERT_EQ(bench.run("memory-write", {0, 0x10000}).error, Error::none);
   const Told wrong = bench.run("zero");
@@ -354,7 +354,7 @@ TEST_P(EncolinkRegister, ZeroWithTheWrongSignPutsTheOldOffsetBack) {
 }
 
 TEST_P(EncolinkRegister, ZeroNeedsAShaftAtRestAndAPosition) {
-  Bench bench(testing::single, wire);
+  Bench bench(testing::single, interface);
   for (const std::int32_t rpm : {600, 1, -1}) {
     bench.shaft.spin(rpm, bench.line.now());
     EXPECT_EQ(bench.run("zero").error, Error::invalid_argument) << rpm;
@@ -366,7 +366,7 @@ TEST_P(EncolinkRegister, ZeroNeedsAShaftAtRestAndAPosition) {
 }
 
 TEST_P(EncolinkRegister, PresetsTheTurns) {
-  Bench bench(testing::multi, wire);
+  Bench bench(testing::multi, interface);
   const Told preset = bench.run("preset-multiturn", {1234});
   ASSERT_EQ(preset.error, Error::none) << preset.detail;
   EXPECT_EQ(preset.reading->multiturn, 1234u);
@@ -374,7 +374,7 @@ TEST_P(EncolinkRegister, PresetsTheTurns) {
   bench.restart(PowerOn::skip);
   EXPECT_EQ(bench.run("position").reading->multiturn, 1234u);
 
-  Bench turnless(testing::single, wire);
+  Bench turnless(testing::single, interface);
   for (const std::string_view told : {testing::single, std::string_view("")}) {
     turnless.tell(told);
     EXPECT_EQ(turnless.run("preset-multiturn").error, Error::unsupported);
@@ -382,7 +382,7 @@ TEST_P(EncolinkRegister, PresetsTheTurns) {
 }
 
 TEST_P(EncolinkRegister, SelfCalibrationShowsItsProgress) {
-  Bench bench(testing::single, wire);
+  Bench bench(testing::single, interface);
   const Told still = bench.run("self-calibrate");
   EXPECT_EQ(still.error, Error::cross_check_failed);
   EXPECT_TRUE(says(still.detail, "turn the shaft")) << still.detail;

@@ -63,7 +63,7 @@ struct Request {
 struct Protocol {
   using Format = encolink::Format;
   using Request = encolink::Request;
-  using Line = encolink::Line;
+  using Dialog = encolink::Dialog;
 
   static AccessBytes encode(const Format&, const Request& request) {
     if (request.access) return encode_access(*request.access);
@@ -137,7 +137,7 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
 
 // The byte of channel 2 stands behind the checksum of a position frame; one that means nothing may stand behind that of
 // the identity.
-bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
+bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = options.format(values);
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
@@ -154,7 +154,7 @@ struct Report {
   static void put(FieldSink& sink, const Run& run) {
     put_found(sink, run, run.found());
   }
-  static void put_found(FieldSink& sink, const Line& line, const Found& found) {
+  static void put_found(FieldSink& sink, const Dialog& dialog, const Found& found) {
     if (found.identity) {
       frame_fields.put(sink, {.identity = found.identity});
       if (found.identity->protocol_version == version::aksim4) {
@@ -164,7 +164,7 @@ struct Report {
     } else if (found.address) {
       put_register(sink, *found.address, found.data);
     } else {
-      put_position(sink, line.format(), line.last(), found.tells_status ? found.status : std::nullopt);
+      put_position(sink, dialog.format(), dialog.last(), found.tells_status ? found.status : std::nullopt);
     }
     for (const Found::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
     if (found.running) sink.put({&running_field, *found.running ? 1 : 0});
@@ -249,7 +249,7 @@ constexpr CommandOf<Protocol> listen(const Command& info) {
           .size = sizeof(Listen)};
 }
 
-constexpr bool streams(const Format& format) { return format.wire == Wire::uart && format.stream_rate > 0; }
+constexpr bool streams(const Format& format) { return format.interface == Interface::uart && format.stream_rate > 0; }
 
 constexpr Command read_position{"position", Verb::read, 0, "position, turns, and the alarms when there are any"};
 constexpr std::array commands_of_unit{
@@ -372,17 +372,17 @@ struct FieldTable {
   std::span<const FieldInfo> infos;
 };
 
-/// What the document says of both wires, and of each.
-template <Wire wire>
+/// What the document says of both interfaces, and of each.
+template <Interface interface>
 struct Definition {
   using Protocol = encolink::Protocol;
   using Encoder = VirtualEncoder;
-  static constexpr bool spi = wire == Wire::spi;
+  static constexpr bool spi = interface == Interface::spi;
   static constexpr std::string_view id = spi ? "encolink-spi" : "encolink";
   static constexpr std::string_view name = spi ? "RLS EncoLink (AksIM-2), SPI" : "RLS EncoLink (AksIM-2), UART";
   static constexpr std::string_view document =
       "Programming AksIM-2 encoders with EncoLink communication protocol, issue 2";
-  static constexpr LinkKind link = spi ? LinkKind::exchange : LinkKind::full_duplex;
+  static constexpr LinkKind link = spi ? LinkKind::spi : LinkKind::full_duplex;
   static constexpr LineSettings line(const Format&) { return spi ? spi_settings : uart_settings; }
   static constexpr LineTiming timing{.turnaround_limit = answer_limit};
   static constexpr auto& options = encolink::options;
@@ -404,12 +404,12 @@ struct Definition {
   static constexpr auto& registers = register_infos;
   static constexpr const Unit* over_spi = spi ? nullptr : &spi_unit;
   static constexpr auto probe = encolink::probe;
-  static constexpr auto covered = encolink::covered;
+  static constexpr auto is_checked = encolink::is_checked;
   static bool streams(const Options& values) { return format(values).stream_rate > 0; }
 
   static constexpr Format format(const Options& values) {
     Format made = options.format(values);
-    made.wire = wire;
+    made.interface = interface;
     return made;
   }
   // Those of the virtual encoder where they are asked from the real one.
@@ -431,7 +431,7 @@ struct Definition {
 
 }  // namespace
 
-constinit const Unit unit = author::UnitOf<Definition<Wire::uart>>::make();
-constinit const Unit spi_unit = author::UnitOf<Definition<Wire::spi>>::make();
+constinit const Unit unit = author::UnitOf<Definition<Interface::uart>>::make();
+constinit const Unit spi_unit = author::UnitOf<Definition<Interface::spi>>::make();
 
 }  // namespace absenc::encolink

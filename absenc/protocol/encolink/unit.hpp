@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink as the neutral layers see it: one unit for each wire.
+// EncoLink as the neutral layers see it: one unit for each interface.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

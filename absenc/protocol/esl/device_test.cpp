@@ -64,7 +64,7 @@ TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
   EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // and it is ready for the next
   EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
   EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // page 8 ends at 2F
-  EXPECT_EQ(bench.encoder.answered(), 1u);
+  EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
 TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {

@@ -14,30 +14,30 @@ namespace {
 constexpr unsigned attempts = 3;  // of what only reads, or selects a page: resets, writes and ID 8 are never repeated
 constexpr unsigned safe_attempts = 6;
 
-Request request_of(const Line& line, DataId id) { return {id, line.format().address}; }
+Request request_of(const Dialog& dialog, DataId id) { return {id, dialog.format().address}; }
 
 // What the last exchange brought, with its times.
-void show_last(const Line& line, Found& found) {
-  found.show(line.last());
-  found.reading = line.last_reading();
+void show_last(const Dialog& dialog, Found& found) {
+  found.show(dialog.last());
+  found.reading = dialog.last_reading();
 }
 
 }  // namespace
 
-Procedure read_encoder_id(Line& line, Found& found) {
-  co_await line.ask(request_of(line, DataId::singleturn_short));
-  found.show(co_await line.ask(request_of(line, DataId::encoder_id)));
+Procedure read_encoder_id(Dialog& dialog, Found& found) {
+  co_await dialog.ask(request_of(dialog, DataId::singleturn_short));
+  found.show(co_await dialog.ask(request_of(dialog, DataId::encoder_id)));
   co_return done;
 }
 
-Procedure read_safely(Line& line, Found& found) {
-  SafetyMonitor monitor(line.format());
+Procedure read_safely(Dialog& dialog, Found& found) {
+  SafetyMonitor monitor(dialog.format());
   SafetyVerdict verdict{.failed = Check::sequence_unknown};
   for (unsigned i = 0; i < safe_attempts && verdict.failed == Check::sequence_unknown; ++i) {
-    const Request request = request_of(line, monitor.next_id());
-    co_await line.ask(request);
-    show_last(line, found);
-    verdict = monitor.judge(request, line.reply(), line.sent_at());
+    const Request request = request_of(dialog, monitor.next_id());
+    co_await dialog.ask(request);
+    show_last(dialog, found);
+    verdict = monitor.judge(request, dialog.reply(), dialog.sent_at());
   }
   if (verdict.position) found.safe_singleturn = verdict.position->singleturn();
   co_return {error_of(verdict.failed), text_of(verdict.failed).sentence};
@@ -48,9 +48,9 @@ Procedure read_safely(Line& line, Found& found) {
 namespace {
 
 // The eight of them are 40 us apart, from start to start; a slow line takes longer.
-Time pause_between_resets(const Line& line, DataId id) {
-  const Time duration = line_settings.character() * static_cast<std::int64_t>(request_length(line.format(), id));
-  return line.sent_at() - duration + reset_interval - line.received_at();
+Time pause_between_resets(const Dialog& dialog, DataId id) {
+  const Time duration = line_settings.character() * static_cast<std::int64_t>(request_length(dialog.format(), id));
+  return dialog.sent_at() - duration + reset_interval - dialog.received_at();
 }
 
 // The alarms that an ID C left, and what clears them (Table 8).
@@ -82,10 +82,10 @@ std::string_view missed(Sentence& words, DataId id, const Reply& before, const R
 
 }  // namespace
 
-Procedure reset(Line& line, Found& found, DataId id) {
-  const Request look = request_of(line, DataId::position);
-  const Reply first = co_await line.ask(look).repeated(attempts);
-  const Reply before = co_await line.ask(look).repeated(attempts).after(author::between_looks);
+Procedure reset(Dialog& dialog, Found& found, DataId id) {
+  const Request look = request_of(dialog, DataId::position);
+  const Reply first = co_await dialog.ask(look).repeated(attempts);
+  const Reply before = co_await dialog.ask(look).repeated(attempts).after(author::between_looks);
   if (!to_reading(before).ready) {
     co_return {Error::invalid_argument, "the encoder is not ready yet; nothing was sent"};
   }
@@ -93,8 +93,8 @@ Procedure reset(Line& line, Found& found, DataId id) {
     co_return {Error::invalid_argument, "the shaft is turning: a reset needs it standing still; nothing was sent"};
   }
   for (unsigned i = 0; i < reset_requests; ++i) {
-    const Time pause = i == 0 ? Time{} : pause_between_resets(line, id);
-    const Result<Reply> reply = co_await line.attempt(request_of(line, id)).after(pause);
+    const Time pause = i == 0 ? Time{} : pause_between_resets(dialog, id);
+    const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).after(pause);
     // When the last reply is lost, the reset may have been done all the same: reading tells.
     if (reply || i + 1 == reset_requests) continue;
     co_return {reply.error(),
@@ -103,9 +103,9 @@ Procedure reset(Line& line, Found& found, DataId id) {
   }
   // B saves the zero in the EEPROM; D may do the same.
   const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
-  const Reply now = co_await line.ask(look).repeated(attempts).after(pause).or_say(
+  const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
-  show_last(line, found);
+  show_last(dialog, found);
   const std::string_view what = missed(found.words, id, before, now);
   if (!what.empty()) co_return {Error::cross_check_failed, what};
   co_return done;
@@ -122,53 +122,53 @@ constexpr std::string_view unknown_area = "Table 11 lists no such page and addre
 // What comes when the memory is no longer busy. A busy encoder has not executed the request, so even a write may be
 // sent again. `after_busy`: only what follows a busy answer is believed, because the temporary register may hold what
 // somebody else once asked for.
-author::Part<Result<Reply>> settled(Line& line, Request request, bool after_busy = false) {
+author::Part<Result<Reply>> settled(Dialog& dialog, Request request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
-  const Time busy_pause = Protocol::manner(line.format(), request).pause;
+  const Time busy_pause = Protocol::manner(dialog.format(), request).pause;
   Time limit = never;
   for (Time pause{};;) {
-    const Result<Reply> reply = co_await line.attempt(request).repeated(writes ? 1 : attempts).after(pause);
+    const Result<Reply> reply = co_await dialog.attempt(request).repeated(writes ? 1 : attempts).after(pause);
     if (!reply || (!reply->busy && !after_busy)) co_return reply;
     if (reply->busy) after_busy = false;
-    limit = std::min(limit, line.received_at() + busy_limit);
-    if (line.received_at() > limit) {
-      co_await line.stop({Error::busy,
-                          "the memory stays busy longer than a write may take; the last request was not executed",
-                          {},
-                          busy_pause});
+    limit = std::min(limit, dialog.received_at() + busy_limit);
+    if (dialog.received_at() > limit) {
+      co_await dialog.stop({Error::busy,
+                            "the memory stays busy longer than a write may take; the last request was not executed",
+                            {},
+                            busy_pause});
     }
     pause = busy_pause;
   }
 }
 
 // When the page is ready. `words`: what the error says where the procedure ends here.
-author::Part<std::uint8_t> select(Line& line, std::uint8_t page, std::string_view words) {
-  const Request request{DataId::write_memory, line.format().address, page_select_address, page};
-  const Result<Reply> reply = co_await settled(line, request);
-  if (!reply) co_await line.stop({reply.error(), words, {}, page_time});
-  co_await line.rest(page_time);
+author::Part<std::uint8_t> select(Dialog& dialog, std::uint8_t page, std::string_view words) {
+  const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
+  const Result<Reply> reply = co_await settled(dialog, request);
+  if (!reply) co_await dialog.stop({reply.error(), words, {}, page_time});
+  co_await dialog.rest(page_time);
   co_return page;
 }
 
-author::Part<std::uint8_t> read_byte(Line& line, std::uint8_t page, std::uint8_t address, std::string_view words) {
-  const Request request{DataId::read_memory, line.format().address, address};
-  const Result<Reply> reply = co_await settled(line, request, !is_immediate(page, address));
-  if (!reply) co_await line.stop({reply.error(), words, {}, eeprom_read_pause});
+author::Part<std::uint8_t> read_byte(Dialog& dialog, std::uint8_t page, std::uint8_t address, std::string_view words) {
+  const Request request{DataId::read_memory, dialog.format().address, address};
+  const Result<Reply> reply = co_await settled(dialog, request, !is_immediate(page, address));
+  if (!reply) co_await dialog.stop({reply.error(), words, {}, eeprom_read_pause});
   co_return reply->value;
 }
 
 }  // namespace
 
-Procedure read_memory(Line& line, Found& found, Arguments arguments) {
+Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const auto page = static_cast<std::uint8_t>(arguments[1]);
   const auto begin = static_cast<std::uint8_t>(arguments[0]);
   const auto end = static_cast<unsigned>(begin + arguments[2]);
   for (unsigned i = begin; i < end; ++i) {
     if (find_area(page, i) == nullptr) co_return {Error::invalid_argument, unknown_area};
   }
-  co_await select(line, page, {});
+  co_await select(dialog, page, {});
   for (unsigned i = begin; i < end; ++i) {
-    const std::uint8_t value = co_await read_byte(line, page, static_cast<std::uint8_t>(i), {});
+    const std::uint8_t value = co_await read_byte(dialog, page, static_cast<std::uint8_t>(i), {});
     found.bytes.push_back(value);
   }
   found.page = page;
@@ -178,7 +178,7 @@ Procedure read_memory(Line& line, Found& found, Arguments arguments) {
   co_return done;
 }
 
-Procedure write_memory(Line& line, Found& found, Arguments arguments) {
+Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const auto address = static_cast<std::uint8_t>(arguments[0]);
   const auto value = static_cast<std::uint8_t>(arguments[1]);
   const auto page = static_cast<std::uint8_t>(arguments[2]);
@@ -193,57 +193,58 @@ Procedure write_memory(Line& line, Found& found, Arguments arguments) {
   found.page = page;
   found.memory_address = address;
   found.value = value;
-  co_await select(line, page, nothing_written);
-  const std::uint8_t before = co_await read_byte(line, page, address, nothing_written);
+  co_await select(dialog, page, nothing_written);
+  const std::uint8_t before = co_await read_byte(dialog, page, address, nothing_written);
   found.written = before != value;
   if (before == value) co_return done;
   // A lost reply does not tell whether the write was done: reading back does.
-  const Request write{DataId::write_memory, line.format().address, address, value};
-  static_cast<void>(co_await settled(line, write));
-  if (!is_immediate(page, address)) co_await line.rest(eeprom_write_pause);
-  const std::uint8_t now = co_await read_byte(line, page, address, "the byte was written, but could not be read back");
+  const Request write{DataId::write_memory, dialog.format().address, address, value};
+  static_cast<void>(co_await settled(dialog, write));
+  if (!is_immediate(page, address)) co_await dialog.rest(eeprom_write_pause);
+  const std::uint8_t now =
+      co_await read_byte(dialog, page, address, "the byte was written, but could not be read back");
   if (now == value) co_return done;
   co_return {Error::cross_check_failed, "reading back gave another value: the write has failed", {}, eeprom_read_pause};
 }
 
-Procedure select_page(Line& line, Found& found, Arguments arguments) {
+Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
   const auto page = static_cast<std::uint8_t>(arguments[0]);
   if (!is_page(page)) co_return {Error::invalid_argument, "Table 11 lists no such page; nothing was sent"};
-  co_await select(line, page, {});
-  found.page = co_await read_byte(line, page, page_select_address, {});
+  co_await select(dialog, page, {});
+  found.page = co_await read_byte(dialog, page, page_select_address, {});
   if (found.page == page) co_return done;
   co_return {Error::cross_check_failed, "another page is selected", {}, eeprom_read_pause};
 }
 
-Procedure read_error_info(Line& line, Found& found) {
+Procedure read_error_info(Dialog& dialog, Found& found) {
   constexpr std::string_view page_may_be_left = "page 8 may be left selected, where it was another before";
-  const Request which{DataId::read_memory, line.format().address, page_select_address};
-  const Result<Reply> before = co_await settled(line, which);
+  const Request which{DataId::read_memory, dialog.format().address, page_select_address};
+  const Result<Reply> before = co_await settled(dialog, which);
   const bool known = before && is_page(before->value);
-  co_await select(line, register_page, page_may_be_left);
-  const std::uint8_t flags = co_await read_byte(line, register_page, error_info_address, page_may_be_left);
+  co_await select(dialog, register_page, page_may_be_left);
+  const std::uint8_t flags = co_await read_byte(dialog, register_page, error_info_address, page_may_be_left);
   found.led_error = (flags & error_info_led) != 0;
   found.lissajous_error = (flags & error_info_lissajous) != 0;
   if (known && before->value == register_page) co_return done;
   found.page_left = register_page;
   if (!known) co_return done;
   // What was asked for is known, whatever becomes of this: reading it back tells what the next user finds.
-  const Request restore{DataId::write_memory, line.format().address, page_select_address, before->value};
-  static_cast<void>(co_await settled(line, restore));
-  co_await line.rest(page_time);
-  const Result<Reply> after = co_await settled(line, which);
+  const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
+  static_cast<void>(co_await settled(dialog, restore));
+  co_await dialog.rest(page_time);
+  const Result<Reply> after = co_await settled(dialog, which);
   if (after && after->value == before->value) found.page_left.reset();
   co_return done;
 }
 
 // ---- Several encoders on one line
 
-Procedure scan(Line& line, Nodes& found) {
+Procedure scan(Dialog& dialog, Nodes& found) {
   bool any = false;
   for (std::uint8_t address = 0; address < most_encoders; ++address) {
     const Request request{DataId::singleturn_short, address};
-    const Result<Reply> reply = co_await line.attempt(request).repeated(attempts).after(request_pause);
-    if (!reply && line.is_noisy()) co_return {reply.error()};
+    const Result<Reply> reply = co_await dialog.attempt(request).repeated(attempts).after(request_pause);
+    if (!reply && dialog.is_noisy()) co_return {reply.error()};
     if (reply) found.answers[address] = *reply;
     found.disturbed[address] = !reply && reply.error() != Error::timeout;
     any = any || reply || found.disturbed[address];

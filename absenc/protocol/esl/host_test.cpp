@@ -271,7 +271,7 @@ TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
     const Told zero = bench.run("zero");
     EXPECT_EQ(zero.error, Error::invalid_argument);
     EXPECT_TRUE(zero.says("nothing was sent"));
-    EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
+    EXPECT_EQ(bench.encoder.answer_count(), 2u);  // it only looked
   }
   Bench starting;
   starting.restart(testing::PowerOn::real);
@@ -301,7 +301,7 @@ TEST(EslHost, ALostReplyStopsAResetUnlessItIsTheLast) {
     const Told reset = bench.run("reset-multiturn");
     EXPECT_EQ(reset.error, row.error) << row.first;
     EXPECT_TRUE(reset.says(row.words)) << reset.detail;
-    EXPECT_EQ(bench.encoder.answered(), row.sent) << row.first;
+    EXPECT_EQ(bench.encoder.answer_count(), row.sent) << row.first;
     EXPECT_EQ(bench.encoder.reply_to(DataId::position, bench.line.now()).multiturn, row.turns) << row.first;
   }
 }
@@ -382,7 +382,8 @@ TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
       if (clashes.empty()) {
         EXPECT_EQ(encoder->violation_count(), 0u);
       }
-      EXPECT_EQ(encoder->answered(), clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // ID 5 and never ID 8
+      EXPECT_EQ(encoder->answer_count(),
+                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // ID 5 and never ID 8
     }
   }
 }

@@ -21,7 +21,7 @@ TEST(EslMemory, MemoryIsWrittenReadBackAndSparedWear) {
   const Told first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
   EXPECT_EQ(first.numbers.at("written"), 1);
-  EXPECT_EQ(bench.encoder.answered(), 6u);  // page, two reads, the write, and two reads when its time is over
+  EXPECT_EQ(bench.encoder.answer_count(), 6u);  // page, two reads, the write, and two reads when its time is over
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
   const Told same = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(same.error, Error::none);
@@ -40,7 +40,7 @@ TEST(EslMemory, WhatIsNotForTheUserNeedsForce) {
     const Told closed = bench.run(write, {area.first, 0x42, area.page});
     EXPECT_EQ(closed.error, area.page <= 3 ? Error::none : Error::invalid_argument);
     EXPECT_EQ(closed.says("needs force") && closed.says(std::string(area.meaning)), area.page > 3) << closed.detail;
-    EXPECT_EQ(bench.encoder.answered() > 0, area.page <= 3);
+    EXPECT_EQ(bench.encoder.answer_count() > 0, area.page <= 3);
     EXPECT_EQ(bench.run(write, {area.first, 0x43, area.page, 1}).error, Error::none) << area.page;
     EXPECT_EQ(bench.violations(), 0u);
   }
@@ -56,7 +56,7 @@ TEST(EslMemory, WhatTable11LacksIsRefusedBeforeAnythingIsSent) {
     EXPECT_EQ(refused.error, Error::invalid_argument);
     EXPECT_TRUE(refused.says("nothing was sent"));
   }
-  EXPECT_EQ(bench.encoder.answered(), 0u);
+  EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
 TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "absenc/core/angle.hpp"
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/esl/frame.hpp"
 #include "absenc/protocol/esl/timing.hpp"
 
@@ -313,7 +313,9 @@ struct Protocol {
   using Reply = esl::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;
 
-  static constexpr author::Wire wire(const Profile&) { return {.answer_limit = answer_limit, .gap_limit = gap_limit}; }
+  static constexpr author::HostTimes host_times(const Profile&) {
+    return {.answer_limit = answer_limit, .gap_limit = gap_limit};
+  }
   /// A page change that was not answered well may be going on all the same, and so may the reading of an EEPROM byte:
   /// neither a repetition nor whoever comes next may meet it.
   static constexpr author::Manner manner(const Profile&, const Request& request) {

@@ -32,10 +32,10 @@ void print(const char* kind, unsigned tried, unsigned accepted) {
   std::printf("%-58s %7u tried %6u accepted\n", kind, tried, accepted);
 }
 
-/// Exchanges without a line: the encoder's reply as bytes, some position apart each time.
-class Exchanges {
+/// An encoder with its monitor and no line: its replies as bytes, some position apart each time.
+class Monitored {
  public:
-  explicit Exchanges(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
+  explicit Monitored(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
     encoder.power_on(Time{}, testing::PowerOn::skip);
     shaft.put(1, 0x123456);
   }
@@ -73,14 +73,14 @@ class Exchanges {
 };
 
 TEST(EslSafety, TheSecondGoodReplyToTheOtherIdIsSafe) {
-  Exchanges line;
-  for (unsigned i = 0; i < 5; ++i) EXPECT_EQ(line.ask(DataId::position).failed, Check::sequence_unknown);
-  const SafetyVerdict verdict = line.next();
+  Monitored pair;
+  for (unsigned i = 0; i < 5; ++i) EXPECT_EQ(pair.ask(DataId::position).failed, Check::sequence_unknown);
+  const SafetyVerdict verdict = pair.next();
   ASSERT_EQ(verdict.failed, Check::passed);
   EXPECT_EQ(verdict.position->singleturn(), 0x123456u);
-  for (unsigned i = 0; i < 1000; ++i) EXPECT_TRUE(line.ask(DataId::position).position.has_value());
-  EXPECT_EQ(line.ask(DataId::zero).failed, Check::not_a_safety_reply);
-  EXPECT_EQ(line.ask(DataId::singleturn_short).failed, Check::not_a_safety_reply);
+  for (unsigned i = 0; i < 1000; ++i) EXPECT_TRUE(pair.ask(DataId::position).position.has_value());
+  EXPECT_EQ(pair.ask(DataId::zero).failed, Check::not_a_safety_reply);
+  EXPECT_EQ(pair.ask(DataId::singleturn_short).failed, Check::not_a_safety_reply);
 }
 
 TEST(EslSafety, EveryCheckIsNamed) {
@@ -107,52 +107,52 @@ TEST(EslSafety, EveryCheckIsNamed) {
            Row{{{condition::redundant_offset, 2}}, Check::redundant_position},
            Row{{{condition::ch1_stuck, 0x123456 ^ 0x800000}}, Check::redundant_position},
        }) {
-    Exchanges line;
-    line.trust();
-    line.set(row.faults);
-    const SafetyVerdict verdict = line.next();
+    Monitored pair;
+    pair.trust();
+    pair.set(row.faults);
+    const SafetyVerdict verdict = pair.next();
     EXPECT_EQ(verdict.failed, row.failed) << text_of(verdict.failed).sentence << " / " << text_of(row.failed).sentence;
     EXPECT_FALSE(verdict.position.has_value());
     // One good reply is not enough afterwards.
-    line.heal();
-    EXPECT_EQ(line.next().failed, Check::sequence_unknown);
-    EXPECT_EQ(line.next().failed, Check::passed);
+    pair.heal();
+    EXPECT_EQ(pair.next().failed, Check::sequence_unknown);
+    EXPECT_EQ(pair.next().failed, Check::passed);
   }
 }
 
 TEST(EslSafety, TheForcedTestCanBeRequired) {
-  Exchanges line({.require_forced_test = true});
-  EXPECT_EQ(line.next().failed, Check::forced_test_missing);
-  line.set({{condition::forced_test, 1}});
-  line.trust();
-  EXPECT_EQ(line.next().failed, Check::passed);
+  Monitored pair({.require_forced_test = true});
+  EXPECT_EQ(pair.next().failed, Check::forced_test_missing);
+  pair.set({{condition::forced_test, 1}});
+  pair.trust();
+  EXPECT_EQ(pair.next().failed, Check::passed);
 }
 
 TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
   for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety, SequenceStep::request}) {
-    Exchanges line({.sequence_step = step});
-    line.trust();
+    Monitored pair({.sequence_step = step});
+    pair.trust();
     for (const DataId other : {DataId::temperature, DataId::zero, DataId::encoder_id, DataId::alarms}) {
-      line.reply_to(other);
-      line.monitor.other_exchange(other);
-      EXPECT_EQ(line.next().failed, Check::passed) << static_cast<int>(step) << " " << static_cast<int>(other);
+      pair.reply_to(other);
+      pair.monitor.other_exchange(other);
+      EXPECT_EQ(pair.next().failed, Check::passed) << static_cast<int>(step) << " " << static_cast<int>(other);
     }
-    line.reply_to(DataId::position);  // lost
-    EXPECT_EQ(line.next().failed, step == SequenceStep::change ? Check::passed : Check::sequence_jumped);
+    pair.reply_to(DataId::position);  // lost
+    EXPECT_EQ(pair.next().failed, step == SequenceStep::change ? Check::passed : Check::sequence_jumped);
   }
-  EXPECT_EQ(Exchanges().judge(DataId::singleturn_short, {}).failed, Check::length);
+  EXPECT_EQ(Monitored().judge(DataId::singleturn_short, {}).failed, Check::length);
 }
 
 // ---- The campaign
 
 // One channel wrong from some moment on: how many are accepted, and how far off they are.
 unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exchanges, std::int64_t& off) {
-  Exchanges line;
-  line.trust();
-  line.set({{index, value}});
+  Monitored pair;
+  pair.trust();
+  pair.set({{index, value}});
   unsigned accepted = 0;
   for (unsigned i = 0; i < exchanges; ++i) {
-    const SafetyVerdict verdict = line.next();
+    const SafetyVerdict verdict = pair.next();
     if (!verdict.position) continue;
     ++accepted;
     off = std::max(off, std::abs(wrapped_difference(verdict.position->singleturn(), 0x123456, 24)));
@@ -245,19 +245,19 @@ TEST(EslSafetyCampaign, EveryBitOfEveryFieldStuckAt0AndAt1) {
     for (unsigned bit = 0; bit < 8; ++bit) {
       const bool visible = (field.seen >> bit & 1) != 0;
       for (const bool value : {false, true}) {
-        Exchanges line;
+        Monitored pair;
         for (unsigned i = 0; i < 300; ++i) {
-          line.encoder.lower_alarms(0xFF);
-          line.shaft.put(static_cast<std::int64_t>(random.below(65536)),
+          pair.encoder.lower_alarms(0xFF);
+          pair.shaft.put(static_cast<std::int64_t>(random.below(65536)),
                          static_cast<std::int64_t>(random.below(1 << 24)));
-          line.trust();
+          pair.trust();
           const bool alarmed = i % 2 == 1;
-          if (alarmed) line.encoder.raise_alarms(1u << random.below(8));
-          const Wire good = line.reply_to(DataId::position);
+          if (alarmed) pair.encoder.raise_alarms(1u << random.below(8));
+          const Wire good = pair.reply_to(DataId::position);
           const Wire bad = stuck(good, field.byte, bit, value);
           if (bad == good) continue;
           ++changed;
-          if (!line.judge(DataId::position, bad).position) continue;
+          if (!pair.judge(DataId::position, bad).position) continue;
           ++(visible ? seen : unseen);
         }
       }
@@ -271,10 +271,10 @@ TEST(EslSafetyCampaign, EveryBitOfEveryFieldStuckAt0AndAt1) {
 }
 
 TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
-  Exchanges line;
-  line.trust();
-  const SafetyMonitor trusting = line.monitor;
-  const Wire good = line.reply_to(DataId::position);
+  Monitored pair;
+  pair.trust();
+  const SafetyMonitor trusting = pair.monitor;
+  const Wire good = pair.reply_to(DataId::position);
   ASSERT_TRUE(SafetyMonitor(trusting).judge({}, good, {}).position.has_value());
   const auto accepted = [&trusting](Bytes bytes) {
     return SafetyMonitor(trusting).judge({}, bytes, {}).position.has_value() ? 1u : 0u;
@@ -296,10 +296,10 @@ TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
   unsigned swaps = 0;
   unsigned swapped = 0;
   for (unsigned i = 0; i < 200; ++i) {
-    line.shaft.put(i, std::int64_t{i} * 83'617);
-    line.trust();
-    const SafetyMonitor then = line.monitor;
-    const Wire reply = line.reply_to(DataId::position);
+    pair.shaft.put(i, std::int64_t{i} * 83'617);
+    pair.trust();
+    const SafetyMonitor then = pair.monitor;
+    const Wire reply = pair.reply_to(DataId::position);
     for (std::size_t a = 0; a < reply.size(); ++a) {
       for (std::size_t b = a + 1; b < reply.size(); ++b) {
         if (reply[a] == reply[b]) continue;
@@ -324,14 +324,14 @@ TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
 TEST(EslSafetyCampaign, ReplaysAndDelays) {
   for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety}) {
     std::printf("sequence_step=%s:\n", step == SequenceStep::change ? "change" : "safety");
-    Exchanges line({.sequence_step = step});
+    Monitored pair({.sequence_step = step});
     unsigned again = 0;
     for (unsigned i = 0; i < 1000; ++i) {
-      line.trust();
-      const Wire last = line.reply_to(DataId::position);
-      line.judge(DataId::position, last);
+      pair.trust();
+      const Wire last = pair.reply_to(DataId::position);
+      pair.judge(DataId::position, last);
       for (unsigned times = 0; times < 4; ++times) {
-        again += line.judge(line.monitor.next_id(), last).position.has_value() ? 1u : 0u;
+        again += pair.judge(pair.monitor.next_id(), last).position.has_value() ? 1u : 0u;
       }
     }
     print("the last reply again", 4000, again);
@@ -339,12 +339,12 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
 
     unsigned older = 0;
     std::deque<Wire> past;
-    line.trust();
+    pair.trust();
     for (unsigned i = 0; i < 1000; ++i) {
-      past.push_back(line.reply_to(DataId::position));
-      line.judge(DataId::position, past.back());
+      past.push_back(pair.reply_to(DataId::position));
+      pair.judge(DataId::position, past.back());
       if (past.size() < 11) continue;
-      SafetyMonitor monitor = line.monitor;
+      SafetyMonitor monitor = pair.monitor;
       older += monitor.judge({}, past[i % 9], {}).position.has_value() ? 1u : 0u;
       past.pop_front();
     }
@@ -353,13 +353,13 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
 
     // From some moment on every reply comes one cycle late: the first cycle has none.
     unsigned late = 0;
-    line.trust();
-    Wire held = line.reply_to(line.monitor.next_id());
-    line.monitor.missed({line.monitor.next_id()});
+    pair.trust();
+    Wire held = pair.reply_to(pair.monitor.next_id());
+    pair.monitor.missed({pair.monitor.next_id()});
     for (unsigned i = 0; i < 1000; ++i) {
-      const DataId id = line.monitor.next_id();
-      const Wire now = line.reply_to(id);
-      late += line.judge(id, held).position.has_value() ? 1u : 0u;
+      const DataId id = pair.monitor.next_id();
+      const Wire now = pair.reply_to(id);
+      late += pair.judge(id, held).position.has_value() ? 1u : 0u;
       held = now;
     }
     print("every reply one cycle late", 1000, late);
@@ -370,9 +370,9 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
 // What is left when random bytes come instead of a reply of the right length: 2^-32 for the CRCs alone.
 TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   sim::Random random(1);
-  Exchanges line;
-  line.trust();
-  const SafetyMonitor trusting = line.monitor;
+  Monitored pair;
+  pair.trust();
+  const SafetyMonitor trusting = pair.monitor;
   unsigned accepted = 0;
   for (unsigned i = 0; i < 200'000; ++i) {
     Wire noise(18);
@@ -396,7 +396,7 @@ TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
   line.attach(sim::Role::device, faulty);
   host::testing::GuardedHost<std::uint8_t> host(unit, line);
   unsigned safe = 0;
-  while (encoder.answered() < 50'000) {
+  while (encoder.answer_count() < 50'000) {
     shaft.put(static_cast<std::int64_t>(random.below(65536)), static_cast<std::int64_t>(random.below(1 << 24)));
     if (random.chance(0.05)) encoder.raise_alarms(1u << random.below(8));
     if (random.chance(0.05)) encoder.lower_alarms(0xFF);

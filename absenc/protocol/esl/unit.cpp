@@ -198,7 +198,7 @@ struct Definition {
   static Explanation explain(const Profile& profile, Error error, Bytes request, Bytes reply) {
     const Check check = check_behind(profile, error, request, reply);
     if (check == Check::length) return {};  // the error says all of it
-    return {.found = text_of(check).sentence};
+    return {.detail = text_of(check).sentence};
   }
 };
 

@@ -55,7 +55,7 @@ TEST(ModbusFrame, EveryRefusalHasItsOwnWords) {
   for (const std::uint8_t code : std::to_array<std::uint8_t>({1, 2, 3, 4, 5, 6, 8, 10, 11, 0x77})) {
     const Explanation explanation = explain_refusal(code);
     EXPECT_FALSE(explanation.advice.empty());
-    words.insert(std::string(explanation.found));
+    words.insert(std::string(explanation.detail));
   }
   EXPECT_EQ(words.size(), 10u);
   EXPECT_NE(words.begin()->find("exception"), std::string::npos);

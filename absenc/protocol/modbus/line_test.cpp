@@ -46,7 +46,7 @@ class ToyServer final : public Server {
 class ToyClient final : public author::Engine {
  public:
   explicit ToyClient(Bytes body, unsigned count = 1, std::uint32_t rate = line_settings.rate)
-      : Engine(client_wire({.rate = rate}, 50ms), storage_), left_(count) {
+      : Engine(client_times({.rate = rate}, 50ms), storage_), left_(count) {
     frame_.append(body);
     append_crc(frame_);
     if (rate != line_settings.rate) set_rate(rate);
@@ -62,7 +62,7 @@ class ToyClient final : public author::Engine {
     return crc_order(bytes) == CrcOrder::low_first ? Error::none : Error::bad_checksum;
   }
   bool is_whole(Error) const override { return false; }
-  void answered(Error error) override {
+  void concluded(Error error) override {
     if (error != Error::none || --left_ == 0) return finish({.error = error});
     send(frame_, {}, {});
   }

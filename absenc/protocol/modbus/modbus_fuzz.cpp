@@ -53,7 +53,7 @@ void ask_server(Bytes input) {
     require(silence && crc_order(step.out) == CrcOrder::low_first);
     server.feed({.kind = Kind::sent, .at = now});
   }
-  require(server.answered() <= input.size());
+  require(server.answer_count() <= input.size());
 }
 
 }  // namespace

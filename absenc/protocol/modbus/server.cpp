@@ -95,7 +95,7 @@ void Server::frame_ended(Time at) {
       append_crc(reply_);
       reply_at_ = at + answer_time;
       reply_pending_ = transmitting_ = true;
-      ++answered_;
+      ++answer_count_;
     }
   }
   forget_frame();

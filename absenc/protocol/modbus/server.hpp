@@ -21,7 +21,7 @@ class Server : public Device<std::uint8_t> {
   void power_off(Time now) final;
   [[nodiscard]] std::span<const Violation> violations() const final { return violations_; }
   [[nodiscard]] std::uint32_t violation_count() const final { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const final { return answered_; }
+  [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
   explicit Server(const LineSettings& line) : line_(line) {}
@@ -67,7 +67,7 @@ class Server : public Device<std::uint8_t> {
   Time reply_at_{};
   Buffer<Violation, 16> violations_;
   std::uint32_t violation_count_ = 0;
-  std::uint64_t answered_ = 0;
+  std::uint64_t answer_count_ = 0;
 };
 
 }  // namespace absenc::modbus

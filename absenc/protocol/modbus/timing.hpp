@@ -31,7 +31,7 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
 }
 
 /// How a client speaks on a line as it is set: `answer_limit` after a request the reply has begun.
-[[nodiscard]] constexpr author::Wire client_wire(const LineSettings& line, Time answer_limit) {
+[[nodiscard]] constexpr author::HostTimes client_times(const LineSettings& line, Time answer_limit) {
   return {.answer_limit = answer_limit + line.character(),
           .gap_limit = frame_silence(line),
           .silence = request_silence(line),

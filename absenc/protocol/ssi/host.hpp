@@ -2,7 +2,7 @@
 // Host side of SSI.
 #pragma once
 
-#include "absenc/protocol/author/clocked_line.hpp"
+#include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
 
 namespace absenc::ssi {
@@ -14,7 +14,9 @@ struct Protocol {
   using Reply = Word;
   static constexpr unsigned most_clocks = frame_capacity;
 
-  static constexpr author::ClockedWire wire(const Format& format) { return {.rest = format.pause + pause_margin}; }
+  static constexpr author::ClockedHostTimes host_times(const Format& format) {
+    return {.rest = format.pause + pause_margin};
+  }
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
   static constexpr Result<Word> decode(const Format& format, BitView bits) { return ssi::decode(format, bits); }
   static constexpr Reading reading(const Format& format, const Word& word) {

@@ -49,7 +49,7 @@ TEST(SsiHost, ThePauseVariesByProduct) {
     bench.shaft.state.position = 0;
     EXPECT_EQ(bench.read(format), 0u);
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
-    EXPECT_EQ(bench.encoder.answered(), 2u);
+    EXPECT_EQ(bench.encoder.answer_count(), 2u);
   }
   Bench slow({.pause = 2ms});
   for (int i = 0; i < 2; ++i) EXPECT_NE(slow.read({}), 0u);

@@ -93,7 +93,7 @@ struct Definition {
   }
 
   // SSI has no checksum.
-  static bool covered(const Options&, Frame, Frame, std::size_t) { return false; }
+  static bool is_checked(const Options&, Frame, Frame, std::size_t) { return false; }
   static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
     return place_in_word(format(values).word, field, 0);
   }

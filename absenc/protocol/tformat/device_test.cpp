@@ -80,7 +80,7 @@ TEST(TformatDevice, ARefusedFrameEndsBeforeItIsAnswered) {
   bench.run(host);
   EXPECT_EQ(host.reply, wire(Reply{.status = status::parity_error, .encoder_id = 0x11}));
   EXPECT_GE(host.first_byte_at - host.sent_at, answer_time);
-  EXPECT_EQ(bench.encoder.answered(), 1u);
+  EXPECT_EQ(bench.encoder.answer_count(), 1u);
   EXPECT_EQ(bench.violations(), 0u);
   for (const Wire& request : {Wire{0xA2, 0x05, 0xEF, 0x01}, Wire{0x32, 0x81, 0x00, 0xB3, 0x00}}) {
     EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));  // an unknown id; a busy bit, and one byte too many

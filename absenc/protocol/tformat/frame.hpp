@@ -16,7 +16,7 @@
 #include "absenc/core/crc.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/protocol/author/device.hpp"
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::tformat {
 
@@ -372,7 +372,9 @@ struct Protocol {
   using Reply = tformat::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;
 
-  static constexpr author::Wire wire(const Format&) { return {.answer_limit = answer_limit, .gap_limit = gap_limit}; }
+  static constexpr author::HostTimes host_times(const Format&) {
+    return {.answer_limit = answer_limit, .gap_limit = gap_limit};
+  }
   /// What reads or selects a page is repeated, resets and writes never. A page change that was not answered well may be
   /// going on all the same, and must not be disturbed.
   static constexpr author::Manner manner(const Format&, const Request& request) {

@@ -29,7 +29,7 @@ class ReadPosition : public author::HostOf<Protocol> {
   [[nodiscard]] const Reply& reply() const { return last(); }
 
  private:
-  void answered(Error error) final {
+  void concluded(Error error) final {
     if (error != Error::none) return finish({.error = error});
     if (reply().id == DataId::everything) {
       known_alarms_ = reply().alarms;

@@ -46,14 +46,14 @@ TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
   ReadPosition first({}, DataId::singleturn);
   EXPECT_EQ(bench.run(first).reading()->singleturn, 0x12345u);
   EXPECT_TRUE(first.reading()->singleturn_valid());
-  EXPECT_EQ(bench.encoder.answered(), 2u);  // ID 3 before it
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // ID 3 before it
   ReadPosition turns({}, DataId::multiturn, 0);
   EXPECT_EQ(bench.run(turns).reading()->multiturn, 4660u);
-  EXPECT_EQ(bench.encoder.answered(), 3u);
+  EXPECT_EQ(bench.encoder.answer_count(), 3u);
   bench.encoder.raise_alarms(alarms::multiturn_error);
   ReadPosition alarmed({}, DataId::multiturn, 0);
   bench.run(alarmed);
-  EXPECT_EQ(bench.encoder.answered(), 5u);  // followed by an ID 3
+  EXPECT_EQ(bench.encoder.answer_count(), 5u);  // followed by an ID 3
   EXPECT_FALSE(alarmed.reading()->multiturn_valid);
   EXPECT_EQ(alarmed.reading()->alarms, alarms::multiturn_error);
   const auto id = bench.run("encoder-id");
@@ -76,7 +76,7 @@ TEST(TformatHost, ARefusalIsExplained) {
   struct Row {
     std::uint8_t alarm;
     std::string_view command;
-    std::string_view found;
+    std::string_view detail;
     bool again;
   };
   for (const Row& row : {Row{status::parity_error, "position", "ca0: it received", true},
@@ -86,10 +86,10 @@ TEST(TformatHost, ARefusalIsExplained) {
     Bench bench(refuse(0, 9, row.alarm));
     const auto read = bench.run(row.command);
     EXPECT_EQ(read.error, Error::request_rejected);
-    EXPECT_TRUE(read.says(row.found)) << read.detail;
+    EXPECT_TRUE(read.says(row.detail)) << read.detail;
     EXPECT_EQ(read.advice.starts_with("send the same request again"), row.again);
     EXPECT_EQ(read.advice.empty(), !row.again);
-    EXPECT_EQ(bench.encoder.answered(), 1u);
+    EXPECT_EQ(bench.encoder.answer_count(), 1u);
   }
   Bench middle(refuse(5, 6, status::parity_error));
   const auto reset = middle.run("clear-alarms");

@@ -43,7 +43,7 @@ TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
     if (index == 0) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 9});
   });
   EXPECT_EQ(odd.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
-  EXPECT_EQ(odd.encoder.answered(), 3u);
+  EXPECT_EQ(odd.encoder.answer_count(), 3u);
   // One that says another page in the end than was selected again.
   Bench other([](unsigned index, Wire& reply) {
     if (index == 4) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 3});
@@ -122,7 +122,7 @@ TEST(TformatProcedures, ClosedMemoryIsRefusedBeforeAnythingIsSent) {
     EXPECT_EQ(closed.error, Error::invalid_argument) << name << arguments[0];
     EXPECT_TRUE(closed.says(arguments[0] == 127 ? "outside its range" : "pages 0 to 5")) << closed.detail;
   }
-  EXPECT_EQ(bench.encoder.answered(), 0u);
+  EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
 // Replies: page select, read, write, page select, read.
@@ -241,7 +241,7 @@ TEST(TformatProcedures, AResetThatMustNotBeSentIsNot) {
     const auto reset = bench.run(row.name);
     EXPECT_EQ(reset.error, Error::invalid_argument) << row.detail;
     EXPECT_TRUE(reset.says(row.detail)) << reset.detail;
-    EXPECT_EQ(bench.encoder.answered(), 2u);  // it only looked
+    EXPECT_EQ(bench.encoder.answer_count(), 2u);  // it only looked
     EXPECT_EQ(bench.violations(), 0u);
   }
 }

@@ -18,7 +18,7 @@ namespace {
 
 using namespace author;
 
-using Line = LineOf<Protocol>;
+using Dialog = DialogOf<Protocol>;
 
 // What a procedure found.
 struct Found : Values {
@@ -61,16 +61,16 @@ std::string_view missed(DataId id, const Reply& now, unsigned bits) {
 
 // Data IDs 7 (latched alarms), 8 (single-turn zero here) and C (turns and latched alarms): makes sure that the shaft
 // stands still, sends ten requests, reads back what became of it.
-Procedure reset(Line& line, Found& found, DataId id) {
-  const unsigned bits = line.format().singleturn_bits;
-  const Reply first = co_await line.ask({DataId::everything});
-  const Reply second = co_await line.ask({DataId::everything}).after(between_looks);
+Procedure reset(Dialog& dialog, Found& found, DataId id) {
+  const unsigned bits = dialog.format().singleturn_bits;
+  const Reply first = co_await dialog.ask({DataId::everything});
+  const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
   const std::string_view why_not = objection(id, first, second, bits);
   if (!why_not.empty()) co_return {Error::invalid_argument, why_not};
 
   // Intervals are counted from the end of the reply: that is 40 us or more however the document means it.
   for (unsigned sent = 1; sent <= reset_requests; ++sent) {
-    const Result<Reply> reply = co_await line.attempt({id}).after(reset_interval);
+    const Result<Reply> reply = co_await dialog.attempt({id}).after(reset_interval);
     // When the tenth reply is lost, the reset may have been done all the same: reading tells.
     if (!reply && sent < reset_requests) {
       co_return {reply.error(),
@@ -79,11 +79,11 @@ Procedure reset(Line& line, Found& found, DataId id) {
     }
   }
   // Only ID 8 writes the EEPROM; the tenth reply still shows the old errors.
-  const Reply now = co_await line.ask({DataId::everything})
+  const Reply now = co_await dialog.ask({DataId::everything})
                         .after(id == DataId::zero ? memory_time : reset_interval)
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
   static_cast<Values&>(found) = values_of(now);
-  found.reading = line.last_reading();
+  found.reading = dialog.last_reading();
   const std::string_view what = missed(id, now, bits);
   if (!what.empty()) co_return {Error::cross_check_failed, what};
   co_return done;
@@ -98,39 +98,39 @@ constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uin
 
 // A busy encoder has not executed the request, so even a write may be sent again. A page change must not be disturbed
 // by asking whether it is over.
-Part<Result<Reply>> persist(Line& line, Request request) {
+Part<Result<Reply>> persist(Dialog& dialog, Request request) {
   const Time pause = selects_page(request) ? memory_time : busy_pause;
-  Result<Reply> reply = co_await line.attempt(request);
-  const Time give_up = line.received_at() + busy_limit;
+  Result<Reply> reply = co_await dialog.attempt(request);
+  const Time give_up = dialog.received_at() + busy_limit;
   while (reply && reply->busy) {
-    if (line.received_at() > give_up) co_return Error::busy;
-    reply = co_await line.attempt(request).after(pause);
+    if (dialog.received_at() > give_up) co_return Error::busy;
+    reply = co_await dialog.attempt(request).after(pause);
   }
   co_return reply;
 }
 
-Outcome failure(const Line& line, Error error, std::string_view step) {
+Outcome failure(const Dialog& dialog, Error error, std::string_view step) {
   return {error,
           error == Error::busy ? "the encoder stays busy longer than a write may take" : step,
           {},
-          Protocol::manner(line.format(), line.request()).hold};
+          Protocol::manner(dialog.format(), dialog.request()).hold};
 }
 
 // The procedure ends, at this step, where the encoder does not do it.
-Part<std::uint8_t> insist(Line& line, Request request, std::string_view step) {
-  const Result<Reply> reply = co_await persist(line, request);
-  if (!reply) co_await line.stop(failure(line, reply.error(), step));
-  if (selects_page(request)) co_await line.rest(memory_time);
+Part<std::uint8_t> insist(Dialog& dialog, Request request, std::string_view step) {
+  const Result<Reply> reply = co_await persist(dialog, request);
+  if (!reply) co_await dialog.stop(failure(dialog, reply.error(), step));
+  if (selects_page(request)) co_await dialog.rest(memory_time);
   co_return reply->value;
 }
 
-Part<std::uint8_t> select_page(Line& line, Found& found, std::uint8_t page, std::string_view step) {
+Part<std::uint8_t> select_page(Dialog& dialog, Found& found, std::uint8_t page, std::string_view step) {
   found.selected = page;
-  const std::uint8_t selected = co_await insist(line, {DataId::write_memory, page_select_address, page}, step);
+  const std::uint8_t selected = co_await insist(dialog, {DataId::write_memory, page_select_address, page}, step);
   co_return selected;
 }
 
-Procedure read_memory(Line& line, Found& found, Arguments arguments) {
+Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const auto address = byte(arguments[0]);
   const auto page = byte(arguments[1]);
   for (std::int64_t i = 0; i < arguments[2]; ++i) {
@@ -139,9 +139,9 @@ Procedure read_memory(Line& line, Found& found, Arguments arguments) {
                "this area is closed: pages 0 to 5 have addresses 0 to 126, page 7 has 4 (over-heat threshold) and 5 "
                "(temperature)"};
   }
-  co_await select_page(line, found, page, "");
+  co_await select_page(dialog, found, page, "");
   for (std::int64_t i = 0; i < arguments[2]; ++i) {
-    const std::uint8_t value = co_await insist(line, {DataId::read_memory, byte(address + i)}, "");
+    const std::uint8_t value = co_await insist(dialog, {DataId::read_memory, byte(address + i)}, "");
     found.bytes.push_back(value);
   }
   found.page = page;
@@ -153,25 +153,25 @@ Procedure read_memory(Line& line, Found& found, Arguments arguments) {
 
 // On the selected page: reads, writes what differs (100 000 writes are permitted in total), waits, selects the page
 // again so that the EEPROM itself is read, and compares.
-Part<bool> write_byte(Line& line, Found& found, std::uint8_t address, std::uint8_t value) {
+Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::uint8_t value) {
   const Request look{DataId::read_memory, address};
-  const std::uint8_t before = co_await insist(line, look, "nothing was written");
+  const std::uint8_t before = co_await insist(dialog, look, "nothing was written");
   found.written = before != value;
   if (before == value) co_return false;
-  const Result<Reply> reply = co_await persist(line, {DataId::write_memory, address, value});
-  if (reply.error() == Error::busy) co_await line.stop(failure(line, Error::busy, ""));
+  const Result<Reply> reply = co_await persist(dialog, {DataId::write_memory, address, value});
+  if (reply.error() == Error::busy) co_await dialog.stop(failure(dialog, Error::busy, ""));
   // A lost reply does not tell whether the write was done: reading back does, of the EEPROM itself.
-  co_await line.rest(memory_time);
+  co_await dialog.rest(memory_time);
   constexpr std::string_view lost = "the byte was written, but could not be read back";
-  co_await select_page(line, found, *found.selected, lost);
-  const std::uint8_t now = co_await insist(line, look, lost);
+  co_await select_page(dialog, found, *found.selected, lost);
+  const std::uint8_t now = co_await insist(dialog, look, lost);
   if (now != value) {
-    co_await line.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
+    co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
   }
   co_return true;
 }
 
-Procedure write_memory(Line& line, Found& found, Arguments arguments) {
+Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const auto address = byte(arguments[0]);
   const auto page = byte(arguments[2]);
   const MemoryArea* const area = find_area(page, address);
@@ -180,8 +180,8 @@ Procedure write_memory(Line& line, Found& found, Arguments arguments) {
                "this address cannot be written: pages 0 to 5 have addresses 0 to 126, page 7 has 4 (over-heat "
                "threshold)"};
   }
-  co_await select_page(line, found, page, "nothing was written");
-  co_await write_byte(line, found, address, byte(arguments[1]));
+  co_await select_page(dialog, found, page, "nothing was written");
+  co_await write_byte(dialog, found, address, byte(arguments[1]));
   found.page = page;
   found.address = address;
   found.value = byte(arguments[1]);
@@ -192,32 +192,32 @@ Procedure write_memory(Line& line, Found& found, Arguments arguments) {
 
 // The document shows the page as the content of address 127, but does not say that it can be read: an encoder that
 // refuses is one of those whose page is not known.
-Part<std::optional<std::uint8_t>> open_service_page(Line& line, Found& found, std::string_view step) {
-  const Result<Reply> before = co_await persist(line, {DataId::read_memory, page_select_address});
+Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, Found& found, std::string_view step) {
+  const Result<Reply> before = co_await persist(dialog, {DataId::read_memory, page_select_address});
   found.page_left = service_page;
-  co_await select_page(line, found, service_page, step);
+  co_await select_page(dialog, found, service_page, step);
   co_return before&& is_page(before->value) ? std::optional(before->value) : std::nullopt;
 }
 
 // When that fails, what was asked for is known all the same. Reading it back is what the encoder's next user finds.
-Part<bool> restore(Line& line, Found& found, std::optional<std::uint8_t> before) {
+Part<bool> restore(Dialog& dialog, Found& found, std::optional<std::uint8_t> before) {
   if (!before) co_return false;
   if (*before != service_page) {
-    const Result<Reply> selected = co_await persist(line, {DataId::write_memory, page_select_address, *before});
-    co_await line.rest(memory_time);  // without a good reply it may be going on all the same
+    const Result<Reply> selected = co_await persist(dialog, {DataId::write_memory, page_select_address, *before});
+    co_await dialog.rest(memory_time);  // without a good reply it may be going on all the same
     if (!selected) co_return false;
-    const Result<Reply> now = co_await persist(line, {DataId::read_memory, page_select_address});
+    const Result<Reply> now = co_await persist(dialog, {DataId::read_memory, page_select_address});
     if (!now || now->value != *before) co_return false;
   }
   found.page_left.reset();
   co_return true;
 }
 
-Procedure read_temperature(Line& line, Found& found) {
-  const std::optional<std::uint8_t> before = co_await open_service_page(line, found, "");
-  const std::uint8_t value = co_await insist(line, {DataId::read_memory, temperature_address}, "");
+Procedure read_temperature(Dialog& dialog, Found& found) {
+  const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "");
+  const std::uint8_t value = co_await insist(dialog, {DataId::read_memory, temperature_address}, "");
   found.temperature = static_cast<std::int8_t>(value);
-  co_await restore(line, found, before);
+  co_await restore(dialog, found, before);
   co_return done;
 }
 
@@ -229,19 +229,19 @@ void show_threshold(Found& found, std::uint8_t value) {
   if (*found.overheat_enabled) found.overheat_threshold = value & 0x7F;
 }
 
-Procedure read_threshold(Line& line, Found& found) {
-  const std::optional<std::uint8_t> before = co_await open_service_page(line, found, "");
-  const std::uint8_t value = co_await insist(line, {DataId::read_memory, overheat_address}, "");
+Procedure read_threshold(Dialog& dialog, Found& found) {
+  const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "");
+  const std::uint8_t value = co_await insist(dialog, {DataId::read_memory, overheat_address}, "");
   show_threshold(found, value);
-  co_await restore(line, found, before);
+  co_await restore(dialog, found, before);
   co_return done;
 }
 
-Procedure write_threshold(Line& line, Found& found, Arguments arguments) {
-  const std::optional<std::uint8_t> before = co_await open_service_page(line, found, "nothing was written");
-  co_await write_byte(line, found, overheat_address, threshold_of(arguments[0]));
+Procedure write_threshold(Dialog& dialog, Found& found, Arguments arguments) {
+  const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "nothing was written");
+  co_await write_byte(dialog, found, overheat_address, threshold_of(arguments[0]));
   show_threshold(found, threshold_of(arguments[0]));
-  co_await restore(line, found, before);
+  co_await restore(dialog, found, before);
   co_return done;
 }
 

@@ -103,7 +103,7 @@ void VirtualNode::hear(const CanFrame& frame, Time at) {
 
 void VirtualNode::answer(const CanFrame& frame, Time at) {
   if (!pending_.push_back({frame, at + answer_time})) return violate("more requests than it can keep answers for", at);
-  ++answered_;
+  ++answer_count_;
 }
 
 void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {

@@ -24,7 +24,7 @@ class VirtualNode final : public Device<CanFrame> {
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
   [[nodiscard]] std::span<const Violation> violations() const override { return violations_; }
   [[nodiscard]] std::uint32_t violation_count() const override { return violation_count_; }
-  [[nodiscard]] std::uint64_t answered() const override { return answered_; }
+  [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }
 
   [[nodiscard]] const Settings& settings() const { return settings_; }
   [[nodiscard]] std::uint8_t node() const { return settings_.number(); }
@@ -57,7 +57,7 @@ class VirtualNode final : public Device<CanFrame> {
   Time next_cyclic_ = never;
   Buffer<Pending, 8> pending_;  // answers, the first due first
   CanFrame out_{};
-  std::uint64_t answered_ = 0;
+  std::uint64_t answer_count_ = 0;
   Buffer<Violation, 16> violations_;
   std::uint32_t violation_count_ = 0;
 };

@@ -9,7 +9,7 @@ Read::Read(const Format& format, Way way) : format_(format) {
   if (way == Way::listen) {
     listen(listening_time);
   } else {
-    ask(position_request(format, way), Protocol::wire(format));
+    ask(position_request(format, way), Protocol::host_times(format));
   }
 }
 

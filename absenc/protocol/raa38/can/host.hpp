@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "absenc/protocol/author/can_line.hpp"
+#include "absenc/protocol/author/can_dialog.hpp"
 #include "absenc/protocol/raa38/can/frame.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -23,7 +23,7 @@ struct Protocol {
   using Format = can::Format;
   using Request = CanFrame;
 
-  static constexpr author::CanWire wire(const Format&) { return {answer_limit, busy_limit}; }
+  static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
   /// "220:8020000000000000"
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
     constexpr std::string_view digits = "0123456789abcdef";
@@ -67,18 +67,18 @@ class Read : public author::CanEngine {
   return way == Read::Way::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
-using Bus = author::LineOf<Protocol>;
+using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node
 
 /// 31: so many readings a second, 0: none. Whether that came true is heard. Error: cross_check_failed.
-author::Procedure set_cyclic(Bus& bus, Values& found, Arguments arguments);
+author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
 /// 20: the position is 0 here, as the document lets one guess: read before and after. Nothing is written when it is 0
 /// already. 22: the counting direction, which no command reads. The position then is either the same or mirrored.
 /// Errors: invalid_argument (the shaft turns), cross_check_failed (any other position), timeout (neither answer nor
 /// effect of 22).
-author::Procedure change(Bus& bus, Values& found, Order order, Arguments arguments);
+author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
 // ---- Every node of the bus
 
@@ -108,7 +108,7 @@ struct Nodes {
 };
 
 /// Listens, because after power on nodes send unasked, then asks every number. Error: timeout when nobody is there.
-author::Procedure scan(Bus& bus, Nodes& nodes);
+author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 struct Surveyed : Values {
   Nodes nodes{};
@@ -117,12 +117,12 @@ struct Surveyed : Values {
 
 /// The number of the node: of the only one, or of the one that is meant. Errors: timeout, unexpected_reply (only others
 /// are there).
-author::Procedure find_node(Bus& bus, Surveyed& found);
+author::Procedure find_node(Dialog& dialog, Surveyed& found);
 
 /// 11: another number; it must answer under the new one and no longer under the old one. 13: another bit rate, to which
 /// this end of the line goes too; back when the node is not there. On 7E5, which reaches every node: only with one on
 /// the bus. Errors: invalid_argument (others are there, or the document does not have that rate), timeout,
 /// request_rejected, cross_check_failed (the encoder did not do it).
-author::Procedure configure(Bus& bus, Surveyed& found, Order order, Arguments arguments);
+author::Procedure configure(Dialog& dialog, Surveyed& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

@@ -46,39 +46,39 @@ struct Cadence {
 // ---- What is heard until the time is over
 
 // What the node sends; until `enough`, where that is wanted.
-Part<Cadence> hear_node(Bus& bus, bool until_enough = false) {
+Part<Cadence> hear_node(Dialog& dialog, bool until_enough = false) {
   Cadence cadence;
   for (;;) {
-    const Frame frame = co_await bus.heard();
+    const Frame frame = co_await dialog.heard();
     if (!frame) break;
-    if (!is_from(*frame, bus.format().node)) continue;
-    cadence.add(bus.heard_at());
+    if (!is_from(*frame, dialog.format().node)) continue;
+    cadence.add(dialog.heard_at());
     if (until_enough && cadence.count >= enough_frames && cadence.last - cadence.first >= enough_time) break;
   }
   co_return cadence;
 }
 
 // Whether the answer to an order comes.
-Part<bool> is_answered(Bus& bus, Order order, std::uint8_t value) {
-  const std::uint8_t node = bus.format().node;
+Part<bool> is_answered(Dialog& dialog, Order order, std::uint8_t value) {
+  const std::uint8_t node = dialog.format().node;
   bool answered = false;
-  bus.ask_for(encode(order, node, value), command_window);
-  while (const Frame frame = co_await bus.heard()) {
+  dialog.ask_for(encode(order, node, value), command_window);
+  while (const Frame frame = co_await dialog.heard()) {
     if (!(*frame == encode_answer(node, order))) continue;
     answered = true;
-    bus.keep();
+    dialog.keep();
   }
   co_return answered;
 }
 
 // What this node answers with to the question where it is.
-Part<Frame> read(Bus& bus, std::uint8_t node, Time pause = {}) {
-  bus.ask(encode(Order::read, node), pause);
+Part<Frame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
+  dialog.ask(encode(Order::read, node), pause);
   Frame frame;
   do {
-    frame = co_await bus.heard();
+    frame = co_await dialog.heard();
   } while (frame && !is_from(*frame, node));
-  if (frame) bus.keep();
+  if (frame) dialog.keep();
   co_return frame;
 }
 
@@ -88,35 +88,35 @@ struct Look {
   std::uint32_t counts = 0;
 };
 
-Part<Look> look(Bus& bus, Time pause = {}) {
-  const Frame frame = co_await read(bus, bus.format().node, pause);
-  const Result<std::uint32_t> counts = frame ? decode_position(bus.format(), *frame) : bus.missing();
+Part<Look> look(Dialog& dialog, Time pause = {}) {
+  const Frame frame = co_await read(dialog, dialog.format().node, pause);
+  const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
   // Other frames follow before the end is told.
-  const Exchange<CanFrame> exchange = bus.exchange();
-  const Explanation words = explain(bus.format(), counts.error(), exchange.sent, exchange.received);
-  co_return Look{counts ? done : only(counts.error(), words.found, words.advice), *counts};
+  const Exchange<CanFrame> exchange = dialog.exchange();
+  const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
+  co_return Look{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
 }
 
 // ---- Commands whose answer looks like a position: no position counts until the time for the answer is over. The node
 // is made to be silent first, and sends again afterwards as it did before.
 
-Part<Cadence> hush(Bus& bus) {
-  bus.listen(listening_time);
-  const Cadence before = co_await hear_node(bus, true);
+Part<Cadence> hush(Dialog& dialog) {
+  dialog.listen(listening_time);
+  const Cadence before = co_await hear_node(dialog, true);
   if (before.count != 0) {
-    co_await is_answered(bus, Order::cyclic, 0);
-    bus.listen(before.pause());
+    co_await is_answered(dialog, Order::cyclic, 0);
+    dialog.listen(before.pause());
     // A node that cannot be stopped is dealt with all the same.
-    co_await hear_node(bus);
+    co_await hear_node(dialog);
   }
   co_return before;
 }
 
-Part<Outcome> let_send_again(Bus& bus, Cadence before, Outcome outcome) {
+Part<Outcome> let_send_again(Dialog& dialog, Cadence before, Outcome outcome) {
   if (before.count == 0) co_return outcome;
-  co_await is_answered(bus, Order::cyclic, static_cast<std::uint8_t>(before.per_second()));
-  bus.listen(before.pause());
-  const Cadence now = co_await hear_node(bus);
+  co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(before.per_second()));
+  dialog.listen(before.pause());
+  const Cadence now = co_await hear_node(dialog);
   if (now.count == 0 && outcome.error == Error::none) {
     co_return only(Error::cross_check_failed, "it was done, but the node no longer sends by itself as it did before",
                    "let it: `run <encoder> cyclic 10`");
@@ -125,11 +125,11 @@ Part<Outcome> let_send_again(Bus& bus, Cadence before, Outcome outcome) {
 }
 
 // A shaft that stands still.
-Part<Look> look_twice(Bus& bus) {
-  const Look first = co_await look(bus);
+Part<Look> look_twice(Dialog& dialog) {
+  const Look first = co_await look(dialog);
   if (first.outcome.error != Error::none) co_return first;
-  Look second = co_await look(bus, between_looks);
-  if (second.outcome.error == Error::none && !is_near(second.counts, first.counts, bus.format().bits)) {
+  Look second = co_await look(dialog, between_looks);
+  if (second.outcome.error == Error::none && !is_near(second.counts, first.counts, dialog.format().bits)) {
     second.outcome = only(Error::invalid_argument, "the shaft turns: it must stand still");
   }
   co_return second;
@@ -162,52 +162,52 @@ Outcome judge_direction(const Format& format, Values& found, std::uint32_t first
   return only(Error::timeout, "the node did not answer the command, and its position is the same");
 }
 
-Part<Outcome> change_quietly(Bus& bus, Values& found, Order order, std::uint8_t value) {
+Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::uint8_t value) {
   const bool zeroing = order == Order::zero;
-  const Look before = co_await look_twice(bus);
+  const Look before = co_await look_twice(dialog);
   if (before.outcome.error != Error::none) co_return before.outcome;
   found.before = found.after = before.counts;
   if (zeroing) {
-    found.written = !is_near(before.counts, 0, bus.format().bits);
+    found.written = !is_near(before.counts, 0, dialog.format().bits);
     if (!*found.written) co_return done;
   }
-  found.answered = co_await is_answered(bus, order, value);
-  const Look first = co_await look(bus);
+  found.answered = co_await is_answered(dialog, order, value);
+  const Look first = co_await look(dialog);
   if (first.outcome.error != Error::none) co_return first.outcome;
-  const Look second = co_await look(bus, between_looks);
+  const Look second = co_await look(dialog, between_looks);
   if (second.outcome.error != Error::none) co_return second.outcome;
   found.after = zeroing ? second.counts : first.counts;
-  co_return zeroing ? judge_zero(bus.format(), found, first.counts, second.counts)
-                    : judge_direction(bus.format(), found, first.counts, second.counts);
+  co_return zeroing ? judge_zero(dialog.format(), found, first.counts, second.counts)
+                    : judge_direction(dialog.format(), found, first.counts, second.counts);
 }
 
 }  // namespace
 
 // ---- One node
 
-Procedure set_cyclic(Bus& bus, Values& found, Arguments arguments) {
+Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   const unsigned wanted = arguments.empty() ? 0 : static_cast<unsigned>(arguments[0]);
-  found.node = bus.format().node;
+  found.node = dialog.format().node;
   found.readings_per_s = wanted;
-  found.answered = co_await is_answered(bus, Order::cyclic, static_cast<std::uint8_t>(wanted));
-  bus.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
-  const Cadence cadence = co_await hear_node(bus);
+  found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
+  dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
+  const Cadence cadence = co_await hear_node(dialog);
   if (wanted == 0 && cadence.count == 0) co_return done;
   if (wanted == 0) co_return only(Error::cross_check_failed, "the node goes on sending by itself", "try again");
-  if (cadence.count == 0 && !*found.answered) co_return {bus.missing()};
+  if (cadence.count == 0 && !*found.answered) co_return {dialog.missing()};
   // By the number of frames: a carrier may hand them out in bunches.
   const unsigned rate = cadence.per_second();
   if (cadence.count >= 2 && 4 * rate >= 3 * wanted && 4 * rate <= 5 * wanted + 4) co_return done;
   co_return only(Error::cross_check_failed, "the node sends more or fewer readings a second than it was told");
 }
 
-Procedure change(Bus& bus, Values& found, Order order, Arguments arguments) {
-  const std::uint8_t value = order == Order::zero ? 0 : *value_of(bus.format(), order, arguments[0]);
-  found.node = bus.format().node;
+Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments) {
+  const std::uint8_t value = order == Order::zero ? 0 : *value_of(dialog.format(), order, arguments[0]);
+  found.node = dialog.format().node;
   if (order == Order::direction) found.value = value;
-  const Cadence before = co_await hush(bus);
-  const Outcome outcome = co_await change_quietly(bus, found, order, value);
-  const Outcome end = co_await let_send_again(bus, before, outcome);
+  const Cadence before = co_await hush(dialog);
+  const Outcome outcome = co_await change_quietly(dialog, found, order, value);
+  const Outcome end = co_await let_send_again(dialog, before, outcome);
   co_return end;
 }
 
@@ -233,94 +233,94 @@ constexpr unsigned nobody = 0;
 constexpr unsigned everybody = 256;
 
 // Until the time is over. `asked`: the last number that was asked.
-Part<bool> hear_nodes(Bus& bus, Nodes& nodes, unsigned asked) {
+Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
-  while (const Frame frame = co_await bus.heard()) {
+  while (const Frame frame = co_await dialog.heard()) {
     if (function_of(*frame) != Function::reply) continue;
-    bus.keep();
+    dialog.keep();
     const unsigned number = node_of(*frame);
     Heard& node = nodes.at[number];
-    if (from == never) from = bus.heard_at();
-    if (asked == nobody && bus.heard_at() - from < 1s) ++node.per_second;
+    if (from == never) from = dialog.heard_at();
+    if (asked == nobody && dialog.heard_at() - from < 1s) ++node.per_second;
     // Where answers are late, they come while the next numbers are asked; but none comes before its own request.
-    const unsigned early = bus.came_early() && node.damaged == 0 ? 1 : 0;
+    const unsigned early = dialog.came_early() && node.damaged == 0 ? 1 : 0;
     const bool was_asked = asked == everybody || (number + early <= asked && number + answering > asked);
     if (!was_asked) {
       ++node.unasked;
     } else if (node.answers < 255) {
       ++node.answers;
     }
-    const Result<std::uint32_t> counts = decode_position(bus.format(), *frame);
+    const Result<std::uint32_t> counts = decode_position(dialog.format(), *frame);
     node.readable = counts.has_value();
     node.counts = counts.value_or(0);
   }
   co_return true;
 }
 
-Part<bool> survey(Bus& bus, Nodes& nodes, bool listen_first) {
-  bus.overhear();
+Part<bool> survey(Dialog& dialog, Nodes& nodes, bool listen_first) {
+  dialog.overhear();
   if (listen_first) {
-    bus.listen(listening_time);
-    co_await hear_nodes(bus, nodes, nobody);
+    dialog.listen(listening_time);
+    co_await hear_nodes(dialog, nodes, nobody);
   }
   for (unsigned number = 1; number < nodes.at.size(); ++number) {
     bool once_more = true;
     while (once_more) {
-      bus.ask_for(encode(Order::read, static_cast<std::uint8_t>(number)), between_requests);
-      co_await hear_nodes(bus, nodes, number);
-      once_more = bus.is_disturbed() && ++nodes.at[number].damaged < 2;
+      dialog.ask_for(encode(Order::read, static_cast<std::uint8_t>(number)), between_requests);
+      co_await hear_nodes(dialog, nodes, number);
+      once_more = dialog.is_disturbed() && ++nodes.at[number].damaged < 2;
     }
   }
-  bus.listen(last_answers);
-  co_await hear_nodes(bus, nodes, everybody);
-  bus.overhear(false);
+  dialog.listen(last_answers);
+  co_await hear_nodes(dialog, nodes, everybody);
+  dialog.overhear(false);
   co_return true;
 }
 
 // 7E5 reaches every node: goes on when this one is the only one.
-Part<bool> be_alone(Bus& bus, Nodes& nodes) {
-  co_await survey(bus, nodes, true);
-  const Heard& node = nodes.at[bus.format().node];
-  if (nodes.count() == 0) co_await bus.stop(only(Error::timeout, "no node answers"));
+Part<bool> be_alone(Dialog& dialog, Nodes& nodes) {
+  co_await survey(dialog, nodes, true);
+  const Heard& node = nodes.at[dialog.format().node];
+  if (nodes.count() == 0) co_await dialog.stop(only(Error::timeout, "no node answers"));
   if (!node.is_there()) {
-    co_await bus.stop(only(Error::unexpected_reply, "other nodes answer, but not this one", which));
+    co_await dialog.stop(only(Error::unexpected_reply, "other nodes answer, but not this one", which));
   }
-  if (nodes.count() > 1) co_await bus.stop(only(Error::invalid_argument, "other nodes are on this bus", alone));
-  if (node.clash()) co_await bus.stop(only(Error::invalid_argument, shared, alone));
+  if (nodes.count() > 1) co_await dialog.stop(only(Error::invalid_argument, "other nodes are on this bus", alone));
+  if (node.clash()) co_await dialog.stop(only(Error::invalid_argument, shared, alone));
   co_return true;
 }
 
-Part<bool> hear_out(Bus& bus) {
+Part<bool> hear_out(Dialog& dialog) {
   Frame frame;
   do {
-    frame = co_await bus.heard();
+    frame = co_await dialog.heard();
   } while (frame);
   co_return true;
 }
 
 // Without an answer perhaps not without effect.
-Part<bool> write(Bus& bus, Surveyed& found, Order order, std::uint8_t value) {
-  bus.ask_for(encode(Order::enter, 0, 1), entering_time);
-  co_await hear_out(bus);
+Part<bool> write(Dialog& dialog, Surveyed& found, Order order, std::uint8_t value) {
+  dialog.ask_for(encode(Order::enter, 0, 1), entering_time);
+  co_await hear_out(dialog);
   found.written = true;
   found.answered = false;
-  bus.ask_for(encode(order, 0, value), answer_window);
-  while (const Frame frame = co_await bus.heard()) {
+  dialog.ask_for(encode(order, 0, value), answer_window);
+  while (const Frame frame = co_await dialog.heard()) {
     const Error error = check_configuration_answer(order, *frame);
     if (error != Error::none && error != Error::request_rejected) continue;
-    bus.keep();
-    if (error != Error::none) co_await bus.stop({error});
+    dialog.keep();
+    if (error != Error::none) co_await dialog.stop({error});
     found.answered = true;
     break;
   }
   co_return true;
 }
 
-Part<Outcome> verify_node(Bus& bus, std::uint8_t before, std::uint8_t node) {
+Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node) {
   constexpr std::string_view supply = "switch its supply off and on, then `scan`";
-  const Frame there = co_await read(bus, node);
-  if (node == before) co_return Outcome{there ? Error::none : bus.missing()};
-  const Frame still = co_await read(bus, before);
+  const Frame there = co_await read(dialog, node);
+  if (node == before) co_return Outcome{there ? Error::none : dialog.missing()};
+  const Frame still = co_await read(dialog, before);
   if (still && there) {
     co_return only(Error::cross_check_failed, "it answers under its old number as well: another node was there",
                    "connect it alone and try again");
@@ -331,17 +331,17 @@ Part<Outcome> verify_node(Bus& bus, std::uint8_t before, std::uint8_t node) {
 }
 
 // This end of the line goes to the rate too, which takes a moment.
-Part<Outcome> verify_rate(Bus& bus, std::uint32_t bits_per_second) {
-  const Format& format = bus.format();
-  bus.configure(bits_per_second, switching_time);
-  co_await hear_out(bus);
+Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
+  const Format& format = dialog.format();
+  dialog.configure(bits_per_second, switching_time);
+  co_await hear_out(dialog);
   for (int attempt = 0; attempt < rate_attempts; ++attempt) {
-    const Frame there = co_await read(bus, format.node);
+    const Frame there = co_await read(dialog, format.node);
     if (there) co_return done;
   }
-  bus.configure(format.bit_rate(), switching_time);
-  co_await hear_out(bus);
-  const Frame back = co_await read(bus, format.node);
+  dialog.configure(format.bit_rate(), switching_time);
+  co_await hear_out(dialog);
+  const Frame back = co_await read(dialog, format.node);
   if (back) {
     co_return only(Error::cross_check_failed, "it keeps its old bit rate",
                    "switch its supply off and on, then try the new one");
@@ -352,8 +352,8 @@ Part<Outcome> verify_rate(Bus& bus, std::uint32_t bits_per_second) {
 
 }  // namespace
 
-Procedure scan(Bus& bus, Nodes& nodes) {
-  co_await survey(bus, nodes, true);
+Procedure scan(Dialog& dialog, Nodes& nodes) {
+  co_await survey(dialog, nodes, true);
   const auto damaged =
       std::count_if(nodes.at.begin(), nodes.at.end(), [](const Heard& node) { return node.damaged > 1; });
   if (damaged > most_clashes) co_return {Error::bad_framing};
@@ -361,10 +361,10 @@ Procedure scan(Bus& bus, Nodes& nodes) {
   co_return done;
 }
 
-Procedure find_node(Bus& bus, Surveyed& found) {
-  const std::uint8_t meant = bus.format().node;
+Procedure find_node(Dialog& dialog, Surveyed& found) {
+  const std::uint8_t meant = dialog.format().node;
   const Nodes& nodes = found.nodes;
-  co_await survey(bus, found.nodes, false);
+  co_await survey(dialog, found.nodes, false);
   if (nodes.count() == 0) co_return only(Error::timeout, "no node answers");
   const std::uint8_t node = nodes.at[meant].is_there() ? meant : nodes.first();
   found.node = node;
@@ -375,8 +375,8 @@ Procedure find_node(Bus& bus, Surveyed& found) {
   co_return only(Error::bad_framing, shared, "connect the nodes one by one");
 }
 
-Procedure configure(Bus& bus, Surveyed& found, Order order, Arguments arguments) {
-  const Format& format = bus.format();
+Procedure configure(Dialog& dialog, Surveyed& found, Order order, Arguments arguments) {
+  const Format& format = dialog.format();
   const std::optional<std::uint8_t> value = value_of(format, order, arguments[0]);
   if (!value) {
     co_return only(Error::invalid_argument, "the document has no such bit rate", "give 1000000, 500000 or 250000");
@@ -384,14 +384,14 @@ Procedure configure(Bus& bus, Surveyed& found, Order order, Arguments arguments)
   const std::int64_t before = order == Order::rate ? format.bit_rate() : format.node;
   (order == Order::rate ? found.bit_rate : found.node) = arguments[0];
   found.written = false;
-  co_await be_alone(bus, found.nodes);
+  co_await be_alone(dialog, found.nodes);
   if (arguments[0] == before && arguments[1] == 0) co_return done;
-  co_await write(bus, found, order, *value);
+  co_await write(dialog, found, order, *value);
   Outcome outcome;
   if (order == Order::rate) {
-    outcome = co_await verify_rate(bus, static_cast<std::uint32_t>(arguments[0]));
+    outcome = co_await verify_rate(dialog, static_cast<std::uint32_t>(arguments[0]));
   } else {
-    outcome = co_await verify_node(bus, format.node, *value);
+    outcome = co_await verify_node(dialog, format.node, *value);
   }
   found.verified = outcome.error == Error::none;
   co_return outcome;

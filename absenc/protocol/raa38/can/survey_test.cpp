@@ -170,7 +170,7 @@ TEST(CanSetRate, IsFollowed) {
 TEST(CanSetRate, OnlyThoseOfTheDocument) {
   Bench bench;
   EXPECT_TRUE(ended(bench.does("bitrate", {125'000}), Error::invalid_argument, "500000"));
-  EXPECT_EQ(bench.encoder().answered(), 0u);
+  EXPECT_EQ(bench.encoder().answer_count(), 0u);
 }
 
 }  // namespace

@@ -131,17 +131,17 @@ struct Definition : author::Declares<Definition, Protocol> {
     return values.error();
   }
   // The controller of the bus does it.
-  static constexpr Delimit delimit(const Options&, Direction, Bytes bytes) {
-    return {Delimit::Kind::complete, bytes.size()};
+  static constexpr FrameEnd frame_end(const Options&, Direction, Bytes bytes) {
+    return {FrameEnd::Kind::complete, bytes.size()};
   }
   // The CRC of CAN is the controller's: here only what must be as it is.
-  static bool covered(const Options& values, Frame request, Frame reply, std::size_t bit) {
+  static bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
     if (is_only_named(function_of(*reply.can))) return false;
     const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
     return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
   }
   // Nothing answers NMT, SYNC and emergencies, nor the command that enters the configuration.
-  static bool answered(const Options&, Frame request) {
+  static bool is_answered(const Options&, Frame request) {
     const Function function = function_of(*request.can);
     if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;
     const OrderInfo* const asked = order_of(*request.can);

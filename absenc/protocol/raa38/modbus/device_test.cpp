@@ -58,7 +58,7 @@ TEST(Raa38ModbusDevice, IsSilentToWhatIsNotForIt) {
     EXPECT_EQ(bench.body(request), Wire{});
   }
   EXPECT_EQ(bench.raw({0x01, 0x03, 0x00, 0x00, 0x00, 0x01, 0x0A, 0x84}), Wire{}) << "CRC the other way round";
-  EXPECT_EQ(bench.encoder().answered(), 0u);
+  EXPECT_EQ(bench.encoder().answer_count(), 0u);
   EXPECT_EQ(bench.encoder().settings().writes() + bench.encoder().violation_count(), 0u);
 }
 

@@ -250,10 +250,10 @@ struct Protocol {
   using Reply = rtu::Reply;
   static constexpr std::size_t longest_reply = 9;
 
-  static constexpr author::Wire wire(const Format&, std::uint32_t rate) {
-    return modbus::client_wire({.rate = rate}, answer_limit);
+  static constexpr author::HostTimes host_times(const Format&, std::uint32_t rate) {
+    return modbus::client_times({.rate = rate}, answer_limit);
   }
-  static constexpr author::Wire wire(const Format& format) { return wire(format, format.line().rate); }
+  static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
   /// Settings wear the memory: nothing is repeated by itself.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }

@@ -64,7 +64,7 @@ TEST(Raa38ModbusFrame, AnAddressIsFrom1To247AndEveryRefusalHasWords) {
     EXPECT_EQ(error_of({}, ask, {0xFF, 0xA0, byte}), i >= 1 && i <= 247 ? Error::none : Error::out_of_range) << i;
     const Wire refusal = framed({1, 0x83, byte});
     EXPECT_EQ(decode_reply({}, one_register, refusal).error(), Error::request_rejected) << i;
-    EXPECT_TRUE(says(explain({}, Error::request_rejected, hex<"010300000001840a">, refusal).found, "exception")) << i;
+    EXPECT_TRUE(says(explain({}, Error::request_rejected, hex<"010300000001840a">, refusal).detail, "exception")) << i;
   }
   EXPECT_EQ(error_of({}, ask, {0x01, 0xA0, 0x01}), Error::unexpected_reply);
   EXPECT_EQ(error_of({}, one_register, {2, 0x83, 2}), Error::unexpected_reply);
@@ -106,10 +106,10 @@ TEST(Raa38ModbusFrame, EndsAreFoundInARun) {
   struct Row {
     Direction way;
     Wire bytes;
-    Delimit::Kind kind;
+    FrameEnd::Kind kind;
     std::size_t size = 0;
   };
-  using enum Delimit::Kind;
+  using enum FrameEnd::Kind;
   const Row rows[]{
       {Direction::request, {0x01, 0x03, 0, 0, 0, 1, 0x84, 0x0A, 0x01}, complete, 8},
       {Direction::request, {0xFF, 0xA0, 0x40, 0x38, 0x01}, complete, 4},
@@ -121,7 +121,7 @@ TEST(Raa38ModbusFrame, EndsAreFoundInARun) {
       {Direction::reply, {0x01, 0x03, 0x04, 0x1F, 0xAB, 0xCD, 0xCB, 0x99, 0x00}, complete, 8},
   };
   for (const Row& row : rows) {
-    const Delimit end = modbus_unit.delimit(options_of({}), row.way, row.bytes);
+    const FrameEnd end = modbus_unit.frame_end(options_of({}), row.way, row.bytes);
     EXPECT_EQ(end.kind, row.kind);
     EXPECT_TRUE(row.size == 0 || end.size == row.size) << end.size;
   }

@@ -115,49 +115,49 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
 }
 
 // Function 03, so often at the most. Asking on is of no use where it is refused.
-Part<Result<Reply>> look(Line& line, std::uint8_t address, unsigned attempts) {
-  Request request = read_request(line.format());
+Part<Result<Reply>> look(Dialog& dialog, std::uint8_t address, unsigned attempts) {
+  Request request = read_request(dialog.format());
   request.address = address;
-  if (request.registers == 1 && line.format().bits > 16) {
-    co_await line.stop(only(Error::invalid_argument, too_few_registers.found, too_few_registers.advice));
+  if (request.registers == 1 && dialog.format().bits > 16) {
+    co_await dialog.stop(only(Error::invalid_argument, too_few_registers.detail, too_few_registers.advice));
   }
   Result<Reply> reply = Error::timeout;
   for (unsigned i = 0; i < attempts; ++i) {
-    reply = co_await line.attempt(request);
+    reply = co_await dialog.attempt(request);
     if (reply && reply->doubtful_size != 0) {
       const Reply first = *reply;
-      reply = co_await line.attempt(request);
+      reply = co_await dialog.attempt(request);
       if (reply && differ_doubtfully(first, *reply)) reply = Error::wrong_length;
     }
-    if (reply || reply.error() == Error::request_rejected || line.is_noisy()) break;
+    if (reply || reply.error() == Error::request_rejected || dialog.is_noisy()) break;
   }
   co_return reply;
 }
 
 // The encoder before its setting is changed.
-Part<Reply> look_first(Line& line) {
-  const Result<Reply> reply = co_await look(line, line.format().address, 3);
-  if (!reply) co_await line.stop({reply.error()});
+Part<Reply> look_first(Dialog& dialog) {
+  const Result<Reply> reply = co_await look(dialog, dialog.format().address, 3);
+  if (!reply) co_await dialog.stop({reply.error()});
   co_return *reply;
 }
 
 // The position in the last reply.
-void show_position(const Line& line, Found& found) {
-  found.reading = line.last_reading();
-  found.singleturn = line.last().singleturn;
-  found.angle = degrees(line.last().singleturn, line.format().bits);
+void show_position(const Dialog& dialog, Found& found) {
+  found.reading = dialog.last_reading();
+  found.singleturn = dialog.last().singleturn;
+  found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
 // Where a setting put the encoder it must answer, or else, when it did not take it, where it was.
-Part<Outcome> look_for_it(Line& line, std::uint8_t address, std::uint32_t rate, std::string_view at_the_old_one) {
-  const Format& format = line.format();
+Part<Outcome> look_for_it(Dialog& dialog, std::uint8_t address, std::uint32_t rate, std::string_view at_the_old_one) {
+  const Format& format = dialog.format();
   const bool moves_rate = rate != format.line().rate;
-  if (moves_rate) line.set_rate(rate);
-  co_await line.rest(memory_time);
-  const Result<Reply> there = co_await look(line, address, 3);
+  if (moves_rate) dialog.set_rate(rate);
+  co_await dialog.rest(memory_time);
+  const Result<Reply> there = co_await look(dialog, address, 3);
   if (there) co_return done;
-  if (moves_rate) line.set_rate(format.line().rate);
-  const Result<Reply> back = co_await look(line, format.address, 3);
+  if (moves_rate) dialog.set_rate(format.line().rate);
+  const Result<Reply> back = co_await look(dialog, format.address, 3);
   if (!back) {
     co_return only(back.error(), "the setting was sent, and now the encoder answers neither as before nor as it should",
                    "switch the encoder off and on, then find it: `absenc config get ... baud`, `absenc scan`; do not "
@@ -170,62 +170,62 @@ Part<Outcome> look_for_it(Line& line, std::uint8_t address, std::uint32_t rate, 
 
 // ---- Reading
 
-Procedure look_once(Line& line, Found& found) {
-  const Result<Reply> reply = co_await look(line, line.format().address, 1);
+Procedure look_once(Dialog& dialog, Found& found) {
+  const Result<Reply> reply = co_await look(dialog, dialog.format().address, 1);
   if (!reply) co_return {reply.error()};
-  show_position(line, found);
+  show_position(dialog, found);
   co_return done;
 }
 
-Procedure look_at_direction(Line& line, Found& found) {
-  const Result<Reply> reply = co_await look(line, line.format().address, 1);
+Procedure look_at_direction(Dialog& dialog, Found& found) {
+  const Result<Reply> reply = co_await look(dialog, dialog.format().address, 1);
   found.singleturn = reply->singleturn;
   found.direction = "the encoder does not tell: turn the shaft and see";
   co_return {reply.error()};
 }
 
-Procedure ask_address(Line& line, Found& found) {
-  const Result<Reply> reply = co_await line.attempt(which_address).repeated(2);
-  const std::uint8_t address = reply ? reply->address : line.format().address;
+Procedure ask_address(Dialog& dialog, Found& found) {
+  const Result<Reply> reply = co_await dialog.attempt(which_address).repeated(2);
+  const std::uint8_t address = reply ? reply->address : dialog.format().address;
   found.address = address;
-  if (reply || line.is_noisy()) co_return {reply.error()};
-  const Result<Reply> position = co_await look(line, address, 2);
+  if (reply || dialog.is_noisy()) co_return {reply.error()};
+  const Result<Reply> position = co_await look(dialog, address, 2);
   co_return {position.error()};
 }
 
-Procedure find_baud(Line& line, Found& found) {
-  const std::size_t own = line.format().baud;
+Procedure find_baud(Dialog& dialog, Found& found) {
+  const std::size_t own = dialog.format().baud;
   found.baud = bauds[own];
-  const Result<Reply> first = co_await look(line, line.format().address, 2);
+  const Result<Reply> first = co_await look(dialog, dialog.format().address, 2);
   if (first || first.error() == Error::request_rejected) co_return done;  // a refusal is understood
-  if (line.is_noisy()) co_return {first.error()};
-  const Explanation reason = explain_reply(read_request(line.format()), first.error(), line.reply());
+  if (dialog.is_noisy()) co_return {first.error()};
+  const Explanation reason = explain_reply(read_request(dialog.format()), first.error(), dialog.reply());
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (i == own) continue;
     found.baud = bauds[i];
-    line.set_rate(bauds[i]);
-    const Result<Reply> reply = co_await look(line, line.format().address, 2);
+    dialog.set_rate(bauds[i]);
+    const Result<Reply> reply = co_await look(dialog, dialog.format().address, 2);
     const bool there = reply || reply.error() == Error::request_rejected;
-    if (!there && !line.is_noisy()) continue;
-    line.set_rate(bauds[own]);
+    if (!there && !dialog.is_noisy()) continue;
+    dialog.set_rate(bauds[own]);
     co_return {there ? Error::none : reply.error()};
   }
-  line.set_rate(bauds[own]);
-  if (first.error() != Error::timeout) co_return only(first.error(), reason.found, reason.advice);
+  dialog.set_rate(bauds[own]);
+  if (first.error() != Error::timeout) co_return only(first.error(), reason.detail, reason.advice);
   co_return only(Error::timeout, "nobody answers at this address at any of the five baud rates",
                  "`absenc scan` asks every address; then check supply and A/B");
 }
 
-Procedure scan(Line& line, Slaves& found, Arguments arguments) {
+Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments) {
   using Kind = Slaves::Kind;
   const std::int64_t first = arguments[0];
   const std::int64_t last = arguments[1];
   if (first > last) co_return {Error::invalid_argument, "the last address is before the first"};
-  const Result<Reply> single = co_await line.attempt(which_address);
-  if (line.is_noisy()) co_return {single.error()};
+  const Result<Reply> single = co_await dialog.attempt(which_address);
+  if (dialog.is_noisy()) co_return {single.error()};
   if (single) {
-    const Result<Reply> there = co_await look(line, single->address, 1);
-    if (line.is_noisy()) co_return {there.error()};
+    const Result<Reply> there = co_await look(dialog, single->address, 1);
+    if (dialog.is_noisy()) co_return {there.error()};
     if (there) {
       found.at[single->address] = Kind::answers;
       co_return done;
@@ -236,8 +236,8 @@ Procedure scan(Line& line, Slaves& found, Arguments arguments) {
     const auto address = static_cast<std::uint8_t>(i);
     Result<Reply> reply = Error::timeout;
     for (unsigned damaged = 0; damaged < most_damaged_answers; ++damaged) {
-      reply = co_await look(line, address, 1);
-      if (line.is_noisy()) co_return {reply.error()};
+      reply = co_await look(dialog, address, 1);
+      if (dialog.is_noisy()) co_return {reply.error()};
       if (reply || reply.error() == Error::timeout || reply.error() == Error::request_rejected) break;
       found.at[address] = Kind::clash;
     }
@@ -252,15 +252,15 @@ Procedure scan(Line& line, Slaves& found, Arguments arguments) {
 
 // ---- Settings
 
-Procedure set_address(Line& line, Found& found, Arguments arguments) {
+Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
   const auto address = static_cast<std::uint8_t>(arguments[0]);
-  const Format& format = line.format();
+  const Format& format = dialog.format();
   found.address = address;
   found.written = false;
-  co_await look_first(line);
+  co_await look_first(dialog);
   if (address == format.address && arguments[1] == 0) co_return done;
   if (address != format.address) {
-    const Result<Reply> other = co_await look(line, address, 3);
+    const Result<Reply> other = co_await look(dialog, address, 3);
     const bool is_free = !other && other.error() == Error::timeout;
     if (!is_free) {
       co_return {Error::invalid_argument,
@@ -272,50 +272,50 @@ Procedure set_address(Line& line, Found& found, Arguments arguments) {
   }
   found.written = true;
   const Result<Reply> answer =
-      co_await line.attempt({.function = function::set_address, .address = format.address, .value = address});
+      co_await dialog.attempt({.function = function::set_address, .address = format.address, .value = address});
   if (!answer && answer.error() == Error::request_rejected) co_return {answer.error()};
   // A lost reply does not tell whether it was done: asking does.
-  const Outcome end = co_await look_for_it(line, address, format.line().rate,
+  const Outcome end = co_await look_for_it(dialog, address, format.line().rate,
                                            "the encoder answers at its old address still: it did not take the new one");
   co_return end;
 }
 
-Procedure set_baud(Line& line, Found& found, Arguments arguments) {
+Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
   const std::optional<std::size_t> baud = baud_index(static_cast<std::uint64_t>(arguments[0]));
-  const Format& format = line.format();
+  const Format& format = dialog.format();
   if (!baud) {
     co_return {Error::invalid_argument, "the encoder does not have this baud rate",
                "it has 2400, 4800, 9600, 19200 and 57600"};
   }
   found.baud = bauds[*baud];
   found.written = false;
-  line.set_rate(format.line().rate);  // a port that cannot change its rate must say so before the encoder has
-  co_await look_first(line);
+  dialog.set_rate(format.line().rate);  // a port that cannot change its rate must say so before the encoder has
+  co_await look_first(dialog);
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
   // Its reply may come at the new rate.
-  static_cast<void>(co_await line.attempt(setting(format, baud_parameters[*baud])));
+  static_cast<void>(co_await dialog.attempt(setting(format, baud_parameters[*baud])));
   const Outcome end =
-      co_await look_for_it(line, format.address, bauds[*baud],
+      co_await look_for_it(dialog, format.address, bauds[*baud],
                            "the encoder answers at its old baud rate still: it did not take the new one");
   co_return end;
 }
 
-Procedure set_direction(Line& line, Found& found, Arguments arguments) {
-  const unsigned bits = line.format().bits;
+Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
+  const unsigned bits = dialog.format().bits;
   const auto value = static_cast<std::uint8_t>(arguments[0]);
   found.parameter = value;
   found.setting = name_of_setting(value);
-  const std::uint32_t before = (co_await look_first(line)).singleturn;
+  const std::uint32_t before = (co_await look_first(dialog)).singleturn;
   found.written = true;
-  const Result<Reply> echo = co_await line.attempt(setting(line.format(), value));
+  const Result<Reply> echo = co_await dialog.attempt(setting(dialog.format(), value));
   if (!echo) {
     co_return only(echo.error(),
                    "the direction was sent, but its echo did not come, and nothing else tells whether it was taken",
                    "turn the shaft and see how the position moves before you send it again: its memory wears out");
   }
-  co_await line.rest(memory_time);
-  const Result<Reply> now = co_await look(line, line.format().address, 3);
+  co_await dialog.rest(memory_time);
+  const Result<Reply> now = co_await look(dialog, dialog.format().address, 3);
   if (!now) {
     co_return {now.error(), "the encoder has taken the direction, but then its position could not be read"};
   }
@@ -327,23 +327,24 @@ Procedure set_direction(Line& line, Found& found, Arguments arguments) {
   co_return done;
 }
 
-Procedure set_zero(Line& line, Found& found, Arguments arguments) {
-  const unsigned bits = line.format().bits;
-  const Reply first = co_await look_first(line);
-  co_await line.rest(between_looks);
-  const Reply second = co_await look_first(line);
+Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
+  const unsigned bits = dialog.format().bits;
+  const Reply first = co_await look_first(dialog);
+  co_await dialog.rest(between_looks);
+  const Reply second = co_await look_first(dialog);
   if (!is_near(second.singleturn, first.singleturn, bits)) {
     co_return {Error::invalid_argument,
                "the shaft is turning: setting the zero needs it standing still; nothing was sent", "stop the shaft"};
   }
-  show_position(line, found);
+  show_position(dialog, found);
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;
-  static_cast<void>(co_await line.attempt(setting(line.format(), parameter::zero)));  // perhaps done without a reply
-  co_await line.rest(memory_time);
-  const Result<Reply> now = co_await look(line, line.format().address, 3);
+  static_cast<void>(
+      co_await dialog.attempt(setting(dialog.format(), parameter::zero)));  // perhaps done without a reply
+  co_await dialog.rest(memory_time);
+  const Result<Reply> now = co_await look(dialog, dialog.format().address, 3);
   if (!now) co_return {now.error(), "the zero was sent, but then the position could not be read"};
-  show_position(line, found);
+  show_position(dialog, found);
   if (is_near(now->singleturn, 0, bits, zero_millidegrees)) co_return done;
   co_return {Error::cross_check_failed, "the position is still not zero",
              "does the shaft turn? Try once more, not often: its memory wears"};

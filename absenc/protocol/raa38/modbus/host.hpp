@@ -44,21 +44,21 @@ struct Found : Values {
   Reading reading{};
 };
 
-using Line = author::LineOf<Protocol>;
+using Dialog = author::DialogOf<Protocol>;
 
 /// One position.
-author::Procedure look_once(Line& line, Found& found);
+author::Procedure look_once(Dialog& dialog, Found& found);
 
 /// No command reads the direction: the position is all there is to see of it.
-author::Procedure look_at_direction(Line& line, Found& found);
+author::Procedure look_at_direction(Dialog& dialog, Found& found);
 
 /// A0. Where that gets no good answer, as with several encoders on the line, the one at the address of the format is
 /// asked for its position.
-author::Procedure ask_address(Line& line, Found& found);
+author::Procedure ask_address(Dialog& dialog, Found& found);
 
 /// Finds the baud rate at which the encoder answers: first that of the format, then the others. Leaves the line as it
 /// was. Error: timeout, or what came at the rate of the format.
-author::Procedure find_baud(Line& line, Found& found);
+author::Procedure find_baud(Dialog& dialog, Found& found);
 
 /// A0 first, which a single encoder answers; otherwise every address from the first argument to the second. An answer
 /// that is damaged every time tells of two encoders with one address, or of a bad line. Error: timeout when nobody
@@ -67,20 +67,20 @@ struct Slaves {
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
   std::array<Kind, modbus::last_address + 1> at{};
 };
-author::Procedure scan(Line& line, Slaves& found, Arguments arguments);
+author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
 /// A1. Refuses (invalid_argument) an address at which somebody answers. Verified by asking the new address; errors:
 /// cross_check_failed (it has its old one), timeout (it answers at neither).
-author::Procedure set_address(Line& line, Found& found, Arguments arguments);
+author::Procedure set_address(Dialog& dialog, Found& found, Arguments arguments);
 
 /// CC with a baud rate; verified at the new rate, to which the line is set. Errors: invalid_argument (the encoder does
 /// not have it), cross_check_failed (it has its old one), timeout (it answers at neither); then the line is as before.
-author::Procedure set_baud(Line& line, Found& found, Arguments arguments);
+author::Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments);
 
 /// CC with a direction. Only its echo tells that it was taken; the position before and after is reported.
-author::Procedure set_direction(Line& line, Found& found, Arguments arguments);
+author::Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments);
 
 /// CC 00: the position becomes 0 here. The shaft must stand still (invalid_argument); read back (cross_check_failed).
-author::Procedure set_zero(Line& line, Found& found, Arguments arguments);
+author::Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments);
 
 }  // namespace absenc::raa38::rtu

@@ -86,11 +86,11 @@ std::size_t length_in_run(const Format& format, const Request& request, Bytes by
   return decode_reply(format, request, bytes.first(9)) ? 9 : 8;
 }
 
-Delimit delimit(const Options& values, Direction way, Bytes bytes) {
-  if (bytes.size() < 3) return {Delimit::Kind::incomplete, modbus::shortest_frame};
+FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
+  if (bytes.size() < 3) return {FrameEnd::Kind::incomplete, modbus::shortest_frame};
   const std::uint8_t code = bytes[1];
   const bool refusal = code == (function::read | modbus::refusal_bit);
-  if (!function::is_known(code) && (way == Direction::request || !refusal)) return {Delimit::Kind::no_frame};
+  if (!function::is_known(code) && (way == Direction::request || !refusal)) return {FrameEnd::Kind::no_frame};
   std::size_t length = request_length(code);
   if (way == Direction::reply) {
     Format format = options.format(values);
@@ -100,7 +100,7 @@ Delimit delimit(const Options& values, Direction way, Bytes bytes) {
     request.registers = bytes[2] == 2 ? 1 : 2;
     length = length_in_run(format, request, bytes);
   }
-  return {bytes.size() < length ? Delimit::Kind::incomplete : Delimit::Kind::complete, length};
+  return {bytes.size() < length ? FrameEnd::Kind::incomplete : FrameEnd::Kind::complete, length};
 }
 
 // ---- What captured frames tell. Whose address they have does not matter.
@@ -166,7 +166,7 @@ struct Definition : author::Declares<Definition, Protocol> {
   static constexpr auto options = rtu::options;
   static constexpr auto vectors = rtu::vectors;
   static constexpr auto probe = rtu::probe;
-  static constexpr auto delimit = rtu::delimit;
+  static constexpr auto frame_end = rtu::frame_end;
   static constexpr auto explain = rtu::explain;
   static constexpr std::array models{author::ModelText{"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, ""}};
   // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.

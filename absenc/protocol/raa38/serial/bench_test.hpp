@@ -64,7 +64,7 @@ struct Tampered final : Device<std::uint8_t> {
   [[nodiscard]] std::uint32_t memory_version() const override { return encoder.memory_version(); }
   [[nodiscard]] std::span<const Violation> violations() const override { return encoder.violations(); }
   [[nodiscard]] std::uint32_t violation_count() const override { return encoder.violation_count(); }
-  [[nodiscard]] std::uint64_t answered() const override { return encoder.answered(); }
+  [[nodiscard]] std::uint64_t answer_count() const override { return encoder.answer_count(); }
 
   VirtualEncoder encoder;
   Tamper tamper;

@@ -54,7 +54,7 @@ void VirtualEncoder::power_off(Time now) {
 }
 
 void VirtualEncoder::triggered(const ByteEvent& event) {
-  if (event.line == Line::clear) {
+  if (event.wire == ExtraWire::clear) {
     if (format().zeroing == Zeroing::line) store_zero(event.at, 0);
     return;
   }

@@ -207,7 +207,7 @@ struct Protocol {
   using Reply = Position;
   static constexpr std::size_t longest_reply = frame_capacity;
 
-  static constexpr author::Wire wire(const Format& format) {
+  static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = format.acquisition > Time{} ? format.acquisition + answer_slack : answer_limit,
             .gap_limit = std::max(format.transmission, gap_limit),
             .patience = patience};
@@ -215,11 +215,11 @@ struct Protocol {
   static constexpr author::Manner manner(const Format&, const Request& request) {
     switch (request.kind) {
       case Request::Kind::trigger:
-        return {.pulse = trigger_width, .line = Line::trigger};
+        return {.pulse = trigger_width, .wire = ExtraWire::trigger};
       case Request::Kind::clear:
-        return {.answered = false, .pulse = clear_width, .line = Line::clear};
+        return {.expects_reply = false, .pulse = clear_width, .wire = ExtraWire::clear};
       default:
-        return {.answered = request.kind == Request::Kind::read};
+        return {.expects_reply = request.kind == Request::Kind::read};
     }
   }
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }

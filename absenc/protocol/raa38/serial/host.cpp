@@ -198,9 +198,9 @@ using namespace author;
 constexpr unsigned scan_attempts = 2;
 
 // The newest frame of what comes first.
-Part<Result<Position>> hear_one(HostLine& line) {
-  StreamDecoder decoder(line.format());
-  Position position{.second_byte = line.format().own_second_byte()};
+Part<Result<Position>> hear_one(Dialog& dialog) {
+  StreamDecoder decoder(dialog.format());
+  Position position{.second_byte = dialog.format().own_second_byte()};
   bool found = false;
   bool anything = false;
   const auto keep = [&](const serial::Found& frame) {
@@ -208,35 +208,35 @@ Part<Result<Position>> hear_one(HostLine& line) {
     position.singleturn = frame.singleturn;
     found = true;
   };
-  line.listen(std::max(listen_limit, 4 * line.format().period()));
+  dialog.listen(std::max(listen_limit, 4 * dialog.format().period()));
   while (!found) {
-    const HostLine::Heard heard = co_await line.heard();
+    const Dialog::Heard heard = co_await dialog.heard();
     if (heard.over) {
       if (!anything) co_return Error::timeout;
       co_return decoder.saw_larger_positions() ? Error::out_of_range : Error::bad_framing;
     }
     anything = true;
     if (heard.bytes.empty()) decoder.disturbed(keep);
-    decoder.feed(heard.bytes, line.received_at(), keep);
+    decoder.feed(heard.bytes, dialog.received_at(), keep);
   }
   co_return position;
 }
 
 // The next position, whatever starts a frame.
-Part<Result<Position>> look(HostLine& line) {
+Part<Result<Position>> look(Dialog& dialog) {
   Result<Position> position = Error::timeout;
-  if (line.format().mode == Mode::timing) {
-    position = co_await hear_one(line);
+  if (dialog.format().mode == Mode::timing) {
+    position = co_await hear_one(dialog);
   } else {
-    position = co_await line.attempt(position_request(line.format()));
+    position = co_await dialog.attempt(position_request(dialog.format()));
   }
   co_return position;
 }
 
 }  // namespace
 
-Procedure set_zero(HostLine& line, Values& found) {
-  const Format& format = line.format();
+Procedure set_zero(Dialog& dialog, Values& found) {
+  const Format& format = dialog.format();
   if (format.zeroing == Zeroing::none) {
     co_return {
         Error::unsupported, "nothing is known of a way to set the zero of this encoder",
@@ -246,27 +246,27 @@ Procedure set_zero(HostLine& line, Values& found) {
     co_return {Error::invalid_argument, "BC AA Cx is a command of a bus",
                "set mode=bus, or zeroing=line for a wire to CLR"};
   }
-  const Result<Position> first = co_await look(line);
+  const Result<Position> first = co_await look(dialog);
   if (!first) co_return {first.error()};
-  co_await line.rest(between_looks);
-  const Result<Position> second = co_await look(line);
+  co_await dialog.rest(between_looks);
+  const Result<Position> second = co_await look(dialog);
   if (!second) co_return {second.error()};
   if (!is_near(second->singleturn, first->singleturn, format.bits)) {
     co_return {Error::invalid_argument,
                "the shaft is turning: setting the zero needs it standing still; nothing was sent", "stop the shaft"};
   }
   const Request by_command{Request::Kind::zero_clear, format.zeroed_unit()};
-  co_await line.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command);
+  co_await dialog.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command);
   // It is not told whether that worked.
-  const Time give_up_at = line.received_at() + zero_limit;
+  const Time give_up_at = dialog.received_at() + zero_limit;
   Result<Position> now = Error::timeout;
   do {
-    co_await line.rest(zero_poll);
-    now = co_await look(line);
+    co_await dialog.rest(zero_poll);
+    now = co_await look(dialog);
     found = values_of(format, *now);
     found.before = second->singleturn;
     if (now && is_near(now->singleturn, 0, format.bits, zero_millidegrees)) co_return done;
-  } while (line.received_at() < give_up_at);
+  } while (dialog.received_at() < give_up_at);
   if (!now) {
     co_return only(now.error(), "the zero was set, but the position could not be read back",
                    "read the encoder to see what it is now");
@@ -276,10 +276,10 @@ Procedure set_zero(HostLine& line, Values& found) {
                  "has it");
 }
 
-Procedure scan(HostLine& line, Units& found) {
-  line.listen(scan_silence);
-  for (HostLine::Heard heard{}; !heard.over;) {
-    heard = co_await line.heard();
+Procedure scan(Dialog& dialog, Units& found) {
+  dialog.listen(scan_silence);
+  for (Dialog::Heard heard{}; !heard.over;) {
+    heard = co_await dialog.heard();
     if (heard.bytes.empty()) continue;
     co_return only(Error::unexpected_reply, "something comes although nobody asks",
                    "an encoder that transmits by itself has no number: mode=timing, and nothing to scan for");
@@ -288,13 +288,13 @@ Procedure scan(HostLine& line, Units& found) {
   for (unsigned i = 0; i < unit_count; ++i) {
     Result<Position> reply = Error::timeout;
     for (unsigned attempt = 0; attempt < scan_attempts && !reply; ++attempt) {
-      reply = co_await line.attempt({Request::Kind::read, static_cast<std::uint8_t>(i)});
-      if (line.is_noisy()) co_return {reply.error()};
+      reply = co_await dialog.attempt({Request::Kind::read, static_cast<std::uint8_t>(i)});
+      if (dialog.is_noisy()) co_return {reply.error()};
       if (reply.error() == Error::timeout) break;
     }
     if (reply.error() == Error::timeout) continue;
     any = true;
-    if (reply) found[i] = values_of(line.format(), *reply);
+    if (reply) found[i] = values_of(dialog.format(), *reply);
     found[i].encoder_address = static_cast<std::uint8_t>(i);
     found[i].clash = !reply;
   }

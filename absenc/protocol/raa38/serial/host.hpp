@@ -38,7 +38,7 @@ class Listen final : public Conversation<std::uint8_t> {
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] bool streams() const override { return true; }
   [[nodiscard]] Error error() const override { return error_; }
-  [[nodiscard]] std::string_view detail() const override { return words_.found; }
+  [[nodiscard]] std::string_view detail() const override { return words_.detail; }
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
@@ -80,17 +80,17 @@ class Listen final : public Conversation<std::uint8_t> {
   Explanation words_{};
 };
 
-using HostLine = author::LineOf<Protocol>;
+using Dialog = author::DialogOf<Protocol>;
 
 /// Reads, sets the zero, and reads until the position is zero. The shaft must stand still. Errors: unsupported and
 /// invalid_argument when the settings have no way to do it, or it turns; cross_check_failed when it is not zero after
 /// half a second.
-author::Procedure set_zero(HostLine& line, Values& found);
+author::Procedure set_zero(Dialog& dialog, Values& found);
 
 /// Listens whether somebody transmits unasked, then asks every number of a bus, whatever the mode. An answer that is
 /// damaged every time tells of two encoders with one number, or of a bad line. Errors: timeout when nobody answers,
 /// unexpected_reply when somebody transmits unasked.
 using Units = std::array<Values, unit_count>;
-author::Procedure scan(HostLine& line, Units& found);
+author::Procedure scan(Dialog& dialog, Units& found);
 
 }  // namespace absenc::raa38::serial

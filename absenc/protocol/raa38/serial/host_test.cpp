@@ -103,14 +103,14 @@ TEST(RaaBus, TheBeginOfARequestInsideAFrameOfAnotherIsNone) {
   bench.shaft.start.position = std::int64_t{0xBCAA} << 16;
   EXPECT_EQ(bench.position(), 0xBCAAu);
   EXPECT_EQ(bench.position(), 0xBCAAu);
-  EXPECT_EQ(bench.encoders.back().answered(), 0u);
+  EXPECT_EQ(bench.encoders.back().answer_count(), 0u);
 }
 
 TEST(RaaReading, SpeedRefusesSwappedBytes) {
   for (const Format& format : {handshake, bus}) {
     Bench bench(with(format, &Format::maximum_rpm, 6000u));
     EXPECT_TRUE(ended(bench.does("position"), Error::none));
-    EXPECT_EQ(bench.encoder().answered(), 2u);
+    EXPECT_EQ(bench.encoder().answer_count(), 2u);
     bench.put(0x1201);
     bench.encoder().set([](unsigned frame, Wire& reply) {
       if (frame == 1) std::swap(reply[2], reply[3]);
@@ -240,7 +240,7 @@ struct Twice final : Machine<std::uint8_t> {
     if (count == 2 || (count == 1 && now < due)) return {.at = count == 1 ? due : never};
     ++count;
     if (!request.empty()) return {.kind = Kind::transfer, .out = request};
-    return {.kind = Kind::pulse, .width = width, .line = Line::trigger};
+    return {.kind = Kind::pulse, .width = width, .wire = ExtraWire::trigger};
   }
   Time width;
   Time due;

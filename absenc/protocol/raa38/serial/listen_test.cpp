@@ -55,7 +55,7 @@ TEST(RaaListen, ADamagedFrameIsOneErrorAndTheStreamGoesOn) {
   const Results results = listen(bench, 20);
   ASSERT_EQ(results.errors.size(), 2u);
   EXPECT_EQ(results.errors[0], Error::bad_checksum);
-  EXPECT_EQ(bench.encoder().answered(), 20u) << "nothing good was lost";
+  EXPECT_EQ(bench.encoder().answer_count(), 20u) << "nothing good was lost";
   EXPECT_TRUE(results.end.has("skipped=9")) << results.end.fields;
 }
 
@@ -158,7 +158,7 @@ TEST(RaaSession, ReadsEveryFrameOfTheStream) {
     EXPECT_EQ(reading.received - before, 1ms);
     before = reading.received;
   }
-  EXPECT_EQ(bench.encoder.answered(), bench.session.counters().good);
+  EXPECT_EQ(bench.encoder.answer_count(), bench.session.counters().good);
 }
 
 // A pause of the caller must not bring old positions.

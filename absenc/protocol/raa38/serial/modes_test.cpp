@@ -82,9 +82,9 @@ TEST(RaaOrders, EachIsReadAndItsZeroSet) {
     paragraphs.insert(row.paragraph);
     const bool rs485 = row.paragraph.starts_with("3.1");
     EXPECT_EQ(row.link.find("rs485=off") == std::string::npos, rs485);
-    const ExtraLines lines = serial_unit.extra_lines(options_of(row.options));
-    EXPECT_EQ(row.link.find("trigger=") != std::string::npos, lines.trigger);
-    EXPECT_EQ(row.link.find("clear=") != std::string::npos, lines.clear);
+    const ExtraWires wires = serial_unit.extra_wires(options_of(row.options));
+    EXPECT_EQ(row.link.find("trigger=") != std::string::npos, wires.trigger);
+    EXPECT_EQ(row.link.find("clear=") != std::string::npos, wires.clear);
     read_and_set_zero(row, rs485 ? LinkKind::half_duplex : LinkKind::full_duplex);
   }
   EXPECT_EQ(paragraphs.size(), 16u);

@@ -53,15 +53,15 @@ constexpr std::size_t second_byte_option = options.find("second_byte");
 
 // ---- Where a frame ends
 
-Delimit delimit(const Options& values, Direction direction, Bytes bytes) {
+FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
   const Format format = options.format(values);
   const bool asks = direction == Direction::request;
   const std::size_t size = asks ? request_bytes : format.frame_bytes();
-  if (!bytes.empty() && bytes[0] != (asks ? encode_request({})[0] : header)) return {Delimit::Kind::no_frame};
-  if (bytes.size() < size) return {Delimit::Kind::incomplete, size};
+  if (!bytes.empty() && bytes[0] != (asks ? encode_request({})[0] : header)) return {FrameEnd::Kind::no_frame};
+  if (bytes.size() < size) return {FrameEnd::Kind::incomplete, size};
   const bool good =
       asks ? decode_request(bytes.first(size)).has_value() : decode_position(format, bytes.first(size)).has_value();
-  return good ? Delimit{Delimit::Kind::complete, size} : Delimit{Delimit::Kind::no_frame};
+  return good ? FrameEnd{FrameEnd::Kind::complete, size} : FrameEnd{FrameEnd::Kind::no_frame};
 }
 
 // ---- What captured frames say of bits and second_byte
@@ -127,7 +127,7 @@ struct Definition : author::Declares<Definition, Protocol> {
   static constexpr auto fields = serial::fields;
   static constexpr auto vectors = serial::vectors;
   static constexpr auto probe = serial::probe;
-  static constexpr auto delimit = serial::delimit;
+  static constexpr auto frame_end = serial::frame_end;
   static constexpr auto explain = serial::explain;
   static constexpr LineTiming timing{.turnaround_limit = answer_limit};
   // The document names no speed.
@@ -154,11 +154,11 @@ struct Definition : author::Declares<Definition, Protocol> {
   static constexpr Request guess_request(const Format&, Bytes) { return {Request::Kind::trigger}; }
   // A pulse is no byte either.
   static bool streams(const Options& values) { return options.format(values).mode != Mode::bus; }
-  static bool answered(const Options&, Frame request) {
+  static bool is_answered(const Options&, Frame request) {
     const Result<Request> asked = decode_request(request.bytes);
     return asked && asked->kind == Request::Kind::read;
   }
-  static ExtraLines extra_lines(const Options& values) {
+  static ExtraWires extra_wires(const Options& values) {
     const Format format = options.format(values);
     return {.trigger = format.mode == Mode::handshake, .clear = format.zeroing == Zeroing::line};
   }

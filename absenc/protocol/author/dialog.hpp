@@ -20,7 +20,7 @@ namespace absenc::author {
 ///   struct Protocol {
 ///     using Format, Request, Reply;                                  // Format: what the options make of them
 ///     static constexpr std::size_t longest_reply;                    // bytes
-///     static Wire wire(const Format&);
+///     static HostTimes host_times(const Format&);
 ///     static Manner manner(const Format&, const Request&);
 ///     static ByteBuffer<N> encode(const Format&, const Request&);
 ///     static std::size_t reply_size(const Format&, const Request&);              // 0: it is not answered
@@ -55,7 +55,7 @@ class HostOf : public Engine {
   }
 
  protected:
-  explicit HostOf(const Format& format) : Engine(P::wire(format), storage_), format_(format) {}
+  explicit HostOf(const Format& format) : Engine(P::host_times(format), storage_), format_(format) {}
   ~HostOf() = default;
 
   /// What was not known of the encoder it has told.
@@ -112,7 +112,7 @@ class ReadPosition : public HostOf<P> {
   }
 
  private:
-  void answered(Error error) final {
+  void concluded(Error error) final {
     if (error == Error::none) reading_ = this->last_reading();
     this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
   }
@@ -122,7 +122,7 @@ class ReadPosition : public HostOf<P> {
 
 /// What a procedure speaks through.
 template <class P>
-class LineOf : public HostOf<P>, public Routine {
+class DialogOf : public HostOf<P>, public Routine {
  public:
   using Request = typename P::Request;
   using Reply = typename P::Reply;
@@ -132,44 +132,44 @@ class LineOf : public HostOf<P>, public Routine {
   template <bool must>
   class [[nodiscard]] Question {
    public:
-    explicit Question(LineOf& line) : line_(line) {}
+    explicit Question(DialogOf& dialog) : dialog_(dialog) {}
     /// Not before `pause` has passed since the encoder was last heard, or asked.
     Question& after(Time pause) {
-      line_.earliest_ = line_.received_at() + pause;
+      dialog_.earliest_ = dialog_.received_at() + pause;
       return *this;
     }
     /// It is never sent again.
     Question& once() {
-      line_.asking_.attempts = 1;
+      dialog_.asking_.attempts = 1;
       return *this;
     }
     Question& repeated(unsigned attempts) {
-      line_.asking_.attempts = attempts;
+      dialog_.asking_.attempts = attempts;
       return *this;
     }
     /// Its reply is taken only when silence follows, as Manner::ends_by_silence.
     Question& until_silence() {
-      line_.asking_.ends_by_silence = true;
+      dialog_.asking_.ends_by_silence = true;
       return *this;
     }
     /// What the procedure's error says when it ends here: which step failed.
     Question& or_say(std::string_view words) {
-      line_.words_ = words;
+      dialog_.words_ = words;
       return *this;
     }
 
     [[nodiscard]] bool await_ready() const { return false; }
-    void await_suspend(std::coroutine_handle<>) { line_.ask_it(must); }
+    void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }
     auto await_resume() const {
       if constexpr (must) {
-        return line_.last();
+        return dialog_.last();
       } else {
-        return line_.failure_ == Error::none ? Result<Reply>(line_.last()) : Result<Reply>(line_.failure_);
+        return dialog_.failure_ == Error::none ? Result<Reply>(dialog_.last()) : Result<Reply>(dialog_.failure_);
       }
     }
 
    private:
-    LineOf& line_;
+    DialogOf& dialog_;
   };
 
   [[nodiscard]] Question<true> ask(const Request& request) {
@@ -180,13 +180,13 @@ class LineOf : public HostOf<P>, public Routine {
     prepare(request);
     return Question<false>(*this);
   }
-  /// Nothing is sent for so long after the encoder was last heard, or asked: `co_await line.rest(10ms)`.
+  /// Nothing is sent for so long after the encoder was last heard, or asked: `co_await dialog.rest(10ms)`.
   [[nodiscard]] auto rest(Time pause) {
     struct Rest {
-      LineOf& line;
+      DialogOf& dialog;
       Time pause;
       [[nodiscard]] bool await_ready() const { return pause == Time{}; }
-      void await_suspend(std::coroutine_handle<>) { line.sleep(line.received_at() + pause); }
+      void await_suspend(std::coroutine_handle<>) { dialog.sleep(dialog.received_at() + pause); }
       void await_resume() const {}
     };
     return Rest{*this, pause};
@@ -195,10 +195,11 @@ class LineOf : public HostOf<P>, public Routine {
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
   /// This end of the line speaks at `rate` from here on; where the times of the line follow the rate, the protocol has
-  /// `wire(format, rate)`.
+  /// `host_times(format, rate)`.
   void set_rate(std::uint32_t rate) {
     HostOf<P>::set_rate(rate);
-    if constexpr (requires { P::wire(this->format(), rate); }) this->set_wire(P::wire(this->format(), rate));
+    if constexpr (requires { P::host_times(this->format(), rate); })
+      this->set_times(P::host_times(this->format(), rate));
   }
   /// Nothing is sent for so long, which what is awaited next begins: `heard` tells what comes, until it is over.
   void listen(Time duration) {
@@ -211,10 +212,10 @@ class LineOf : public HostOf<P>, public Routine {
   };
   [[nodiscard]] auto heard() {
     struct Hear {
-      LineOf& line;
+      DialogOf& dialog;
       [[nodiscard]] bool await_ready() const { return false; }
-      void await_suspend(std::coroutine_handle<>) { line.listen_on(); }
-      Heard await_resume() const { return line.heard_; }
+      void await_suspend(std::coroutine_handle<>) { dialog.listen_on(); }
+      Heard await_resume() const { return dialog.heard_; }
     };
     return Hear{*this};
   }
@@ -227,8 +228,8 @@ class LineOf : public HostOf<P>, public Routine {
   }
 
  protected:
-  LineOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
-  ~LineOf() = default;
+  DialogOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
+  ~DialogOf() = default;
 
  private:
   void prepare(const Request& request) {
@@ -241,7 +242,7 @@ class LineOf : public HostOf<P>, public Routine {
     must_ = must;
     HostOf<P>::ask(next_, asking_, earliest_);
   }
-  void answered(Error error) final {
+  void concluded(Error error) final {
     failure_ = error;
     if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
     resume();
@@ -269,30 +270,32 @@ class LineOf : public HostOf<P>, public Routine {
 
 namespace detail {
 template <class P>
-struct CarrierOf {
-  using Type = LineOf<P>;
+struct ProcedureDialog {
+  using Type = DialogOf<P>;
 };
 template <class P>
-requires requires { typename P::Line; }
-struct CarrierOf<P> {
-  using Type = typename P::Line;
+requires requires { typename P::Dialog; }
+struct ProcedureDialog<P> {
+  using Type = typename P::Dialog;
 };
 }  // namespace detail
 
-/// What carries the procedures of a protocol: `P::Line`, an Engine and Routine made of (format, arena), where one
-/// request is not answered by one reply.
+/// What the procedures of a protocol speak through: `P::Dialog`, an Engine and Routine made of (format, arena), where
+/// one request is not answered by one reply.
 template <class P>
-using CarrierOf = typename detail::CarrierOf<P>::Type;
+using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
-/// A procedure that runs: `procedure(line, found, bound..., arguments)`, the last where it takes them. What it finds is
-/// `Found`, whose member `reading`, if there is one, is the position; else that of the line. Frames lie in the storage
-/// behind this object.
+/// A procedure that runs: `procedure(dialog, found, bound..., arguments)`, the last where it takes them. What it finds
+/// is `Found`, whose member `reading`, if there is one, is the position; else that of the dialog. Frames lie in the
+/// storage behind this object.
 template <class P, class Found, auto procedure, auto... bound>
-class Run : public CarrierOf<P> {
+class Run : public ProcedureDialog<P> {
  public:
-  Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena) : CarrierOf<P>(format, arena) {
+  Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena)
+      : ProcedureDialog<P>(format, arena) {
     for (const std::int64_t argument : arguments) static_cast<void>(arguments_.push_back(argument));
-    if constexpr (std::is_invocable_v<decltype(procedure), CarrierOf<P>&, Found&, decltype(bound)..., Arguments>) {
+    if constexpr (std::is_invocable_v<decltype(procedure), ProcedureDialog<P>&, Found&, decltype(bound)...,
+                                      Arguments>) {
       this->begin(procedure(*this, found_, bound..., arguments_.view()).handle);
     } else {
       this->begin(procedure(*this, found_, bound...).handle);
@@ -303,7 +306,7 @@ class Run : public CarrierOf<P> {
     if constexpr (requires { found_.reading; }) {
       return this->error() == Error::none && found_.reading.singleturn_bits != 0 ? &found_.reading : nullptr;
     } else {
-      return CarrierOf<P>::reading();
+      return ProcedureDialog<P>::reading();
     }
   }
 

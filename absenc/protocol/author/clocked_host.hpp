@@ -20,7 +20,7 @@ struct NoRequest {};
 ///     using Format, Reply;
 ///     using Request = NoRequest;
 ///     static constexpr unsigned most_clocks;                 // of one transfer
-///     static ClockedWire wire(const Format&);
+///     static ClockedHostTimes host_times(const Format&);
 ///     static unsigned clocks(const Format&);                 // of one reading; more than `most_clocks` are refused
 ///     static Result<Reply> decode(const Format&, BitView);
 ///     static Reading reading(const Format&, const Reply&);
@@ -45,7 +45,9 @@ class ClockedHostOf : public ClockedEngine {
   }
 
  protected:
-  explicit ClockedHostOf(const Format& format) : ClockedEngine(P::wire(format), storage_), format_(format) { ask(); }
+  explicit ClockedHostOf(const Format& format) : ClockedEngine(P::host_times(format), storage_), format_(format) {
+    ask();
+  }
   ~ClockedHostOf() = default;
 
   void ask() { clock(P::clocks(format_)); }

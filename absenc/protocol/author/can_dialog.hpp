@@ -5,7 +5,7 @@
 //   struct Protocol {
 //     using Item = CanFrame;
 //     using Format, Request = CanFrame;
-//     static CanWire wire(const Format&);
+//     static CanHostTimes host_times(const Format&);
 //     static ByteBuffer<N> encode(const Format&, const CanFrame&);   // the text of a frame, as in vectors
 //   };
 #pragma once
@@ -16,33 +16,33 @@
 #include <span>
 
 #include "absenc/protocol/author/can_engine.hpp"
-#include "absenc/protocol/author/line.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::author {
 
 template <class P>
 requires std::same_as<typename P::Item, CanFrame>
-class LineOf<P> : public CanEngine, public Routine {
+class DialogOf<P> : public CanEngine, public Routine {
  public:
   using Format = typename P::Format;
 
   [[nodiscard]] const Format& format() const { return format_; }
 
   // What is heard begins with one of these.
-  void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::wire(format_), pause); }
+  void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;
   using CanEngine::overhear;
 
   /// The next frame, anybody's; none when the time is over: `const std::optional<CanFrame> frame = co_await
-  /// line.heard()`.
+  /// dialog.heard()`.
   [[nodiscard]] auto heard() {
     struct Hear {
-      LineOf& line;
+      DialogOf& dialog;
       [[nodiscard]] bool await_ready() const { return false; }
       void await_suspend(std::coroutine_handle<>) {}
-      std::optional<CanFrame> await_resume() const { return line.frame_; }
+      std::optional<CanFrame> await_resume() const { return dialog.frame_; }
     };
     return Hear{*this};
   }
@@ -54,8 +54,8 @@ class LineOf<P> : public CanEngine, public Routine {
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 
  protected:
-  LineOf(const Format& format, std::span<std::byte> arena) : Routine(arena), format_(format) {}
-  ~LineOf() = default;
+  DialogOf(const Format& format, std::span<std::byte> arena) : Routine(arena), format_(format) {}
+  ~DialogOf() = default;
 
  private:
   void heard(const CanFrame& frame, Time at) final {
