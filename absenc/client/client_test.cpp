@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// The library as a program uses it: against virtual encoders, in this process and on pseudo-terminals.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <thread>
+
+#include "absenc/client/decode.hpp"
+#include "absenc/client/emulate.hpp"
+#include "absenc/client/encoder.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::client {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Kind = Sample::Kind;
+
+/// A file of this test alone.
+class TestFile {
+ public:
+  explicit TestFile(const std::string& text) { std::ofstream(path_) << text; }
+  ~TestFile() { std::filesystem::remove(path_); }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_ = testing::TempDir() + "absenc-client-" + std::to_string(::getpid()) + ".txt";
+};
+
+std::string flag_text(const Unit& unit, const Reading& reading) {
+  std::string text;
+  for (const Flags& flags : alarms_of(unit, reading)) text += to_text(Value(flags));
+  return text;
+}
+
+template <class Thrown, class Work>
+std::string thrown_by(const Work& work) {
+  try {
+    work();
+  } catch (const Thrown& thrown) {
+    return thrown.what();
+  }
+  return "nothing was thrown";
+}
+
+// ---- An encoder by its name
+
+TEST(ClientEncoder, EveryUnitIsReadByItsName) {
+  for (const Unit* unit : all_units()) {
+    if (find_command(*unit, Verb::read) == nullptr) continue;
+    Encoder encoder = open("sim:" + std::string(unit->id));
+    const Reading reading = encoder.read();
+    EXPECT_TRUE(reading.ready) << unit->id;
+    EXPECT_EQ(reading.singleturn, 0u) << unit->id;
+    EXPECT_EQ(&encoder.unit(), unit);
+    EXPECT_GE(encoder.counters().good, 1u) << unit->id;
+  }
+}
+
+TEST(ClientEncoder, WhatCannotBeSaysSo) {
+  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(open("tfromat:/dev/null")); }), HasSubstr("tformat"));
+  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(open("sim:tformat?modle=1")); }), HasSubstr("model"));
+  EXPECT_THAT(thrown_by<os::Failure>([] { static_cast<void>(open("tformat:/dev/absenc-none")); }),
+              HasSubstr("/dev/absenc-none"));
+  Encoder encoder = open("sim:tformat");
+  EXPECT_THAT(thrown_by<UsageError>([&] { encoder.run("memory-raed"); }), HasSubstr("memory-read"));
+  EXPECT_THAT(thrown_by<UsageError>([&] { encoder.run("memory-read"); }), HasSubstr("needs the argument"));
+  EXPECT_THAT(thrown_by<UsageError>([&] { encoder.run("memory-read", {1, 2, 3, 4, 5}); }), HasSubstr("too much"));
+  EXPECT_THAT(thrown_by<UsageError>([&] { encoder.run("memory-read", {100'000}); }), HasSubstr("must be a number"));
+}
+
+TEST(ClientEncoder, ACommandTellsTypedValues) {
+  Encoder encoder = open("sim:tformat");
+  encoder.run("memory-write", {5, 0x42});
+  const Answer read = encoder.run("memory-read", {5});
+  EXPECT_EQ(std::get<std::int64_t>(read["value"]), 0x42);
+  EXPECT_EQ(read.row().get<std::int64_t>("value"), 0x42);
+  EXPECT_EQ(to_text(read["value"]), "66");
+  EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(read["vlaue"]); }), HasSubstr("value"));
+}
+
+TEST(ClientEncoder, AFailureHasWhatWasSentAndWhatToTry) {
+  Encoder encoder = open("sim:tformat?fault=silence=1");
+  try {
+    static_cast<void>(encoder.read());
+    FAIL() << "no reply, and yet a reading";
+  } catch (const EncoderFailure& failure) {
+    EXPECT_EQ(failure.trouble.error, Error::timeout);
+    EXPECT_EQ(failure.trouble.sent, "1A");
+    EXPECT_THAT(failure.trouble.received, IsEmpty());
+    EXPECT_NE(failure.trouble.advice, "");
+  }
+  EXPECT_EQ(encoder.bad_exchanges().at(0).error, Error::timeout);
+}
+
+TEST(ClientEncoder, SamplesEndWithTheirCountOrByCancel) {
+  Encoder encoder = open("sim:tformat?motion=rpm=600");
+  std::size_t count = 0;
+  Time last{};
+  for (const Sample& sample : encoder.samples({.rate_hz = 1000, .count = 20})) {
+    ASSERT_EQ(sample.kind, Kind::reading) << sample.trouble.text();
+    EXPECT_GT(sample.at, last);
+    last = sample.at;
+    ++count;
+  }
+  EXPECT_EQ(count, 20u);
+  EXPECT_EQ(encoder.readings(), 20u);
+
+  // A tenth of a reading a second: whoever waits for the second one is woken.
+  std::atomic<unsigned> seen = 0;
+  std::jthread other([&] {
+    seen.wait(0);
+    encoder.cancel();
+  });
+  for (const Sample& sample : encoder.samples({.rate_hz = 0.1})) {
+    EXPECT_EQ(sample.kind, Kind::reading);
+    ++seen;
+    seen.notify_all();
+  }
+  EXPECT_EQ(seen, 1u);
+  EXPECT_THROW(static_cast<void>(encoder.read()), Cancelled);
+}
+
+// ---- A virtual encoder that others open: half a second for the way, because others may use the machine
+
+TEST(ClientEmulation, EveryUnitOfALineIsServedAndRead) {
+  for (const Unit* unit : all_units()) {
+    const bool goes = unit->link != LinkKind::spi && unit->link != LinkKind::clocked;
+    const std::string text = std::string(unit->id);
+    if (!goes) {
+      EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(emulate(text)); }), HasSubstr("sim:" + text));
+      continue;
+    }
+    const Emulation emulation = emulate(text);
+    Encoder encoder = open(emulation.address() + "?latency=500");
+    const Reading reading = encoder.read();
+    EXPECT_EQ(reading.singleturn, 0u) << text;
+    EXPECT_GT(emulation.answer_count(), 0u) << text;
+  }
+}
+
+TEST(ClientEmulation, WhatIsDoneToItIsSoAtOnce) {
+  Emulation emulation = emulate("tformat?singleturn=1000");
+  Encoder encoder = open(emulation.address() + "?latency=500");
+  EXPECT_EQ(encoder.read().singleturn, 1000u);
+  emulation.raise_alarm("over_heat");
+  Reading reading = encoder.read();
+  EXPECT_EQ(flag_text(emulation.unit(), reading), "over_heat");
+  emulation.lower_alarm("over_heat");
+  static_cast<void>(encoder.run("clear-alarms"));
+  reading = encoder.read();
+  EXPECT_EQ(flag_text(emulation.unit(), reading), "");
+  emulation.set_condition("temperature", 85);
+  EXPECT_EQ(to_text(encoder.run("temperature")["temperature_c"]), "85");
+  emulation.power_off();
+  EXPECT_EQ(thrown_by<EncoderFailure>([&] { static_cast<void>(encoder.read()); }).substr(0, 7), "timeout");
+  emulation.power_on();
+  EXPECT_EQ(encoder.read().singleturn, 1000u);
+  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.raise_alarm("over_haet"); }), HasSubstr("over_heat"));
+  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_condition("temprature", 1); }), HasSubstr("temperature"));
+  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_condition("temperature", 1000); }), HasSubstr("must be"));
+}
+
+TEST(ClientEmulation, APortThatGoesIsWaitedFor) {
+  const std::string link = testing::TempDir() + "absenc-client-link-" + std::to_string(::getpid());
+  std::optional<Emulation> emulation = emulate("tformat?singleturn=7", {.link = link});
+  Encoder encoder = open("tformat:" + link);
+  std::vector<Kind> kinds;
+  for (const Sample& sample : encoder.samples({.rate_hz = 200})) {
+    if (kinds.empty() || kinds.back() != sample.kind) kinds.push_back(sample.kind);
+    if (sample.kind == Kind::reading && kinds.size() == 1) emulation.reset();
+    if (sample.kind == Kind::absent) emulation = emulate("tformat?singleturn=8", {.link = link});
+    if (sample.kind == Kind::reading && sample.reading.singleturn == 8) encoder.cancel();
+  }
+  const std::set<Kind> met(kinds.begin(), kinds.end());
+  EXPECT_EQ(met.count(Kind::lost) + met.count(Kind::absent) + met.count(Kind::back), 3u);
+  EXPECT_EQ(kinds.back(), Kind::reading);
+  EXPECT_EQ(encoder.losses(), 1u);
+}
+
+// ---- A capture as rows
+
+constexpr std::string_view good = "1A\n1A 00 45 23 01 11 34 12 00 00 4A\n";
+constexpr std::string_view bad = "1A\n1A 00 45 23 01 11 34 12 00 00 4B\n";
+
+TEST(ClientDecode, RowsHaveTypedColumns) {
+  const TestFile file(std::string(good) + std::string(bad) + std::string(good));
+  Decoded rows = decode(file.path(), "tformat");
+  std::vector<std::string> errors;
+  for (const Row& row : rows) {
+    ASSERT_EQ(row.columns.size(), row.values.size());
+    EXPECT_EQ(row.get<std::string>("kind"), "exchange");
+    EXPECT_EQ(row.get<ByteVector>("request"), ByteVector{0x1A});
+    errors.push_back(to_text(row["error"]));
+    const bool is_good = errors.back().empty();
+    EXPECT_EQ(std::holds_alternative<std::monostate>(row["singleturn"]), !is_good);
+    EXPECT_EQ(std::holds_alternative<std::monostate>(row["angle_deg"]), !is_good);
+    EXPECT_EQ(std::holds_alternative<std::monostate>(row["message"]), is_good);
+    if (!is_good) continue;
+    EXPECT_EQ(to_text(row["singleturn"]), "74565");
+    EXPECT_NEAR(row.get<double>("angle_deg"), 74565 * 360.0 / (1 << 17), 1e-9);
+  }
+  EXPECT_EQ(errors, (std::vector<std::string>{"", "bad_checksum", ""}));
+}
+
+TEST(ClientDecode, WhoeverHasEnoughEndsIt) {
+  std::string text;
+  for (int i = 0; i < 20'000; ++i) text += good;
+  const TestFile file(text);
+  {
+    Decoded rows = decode(file.path(), "tformat");
+    EXPECT_EQ(to_text((*rows.begin())["singleturn"]), "74565");
+  }
+  std::size_t count = 0;
+  for (const Row& row : decode(file.path(), "tformat")) count += to_text(row["error"]).empty() ? 1 : 0;
+  EXPECT_EQ(count, 20'000u);
+}
+
+TEST(ClientDecode, WhatCannotBeDecodedSaysSo) {
+  EXPECT_THAT(thrown_by<Failure>([] { static_cast<void>(decode("/nowhere/absenc.sr", "tformat")); }),
+              HasSubstr("/nowhere/absenc.sr"));
+  const TestFile file("nothing that could be bytes\n");
+  EXPECT_NE(thrown_by<Failure>([&] {
+              for (const Row& row : decode(file.path(), "tformat")) static_cast<void>(row);
+            }),
+            "nothing was thrown");
+  EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(decode(file.path(), "tfromat")); }), HasSubstr("tformat"));
+}
+
+}  // namespace absenc::client
