@@ -91,7 +91,7 @@ class Bench {
   }
 
   LineSettings settings() const {
-    return (unit.settings != nullptr ? unit.settings(options) : unit.line).with_some_rate();
+    return line_settings(unit, options).with_some_rate();
   }
 
   static Options resolve(const Kind& kind) {

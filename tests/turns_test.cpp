@@ -96,7 +96,7 @@ class Bench {
       device_ = made.bytes;
     }
     device_->power_on(Time{}, Device<Item>::PowerOn::skip);
-    const LineSettings line = one.unit->settings != nullptr ? one.unit->settings(built) : one.unit->line;
+    const LineSettings line = line_settings(*one.unit, built);
     port_ = std::make_unique<sim::SimPort<Item>>(one.unit->link, line.with_some_rate(), *device_);
     session_ = std::make_unique<Session<Item>>(*one.unit, known_, *port_, host_storage_);
     const bool unasked = one.unit->link == LinkKind::can || (one.unit->streams != nullptr && one.unit->streams(known_));

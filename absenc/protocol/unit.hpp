@@ -268,6 +268,11 @@ struct Unit {
   return false;
 }
 
+/// The line as these options describe it.
+[[nodiscard]] inline LineSettings line_settings(const Unit& unit, const Options& options) {
+  return unit.settings != nullptr ? unit.settings(options) : unit.line;
+}
+
 /// The first command with this verb, or null.
 [[nodiscard]] constexpr const Command* find_command(const Unit& unit, Verb verb) {
   for (const Command& command : unit.commands) {

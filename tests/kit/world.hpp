@@ -171,7 +171,7 @@ class World {
   };
 
   [[nodiscard]] LineSettings settings() const {
-    return (unit_.settings != nullptr ? unit_.settings(options_) : unit_.line).with_some_rate();
+    return line_settings(unit_, options_).with_some_rate();
   }
   // As host::Session has it.
   [[nodiscard]] bool guarded(const Command& command) const {

@@ -80,10 +80,6 @@ const Unit& emulated_unit(const Invocation& invocation) {
   return invocation.has("--spidev") && unit.over_spi != nullptr ? *unit.over_spi : unit;
 }
 
-LineSettings line_settings(const Unit& unit, const Options& options) {
-  return unit.settings != nullptr ? unit.settings(options) : unit.line;
-}
-
 /// Where an encoder may be.
 struct Where {
   std::string_view option;

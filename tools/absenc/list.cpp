@@ -47,7 +47,7 @@ std::string section(std::string_view heading, Rows rows) {
 std::string line_of_model(const Unit& unit, const Model& model) {
   Options options;
   static_cast<void>(resolve_options(unit, model.name, {}, options));  // a name of its own, and nothing else
-  return line_of(unit.link, unit.settings != nullptr ? unit.settings(options) : unit.line);
+  return line_of(unit.link, line_settings(unit, options));
 }
 
 std::string supported_encoders() {

@@ -40,7 +40,7 @@ class VirtualLine {
     std::vector<Machine<Item>*> machines;
     for (const auto& device : devices_) machines.push_back(machine_of(*device));
     if constexpr (is_can) {
-      const LineSettings line = unit.settings != nullptr ? unit.settings(options) : unit.line;
+      const LineSettings line = line_settings(unit, options);
       bus_ = std::make_unique<sim::FrameBus>(machines, line.rate);
     } else if (machines.size() > 1) {
       bus_ = std::make_unique<sim::Bus>(machines, unit.line.with_some_rate().character());

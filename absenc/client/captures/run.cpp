@@ -109,7 +109,7 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
 CaptureRun::CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices)
     : unit_(unit),
       options_(options),
-      line_(unit.settings != nullptr ? unit.settings(options) : unit.line),
+      line_(line_settings(unit, options)),
       choices_(choices),
       reader_(open_capture(choices)) {
   require_link(unit, reader_->layout().content);

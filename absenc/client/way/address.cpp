@@ -134,7 +134,7 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
     if (allowed(parameter, uri.place)) names.push_back(parameter.name);
   }
   uri.options = require_options(*uri.unit, {}, options, names);
-  if (uri.unit->settings != nullptr) uri.line = uri.unit->settings(uri.options);
+  uri.line = line_settings(*uri.unit, uri.options);
   for (const OptionText& setting : of_link) set_link_parameter(uri, setting);
   const bool any_rate_does =
       uri.place == Place::sim || (uri.place == Place::serial && os::is_pseudo_terminal(uri.path));

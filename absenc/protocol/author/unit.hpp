@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <span>
 #include <string_view>
@@ -16,6 +15,7 @@
 #include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/author/option.hpp"
+#include "absenc/protocol/author/tables.hpp"
 #include "absenc/protocol/author/text.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "absenc/protocol/vector_check.hpp"
@@ -63,6 +63,7 @@ struct UnitOf {
   using P = typename Definition::Protocol;
   using Format = typename P::Format;
   using Request = typename P::Request;
+  using Tables = TablesOf<Definition>;
 
   static constexpr Format format(const Options& values) {
     if constexpr (requires { Definition::format(values); }) {
@@ -122,7 +123,7 @@ struct UnitOf {
     return request;
   }
 
-  static constexpr const CommandOf<P>& find(const Command& command) { return command_table[command.id]; }
+  static constexpr const CommandOf<P>& find(const Command& command) { return Tables::command_table[command.id]; }
 
   // One for each that the command has, in its range.
   static constexpr bool are_good(const Command& command, Arguments arguments) {
@@ -247,121 +248,6 @@ struct UnitOf {
     return Definition::explain(format(values), error, items(asked), items(reply));
   }
 
-  // ---- Its tables
-
-  // Copies, because g++ lets those of a class that is no template be written to: on firmware that is RAM.
-  static constexpr auto command_table = Definition::commands;
-  static constexpr auto options = Definition::options.infos;
-
-  static constexpr auto commands = [] {
-    std::array<Command, Definition::commands.size()> made{};
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      made[i] = Definition::commands[i].info;
-      made[i].id = static_cast<std::uint8_t>(i);
-    }
-    return made;
-  }();
-
-  static constexpr std::size_t host_storage = [] {
-    std::size_t most = sizeof(Refusal<ItemOf<P>>);
-    for (const CommandOf<P>& one : Definition::commands) most = std::max(most, one.size);
-    return most + Definition::frames_size;
-  }();
-
-  // What texts say lies one behind the other, and no larger than if it were written by hand.
-  static constexpr Buffer<OptionValue, maximum_options> values_of(const ModelText& model) {
-    Buffer<OptionValue, maximum_options> made;
-    const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {
-      const std::size_t option = Definition::options.find(name);
-      std::int64_t value = 0;
-      return option < Definition::options.infos.size() && to_value(Definition::options.infos[option], text, value) &&
-             made.push_back({option, value});
-    });
-    if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
-    return made;
-  }
-  static constexpr auto model_values = [] {
-    constexpr std::size_t size = [] {
-      std::size_t sum = 0;
-      for (const ModelText& text : Definition::models) sum += values_of(text).size();
-      return sum;
-    }();
-    Buffer<OptionValue, size> all;
-    for (const ModelText& text : Definition::models) all.append(values_of(text));
-    return all;
-  }();
-  static constexpr auto models = [] {
-    std::array<Model, Definition::models.size()> made{};
-    std::size_t first = 0;
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      const ModelText& text = Definition::models[i];
-      const std::size_t size = values_of(text).size();
-      made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
-      if (size != 0) made[i].values = model_values.view().subspan(first, size);  // g++ 12 cannot view an empty one
-      first += size;
-    }
-    return made;
-  }();
-
-  static constexpr VectorParts parts_of(const VectorText& text) {
-    return VectorParts(
-        text, Clocked<P> || requires { Definition::frames_are_texts; });
-  }
-  static constexpr bool has_texts = std::is_same_v<std::remove_cvref_t<decltype(Definition::vectors[0])>, VectorText>;
-  static constexpr auto texts = [] {
-    if constexpr (has_texts) {
-      return Definition::vectors;
-    } else {
-      return std::array<VectorText, 0>{};
-    }
-  }();
-  static constexpr auto vector_parts = [] {
-    constexpr auto sizes = [] {
-      std::array<std::size_t, 2> sums{};
-      for (const VectorText& text : texts) {
-        const VectorParts parts = parts_of(text);
-        sums[0] += parts.request.size() + parts.reply.size();
-        sums[1] += parts.fields.size();
-      }
-      return sums;
-    }();
-    AllParts<sizes[0], sizes[1]> all;
-    for (const VectorText& text : texts) {
-      const VectorParts parts = parts_of(text);
-      all.bytes.append(parts.request);
-      all.bytes.append(parts.reply);
-      all.fields.append(parts.fields);
-    }
-    return all;
-  }();
-  static constexpr auto vectors_of_texts = [] {
-    std::array<Vector, texts.size()> made{};
-    Bytes bytes = vector_parts.bytes;
-    std::span<const Expected> fields = vector_parts.fields;
-    const auto taken = [](auto& all, std::size_t size) {
-      const auto first = all.first(size);
-      all = all.subspan(size);
-      return first;
-    };
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      const VectorText& text = texts[i];
-      const VectorParts parts = parts_of(text);
-      const Bytes request = taken(bytes, parts.request.size());
-      const Bytes reply = taken(bytes, parts.reply.size());
-      made[i] = {
-          text.id,    text.meaning, text.source, text.options, request, reply, taken(fields, parts.fields.size()),
-          parts.error};
-    }
-    return made;
-  }();
-  static constexpr auto vectors = [] {
-    if constexpr (has_texts) {
-      return vectors_of_texts;
-    } else {
-      return Definition::vectors;
-    }
-  }();
-
   static constexpr Error decode_vector(const Options& values, const Vector& vector, FieldSink& sink) {
     if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
       const CanFrame request = can_frame_of_text(vector.request);
@@ -397,7 +283,7 @@ struct UnitOf {
     Options values;
     bool known = resolve(vector.options, {}, values);
     // The first model that agrees with what is said, as resolve_options has it.
-    for (const Model& model : models) {
+    for (const Model& model : Tables::models) {
       Options of_model;
       known = known && resolve(vector.options, model.values, of_model);
       if (!agrees(model, of_model)) continue;
@@ -407,7 +293,8 @@ struct UnitOf {
     VectorCheck check(vector.fields);
     return known && decode_vector(values, vector, check) == vector.error && check.all();
   }
-  static_assert(std::all_of(vectors.begin(), vectors.end(), holds), "a vector does not decode to what it says");
+  static_assert(std::all_of(Tables::vectors.begin(), Tables::vectors.end(), holds),
+                "a vector does not decode to what it says");
 
   static constexpr Unit make() {
     Unit unit{.id = Definition::id,
@@ -415,14 +302,14 @@ struct UnitOf {
               .document = Definition::document,
               .link = Definition::link,
               .line = line_of(Format{}),
-              .options = options,
-              .models = models,
+              .options = Tables::options,
+              .models = Tables::models,
               .fields = Definition::fields.infos,
-              .commands = commands,
-              .vectors = vectors,
+              .commands = Tables::commands,
+              .vectors = Tables::vectors,
               .status = nullptr,
               .alarms = nullptr,
-              .host_storage = host_storage,
+              .host_storage = Tables::host_storage,
               .device_storage = sizeof(typename Definition::Encoder),
               .decode = decode,
               .encode = encode,
