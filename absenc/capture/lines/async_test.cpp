@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
+#include <mutex>
 #include <stdexcept>
+#include <thread>
 
 #include "absenc/capture/files/memory_reader_test.hpp"
 #include "absenc/capture/lines/pipeline.hpp"
@@ -263,6 +267,51 @@ TEST(Async, WhatTheReaderThrowsArrives) {
     Failing reader(memory);
     EXPECT_THROW(decoded(reader, {{0, {.baud = 125e6, .idle = Idle::high}}}, threads), std::runtime_error);
   }
+}
+
+// Of text, to claim a block is to parse it: who does that must not keep the others from decoding what came before.
+struct Slow : Reader {
+  explicit Slow(Reader& other) : reader(other) {}
+  [[nodiscard]] const Layout& layout() const override { return reader.layout(); }
+  [[nodiscard]] bool claim(Block& block) override {
+    std::unique_lock lock(mutex);
+    // Where another thread than the one that joins is here, what was claimed before arrives meanwhile.
+    if (std::this_thread::get_id() != joining) {
+      held_up = held_up || !arrived.wait_for(lock, std::chrono::minutes(1), [this] { return taken == claimed; });
+    }
+    const bool more = reader.claim(block);
+    claimed += more ? 1 : 0;
+    return more;
+  }
+  void fill(Block& block) override { reader.fill(block); }
+  void take() {
+    const std::lock_guard lock(mutex);
+    ++taken;
+    arrived.notify_all();
+  }
+  [[nodiscard]] const std::vector<Damage>& damages() const override { return reader.damages(); }
+
+  Reader& reader;
+  std::thread::id joining = std::this_thread::get_id();
+  std::mutex mutex;
+  std::condition_variable arrived;
+  unsigned claimed = 0;
+  unsigned taken = 0;
+  bool held_up = false;
+};
+
+TEST(Async, WhoClaimsABlockKeepsNobodyFromDecoding) {
+  Pen pen(8, Parity::none, 1);
+  for (unsigned i = 0; i < 2000; ++i) pen.character(0x55);
+  const Wires wires{{pen.levels}};
+  MemoryReader memory(wires, Content::samples, 1000, 1);
+  Slow reader(memory);
+  decode_async(reader, std::vector<AsyncLine>{{0, {.baud = 125e6, .idle = Idle::high}}}, 2, [&](const Part&) {
+    reader.take();
+    return true;
+  });
+  EXPECT_GE(reader.taken, reader.claimed);
+  EXPECT_FALSE(reader.held_up);
 }
 
 }  // namespace
