@@ -270,34 +270,53 @@ TEST(Async, WhatTheReaderThrowsArrives) {
 }
 
 // Of text, to claim a block is to parse it: who does that must not keep the others from decoding what came before.
-struct Slow : Reader {
-  explicit Slow(Reader& other) : reader(other) {}
-  [[nodiscard]] const Layout& layout() const override { return reader.layout(); }
+class Slow final : public Reader {
+ public:
+  explicit Slow(Reader& reader) : reader_(reader) {}
+
+  [[nodiscard]] const Layout& layout() const override { return reader_.layout(); }
+  [[nodiscard]] const std::vector<Damage>& damages() const override { return reader_.damages(); }
+
+  // Another thread than the one that joins is not done before all that was claimed has arrived.
   [[nodiscard]] bool claim(Block& block) override {
-    std::unique_lock lock(mutex);
-    // Where another thread than the one that joins is here, what was claimed before arrives meanwhile.
-    if (std::this_thread::get_id() != joining) {
-      held_up = held_up || !arrived.wait_for(lock, std::chrono::minutes(1), [this] { return taken == claimed; });
+    std::unique_lock lock(mutex_);
+    if (!is_joining() && claimed_ != arrived_) {
+      overlaps_ = true;
+      changed_.notify_all();
+      wait(lock, [this] { return claimed_ == arrived_; });
     }
-    const bool more = reader.claim(block);
-    claimed += more ? 1 : 0;
+    const bool more = reader_.claim(block);
+    claimed_ += more ? 1 : 0;
     return more;
   }
-  void fill(Block& block) override { reader.fill(block); }
-  void take() {
-    const std::lock_guard lock(mutex);
-    ++taken;
-    arrived.notify_all();
+  // The one that joins has something that was claimed while another thread claims.
+  void fill(Block& block) override {
+    std::unique_lock lock(mutex_);
+    if (is_joining()) wait(lock, [this] { return overlaps_; });
+    reader_.fill(block);
   }
-  [[nodiscard]] const std::vector<Damage>& damages() const override { return reader.damages(); }
+  void arrive() {
+    const std::lock_guard lock(mutex_);
+    ++arrived_;
+    changed_.notify_all();
+  }
+  [[nodiscard]] bool held_up() const { return held_up_; }
 
-  Reader& reader;
-  std::thread::id joining = std::this_thread::get_id();
-  std::mutex mutex;
-  std::condition_variable arrived;
-  unsigned claimed = 0;
-  unsigned taken = 0;
-  bool held_up = false;
+ private:
+  [[nodiscard]] bool is_joining() const { return std::this_thread::get_id() == joining_; }
+  template <class Condition>
+  void wait(std::unique_lock<std::mutex>& lock, Condition condition) {
+    held_up_ = held_up_ || !changed_.wait_for(lock, std::chrono::minutes(1), condition);
+  }
+
+  Reader& reader_;
+  std::thread::id joining_ = std::this_thread::get_id();
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  unsigned claimed_ = 0;
+  unsigned arrived_ = 0;
+  bool overlaps_ = false;
+  bool held_up_ = false;
 };
 
 TEST(Async, WhoClaimsABlockKeepsNobodyFromDecoding) {
@@ -307,11 +326,10 @@ TEST(Async, WhoClaimsABlockKeepsNobodyFromDecoding) {
   MemoryReader memory(wires, Content::samples, 1000, 1);
   Slow reader(memory);
   decode_async(reader, std::vector<AsyncLine>{{0, {.baud = 125e6, .idle = Idle::high}}}, 2, [&](const Part&) {
-    reader.take();
+    reader.arrive();
     return true;
   });
-  EXPECT_GE(reader.taken, reader.claimed);
-  EXPECT_FALSE(reader.held_up);
+  EXPECT_FALSE(reader.held_up());
 }
 
 }  // namespace
