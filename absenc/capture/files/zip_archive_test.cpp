@@ -94,7 +94,8 @@ TEST(ZipArchive, WhatIsPackedAnotherWayIsReadOnly) {
 
 TEST(ZipArchive, EntriesOfAnySizeOneAfterTheOther) {
   std::vector<std::pair<std::string, FileBytes>> entries;
-  for (const std::size_t size : {70'000, 1, 0, 100'000, 3}) entries.emplace_back(std::to_string(size), mixed(size));
+  for (const std::size_t size : {70'000u, 1u, 0u, 100'000u, 3u})
+    entries.emplace_back(std::to_string(size), mixed(size));
   const auto source = memory_source(make_zip(entries));
   ZipArchive archive(*source);
   for (const auto& [name, bytes] : entries) {
