@@ -158,16 +158,13 @@ bool ZipArchive::expand(const Entry& entry, std::span<std::uint8_t> into) {
   zip_stat_init(&stat);
   constexpr zip_uint64_t needed =
       ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE | ZIP_STAT_CRC | ZIP_STAT_COMP_METHOD | ZIP_STAT_ENCRYPTION_METHOD;
-  if (zip_stat_index(state_->archive.get(), entry.index, 0, &stat) != 0 || (stat.valid & needed) != needed)
-    return false;
-  const bool stored = stat.comp_method == ZIP_CM_STORE;
-  if (!stored && stat.comp_method != ZIP_CM_DEFLATE) return false;
-  if (stat.encryption_method != ZIP_EM_NONE || stat.size != into.size()) return false;
-  if (stat.comp_size > most_packed(into.size()) || (stored && stat.comp_size != stat.size)) return false;
-  const std::span<std::uint8_t> packed = stored ? into : state_->room(static_cast<std::size_t>(stat.comp_size));
+  const bool known =
+      zip_stat_index(state_->archive.get(), entry.index, 0, &stat) == 0 && (stat.valid & needed) == needed;
+  if (!known || stat.comp_method != ZIP_CM_DEFLATE || stat.encryption_method != ZIP_EM_NONE) return false;
+  if (stat.size != into.size() || stat.comp_size > most_packed(into.size())) return false;
+  const std::span<std::uint8_t> packed = state_->room(static_cast<std::size_t>(stat.comp_size));
   state_->file.reset(zip_fopen_index(state_->archive.get(), entry.index, ZIP_FL_COMPRESSED));
-  if (state_->file == nullptr || read(packed) != packed.size()) return false;
-  if (!stored && !state_->inflate(packed, into)) return false;
+  if (state_->file == nullptr || read(packed) != packed.size() || !state_->inflate(packed, into)) return false;
   return libdeflate_crc32(0, into.data(), into.size()) == stat.crc;
 }
 
