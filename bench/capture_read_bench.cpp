@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reading captures against doing the least: raw samples against std::fread, a session of sigrok against libzip's own
-// inflate, as in a loop of its manual; and the text formats by themselves. Files are of 64 MiB of samples.
+// inflate, as in a loop of its manual; and text, a value change dump and CSV, by itself. Files are of 64 MiB of
+// samples.
 #include <zip.h>
 
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -42,6 +44,7 @@ struct Files {
     std::ofstream(raw(), std::ios::binary).write(samples.data(), static_cast<std::streamsize>(samples.size()));
     write_session(samples);
     write_dump(samples);
+    write_csv(samples);
   }
   ~Files() { std::filesystem::remove_all(folder); }
   Files(const Files&) = delete;
@@ -50,6 +53,7 @@ struct Files {
   [[nodiscard]] std::string raw() const { return folder / "raw"; }
   [[nodiscard]] std::string session() const { return folder / "session.sr"; }
   [[nodiscard]] std::string dump() const { return folder / "dump.vcd"; }
+  [[nodiscard]] std::string csv() const { return folder / "digital.csv"; }
 
   void write_session(const std::vector<char>& samples) const {
     zip_t* archive = zip_open(session().c_str(), ZIP_CREATE, nullptr);
@@ -78,6 +82,23 @@ struct Files {
       for (unsigned bit = 0; bit < 8; ++bit) {
         if (((now ^ before) >> bit & 1) != 0) file << ' ' << (now >> bit & 1) << static_cast<char>('!' + bit);
       }
+      file << '\n';
+      before = now;
+    }
+  }
+
+  // As Saleae's Logic 2 exports them.
+  void write_csv(const std::vector<char>& samples) const {
+    std::ofstream file(csv());
+    file << "Time [s],0,1,2,3,4,5,6,7\n";
+    int before = -1;
+    for (std::size_t i = 0; i < samples.size() / 2; ++i) {
+      const auto now = static_cast<unsigned char>(samples[i]);
+      if (now == before) continue;
+      std::array<char, 64> row{};
+      const auto time = static_cast<double>(i) / 24e6;
+      file.write(row.data(), std::snprintf(row.data(), row.size(), "%.9f", time));
+      for (unsigned bit = 0; bit < 8; ++bit) file << ',' << (now >> bit & 1);
       file << '\n';
       before = now;
     }
@@ -147,6 +168,9 @@ BENCHMARK(sigrok_session_reference)->Unit(benchmark::kMillisecond);
 
 void value_change_dump(benchmark::State& state) { read_blocks(state, files().dump(), {}); }
 BENCHMARK(value_change_dump)->Unit(benchmark::kMillisecond);
+
+void logic_csv(benchmark::State& state) { read_blocks(state, files().csv(), {}); }
+BENCHMARK(logic_csv)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

@@ -37,11 +37,13 @@ const Unit* find_unit(std::string_view name) {
 }
 
 std::string_view take_field(std::string_view& row) {
-  const std::size_t comma = row.find(',');
+  const std::size_t comma = row.size() > 1 && row[1] == ',' ? 1 : row.find(',');  // most fields are a level
   const std::string_view field = row.substr(0, comma);
   row.remove_prefix(comma == std::string_view::npos ? row.size() : comma + 1);
   return field;
 }
+
+constexpr bool is_level(char c) { return c == '0' || c == '1' || c == 'X' || c == 'x'; }
 
 bool begins_with_time(std::string_view line) { return line.starts_with("Time [s],") || line.starts_with("Time,"); }
 
@@ -140,7 +142,7 @@ class LogicCsv final : public ParsedReader {
       if (take_field(line) == "logic") {
         add_column(column < names_.size() ? names_[column] : std::to_string(column), name);
       } else {
-        columns_.push_back(false);
+        columns_.push_back(0);
         ++others;
       }
     }
@@ -155,7 +157,7 @@ class LogicCsv final : public ParsedReader {
       throw OpenError(std::string(name) + " has more than " + std::to_string(most_channels) + " channels");
     }
     layout_.channels.push_back(std::move(channel));
-    columns_.push_back(true);
+    columns_.push_back(1);
   }
 
   bool fail(std::string what) {
@@ -177,10 +179,10 @@ class LogicCsv final : public ParsedReader {
     const std::optional<Tick> at = row_time(row);
     if (!at) return fail("this row has no time that goes on from the row before it: is the file cut or mixed up?");
     values_.clear();
-    for (const bool channel : columns_) {
+    for (const char channel : columns_) {
       const std::string_view field = trim(take_field(row));
-      if (!channel) continue;
-      if (field.size() != 1 || std::string_view("01Xx").find(field[0]) == std::string_view::npos) {
+      if (channel == 0) continue;
+      if (field.size() != 1 || !is_level(field[0])) {
         return fail("this row does not have 0, 1 or X for each channel: is the file cut here?");
       }
       values_.push_back(field[0]);
@@ -205,7 +207,8 @@ class LogicCsv final : public ParsedReader {
       if (value == std::numeric_limits<Tick>::max()) return std::nullopt;
       at = value;
     } else {
-      const auto instant = field.find(':') == std::string_view::npos ? parse_seconds(field) : parse_clock(field);
+      std::optional<Instant> instant = parse_seconds(field);
+      if (!instant) instant = parse_clock(field);
       if (!instant) return std::nullopt;
       if (first) origin_ = *instant;
       at = ticks_between(origin_, *instant, 1);
@@ -237,7 +240,7 @@ class LogicCsv final : public ParsedReader {
   TextLines lines_;
   std::uint64_t rate_;
   std::vector<std::string> names_;
-  std::vector<bool> columns_;  // of a channel, the column of time aside
+  std::vector<char> columns_;  // of a channel, the column of time aside
   Clock clock_ = Clock::seconds;
   bool skip_first_ = false;
   bool first_row_ = true;

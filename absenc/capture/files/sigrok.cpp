@@ -124,9 +124,13 @@ class SigrokReader final : public Reader {
         std::max(static_cast<std::size_t>(block.end - block.first) * bytes_per_sample_, size + piece.tail));
     const std::span<std::uint8_t> into(block.samples);
     std::unique_ptr<ZipArchive> archive = take();
-    const bool opened = archive != nullptr && archive->open(piece.entry);
-    std::size_t count = opened ? archive->read(into.first(size)) : 0;
-    const bool whole = opened && count == size && archive->at_good_end();
+    bool whole = archive != nullptr && archive->expand(piece.entry, into.first(size));
+    std::size_t count = size;
+    if (!whole) {
+      const bool opened = archive != nullptr && archive->open(piece.entry);
+      count = opened ? archive->read(into.first(size)) : 0;
+      whole = opened && count == size && archive->at_good_end();
+    }
     if (whole) {
       count += read_tail(*archive, index, into.subspan(size, piece.tail));
     } else if (!ends_at_cut(piece, archive.get())) {

@@ -154,6 +154,25 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
   }
 }
 
+TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
+  const FileBytes samples = wave(1 << 16);
+  for (const bool deflate : {true, false}) {
+    std::vector<std::pair<std::string, FileBytes>> pieces;
+    for (int i = 1; i <= 12; ++i) pieces.emplace_back("logic-1-" + std::to_string(i), samples);
+    FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
+    constexpr std::string_view name = "logic-1-7";  // it stands in front of the piece, and in the directory
+    const auto in_directory = std::find_end(file.begin(), file.end(), name.begin(), name.end());
+    *(in_directory - 30) ^= 1;  // of the checksum
+    const auto reader = open_bytes(file);
+    FileBytes expected;
+    for (int i = 0; i < 11; ++i) expected.insert(expected.end(), samples.begin(), samples.end());
+    EXPECT_TRUE(read_in_threads(*reader) == expected);
+    ASSERT_EQ(reader->damages().size(), 1u);
+    EXPECT_EQ(reader->damages()[0].tick, 6u << 16);
+    EXPECT_EQ(reader->damages()[0].what, "logic-1-7, which ends at sample 458752, is damaged: CRC error");
+  }
+}
+
 TEST(Sigrok, ALargePieceThatIsDamagedEndsWhereItShows) {
   const FileBytes samples = wave(20 << 20);
   const FileBytes behind(1000, 0x5A);

@@ -113,8 +113,8 @@ inline FileBytes read_in_threads(Reader& reader) {
   return all;
 }
 
-/// A zip archive, as libzip writes it; entries are deflated, or stored as they are.
-inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, bool deflate = true) {
+/// A zip archive, as libzip writes it, with its method of packing.
+inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, zip_int32_t method) {
   zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, nullptr);
   zip_source_keep(target);
   zip_t* archive = zip_open_from_source(target, ZIP_TRUNCATE, nullptr);
@@ -123,7 +123,7 @@ inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& 
     zip_source_t* from = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
     const zip_int64_t index = zip_file_add(archive, name.c_str(), from, 0);
     require_that(index >= 0);
-    zip_set_file_compression(archive, static_cast<zip_uint64_t>(index), deflate ? ZIP_CM_DEFLATE : ZIP_CM_STORE, 1);
+    zip_set_file_compression(archive, static_cast<zip_uint64_t>(index), method, 1);
   }
   require_that(zip_close(archive) == 0);
   zip_stat_t stat;
@@ -133,6 +133,11 @@ inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& 
   zip_source_close(target);
   zip_source_free(target);
   return made;
+}
+
+/// Entries are deflated, or stored as they are.
+inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, bool deflate = true) {
+  return make_zip(entries, deflate ? zip_int32_t{ZIP_CM_DEFLATE} : zip_int32_t{ZIP_CM_STORE});
 }
 
 inline std::string sigrok_metadata(std::string_view rate, unsigned channels, unsigned unit_size) {

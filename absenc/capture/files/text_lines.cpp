@@ -14,7 +14,6 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
 constexpr std::size_t read_at_once = 1 << 18;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -73,6 +72,36 @@ std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t 
     value = 10 * value + (inside ? decimal.digits[static_cast<std::size_t>(i)] - '0' : 0);
   }
   return value;
+}
+
+// As programs write seconds, "12.000125", into a positive instant; false: it may be written another way. A million rows
+// have a million of them.
+bool read_plain_seconds(std::string_view text, Instant& instant) {
+  constexpr std::ptrdiff_t most_digits = 18;
+  constexpr std::array<std::int64_t, 13> picoseconds = {
+      1'000'000'000'000, 100'000'000'000, 10'000'000'000, 1'000'000'000, 100'000'000, 10'000'000, 1'000'000,
+      100'000,           10'000,          1'000,          100,           10,          1};
+  const auto end = text.end();
+  auto at = text.begin();
+  for (; at != end && is_digit(*at) && at - text.begin() < most_digits; ++at) {
+    instant.seconds = 10 * instant.seconds + (*at - '0');
+  }
+  if (at == text.begin() || at == end || *at != '.') return false;
+  const auto fraction = ++at;
+  for (; at != end && is_digit(*at) && at - fraction < 12; ++at) {
+    instant.picoseconds = 10 * instant.picoseconds + (*at - '0');
+  }
+  instant.picoseconds *= picoseconds[static_cast<std::size_t>(at - fraction)];
+  return at == end;
+}
+
+// However decimal numbers are written.
+bool read_seconds(std::string_view text, Instant& instant) {
+  const std::optional<Decimal> decimal = parse_decimal(text);
+  if (!decimal || decimal->point > 18) return false;
+  instant = {digits_at(*decimal, 0, std::max<std::int64_t>(decimal->point, 0)),
+             digits_at(*decimal, decimal->point, 12)};
+  return true;
 }
 
 // "2026-11-21": days since 1970.
@@ -148,10 +177,8 @@ bool TextLines::next(std::string_view& line) {
 std::optional<Instant> parse_seconds(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
-  const std::optional<Decimal> decimal = parse_decimal(text);
-  if (!decimal || decimal->point > 18) return std::nullopt;
-  Instant instant{digits_at(*decimal, 0, std::max<std::int64_t>(decimal->point, 0)),
-                  digits_at(*decimal, decimal->point, 12)};
+  Instant instant;
+  if (!read_plain_seconds(text, instant) && !read_seconds(text, instant)) return std::nullopt;
   if (negative) {
     instant.seconds = -instant.seconds;
     if (instant.picoseconds != 0) {
@@ -185,19 +212,6 @@ std::optional<Instant> parse_clock(std::string_view text) {
   return Instant{seconds + *hour * 3600 + *minute * 60 + second->seconds, second->picoseconds};
 }
 
-std::optional<Tick> ticks_between(const Instant& from, const Instant& to, std::int64_t picoseconds) {
-  // Both are below 10^18 seconds, so that the difference fits.
-  std::int64_t seconds = to.seconds - from.seconds;
-  std::int64_t rest = to.picoseconds - from.picoseconds;
-  if (rest < 0) {
-    rest += picoseconds_per_second;
-    --seconds;
-  }
-  const std::int64_t per_second = picoseconds_per_second / picoseconds;
-  if (seconds < 0 || seconds > std::numeric_limits<std::int64_t>::max() / per_second - 1) return std::nullopt;
-  return static_cast<Tick>(seconds * per_second + rest / picoseconds);
-}
-
 std::optional<std::uint64_t> parse_rate(std::string_view text) {
   text = trim(text);
   const std::size_t end = std::min(text.find_first_not_of("0123456789.,"), text.size());
@@ -218,10 +232,10 @@ std::optional<std::uint64_t> parse_rate(std::string_view text) {
 }
 
 std::string_view trim(std::string_view text) {
-  constexpr std::string_view blanks = " \t\r\n";
-  const std::size_t first = text.find_first_not_of(blanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
 }
 
 std::string_view take_word(std::string_view& text) {

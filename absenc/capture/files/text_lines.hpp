@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -40,6 +41,8 @@ class TextLines {
   bool too_long_ = false;
 };
 
+inline constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
+
 /// A place in time: of a clock, or from whatever a program counts.
 struct Instant {
   std::int64_t seconds = 0;
@@ -53,7 +56,19 @@ struct Instant {
 [[nodiscard]] std::optional<Instant> parse_clock(std::string_view text);
 
 /// Ticks of 10^12 / `picoseconds` a second; nothing when `to` is before `from` or too late to be counted.
-[[nodiscard]] std::optional<Tick> ticks_between(const Instant& from, const Instant& to, std::int64_t picoseconds);
+[[nodiscard]] constexpr std::optional<Tick> ticks_between(const Instant& from, const Instant& to,
+                                                          std::int64_t picoseconds) {
+  // Both are below 10^18 seconds, so that the difference fits.
+  std::int64_t seconds = to.seconds - from.seconds;
+  std::int64_t rest = to.picoseconds - from.picoseconds;
+  if (rest < 0) {
+    rest += picoseconds_per_second;
+    --seconds;
+  }
+  const std::int64_t per_second = picoseconds_per_second / picoseconds;
+  if (seconds < 0 || seconds > std::numeric_limits<std::int64_t>::max() / per_second - 1) return std::nullopt;
+  return static_cast<Tick>(seconds * per_second + rest / picoseconds);
+}
 
 /// "1 MHz", "12.5 kHz", "250000": hertz; nothing when it is not a positive whole number.
 [[nodiscard]] std::optional<std::uint64_t> parse_rate(std::string_view text);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -24,7 +25,7 @@ class TextWords {
     while (begin_ != end_ && is_blank(buffer_[begin_])) ++begin_;
     std::size_t end = begin_;
     for (;;) {
-      while (end != end_ && !is_blank(buffer_[end])) ++end;
+      end = skip_word(end);
       if (end != end_) break;
       const std::size_t size = end - begin_;
       const bool more = size <= longest && refill();
@@ -50,6 +51,20 @@ class TextWords {
   static constexpr std::size_t longest = 1 << 16;
 
   static bool is_blank(std::uint8_t c) { return c <= ' ' && (c == ' ' || (c >= '\t' && c <= '\r')); }
+
+  // Eight bytes at a time, up to the first that may be a blank.
+  [[nodiscard]] std::size_t skip_word(std::size_t at) const {
+    constexpr std::uint64_t each = 0x0101010101010101;
+    while (std::endian::native == std::endian::little && end_ - at >= 8) {
+      std::uint64_t bytes = 0;
+      std::memcpy(&bytes, &buffer_[at], sizeof(bytes));
+      const std::uint64_t small = (bytes - each * (' ' + 1)) & ~bytes & each * 0x80;
+      at += small == 0 ? 8 : static_cast<std::size_t>(std::countr_zero(small)) / 8;
+      if (small != 0) break;
+    }
+    while (at != end_ && !is_blank(buffer_[at])) ++at;
+    return at;
+  }
 
   bool refill() {
     if (begin_ != 0) std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/capture/files/zip_archive.hpp"
 
+#include <libdeflate.h>
 #include <zip.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <cstring>
 #include <memory>
 #include <utility>
+#include <vector>
 
 namespace absenc::capture {
 
@@ -15,7 +17,7 @@ namespace {
 
 // What libzip reads from: a window on the source. libzip asks for 8 KiB at a time, the system is asked for more.
 struct Window {
-  Source* source;
+  Source* source = nullptr;
   std::uint64_t position = 0;
   std::uint64_t buffered_at = 0;
   std::size_t buffered = 0;
@@ -91,7 +93,11 @@ zip_int64_t answer(void* user, void* data, zip_uint64_t length, zip_source_cmd_t
 struct Close {
   void operator()(zip_t* archive) const { zip_discard(archive); }
   void operator()(zip_file_t* file) const { zip_fclose(file); }
+  void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
 };
+
+// Deflate adds 5 bytes to 64 KiB that it cannot make smaller; what is larger than that by far wastes memory.
+constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 1024; }
 
 }  // namespace
 
@@ -99,11 +105,25 @@ struct ZipArchive::State {
   Window window;
   std::unique_ptr<zip_t, Close> archive;
   std::unique_ptr<zip_file_t, Close> file;  // closed before its archive
+  std::unique_ptr<libdeflate_decompressor, Close> inflater;
+  std::vector<std::uint8_t> packed;
   std::string trouble;
   bool ran_out = false;
+
+  std::span<std::uint8_t> room(std::size_t size) {
+    if (packed.size() < size) packed.resize(size);
+    return std::span(packed).first(size);
+  }
+  // True: `into` is full, and that is all there is.
+  bool inflate(std::span<const std::uint8_t> from, std::span<std::uint8_t> into) {
+    if (inflater == nullptr) inflater.reset(libdeflate_alloc_decompressor());
+    return inflater != nullptr && libdeflate_deflate_decompress(inflater.get(), from.data(), from.size(), into.data(),
+                                                                into.size(), nullptr) == LIBDEFLATE_SUCCESS;
+  }
 };
 
-ZipArchive::ZipArchive(Source& source) : state_(new State{{&source}, nullptr, nullptr, {}, false}) {
+ZipArchive::ZipArchive(Source& source) : state_(std::make_unique<State>()) {
+  state_->window.source = &source;
   zip_error_t error;
   zip_error_init(&error);
   zip_error_init(&state_->window.error);
@@ -131,6 +151,21 @@ bool ZipArchive::find(const std::string& name, Entry& entry) const {
   if (index < 0 || zip_stat_index(state_->archive.get(), static_cast<zip_uint64_t>(index), 0, &stat) != 0) return false;
   entry = {static_cast<std::uint64_t>(index), (stat.valid & ZIP_STAT_SIZE) != 0 ? stat.size : 0};
   return true;
+}
+
+bool ZipArchive::expand(const Entry& entry, std::span<std::uint8_t> into) {
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  constexpr zip_uint64_t needed =
+      ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE | ZIP_STAT_CRC | ZIP_STAT_COMP_METHOD | ZIP_STAT_ENCRYPTION_METHOD;
+  const bool known =
+      zip_stat_index(state_->archive.get(), entry.index, 0, &stat) == 0 && (stat.valid & needed) == needed;
+  if (!known || stat.comp_method != ZIP_CM_DEFLATE || stat.encryption_method != ZIP_EM_NONE) return false;
+  if (stat.size != into.size() || stat.comp_size > most_packed(into.size())) return false;
+  const std::span<std::uint8_t> packed = state_->room(static_cast<std::size_t>(stat.comp_size));
+  state_->file.reset(zip_fopen_index(state_->archive.get(), entry.index, ZIP_FL_COMPRESSED));
+  if (state_->file == nullptr || read(packed) != packed.size() || !state_->inflate(packed, into)) return false;
+  return libdeflate_crc32(0, into.data(), into.size()) == stat.crc;
 }
 
 bool ZipArchive::open(const Entry& entry) {

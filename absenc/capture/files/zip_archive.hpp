@@ -27,6 +27,11 @@ class ZipArchive {
   /// False: there is none of that name.
   [[nodiscard]] bool find(const std::string& name, Entry& entry) const;
 
+  /// Expands a whole deflated entry into `into`, which has its size, in a quarter of the time that `open` and `read`
+  /// take. True only when all of it is there and its checksum is right; else those read it as far as can be, and say
+  /// what is wrong.
+  [[nodiscard]] bool expand(const Entry& entry, std::span<std::uint8_t> into);
+
   /// Begins to read an entry; the one before is closed. False: see `trouble`.
   [[nodiscard]] bool open(const Entry& entry);
   /// Expands what comes next straight into `into`; fewer bytes: see `trouble`.

@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
+#include <mutex>
 #include <stdexcept>
+#include <thread>
 
 #include "absenc/capture/files/memory_reader_test.hpp"
 #include "absenc/capture/lines/pipeline.hpp"
@@ -263,6 +267,69 @@ TEST(Async, WhatTheReaderThrowsArrives) {
     Failing reader(memory);
     EXPECT_THROW(decoded(reader, {{0, {.baud = 125e6, .idle = Idle::high}}}, threads), std::runtime_error);
   }
+}
+
+// Of text, to claim a block is to parse it: who does that must not keep the others from decoding what came before.
+class Slow final : public Reader {
+ public:
+  explicit Slow(Reader& reader) : reader_(reader) {}
+
+  [[nodiscard]] const Layout& layout() const override { return reader_.layout(); }
+  [[nodiscard]] const std::vector<Damage>& damages() const override { return reader_.damages(); }
+
+  // Another thread than the one that joins is not done before all that was claimed has arrived.
+  [[nodiscard]] bool claim(Block& block) override {
+    std::unique_lock lock(mutex_);
+    if (!is_joining() && claimed_ != arrived_) {
+      overlaps_ = true;
+      changed_.notify_all();
+      wait(lock, [this] { return claimed_ == arrived_; });
+    }
+    const bool more = reader_.claim(block);
+    claimed_ += more ? 1 : 0;
+    return more;
+  }
+  // The one that joins has something that was claimed while another thread claims.
+  void fill(Block& block) override {
+    std::unique_lock lock(mutex_);
+    if (is_joining()) wait(lock, [this] { return overlaps_; });
+    reader_.fill(block);
+  }
+  void arrive() {
+    const std::lock_guard lock(mutex_);
+    ++arrived_;
+    changed_.notify_all();
+  }
+  [[nodiscard]] bool held_up() const { return held_up_; }
+
+ private:
+  [[nodiscard]] bool is_joining() const { return std::this_thread::get_id() == joining_; }
+  template <class Condition>
+  void wait(std::unique_lock<std::mutex>& lock, Condition condition) {
+    held_up_ = held_up_ || !changed_.wait_for(lock, std::chrono::minutes(1), condition);
+  }
+
+  Reader& reader_;
+  std::thread::id joining_ = std::this_thread::get_id();
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  unsigned claimed_ = 0;
+  unsigned arrived_ = 0;
+  bool overlaps_ = false;
+  bool held_up_ = false;
+};
+
+TEST(Async, WhoClaimsABlockKeepsNobodyFromDecoding) {
+  Pen pen(8, Parity::none, 1);
+  for (unsigned i = 0; i < 2000; ++i) pen.character(0x55);
+  const Wires wires{{pen.levels}};
+  MemoryReader memory(wires, Content::samples, 1000, 1);
+  Slow reader(memory);
+  decode_async(reader, std::vector<AsyncLine>{{0, {.baud = 125e6, .idle = Idle::high}}}, 2, [&](const Part&) {
+    reader.arrive();
+    return true;
+  });
+  EXPECT_FALSE(reader.held_up());
 }
 
 }  // namespace

@@ -126,23 +126,27 @@ class BlockRun {
     return true;
   }
 
-  [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !free_.empty(); }
+  [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !claiming_ && !free_.empty(); }
 
-  // Takes a block and prepares it; the lock is held before and after.
+  // Takes a block and prepares it; the lock is held before and after. One thread claims, which of text is most of the
+  // work, while the others decode what was claimed before.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
     // The last that this thread had is still in its cache.
     const auto last = std::find_if(free_.rbegin(), free_.rend(), [&](const Job* job) { return job->thread == thread; });
     const auto own = last == free_.rend() ? free_.begin() : last.base() - 1;
     Job& job = **own;
+    free_.erase(own);
+    job.thread = thread;
+    claiming_ = true;
+    lock.unlock();
     try {
-      if (!reader_.claim(job.block)) {
-        exhausted_ = true;
-        changed_.notify_all();
-        return;
-      }
-      free_.erase(own);
-      flying_.push_back(&job);
-      job.thread = thread;
+      const bool claimed = reader_.claim(job.block);
+      lock.lock();
+      claiming_ = false;
+      exhausted_ = !claimed;
+      if (claimed) flying_.push_back(&job);
+      changed_.notify_all();
+      if (!claimed) return;
       lock.unlock();
       reader_.expand(job.block, job.levels);
       std::as_const(decoding_).guess(job.levels, job.guess);
@@ -196,6 +200,7 @@ class BlockRun {
   std::condition_variable changed_;
   std::vector<Job*> free_;
   std::deque<Job*> flying_;  // in the order of the capture
+  bool claiming_ = false;
   bool exhausted_ = false;
   bool stopped_ = false;
   std::exception_ptr failure_;

@@ -77,6 +77,32 @@ std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
   return outcome.problem;
 }
 
+// The levels of a bus, for capture::BlockRun: a frame depends on those before it, so that only reading and expanding
+// are done ahead.
+struct BusDecoding {
+  struct Guess {};
+
+  capture::CanDecoder decoder;
+  capture::CanAnnotator& annotator;
+  const std::function<void(Tick)>& progress;
+  std::vector<capture::CanRecord> frames{};
+  Tick end = 0;
+
+  void guess(const capture::Levels&, Guess&) const {}
+  bool join(const capture::Levels& levels, Guess&) { return decode(levels); }
+  bool decode(const capture::Levels& levels) {
+    decoder.decode(levels.changes[0], levels.first, levels.end, frames);
+    annotate();
+    end = std::max(end, levels.end);
+    progress(levels.end);
+    return true;
+  }
+  void annotate() {
+    for (const capture::CanRecord& frame : frames) annotator.put(frame);
+    frames.clear();
+  }
+};
+
 // Reads blocks that need no decoding.
 template <class Take>
 void read_all(capture::Reader& reader, Take&& take) {
@@ -258,27 +284,15 @@ CaptureOutcome CaptureRun::run_bus(capture::AnnotationSink& sink, const std::fun
                     ticks_per_second(), rate));
   }
   CaptureOutcome outcome;
-  capture::CanDecoder decoder(bit);
   capture::CanAnnotator annotator(unit_, options_, capture::line_ticks(unit_, bit, ticks_per_second()), sink);
-  std::vector<capture::CanRecord> frames;
-  const auto take = [&] {
-    for (const capture::CanRecord& frame : frames) annotator.put(frame);
-    frames.clear();
-  };
   capture::LevelReader reader(*reader_, {*wires.wires[0]});
   outcome.problem = reader.problem();
   if (!outcome.problem.empty()) return outcome;
-  capture::Block block;
-  capture::Levels levels;
-  while (reader.claim(block)) {
-    reader.expand(block, levels);
-    decoder.decode(levels.changes[0], levels.first, levels.end, frames);
-    take();
-    outcome.end = std::max(outcome.end, levels.end);
-    progress(levels.end);
-  }
-  decoder.finish(frames);
-  take();
+  BusDecoding decoding{.decoder = capture::CanDecoder(bit), .annotator = annotator, .progress = progress};
+  capture::BlockRun<BusDecoding>(reader, decoding, threads()).run();
+  decoding.decoder.finish(decoding.frames);
+  decoding.annotate();
+  outcome.end = decoding.end;
   annotator.finish(outcome.end);
   return outcome;
 }

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/capture/files/zip_archive.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string_view>
+
+#include "absenc/capture/files/test_files.hpp"
+
+namespace absenc::capture {
+namespace {
+
+// Half of it can be made smaller.
+FileBytes mixed(std::size_t size) {
+  std::mt19937 random(7);
+  FileBytes bytes(size);
+  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::uint8_t>(i % 512 < 256 ? random() : i / 512);
+  return bytes;
+}
+
+const FileBytes content = mixed(100'000);
+
+// Where a number of the entry stands in the directory, counted from its signature.
+std::uint8_t& in_directory(FileBytes& file, std::size_t at) {
+  constexpr std::string_view signature = "PK\x01\x02";
+  const auto found = std::search(file.begin(), file.end(), signature.begin(), signature.end());
+  return found[static_cast<std::ptrdiff_t>(at)];
+}
+constexpr std::size_t checksum = 16;
+constexpr std::size_t unpacked_size = 24;
+
+struct Expanded {
+  bool whole = false;
+  FileBytes bytes;
+  bool found_by_reading = false;  // open, read, and what they say of the end
+  std::string trouble;
+};
+
+Expanded expanded(FileBytes file) {
+  const auto source = memory_source(std::move(file));
+  ZipArchive archive(*source);
+  ZipArchive::Entry entry;
+  require_that(archive.find("entry", entry));
+  Expanded result;
+  result.bytes.resize(static_cast<std::size_t>(entry.size));
+  result.whole = archive.expand(entry, result.bytes);
+  FileBytes read(result.bytes.size());
+  result.found_by_reading =
+      archive.open(entry) && archive.read(read) == read.size() && archive.at_good_end() && read == content;
+  result.trouble = archive.trouble();
+  return result;
+}
+
+TEST(ZipArchive, ExpandsAWholeEntry) {
+  const Expanded result = expanded(make_zip({{"entry", content}}));
+  EXPECT_TRUE(result.whole);
+  EXPECT_TRUE(result.bytes == content);
+  EXPECT_TRUE(result.found_by_reading);
+}
+
+TEST(ZipArchive, WhatIsWrongIsToldByReading) {
+  for (const bool deflate : {true, false}) {
+    const FileBytes good = make_zip({{"entry", content}}, deflate);
+    FileBytes file = good;
+    in_directory(file, checksum) ^= 1;
+    Expanded result = expanded(file);
+    EXPECT_FALSE(result.whole);
+    EXPECT_EQ(result.trouble, "CRC error");
+
+    file = good;
+    file[200] ^= 0x10;  // within the entry
+    result = expanded(file);
+    EXPECT_FALSE(result.whole || result.found_by_reading);
+    EXPECT_NE(result.trouble, "");
+  }
+  for (const int change : {-1, 1}) {
+    FileBytes file = make_zip({{"entry", content}});
+    in_directory(file, unpacked_size) = static_cast<std::uint8_t>(in_directory(file, unpacked_size) + change);
+    const Expanded result = expanded(file);
+    EXPECT_FALSE(result.whole || result.found_by_reading);
+  }
+}
+
+// Stored, too: libzip looks at the checksum of that whether it is asked to or not.
+TEST(ZipArchive, WhatIsPackedAnotherWayIsReadOnly) {
+  for (const zip_int32_t method : {ZIP_CM_STORE, ZIP_CM_BZIP2}) {
+    if (zip_compression_method_supported(method, 1) == 0) continue;
+    const Expanded result = expanded(make_zip({{"entry", content}}, method));
+    EXPECT_FALSE(result.whole);
+    EXPECT_TRUE(result.found_by_reading);
+  }
+}
+
+TEST(ZipArchive, EntriesOfAnySizeOneAfterTheOther) {
+  std::vector<std::pair<std::string, FileBytes>> entries;
+  for (const std::size_t size : {70'000u, 1u, 0u, 100'000u, 3u})
+    entries.emplace_back(std::to_string(size), mixed(size));
+  const auto source = memory_source(make_zip(entries));
+  ZipArchive archive(*source);
+  for (const auto& [name, bytes] : entries) {
+    ZipArchive::Entry entry;
+    ASSERT_TRUE(archive.find(name, entry));
+    FileBytes into(bytes.size(), 0xEE);
+    EXPECT_TRUE(archive.expand(entry, into)) << name;
+    EXPECT_TRUE(into == bytes) << name;
+  }
+}
+
+}  // namespace
+}  // namespace absenc::capture
