@@ -22,6 +22,23 @@ class Decoding {
     if (seen.reading) reading_shows(seen);
   }
 
+  // Of a request that stops early, or goes on, nothing is told either.
+  void good_request() {
+    if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
+    const auto unknown = [&](const Held& request, std::string_view what) {
+      Seen seen;
+      const Error error = unit_.decode(options_, request.frame(), {}, seen);
+      require(error != Error::none && seen.fields.empty(),
+              [&] { return "its request " + std::string(what) + " is accepted"; });
+    };
+    for (std::size_t size = 1; size < request_.elements(); ++size) {
+      const Held begin = request_.cut(size);
+      const FrameEnd end = unit_.frame_end(options_, Direction::request, begin.bytes);
+      if (end.kind != FrameEnd::Kind::complete) unknown(begin, "cut after " + std::to_string(size));
+    }
+    unknown(request_.between({}, std::array<std::uint8_t, 1>{0}), "with another byte");
+  }
+
   void good_reply() {
     std::size_t flipped = 0;
     for (std::size_t bit = 0; bit < reply_.bit_count(); ++bit) {
@@ -126,7 +143,9 @@ Findings check_decoding(const Unit& unit) {
     if (!options) continue;
     Decoding decoding(unit, vector, *options, findings);
     decoding.whole();
-    if (!vector.reply.empty() && vector.error == Error::none) decoding.good_reply();
+    if (vector.error != Error::none) continue;
+    decoding.good_request();
+    if (!vector.reply.empty()) decoding.good_reply();
   }
   return findings;
 }
