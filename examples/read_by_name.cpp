@@ -8,16 +8,18 @@
 using namespace absenc;
 
 int main(int argc, char** argv) try {
+  // [readme]
   client::Encoder encoder = client::open(argc > 1 ? argv[1] : "sim:tformat?motion=rpm=60");
   for (const client::Sample& sample : encoder.samples({.rate_hz = 100, .count = 5})) {
     if (sample.kind != client::Sample::Kind::reading) {
-      std::printf("%s%s\n", sample.message.c_str(), sample.trouble.text().c_str());
+      std::printf("%s\n", sample.text().c_str());
       continue;
     }
     const Reading& reading = sample.reading;
     if (!reading.singleturn_valid()) continue;  // nobody confirmed it, or the encoder says so itself
     std::printf("%.4f degrees, %.1f rpm\n", degrees(reading.singleturn, reading.singleturn_bits), sample.speed);
   }
+  // [readme]
 } catch (const std::exception& failure) {
   std::fprintf(stderr, "%s\n", failure.what());
   return 1;

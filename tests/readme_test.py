@@ -45,10 +45,13 @@ class Readme(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, f"{command}\n{done.stderr}")
                 self.assertTrue(done.stdout, command)
 
-    def test_the_program_is_the_example(self):
-        example = (SOURCE / "examples/read_position.cpp").read_text()
-        shown = textwrap.dedent(example.split("// [readme]\n")[1].rsplit("\n", 1)[0]).strip()
-        self.assertEqual(shown, blocks("cpp")[0].strip())
+    def test_the_programs_are_the_examples(self):
+        examples = ["read_by_name.cpp", "read_position.cpp"]
+        self.assertEqual(len(blocks("cpp")), len(examples))
+        for name, block in zip(examples, blocks("cpp")):
+            example = (SOURCE / "examples" / name).read_text()
+            shown = textwrap.dedent(example.split("// [readme]\n")[1].rsplit("\n", 1)[0]).strip()
+            self.assertEqual(shown, block.strip())
 
     def test_files_it_points_to_are_there(self):
         links = re.findall(r"\]\(([^)#]+)\)", README)

@@ -45,6 +45,9 @@ struct Sample {
   Time speed_delay{};
   Trouble trouble{};      // failed
   std::string message{};  // lost, absent, back, restarted
+
+  /// Why there is no reading, or what happened; "" of a reading that goes on.
+  [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
 class Connection;
