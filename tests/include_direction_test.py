@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- tools; os needs
-core, link."""
+core, link. A public header, which is installed, needs public ones only."""
 
 import os
 import re
@@ -27,6 +27,8 @@ FREESTANDING_HEADERS = set(
     """algorithm array bit cfloat chrono climits compare concepts coroutine cstddef cstdint cstring initializer_list iterator
     limits new numbers numeric optional ratio span string_view tuple type_traits utility version""".split()
 )
+# Layers whose headers are all public.
+WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
 # Each costs seconds for every file that includes it.
 HEAVY = ("CLI/", "toml++/", "nlohmann/")
 LIGHT = {"nlohmann/json_fwd.hpp"}
@@ -54,6 +56,14 @@ def built_on(root, unit):
     return set(re.findall(r"[a-z0-9_]+", match.group(1))) if match else set()
 
 
+def is_public(path):
+    """What CMakeLists.txt gives to absenc_public."""
+    if path.suffix != ".hpp" or path.parts[0] != "absenc" or is_test(path):
+        return False
+    in_client = path.parts[1] == "client" and len(path.parts) == 3
+    return path.parts[1] in WHOLLY_PUBLIC or in_client or path == Path("absenc/os/error.hpp")
+
+
 def layer_fault(root, path, target):
     """Why the file at `path` must not include the project's header `target`, or None."""
     layer = path.parts[1] if path.parts[0] == "absenc" else path.parts[0]
@@ -73,7 +83,7 @@ def layer_fault(root, path, target):
             return f'is another unit: say "Built on: {other}" in the README.md of {unit}'
     if layer in BELOW and target.parts[1] not in BELOW[layer] | {layer}:
         return f"is not below {layer}"
-    return None
+    return "is internal, for no public header" if is_public(path) and not is_public(target) else None
 
 
 def system_fault(path, header):
@@ -81,6 +91,8 @@ def system_fault(path, header):
     in_absenc = path.parts[0] == "absenc"
     if in_absenc and path.parts[1] in FREESTANDING and not is_test(path):
         return None if header in FREESTANDING_HEADERS else "is not a freestanding header"
+    if is_public(path) and re.search(r"[/.]", header):
+        return "is no header of C++: not for a public header"
     at_os = path.parts[:2] == ("absenc", "os") or path.parts[0] == "bench"
     return "belongs into absenc/os" if OS_HEADER.search(header) and not at_os else None
 
@@ -127,6 +139,13 @@ class TheCheckItself(unittest.TestCase):
         "absenc/protocol/two/unit.hpp": '#include "absenc/protocol/one/unit.hpp"\n',
         "absenc/host/drive.hpp": '#include "absenc/link/step.hpp"\n',
         "absenc/sim/line.hpp": '#include <vector>\n#include "absenc/link/step.hpp"\n',
+        "absenc/os/error.hpp": '#include <string>\n#include "absenc/core/bits.hpp"\n',
+        "absenc/os/serial.hpp": '#include <poll.h>\n#include "absenc/os/error.hpp"\n',
+        "absenc/capture/open.hpp": "",
+        "absenc/client/encoder.hpp": '#include "absenc/client/row.hpp"\n#include "absenc/sim/line.hpp"\n',
+        "absenc/client/row.hpp": '#include "absenc/os/error.hpp"\n',
+        "absenc/client/row.cpp": '#include <fmt/core.h>\n#include "absenc/client/text/rows.hpp"\n',
+        "absenc/client/text/rows.hpp": '#include "absenc/capture/open.hpp"\n#include "absenc/os/serial.hpp"\n',
         "absenc/os/serial.cpp": '#include <sys/ioctl.h>\n#include "absenc/link/step.hpp"\n',
         "tools/absenc/main.cpp": '#include <CLI/CLI.hpp>\n#include "absenc/protocol/all.hpp"\n',
         "tools/absenc/text.hpp": "#include <string>\n",
@@ -164,6 +183,13 @@ class TheCheckItself(unittest.TestCase):
             ("absenc/sim/line.hpp", '#include "absenc/os/none.hpp"'),
             ("absenc/sim/line.hpp", "#include <unistd.h>"),
             ("absenc/os/serial.cpp", '#include "absenc/protocol/unit.hpp"'),
+            ("absenc/os/error.hpp", '#include "absenc/os/serial.hpp"'),
+            ("absenc/client/encoder.hpp", '#include "absenc/client/text/rows.hpp"'),
+            ("absenc/client/encoder.hpp", '#include "absenc/capture/open.hpp"'),
+            ("absenc/client/encoder.hpp", '#include "absenc/os/serial.hpp"'),
+            ("absenc/client/encoder.hpp", "#include <fmt/core.h>"),
+            ("absenc/client/encoder.hpp", "#include <poll.h>"),
+            ("absenc/client/row.cpp", '#include "absenc/protocol/one/unit.hpp"'),
             ("tools/absenc/main.cpp", '#include "absenc/protocol/one/unit.hpp"'),
             ("tools/absenc/main.cpp", "#include <linux/spi/spidev.h>"),
             ("tools/absenc/main.cpp", "#include <fuse3/cuse_lowlevel.h>"),
