@@ -2,11 +2,11 @@
 // The library as a program uses it: against virtual encoders, in this process and on pseudo-terminals.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <set>
 #include <thread>
 
@@ -21,6 +21,11 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Kind = Sample::Kind;
 
+/// A path of this test alone.
+std::string own_path(std::string_view what) {
+  return testing::TempDir() + "absenc-client-" + std::string(what) + std::to_string(std::random_device{}());
+}
+
 /// A file of this test alone.
 class TestFile {
  public:
@@ -29,7 +34,7 @@ class TestFile {
   [[nodiscard]] const std::string& path() const { return path_; }
 
  private:
-  std::string path_ = testing::TempDir() + "absenc-client-" + std::to_string(::getpid()) + ".txt";
+  std::string path_ = own_path("capture") + ".txt";
 };
 
 std::string flag_text(const Unit& unit, const Reading& reading) {
@@ -167,7 +172,7 @@ TEST(ClientEmulation, WhatIsDoneToItIsSoAtOnce) {
 }
 
 TEST(ClientEmulation, APortThatGoesIsWaitedFor) {
-  const std::string link = testing::TempDir() + "absenc-client-link-" + std::to_string(::getpid());
+  const std::string link = own_path("link");
   std::optional<Emulation> emulation = emulate("tformat?singleturn=7", {.link = link});
   Encoder encoder = open("tformat:" + link);
   std::vector<Kind> kinds;
