@@ -21,7 +21,8 @@ PATIENCE = 60.0  # seconds after which a test gives up; nothing takes that long 
 def absenc(*arguments, **settings):
     """Runs the command to its end."""
     settings.setdefault("stdin", subprocess.DEVNULL)
-    return subprocess.run([ABSENC, *arguments], capture_output=True, text=True, timeout=PATIENCE, **settings)
+    settings.setdefault("timeout", PATIENCE)
+    return subprocess.run([ABSENC, *arguments], capture_output=True, text=True, **settings)
 
 
 def read_line(stream, deadline):

@@ -249,7 +249,7 @@ class Frames(ModbusCase):
     def test_read_says_what_came_and_what_to_do(self):
         for options, _, reply, error, found, advice in FRAMES:
             with self.subTest(reply.hex()), FakeEncoder({0x01: reply}) as encoder:
-                result = absenc("read", f"raa38-modbus:{encoder.path}?{options}")
+                result = absenc("read", f"raa38-modbus:{encoder.path}?{options}&latency=300")
                 self.assert_failed(result, error, found, reply.hex(" ").upper())
                 self.assertIn(advice, result.stderr.partition("Try: ")[2])
 

@@ -239,6 +239,7 @@ void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
   if (!is_can) strip_late(at);
   if (reply_.empty()) return;
   received_at_ = at;
+  if (!is_can && at - first_at_ >= noise_limit) return conclude_noise();
   // Where the length is not known silence ends the reply: some begin with what is one already.
   const std::size_t expected = is_can ? 1 : pending_.expect;
   if (expected == 0 || reply_.size() < expected) return;
@@ -305,6 +306,16 @@ void ReplyGuard<Item>::conclude_asking(bool silent) {
   tell_silence_ = silent || !heard_;
   doubtful_ = !(heard_ && !damaged_ && owed_.is_reply(request_, reply_));
   if (!doubtful_) owed_.clear();  // the line keeps the order: whatever was to come before this has come, or is lost
+}
+
+// On a line that is never silent nothing tells whose a reply is: the conversation, which is to take none of what came,
+// finds out in its own time.
+template <class Item>
+void ReplyGuard<Item>::conclude_noise() {
+  phase_ = Phase::passing;
+  reply_.clear();
+  tell_sent_ = tell_error_ = true;
+  open_ = heard_ = doubtful_ = true;
 }
 
 // Where the length of a reply is known, the last ones that could be it are looked at: noise may come before them.

@@ -76,6 +76,7 @@ class ReplyGuard final : public Machine<Item> {
   [[nodiscard]] bool ends_with_reply(std::span<const Item> request, std::size_t expect) const;
   void end_late(Owed* owed, Time at);
   void conclude_asking(bool silent);
+  void conclude_noise();
   Step<Item> end_holding(Time now);
 
   Machine<Item>* inner_ = nullptr;

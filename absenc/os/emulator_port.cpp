@@ -61,6 +61,7 @@ Descriptor bind_name_of(const fs::path& link) {
 EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_port) {
   set_latency(2ms);
   set_idle_latency(200us);
+  set_read_at_once(true);  // to write wakes the reader, who is often let run first
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
   for (const Descriptor* end : {&master_, &watch_, &listener_}) {

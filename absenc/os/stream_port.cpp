@@ -28,10 +28,7 @@ Time StreamPort::now() {
 void StreamPort::begin(const ByteStep& step) {
   switch (step.kind) {
     case ByteStep::Kind::transfer:
-      // The first comparison spares most transfers a look at the clock.
-      if (step.at > told_ + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
-      if (!step.out.empty()) write_all(step.out);
-      mark_sent(std::max(os::now(), sent_at_) + character_time_ * static_cast<std::int64_t>(step.out.size()));
+      transfer(step);
       break;
     case ByteStep::Kind::pulse:
       reach(step.at);
@@ -46,6 +43,15 @@ void StreamPort::begin(const ByteStep& step) {
     case ByteStep::Kind::done:
       break;
   }
+}
+
+void StreamPort::transfer(const ByteStep& step) {
+  // The first comparison spares most transfers a look at the clock.
+  if (step.at > told_ + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
+  const Time before = read_at_once_ ? os::now() : Time{};
+  if (!step.out.empty()) write_all(step.out);
+  const Time written = read_at_once_ ? before : os::now();
+  mark_sent(std::max(written, sent_at_) + character_time_ * static_cast<std::int64_t>(step.out.size()));
 }
 
 ByteEvent StreamPort::wait(const ByteStep& step) {

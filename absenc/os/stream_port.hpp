@@ -48,6 +48,9 @@ class StreamPort : public Port<std::uint8_t> {
   /// Line time of a character: `sent` is computed from it, because tcdrain blocks for milliseconds. 0 at first: a
   /// transfer has left when it is written.
   void set_character_time(Time time) { character_time_ = time; }
+  /// Whoever is at the other end may read what is written, and answer it, before the call that writes it has returned:
+  /// `sent` is told with the time before that call, not after it. false at first.
+  void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
   /// End of the last transfer.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
@@ -68,6 +71,7 @@ class StreamPort : public Port<std::uint8_t> {
   void reach(Time time);
   void pulse(const Step<std::uint8_t>& step);
   void mark_sent(Time at);
+  void transfer(const Step<std::uint8_t>& step);
 
   Poller poller_;
   Time latency_{};
@@ -75,6 +79,7 @@ class StreamPort : public Port<std::uint8_t> {
   Time send_slack_{};
   Time end_ = never;
   Time character_time_{};
+  bool read_at_once_ = false;
 
   Time told_{};                // the time that the machine knows: of `now`, or of its last event
   Time armed_ = never;         // the `timer` that was promised and not yet reported

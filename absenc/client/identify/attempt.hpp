@@ -35,6 +35,8 @@ inline constexpr std::size_t most_ways = 8;       // in which a unit is asked
 inline constexpr unsigned most_unanswered = 3;    // of them, until it is given up
 inline constexpr Time settled = 5ms;              // without a byte: nothing of what was asked before is under way
 inline constexpr Time longest_settling = 200ms;   // on a line that is never silent
+inline constexpr Time late_window = 100ms;        // behind a request that was not answered: its reply may be late
+inline constexpr Time most_allowance = 400ms;     // for replies that are
 
 using Settings = std::vector<std::string>;
 
@@ -179,9 +181,31 @@ class Attempt {
     }
   }
 
-  // One conversation; what was exchanged goes to `exchanges`. Returns the bytes that came.
+  // One conversation; what was exchanged goes to `exchanges`. Returns the items that came. A reply that comes after its
+  // time would be taken for the answer to what is asked next: then all is asked once more, with more time for each
+  // answer.
   std::size_t converse(const Command& command, const Options& options, std::vector<HeardExchange>& exchanges,
                        FieldSink* sink = nullptr) {
+    for (;;) {
+      const std::vector<HeardExchange>::size_type known = exchanges.size();
+      Conversed one = converse_once(command, options, exchanges, sink);
+      if (one.open) one.late = settle(late_window) ? std::max(port().now() - one.sent_at, Time{1}) : Time{};
+      if (one.late == Time{} || allowance_ == most_allowance) return one.heard;
+      allowance_ = std::min(most_allowance, 2 * std::max(one.late, allowance_));
+      exchanges.resize(known);
+      settle(late_window);
+    }
+  }
+
+  struct Conversed {
+    std::size_t heard = 0;  // items, when somebody sent them
+    bool open = false;      // its last request was not answered
+    Time sent_at{};         // when that had left
+    Time late{};            // how long after its request a reply came that was given up
+  };
+
+  Conversed converse_once(const Command& command, const Options& options, std::vector<HeardExchange>& exchanges,
+                          FieldSink* sink) {
     const std::vector<std::int64_t> arguments = require_arguments(command, {});
     const Any<Conversation> made = unit_.host(options, command, arguments, {storage_.get(), unit_.host_storage});
     Conversation<Item>* conversation = nullptr;
@@ -190,12 +214,17 @@ class Attempt {
     } else {
       conversation = made.bytes;
     }
-    if (conversation == nullptr) return 0;
-    settle();
+    if (conversation == nullptr) return {};
+    if (std::exchange(asked_, true)) settle(settled);
     const bool scans = command.verb == Verb::scan;
-    const Time quiet = (scans ? patience_ : 500ms) + 5 * link_.latency;
+    const Time quiet = (scans ? patience_ : 500ms) + 5 * (link_.latency + allowance_);
     RecordedConversation<Item> recorded(
-        *conversation, harmful_, {.quiet = quiet, .nonsense = scans ? 2 * quiet : quiet, .deadline = deadline_},
+        *conversation, harmful_,
+        {.quiet = quiet,
+         .nonsense = scans ? 2 * quiet : quiet,
+         .deadline = deadline_,
+         .latency = link_.latency,
+         .allowance = allowance_},
         [&](const HeardExchange& one) { return capture::explains(unit_, options, one); });
     const auto keep = [&] {
       findings_.requests += recorded.exchanges.size();
@@ -212,25 +241,30 @@ class Attempt {
         findings_.notes.push_back(
             fmt::format("{} of {} was not sent: to another encoder it might be a command", command.name, unit_.id));
       }
-      return recorded.heard;
+      return {recorded.heard, recorded.is_unanswered(), recorded.sent_at(), recorded.lateness()};
     }
     findings_.only_echo = findings_.only_echo || echo_.only_echo();
     echo_.conclude(conversation->error() == Error::none);
     if (sink != nullptr && conversation->error() == Error::none) conversation->report(*sink);
     keep();
     const auto alive = [this](const HeardExchange& one) { return is_alive(one); };
-    return std::any_of(recorded.exchanges.begin(), recorded.exchanges.end(), alive) ? recorded.heard : 0;
+    const bool answered = std::any_of(recorded.exchanges.begin(), recorded.exchanges.end(), alive);
+    return {answered ? recorded.heard : 0, recorded.is_unanswered(), recorded.sent_at()};
   }
 
-  // What was asked before may be answered only now: that is no answer to what will be asked.
-  void settle() {
-    if (!std::exchange(asked_, true) || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) return;
+  // Until nothing has come for that time: what was asked before may be answered only now, which is no answer to what
+  // will be asked. Returns whether anything came of which that may be said.
+  bool settle(Time quiet) {
+    if (unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) return false;
+    bool heard = false;
     const Time end = port().now() + longest_settling;
-    while (port().now() < end) {
-      const Step<Item> step{.at = port().now() + settled};
+    while (port().now() < std::min(end, deadline_)) {
+      const Step<Item> step{.at = port().now() + quiet};
       const Event<Item> event = port().wait(step);
-      if (event.kind == Event<Item>::Kind::timer || event.at >= step.at) return;
+      if (event.kind == Event<Item>::Kind::timer || event.at >= step.at) break;
+      heard = heard || event.kind == Event<Item>::Kind::received;
     }
+    return heard && unit_.link != LinkKind::can;
   }
 
   // Of one that goes on for ever the first result is enough.
@@ -310,6 +344,7 @@ class Attempt {
       if (converse(read, options, exchanges) == 0) return false;
     }
     read_all(read, options, exchanges);
+    if (exchanges.empty()) return false;
     ++findings_.searches;
     std::vector<Hypothesis> found = capture::find_hypotheses(unit_, known, exchanges);
     // What explains more than what was asked with may also ask better.
@@ -332,7 +367,17 @@ class Attempt {
       if (converse(read, options, exchanges) == 0 && ++unanswered == most_unanswered) break;
     }
     // On a busy machine an answer may come too late for one of them.
-    std::erase_if(exchanges, [](const HeardExchange& one) { return one.reply.frame().empty(); });
+    std::erase_if(exchanges,
+                  [&](const HeardExchange& one) { return one.reply.frame().empty() || is_of_another(one, options); });
+  }
+
+  // Whether it says that it is from another encoder than the one that was asked: one on a CAN bus sends by itself.
+  [[nodiscard]] bool is_of_another(const HeardExchange& exchange, const Options& options) const {
+    const Option* asked = find_role(unit_.options, Role::encoder);
+    Addresses who;
+    if (asked == nullptr || unit_.decode(options, {}, exchange.reply.frame(), who) != Error::none) return false;
+    const auto index = static_cast<std::size_t>(asked - unit_.options.data());
+    return !who.all.empty() && who.all.front() != options.values[index];
   }
 
   void keep(const std::vector<Hypothesis>& found, const Settings& settings, const std::string& encoder) {
@@ -353,6 +398,7 @@ class Attempt {
   LineFindings& findings_;
   bool cut_ = false;
   bool asked_ = false;  // anything
+  Time allowance_{};    // beside the limit of each answer, where replies are late
   EncoderAddress uri_;
   std::vector<std::vector<Item>> harmful_;
   std::unique_ptr<std::byte[]> storage_;

@@ -208,6 +208,26 @@ TEST(ModbusLine, ARequestThatComesTooSoonIsTold) {
   EXPECT_TRUE(says(bench.broken(), "3.5 characters"));
 }
 
+// Where silence is told by a program that may not be let run, a client that has given up is not to be blamed.
+TEST(ModbusLine, WhoAnswersLateBlamesNobodyForNotWaiting) {
+  using Kind = Event<std::uint8_t>::Kind;
+  for (const auto& [late, rules] : {std::pair(Time(1ms), 1u), {Time(50ms), 0u}}) {
+    for (const bool replied : {false, true}) {
+      ToyServer server;
+      server.power_on({}, Device<std::uint8_t>::PowerOn::skip);
+      server.feed({.kind = Kind::received, .at = 50ms, .items = good_request});
+      Time now = 50ms + frame_silence(line_settings) + late;
+      server.feed({.kind = Kind::silence, .at = now});
+      static_cast<void>(server.next(now));  // configure
+      ASSERT_EQ(server.answer_count(), 1u);
+      if (replied) server.feed({.kind = Kind::sent, .at = now});
+      server.feed({.kind = Kind::received, .at = now + 100us, .items = good_request});
+      server.feed({.kind = Kind::silence, .at = now + 10ms});
+      EXPECT_EQ(server.violation_count(), rules) << late.count() << ' ' << replied;
+    }
+  }
+}
+
 TEST(ModbusLine, WhoeverTalksIntoAReplyIsTold) {
   Bench bench;
   EXPECT_EQ(bench.raw(good_request, 5ms, 1us, 1us), Wire{});

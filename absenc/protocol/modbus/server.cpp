@@ -9,6 +9,7 @@ using ByteStep = Step<std::uint8_t>;
 using ByteEvent = Event<std::uint8_t>;
 
 constexpr Time answer_time = 200us;  // behind the silence that ends a request; the standard gives none
+constexpr Time late = 20ms;          // behind that silence: a client may have given up, and asked again
 
 }  // namespace
 
@@ -69,7 +70,7 @@ void Server::feed(const ByteEvent& event) {
 void Server::hear(const ByteEvent& event) {
   if (transmitting_) {
     // A request is one broken rule, not each of its bytes.
-    if (!company_ && !interrupted_) violate("something was sent during the encoder's transmission", event.at);
+    if (!company_ && !interrupted_ && !late_) violate("something was sent during the encoder's transmission", event.at);
     interrupted_ = true;
     return;
   }
@@ -77,7 +78,7 @@ void Server::hear(const ByteEvent& event) {
   const Time begun = event.items.size() == 1 ? event.at - line_.character() : event.at;
   const Time idle = begun - quiet_since_;
   if (frame_.empty()) {
-    early_ = heard_ && idle < line_.character() * 7 / 2;
+    early_ = heard_ && !late_ && idle < line_.character() * 7 / 2;
   } else if (idle > character_gap(line_)) {
     gappy_ = true;
   }
@@ -87,6 +88,8 @@ void Server::hear(const ByteEvent& event) {
 }
 
 void Server::frame_ended(Time at) {
+  // On a line of bits the silence is told when it has come; elsewhere whenever this program is let run.
+  late_ = at - quiet_since_ > frame_silence(line_) + late;
   if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
     reply_.clear();
     company_ = false;

@@ -58,6 +58,7 @@ class Server : public Device<std::uint8_t> {
   bool early_ = false;    // it began too soon after what was before
   bool gappy_ = false;    // too much time between two of its characters
   bool heard_ = false;    // anything, since power on
+  bool late_ = false;     // it ended so long ago that its client need not wait for the reply any more
   bool company_ = false;
   Time quiet_since_{};
   FrameBytes reply_;
