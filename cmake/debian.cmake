@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-# What Debian's policy asks of a package beside what is installed: compressed man pages, a file "copyright", and folders
-# that all may enter, whatever the umask.
-set(root "${CPACK_TEMPORARY_DIRECTORY}/usr")
-file(GLOB_RECURSE man_pages "${root}/share/man/*.[1-9]")
-execute_process(COMMAND gzip -9n ${man_pages} COMMAND_ERROR_IS_FATAL ANY)
-file(GLOB documents "${root}/share/doc/*")
-file(REMOVE "${documents}/LICENSE")  # stands in /usr/share/common-licenses
-file(COPY "${CMAKE_CURRENT_LIST_DIR}/copyright" DESTINATION "${documents}"
-     FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
-file(CHMOD_RECURSE "${root}" DIRECTORY_PERMISSIONS
-     OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+# What Debian's policy asks of each package beside what is installed: compressed man pages, a file "copyright", and
+# folders that all may enter, whatever the umask. A component is called as its package.
+foreach(package IN LISTS CPACK_COMPONENTS_ALL)
+  set(root "${CPACK_TEMPORARY_DIRECTORY}/${package}/usr")
+  file(GLOB_RECURSE man_pages "${root}/share/man/*.[1-9]")
+  if(man_pages)
+    execute_process(COMMAND gzip -9n ${man_pages} COMMAND_ERROR_IS_FATAL ANY)
+  endif()
+  set(documents "${root}/share/doc/${package}")
+  file(REMOVE "${documents}/LICENSE")  # stands in /usr/share/common-licenses
+  file(COPY "${CMAKE_CURRENT_LIST_DIR}/copyright" DESTINATION "${documents}"
+       FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+  file(CHMOD_RECURSE "${root}" DIRECTORY_PERMISSIONS
+       OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+endforeach()

@@ -1,32 +1,43 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` and `cpack` make of a build tree.
+# What `cmake --install` and `cpack` make of a build tree, in two components: absenc, the command, and libabsenc-dev.
 include(CMakePackageConfigHelpers)
 
 set(absenc_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/absenc")
 set(absenc_pkgconfig_dir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
-set(absenc_libraries absenc absenc-os)
-if(TARGET absenc-capture)
-  list(APPEND absenc_libraries absenc-capture)
+set(absenc_libraries absenc)
+set(absenc_pkgconfig_names absenc)
+if(TARGET absenc-client)
+  list(APPEND absenc_libraries absenc-os absenc-capture absenc-client)
+  list(APPEND absenc_pkgconfig_names absenc-client)
 endif()
-install(TARGETS ${absenc_libraries} EXPORT absenc FILE_SET HEADERS)
-install(EXPORT absenc NAMESPACE absenc:: FILE absencConfig.cmake DESTINATION "${absenc_package_dir}")
+install(TARGETS ${absenc_libraries} EXPORT absenc ARCHIVE COMPONENT libabsenc-dev
+        FILE_SET HEADERS COMPONENT libabsenc-dev)
+install(EXPORT absenc NAMESPACE absenc:: FILE absencConfig.cmake DESTINATION "${absenc_package_dir}"
+        COMPONENT libabsenc-dev)
 write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake"
                                  COMPATIBILITY SameMinorVersion)
-install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATION "${absenc_package_dir}")
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATION "${absenc_package_dir}"
+        COMPONENT libabsenc-dev)
 
 # The way from the folder of the .pc files to the prefix, so that the tree may be moved.
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}/${absenc_pkgconfig_dir}"
            OUTPUT_VARIABLE absenc_prefix_from_pkgconfig)
-foreach(library IN LISTS absenc_libraries)
-  configure_file("cmake/${library}.pc.in" ${library}.pc @ONLY)
-  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/${library}.pc" DESTINATION "${absenc_pkgconfig_dir}")
+set(absenc_client_needs ${gpiod_LIBRARIES} ${hwy_LIBRARIES} ${libzip_LIBRARIES} ${fmt_LIBRARIES}
+    ${tomlplusplus_LIBRARIES})
+list(TRANSFORM absenc_client_needs PREPEND -l)
+list(JOIN absenc_client_needs " " absenc_client_needs)
+string(APPEND absenc_client_needs " ${CMAKE_THREAD_LIBS_INIT}")
+foreach(name IN LISTS absenc_pkgconfig_names)
+  configure_file("cmake/${name}.pc.in" ${name}.pc @ONLY)
+  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}.pc" DESTINATION "${absenc_pkgconfig_dir}"
+          COMPONENT libabsenc-dev)
 endforeach()
 
-install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
 
 # The man page and the bash completion are written by a program that knows the tables of the command.
 if(TARGET absenc-command)
-  install(TARGETS absenc-command)
+  install(TARGETS absenc-command COMPONENT absenc)
   if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
     add_library(absenc-manual-objects OBJECT tools/manual/completion.cpp tools/manual/man_page.cpp)
     absenc_settings(absenc-manual-objects)
@@ -44,8 +55,9 @@ if(TARGET absenc-command)
                        DEPENDS absenc-write-manual
                        COMMENT "Writing the man page and the bash completion")
     add_custom_target(absenc-manual ALL DEPENDS "${absenc_man_page}" "${absenc_completion}")
-    install(FILES "${absenc_man_page}" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1")
-    install(FILES "${absenc_completion}" DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions")
+    install(FILES "${absenc_man_page}" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT absenc)
+    install(FILES "${absenc_completion}" DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions"
+            COMPONENT absenc)
   endif()
 endif()
 

@@ -1,17 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-# A Debian package of everything that is installed: cpack --config build/release/CPackConfig.cmake
+# Debian packages of what is installed, one for each component: cpack --config build/release/CPackConfig.cmake
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME absenc)
 set(CPACK_PACKAGE_CONTACT "absenc developers <absenc@localhost.invalid>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package's description begins with its own
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PRE_BUILD_SCRIPTS "${PROJECT_SOURCE_DIR}/cmake/debian.cmake")
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_SECTION electronics)
-set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-string(JOIN "\n" CPACK_DEBIAN_PACKAGE_DESCRIPTION
-  "One C++20 library and one command for the absolute encoders of servo motors:"
-  "read them, set them up, emulate them, decode what was captured on their wires."
-  "This package holds both, with the headers and the files for CMake and pkg-config.")
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_ALL)
+
+if(TARGET absenc-command)
+  list(APPEND CPACK_COMPONENTS_ALL absenc)
+  set(CPACK_DEBIAN_ABSENC_PACKAGE_NAME absenc)
+  set(CPACK_DEBIAN_ABSENC_PACKAGE_SECTION electronics)
+  set(CPACK_DEBIAN_ABSENC_PACKAGE_SHLIBDEPS ON)
+  string(JOIN "\n" CPACK_DEBIAN_ABSENC_DESCRIPTION
+    "${PROJECT_DESCRIPTION}"
+    "One command for the absolute encoders of servo motors: read them, set them up,"
+    "emulate them, decode what was captured on their wires.")
+endif()
+
+list(APPEND CPACK_COMPONENTS_ALL libabsenc-dev)
+set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_NAME libabsenc-dev)
+set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_SECTION libdevel)
+if(TARGET absenc-client)
+  set(CPACK_DEBIAN_LIBABSENC-DEV_PACKAGE_DEPENDS
+      "libfmt-dev, libgpiod-dev, libhwy-dev, libtomlplusplus-dev, libzip-dev")
+endif()
+string(JOIN "\n" CPACK_DEBIAN_LIBABSENC-DEV_DESCRIPTION
+  "${PROJECT_DESCRIPTION} (development files)"
+  "One C++20 library for the absolute encoders of servo motors: read them, set them"
+  "up, emulate them, decode what was captured on their wires."
+  "This package holds the static libraries with their headers, and the files for"
+  "CMake and pkg-config.")
 include(CPack)
