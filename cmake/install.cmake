@@ -33,10 +33,11 @@ foreach(name IN LISTS absenc_pkgconfig_names)
           COMPONENT libabsenc-dev)
 endforeach()
 
+install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
+
 # The man page and the bash completion are written by a program that knows the tables of the command.
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
-  install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
   if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
     add_library(absenc-manual-objects OBJECT tools/manual/completion.cpp tools/manual/man_page.cpp)
     absenc_settings(absenc-manual-objects)

@@ -15,7 +15,37 @@ from command_support import absenc
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 BUILD = Path(os.environ["ABSENC"]).parent.parent
 VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
-PROGRAM = SOURCE / "examples/read_position.cpp"  # reads a virtual encoder with both libraries
+
+BY_NAME = SOURCE / "examples/read_by_name.cpp"
+BY_NAME_SAYS = "0.0000 degrees, 0.0 rpm\n" * 5
+# As firmware would use it: a conversation with a virtual encoder that stands at 7 turns and a quarter.
+FIRMWARE = """
+#include <cstdint>
+#include <cstdio>
+
+#include "absenc/host/drive.hpp"
+#include "absenc/protocol/tformat/device.hpp"
+#include "absenc/protocol/tformat/host.hpp"
+#include "absenc/sim/motion.hpp"
+#include "absenc/sim/sim_port.hpp"
+
+using namespace absenc;
+
+int main() {
+  const sim::Motion shaft = sim::Motion::still(std::int64_t{7} << 32 | 0x4000'0000);
+  tformat::VirtualEncoder encoder({}, shaft);
+  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  sim::SimPort<std::uint8_t> port(LinkKind::half_duplex, tformat::line_settings, encoder);
+  tformat::ReadPosition read{tformat::Format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11}};
+  host::drive(read, port, [] { return true; });
+  if (read.error() != Error::none) return 1;
+  const Reading& reading = *read.reading();
+  if (!reading.singleturn_valid() || !reading.multiturn_valid) return 1;
+  std::printf("%.4f degrees, %d turns\\n", degrees(reading.singleturn, reading.singleturn_bits),
+              static_cast<int>(reading.multiturn));
+}
+"""
+FIRMWARE_SAYS = "90.0000 degrees, 7 turns\n"
 
 PROJECT = f"""
 cmake_minimum_required(VERSION 3.25)
@@ -25,15 +55,20 @@ if(absenc_FOUND)
   message(FATAL_ERROR "version 99 was found")
 endif()
 find_package(absenc {VERSION} REQUIRED)
-add_executable(outside {PROGRAM})
-target_link_libraries(outside PRIVATE absenc::absenc absenc::os)
+add_executable(by_name {BY_NAME})
+target_link_libraries(by_name PRIVATE absenc::client)
+add_executable(firmware firmware.cpp)
+target_link_libraries(firmware PRIVATE absenc::absenc)
 """
 PARENT = f"""
 cmake_minimum_required(VERSION 3.25)
 project(parent LANGUAGES CXX)
 add_subdirectory({SOURCE} absenc)
-if(NOT TARGET absenc::os OR TARGET absenc-command)
+if(NOT TARGET absenc::absenc OR TARGET absenc-command)
   message(FATAL_ERROR "not what a parent wants")
+endif()
+if((ABSENC_CLIENT AND NOT TARGET absenc::client) OR (NOT ABSENC_CLIENT AND TARGET absenc::os))
+  message(FATAL_ERROR "ABSENC_CLIENT is not what decides")
 endif()
 """
 # What bash does at the tab key; `compopt` works only there.
@@ -61,6 +96,20 @@ def files_below(folder):
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if not path.is_dir()}
 
 
+def pkg_config(root, *arguments):
+    """What pkg-config answers of the tree at `root`."""
+    [pc] = root.rglob("absenc.pc")
+    return run("pkg-config", *arguments, env={**os.environ, "PKG_CONFIG_PATH": str(pc.parent)}).split()
+
+
+def public_headers():
+    """Where they are installed."""
+    patterns = [f"{layer}/**/*.hpp" for layer in ("core", "link", "protocol", "host", "sim")]
+    patterns += ["client/*.hpp", "os/error.hpp"]
+    sources = [path for pattern in patterns for path in (SOURCE / "absenc").glob(pattern)]
+    return {f"include/{path.relative_to(SOURCE)}" for path in sources if "test" not in path.name}
+
+
 def verbs():
     """Each verb with its help."""
     listed = re.findall(r"^  (\S+(?: \S+)?)  ", absenc("--help").stdout.split("\nVerbs:\n")[1].split("\nAn ")[0],
@@ -84,22 +133,18 @@ class Installed(Case):
         files = files_below(self.root)
         headers = {path for path in files if path.startswith("include/")}
         self.assertEqual({re.sub(r"^lib/.*/", "lib/", path) for path in files - headers}, {
-            "bin/absenc", "lib/libabsenc.a", "lib/libabsenc-os.a", "lib/libabsenc-capture.a",
-            "lib/absenc.pc", "lib/absenc-os.pc", "lib/absenc-capture.pc",
+            "bin/absenc", "lib/libabsenc.a", "lib/libabsenc-os.a", "lib/libabsenc-capture.a", "lib/libabsenc-client.a",
+            "lib/absenc.pc", "lib/absenc-client.pc",
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
             "share/doc/absenc/LICENSE"})
-        sources = {"include/" + str(path.relative_to(SOURCE)) for path in (SOURCE / "absenc").rglob("*.hpp")}
-        sources = {path for path in sources if not path.startswith("include/absenc/os/cuse/")}  # only the command's
-        self.assertLessEqual(headers, sources)
-        left_out = {os.path.basename(path) for path in sources - headers}
-        self.assertTrue(left_out)
-        self.assertTrue(all("test" in name for name in left_out), left_out)
+        self.assertEqual(headers, public_headers())
 
     def test_headers_need_only_installed_ones(self):
         for header in (self.root / "include").rglob("*.hpp"):
             text = header.read_text()
-            self.assertNotIn("gtest", text, header)
+            for included in re.findall(r"^#include <(.+)>", text, re.MULTILINE):
+                self.assertRegex(included, r"^\w+$", header)  # of C++: no other library, no operating system
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")
 
@@ -117,24 +162,34 @@ class Installed(Case):
         project = self.folder / "project"
         project.mkdir()
         (project / "CMakeLists.txt").write_text(PROJECT)
+        (project / "firmware.cpp").write_text(FIRMWARE)
         run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.root}")
         run("cmake", "--build", project / "build")
-        self.assertEqual(run(project / "build/outside"), "90.0000 degrees\n7 turns\n")
+        self.assertEqual(run(project / "build/by_name", "sim:tformat"), BY_NAME_SAYS)
+        self.assertEqual(run(project / "build/firmware"), FIRMWARE_SAYS)
 
-    def test_a_program_with_pkg_config(self):
-        [pc] = self.root.rglob("absenc-os.pc")
-        environment = {**os.environ, "PKG_CONFIG_PATH": str(pc.parent)}
-        self.assertEqual(run("pkg-config", "--modversion", "absenc", env=environment).strip(), VERSION)
-        flags = run("pkg-config", "--cflags", "--libs", "absenc-os", env=environment).split()
-        program = self.folder / "program"
-        run("g++", "-std=c++20", "-O0", PROGRAM, *flags, "-o", program)
-        self.assertEqual(run(program), "90.0000 degrees\n7 turns\n")
+    def program(self, name, source, library):
+        """Compiled and linked with what pkg-config says of `library`."""
+        run("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", library), "-o",
+            self.folder / name)
+        return self.folder / name
+
+    def test_programs_with_pkg_config(self):
+        firmware = self.folder / "firmware.cpp"
+        firmware.write_text(FIRMWARE)
+        self.assertEqual(run(self.program("by_name", BY_NAME, "absenc-client"), "sim:tformat"), BY_NAME_SAYS)
+        self.assertEqual(run(self.program("firmware", firmware, "absenc")), FIRMWARE_SAYS)
+        for library in ("absenc", "absenc-client"):
+            self.assertEqual(pkg_config(self.root, "--modversion", library), [VERSION])
+        self.assertEqual({flag for flag in pkg_config(self.root, "--libs", "absenc") if flag.startswith("-l")},
+                         {"-labsenc"})
 
     def test_a_parent_project_installs_nothing_of_it(self):
         parent = self.folder / "parent"
         parent.mkdir()
         (parent / "CMakeLists.txt").write_text(PARENT)
-        run("cmake", "-G", "Ninja", "-S", parent, "-B", parent / "build")
+        for client in ("OFF", "ON"):
+            run("cmake", "-G", "Ninja", "-S", parent, "-B", parent / "build", f"-DABSENC_CLIENT={client}")
         run("cmake", "--install", parent / "build", "--prefix", parent / "installed")
         self.assertEqual(files_below(parent / "installed"), set())
         self.assertFalse((parent / "build/CPackConfig.cmake").exists())
@@ -229,49 +284,80 @@ class Completion(Case):
                          ["compopt -o filenames", f"{self.folder}/memory.txt"])
 
 
-class Package(unittest.TestCase):
+class Packages(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = Path(tempfile.mkdtemp(prefix="absenc-package-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
         run("cpack", "--config", BUILD / "CPackConfig.cmake", "-B", cls.folder, umask=0o077)
-        [cls.package] = cls.folder.glob("absenc_*.deb")
-        cls.root = cls.folder / "root"
-        run("dpkg-deb", "-x", cls.package, cls.root)
+        cls.packages = {path.name.split("_")[0]: path for path in cls.folder.glob("*.deb")}
+        for name, package in cls.packages.items():
+            run("dpkg-deb", "-x", package, cls.folder / name)
+        cls.command = cls.folder / "absenc/usr"
+        cls.development = cls.folder / "libabsenc-dev/usr"
 
-    def field(self, name):
-        return run("dpkg-deb", "-f", self.package, name).strip()
+    def field(self, package, name):
+        return run("dpkg-deb", "-f", self.packages[package], name).strip()
 
-    def test_says_what_it_is(self):
-        self.assertEqual(self.field("Package"), "absenc")
-        self.assertEqual(self.field("Version"), VERSION)
-        self.assertEqual(self.field("Architecture"), run("dpkg", "--print-architecture").strip())
-        self.assertRegex(self.field("Maintainer"), r"^absenc developers <\S+@\S+>$")
-        self.assertRegex(self.field("Description"), r"\A[A-Z].+[^.]\n .+")
+    def depends(self, package):
+        return set(re.findall(r"[a-z0-9.+-]+(?= \(|,|$)", self.field(package, "Depends")))
+
+    def test_are_two_and_say_what_they_are(self):
+        self.assertEqual(set(self.packages), {"absenc", "libabsenc-dev"})
+        for name, section in (("absenc", "electronics"), ("libabsenc-dev", "libdevel")):
+            with self.subTest(name):
+                self.assertEqual(self.field(name, "Package"), name)
+                self.assertEqual(self.field(name, "Version"), VERSION)
+                self.assertEqual(self.field(name, "Section"), section)
+                self.assertEqual(self.field(name, "Architecture"), run("dpkg", "--print-architecture").strip())
+                self.assertRegex(self.field(name, "Maintainer"), r"^absenc developers <\S+@\S+>$")
+                self.assertRegex(self.field(name, "Description"), r"\A[A-Z].+[^.]\n .+")
+        self.assertEqual(len({self.field(name, "Description").splitlines()[0] for name in self.packages}), 2)
+
+    def test_the_command_needs_nothing_to_develop_with(self):
         for library in ("libc6", "libstdc++6", "libfmt"):
-            self.assertIn(library, self.field("Depends"))
+            self.assertIn(library, self.field("absenc", "Depends"))
+        self.assertEqual({name for name in self.depends("absenc") if name.endswith("-dev")}, set())
 
-    def test_holds_what_is_installed(self):
+    def test_the_library_needs_what_is_linked(self):
+        linked = [flag[2:] for flag in pkg_config(self.development, "--libs", "absenc-client")
+                  if flag.startswith("-l") and not flag.startswith("-labsenc")]
+        self.assertGreater(len(linked), 3)
+        files = [os.path.normpath(run("g++", f"-print-file-name=lib{name}.so").strip()) for name in linked]
+        owners = {run("dpkg", "-S", file).split(":")[0] for file in files}
+        self.assertEqual(self.depends("libabsenc-dev"), owners)
+
+    def test_hold_what_is_installed_once(self):
         run("cmake", "--install", BUILD, "--prefix", self.folder / "installed")
         installed = files_below(self.folder / "installed") - {"share/doc/absenc/LICENSE", "share/man/man1/absenc.1"}
-        added = {"share/doc/absenc/copyright", "share/man/man1/absenc.1.gz"}
-        self.assertEqual(files_below(self.root), {"usr/" + path for path in installed | added})
+        added = {"share/doc/absenc/copyright", "share/man/man1/absenc.1.gz", "share/doc/libabsenc-dev/copyright"}
+        command, development = files_below(self.command), files_below(self.development)
+        self.assertEqual(command & development, set())
+        self.assertEqual(command | development, installed | added)
+        self.assertEqual(command, {
+            "bin/absenc", "share/man/man1/absenc.1.gz", "share/bash-completion/completions/absenc",
+            "share/doc/absenc/README.md", "share/doc/absenc/copyright"})
+        for name, held in (("absenc", command), ("libabsenc-dev", development)):
+            self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})
 
-    def test_belongs_to_root_and_may_be_read_by_all(self):
-        for line in run("dpkg-deb", "-c", self.package).splitlines():
-            mode = "drwxr-xr-x" if line.endswith("/") else "-rwxr-xr-x" if line.endswith("bin/absenc") else "-rw-r--r--"
-            self.assertTrue(line.startswith(f"{mode} root/root "), line)
+    def test_belong_to_root_and_may_be_read_by_all(self):
+        for package in self.packages.values():
+            for line in run("dpkg-deb", "-c", package).splitlines():
+                mode = "-rwxr-xr-x" if line.endswith("bin/absenc") else "-rw-r--r--"
+                mode = "drwxr-xr-x" if line.endswith("/") else mode
+                self.assertTrue(line.startswith(f"{mode} root/root "), line)
 
     def test_the_unpacked_command(self):
-        self.assertIn("turns", run(self.root / "usr/bin/absenc", "read", "sim:tformat"))
+        self.assertIn("turns", run(self.command / "bin/absenc", "read", "sim:tformat"))
 
     def test_the_unpacked_documents(self):
-        made = self.root / "usr/share"
+        made = self.command / "share"
         self.assertEqual(gzip.decompress((made / "man/man1/absenc.1.gz").read_bytes()),
                          (BUILD / "manual/absenc.1").read_bytes())
         self.assertEqual((made / "bash-completion/completions/absenc").read_bytes(),
                          (BUILD / "manual/absenc").read_bytes())
-        self.assertIn("Apache-2.0", (made / "doc/absenc/copyright").read_text())
+        for name in self.packages:
+            self.assertIn("Apache-2.0", (self.folder / name / f"usr/share/doc/{name}/copyright").read_text())
 
 
 if __name__ == "__main__":
