@@ -90,9 +90,7 @@ class Bench {
     return Time(static_cast<std::int64_t>(std::max(0.0, std::abs(seconds) - count) * 1e9));
   }
 
-  LineSettings settings() const {
-    return line_settings(unit, options).with_some_rate();
-  }
+  LineSettings settings() const { return line_settings(unit, options).with_some_rate(); }
 
   static Options resolve(const Kind& kind) {
     Options options;

@@ -170,9 +170,7 @@ class World {
     void detach(Line& line, std::size_t node) { line.replace(node, *this); }
   };
 
-  [[nodiscard]] LineSettings settings() const {
-    return line_settings(unit_, options_).with_some_rate();
-  }
+  [[nodiscard]] LineSettings settings() const { return line_settings(unit_, options_).with_some_rate(); }
   // As host::Session has it.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
