@@ -13,6 +13,7 @@
 #include "absenc/client/decode.hpp"
 #include "absenc/client/emulate.hpp"
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/identify.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
@@ -188,6 +189,55 @@ TEST(ClientEmulation, APortThatGoesIsWaitedFor) {
   EXPECT_EQ(encoder.losses(), 1u);
 }
 
+// ---- Memory
+
+MemoryImage some_bytes(std::uint32_t count) {
+  MemoryImage image;
+  for (std::uint32_t i = 0; i < count; ++i) image[{0, 10 + i}] = static_cast<std::uint8_t>(0x40 + i);
+  return image;
+}
+
+TEST(ClientMemory, IsBroughtToWhatIsWantedAndReadBack) {
+  Encoder encoder = open("sim:tformat");
+  std::vector<std::size_t> steps;
+  MemoryChange change(encoder.memory(), some_bytes(3), Access::write);
+  change.look();
+  EXPECT_EQ(change.differing(), change.wanted());
+  change.write([&](std::size_t done, std::size_t all) {
+    steps.push_back(done);
+    EXPECT_EQ(all, 3u);
+  });
+  change.verify();
+  EXPECT_EQ(steps, (std::vector<std::size_t>{1, 2, 3}));
+  EXPECT_EQ(change.written(), change.wanted());
+  const MemoryImage whole = encoder.memory().read(dump_addresses(encoder.unit()));
+  EXPECT_EQ(differing(some_bytes(3), whole), MemoryImage{});
+  EXPECT_THROW(MemoryChange(encoder.memory(), {{{99, 0}, 0}}, Access::write), UsageError);
+  EXPECT_THROW(static_cast<void>(encoder.memory().read({{{99, 0}, 0}})), UsageError);
+}
+
+TEST(ClientMemory, WhateverBecomesOfItSaysWhatIsWritten) {
+  Emulation emulation = emulate("tformat");
+  Encoder encoder = open(emulation.address() + "?latency=300");
+  MemoryChange change(encoder.memory(), some_bytes(6), Access::write);
+  change.look();
+  EXPECT_THROW(change.write([&](std::size_t done, std::size_t) {
+    if (done == 3) emulation.power_off();
+  }),
+               EncoderFailure);
+  change.settle();
+  EXPECT_EQ(change.written(), some_bytes(3));
+  EXPECT_EQ(change.unknown().begin()->first, (MemoryAddress{0, 13}));
+  EXPECT_EQ(change.not_written().size(), 2u);
+  emulation.power_on();
+  change.settle();
+  EXPECT_EQ(change.unknown(), MemoryImage{});
+  EXPECT_EQ(change.not_written().size(), 3u);
+  change.write();
+  change.verify();
+  EXPECT_EQ(change.written(), some_bytes(6));
+}
+
 // ---- A capture as rows
 
 constexpr std::string_view good = "1A\n1A 00 45 23 01 11 34 12 00 00 4A\n";
@@ -211,6 +261,26 @@ TEST(ClientDecode, RowsHaveTypedColumns) {
     EXPECT_NEAR(row.get<double>("angle_deg"), 74565 * 360.0 / (1 << 17), 1e-9);
   }
   EXPECT_EQ(errors, (std::vector<std::string>{"", "bad_checksum", ""}));
+}
+
+TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
+  const Emulation emulation = emulate("tformat?motion=rpm=60");
+  const Identified all = identify(emulation.path() + "?latency=200", {.limit = std::chrono::minutes(5)});
+  ASSERT_FALSE(all.found.empty());
+  EXPECT_TRUE(all.found[0].sure);
+  EXPECT_EQ(all.found[0].unit, &emulation.unit());
+  EXPECT_LT(all.found[0].log10_chance, -3);
+  EXPECT_TRUE(open(all.found[0].address).read().ready);
+  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(identify("sim:tformat")); }), HasSubstr("which protocol"));
+}
+
+TEST(ClientIdentify, TellsWhoseFramesAreInACapture) {
+  const TestFile file("1A\n1A 00 45 23 01 11 34 12 00 00 4A\n1A\n1A 00 46 23 01 11 34 12 00 00 49\n");
+  const Identified all = identify_capture(file.path());
+  ASSERT_FALSE(all.found.empty());
+  EXPECT_EQ(all.found[0].unit->id, "tformat");
+  EXPECT_EQ(all.found[0].explained, 2u);
+  EXPECT_THROW(static_cast<void>(identify_capture(file.path(), {.model = "23-bit"})), UsageError);
 }
 
 TEST(ClientDecode, WhoeverHasEnoughEndsIt) {

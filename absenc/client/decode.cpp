@@ -81,8 +81,7 @@ struct Decoded::Work {
 
   Work(const std::string& path, std::string_view protocol, const DecodeChoices& choices)
       : unit(require_unit(protocol)),
-        run(unit, require_options(unit, choices.model, choices.options),
-            {path, choices.channels, choices.raw_channels, choices.samples_per_second, choices.baud, choices.parity}),
+        run(unit, require_options(unit, choices.model, choices.options), capture_choices(path, choices)),
         clock(run.ticks_per_second()),
         columns(columns_of(unit, run.options(), clock.has_time())) {}
 

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/memory.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/client/trouble.hpp"
 #include "absenc/host/session.hpp"
@@ -50,7 +51,6 @@ struct Sample {
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
-class Connection;
 struct EncoderAddress;
 
 /// How an encoder is to be read.
@@ -89,6 +89,9 @@ class Encoder {
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
     return run(command, std::span(arguments.begin(), arguments.size()));
   }
+
+  /// Its bytes, of an encoder that is connected and while this object stays where it is.
+  [[nodiscard]] Memory memory() { return Memory(*connection_); }
 
   /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
   void cancel();

@@ -37,7 +37,7 @@ void FramePort::begin(const Step<CanFrame>& step) {
       transfer(step);
       break;
     case StepKind::pulse:
-      throw Failure(Failure::Kind::unsupported, "a CAN bus has no trigger and clear lines");
+      throw Failure(Failure::Kind::unsupported, "a CAN bus has no trigger and clear wires");
     case StepKind::configure:
       apply(step.settings);
       break;

@@ -112,7 +112,7 @@ void SpiPort::begin(const ByteStep& step) {
       transfer(step);
       break;
     case ByteStep::Kind::pulse:
-      throw Failure(Kind::unsupported, "an SPI controller has no trigger and clear lines: use a serial port");
+      throw Failure(Kind::unsupported, "an SPI controller has no trigger and clear wires: use a serial port");
     case ByteStep::Kind::configure:
       change_rate(step.settings.rate);
       break;

@@ -117,7 +117,7 @@ void StreamPort::mark_sent(Time at) {
 }
 
 void StreamPort::drive(ExtraWire, bool) {
-  throw Failure(Failure::Kind::unsupported, "this kind of port has no trigger and clear lines: use a serial port");
+  throw Failure(Failure::Kind::unsupported, "this kind of port has no trigger and clear wires: use a serial port");
 }
 
 Time StreamPort::pulse_width(ExtraWire, Time asked) const { return asked; }

@@ -111,28 +111,7 @@ std::string advice_for(const LineFindings& findings, const LineSearch& search) {
 }
 
 LineSearch search_of(const Invocation& invocation) {
-  LineSearch search;
-  const std::string_view text = invocation.text("where");
-  const std::size_t question = std::min(text.find('?'), text.size());
-  search.place = text.substr(0, question);
-  std::string_view rest = text.substr(std::min(question + 1, text.size()));
-  while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find('&'), rest.size());
-    search.settings.emplace_back(rest.substr(0, end));
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
-  for (const std::string& setting : search.settings) {
-    if (find_link_parameter(split_setting(setting).name) != nullptr) continue;
-    throw UsageError(
-        fmt::format("\"{}\" is no setting of a port: the options of the protocol are what is searched for", setting));
-  }
-  const std::string first = search.place.substr(0, search.place.find(':'));
-  if (first == "sim" || find_unit(first) != nullptr) {
-    throw UsageError(
-        fmt::format("\"{}\" says which protocol: `absenc read {}` reads it; to identify, give the port "
-                    "alone, as /dev/ttyUSB0, tcp:HOST:PORT or spi:/dev/spidev0.0",
-                    search.place, search.place));
-  }
+  LineSearch search = parse_search(invocation.text("where"));
   search.limit =
       std::chrono::duration_cast<Time>(std::chrono::duration<double>(invocation.real("--for", 60, 0.1, 86'400)));
   return search;

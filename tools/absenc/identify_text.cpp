@@ -21,8 +21,6 @@ namespace {
 constexpr std::size_t most_shown = 8;
 constexpr double same_likelihood = 0.5;  // a factor of three
 
-bool is_found(const Candidate& candidate) { return candidate.hypothesis.chance() <= capture::is_found; }
-
 // "1 in 16384", "1 in 10^9"
 std::string chance_text(double log10) {
   if (log10 > -0.05) return "as likely";
@@ -30,45 +28,10 @@ std::string chance_text(double log10) {
   return fmt::format("1 in 10^{:.0f}", std::floor(-log10));
 }
 
-bool resolves_to(const Unit& unit, std::string_view model, const std::vector<std::string>& settings,
-                 const Options& wanted) {
-  std::vector<OptionText> texts;
-  for (const std::string& setting : settings) texts.push_back(split_setting(setting));
-  Options options;
-  const OptionError error = resolve_options(unit, model, texts, options);
-  return error.kind == OptionError::Kind::none && options.values == wanted.values;
-}
-
-// What `model` does not say of these options; "": the model that is taken without one.
-std::vector<std::string> differences(const Unit& unit, std::string_view model, const Options& options) {
-  Options usual;
-  static_cast<void>(resolve_options(unit, model, {}, usual));
-  std::vector<std::string> settings;
-  for (std::size_t i = 0; i < unit.options.size(); ++i) {
-    if (options[i] == usual[i]) continue;
-    settings.push_back(fmt::format("{}={}", unit.options[i].name, to_text(unit.options[i], options[i])));
-  }
-  return settings;
-}
-
 std::string settings_text(const Candidate& candidate) {
   std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
   if (candidate.unasked) settings.emplace_back("sends by itself");
   return settings.empty() ? "the defaults" : fmt::format("{}", fmt::join(settings, ", "));
-}
-
-// Settings of the port that are no options of the unit.
-std::vector<std::string> all_settings(const Candidate& candidate) {
-  std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
-  for (const std::string& one : candidate.link_settings) {
-    const std::string_view name = split_setting(one).name;
-    const Option* option = find_option(*candidate.unit, name);
-    const bool said = std::any_of(settings.begin(), settings.end(), [&](const std::string& other) {
-      return split_setting(other).name == (option != nullptr ? option->name : name);
-    });
-    if (!said) settings.push_back(one);
-  }
-  return settings;
 }
 
 Json to_json(const Candidate& candidate, const std::string& command) {
@@ -137,22 +100,10 @@ std::string advice(std::span<const Candidate> candidates) {
 
 }  // namespace
 
-std::vector<std::string> settings_for(const Unit& unit, const Options& options) {
-  std::vector<std::string> settings = differences(unit, {}, options);
-  if (options.model != nullptr && !settings.empty()) {
-    std::vector<std::string> by_model = differences(unit, options.model->name, options);
-    by_model.insert(by_model.begin(), fmt::format("model={}", options.model->name));
-    if (by_model.size() <= settings.size()) return by_model;
-  }
-  if (resolves_to(unit, {}, settings, options)) return settings;
-  // A model agrees with these and says more.
-  return option_texts(unit, options);
-}
-
 std::string read_command(const Candidate& candidate, std::string_view place) {
-  const std::vector<std::string> settings = all_settings(candidate);
-  if (settings.empty()) return fmt::format("absenc read {}:{}", candidate.unit->id, place);
-  return fmt::format("absenc read \"{}:{}?{}\"", candidate.unit->id, place, fmt::join(settings, "&"));
+  const std::string address = address_of(candidate, place);
+  const std::string_view quote = address.find('?') == std::string::npos ? "" : "\"";
+  return fmt::format("absenc read {1}{0}{1}", address, quote);
 }
 
 std::string decode_command(const Candidate& candidate) {

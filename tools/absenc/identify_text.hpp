@@ -14,9 +14,6 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// The fewest settings by which these options come about: "model=23-bit".
-[[nodiscard]] std::vector<std::string> settings_for(const Unit& unit, const Options& options);
-
 /// absenc read "tformat:/dev/ttyUSB0?model=23-bit"
 [[nodiscard]] std::string read_command(const Candidate& candidate, std::string_view place);
 /// absenc decode tformat --option model=23-bit

@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/memory.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
@@ -91,7 +91,7 @@ int run_read(const Invocation& invocation) {
   require_open(*uri.unit, image, Access::read);
 
   const std::unique_ptr<Connection> encoder = open_connection(uri);
-  EncoderMemory memory(*encoder);
+  Memory memory(*encoder);
   image = read_memory(memory, image);
   if (!invocation.has("--json")) {
     print_line(hex_dump(image));

@@ -7,7 +7,7 @@
 #include <exception>
 #include <optional>
 
-#include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/memory.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/error.hpp"
@@ -22,9 +22,6 @@
 namespace absenc::tool {
 
 namespace {
-
-// Longer than an encoder is busy with a byte and its reply is under way.
-constexpr Time settling = std::chrono::milliseconds(50);
 
 std::string_view noun(std::size_t bytes) { return bytes == 1 ? "byte" : "bytes"; }
 
@@ -49,6 +46,13 @@ std::string write_life(const Unit& unit, const MemoryImage& image) {
   return least == nullptr ? "" : life_of(*least);
 }
 
+// Nothing else may be printed meanwhile.
+template <class Work>
+void with_progress(std::string_view doing, const Work& work) {
+  Progress progress;
+  work([&](std::size_t done, std::size_t all) { progress.show(fmt::format("{} {} of {} bytes", doing, done, all)); });
+}
+
 class Change {
  public:
   Change(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access)
@@ -58,20 +62,17 @@ class Change {
     const bool dry = invocation_.has("--dry-run");
     asks_ = !dry && must_ask(invocation_, uri_, "writing memory", "bytes that differ are overwritten");
     encoder_ = open_connection(uri_);
-    memory_.emplace(*encoder_);
+    change_.emplace(Memory(*encoder_), wanted_, access_);
     try {
-      memory_->check_model();
-      found_ = read_memory(*memory_, wanted_);
-      left_ = differing(wanted_, found_);
-      differing_ = left_;
+      with_progress("reading", [&](const MemoryProgress& progress) { change_->look(progress); });
       show();
-      if (left_.empty() || dry) return finish();
+      if (change_->differing().empty() || dry) return finish();
       if (asks_ && !confirmed(uri_, cost())) {
         print_message("nothing was changed");
         return exit_failed;
       }
-      write();
-      verify();
+      with_progress("writing", [&](const MemoryProgress& progress) { change_->write(progress); });
+      with_progress("reading", [&](const MemoryProgress& progress) { change_->verify(progress); });
       return finish();
     } catch (...) {
       return give_account(std::current_exception());
@@ -82,8 +83,8 @@ class Change {
   [[nodiscard]] bool json() const { return invocation_.has("--json"); }
 
   [[nodiscard]] std::string cost() const {
-    const std::size_t count = differing_.size();
-    const std::string life = write_life(unit_, differing_);
+    const std::size_t count = change_->differing().size();
+    const std::string life = write_life(unit_, change_->differing());
     const std::string wear = life.empty() ? "" : fmt::format("; each byte takes one of {}", life);
     return fmt::format("{} of {} {} differ{}{}", count, wanted_.size(), noun(wanted_.size()), count == 1 ? "s" : "",
                        wear);
@@ -91,69 +92,28 @@ class Change {
 
   void show() const {
     if (json()) return;
-    if (differing_.empty()) {
+    if (change_->differing().empty()) {
       print_line(wanted_.size() == 1 ? "the byte is so already: nothing to write"
                                      : fmt::format("all {} bytes are so already: nothing to write", wanted_.size()));
       return;
     }
-    print_line(difference_table(unit_, "NEW", differing_, found_));
+    print_line(difference_table(unit_, "NEW", change_->differing(), change_->found()));
     if (!asks_) print_note(cost());  // otherwise the question says it
   }
 
-  void write() {
-    Progress progress;
-    const std::size_t all = left_.size();
-    while (!left_.empty()) {
-      const auto [at, value] = *left_.begin();
-      in_flight_ = at;
-      memory_->write(at, value, access_);
-      in_flight_.reset();
-      done_[at] = value;
-      left_.erase(at);
-      progress.show(fmt::format("writing {} of {} bytes", done_.size(), all));
-    }
-  }
-
-  // Each byte was read back when it was written; this finds one that a later one has changed.
-  void verify() {
-    const MemoryImage wrong = differing(done_, read_memory(*memory_, done_));
-    if (wrong.empty()) return;
-    for (const auto& [at, value] : wrong) {
-      done_.erase(at);
-      left_[at] = value;
-    }
-    throw Failure("bytes that were written and read back have changed again");
-  }
-
   int finish() const {
+    const MemoryImage& written = change_->written();
     if (json()) {
       print_line(Json::object()
                      .set("ok", true)
                      .set("compared", wanted_.size())
-                     .set("differences", differences_json(differing_, found_))
-                     .set("written", addresses_json(done_))
+                     .set("differences", differences_json(change_->differing(), change_->found()))
+                     .set("written", addresses_json(written))
                      .line());
-    } else if (!done_.empty()) {
-      print_line(fmt::format("{} {} written and read back", done_.size(), noun(done_.size())));
+    } else if (!written.empty()) {
+      print_line(fmt::format("{} {} written and read back", written.size(), noun(written.size())));
     }
     return exit_good;
-  }
-
-  // The byte whose write was cut short: is it there? When the encoder does not say, it stays in flight.
-  void settle() {
-    if (!in_flight_) return;
-    const MemoryAddress at = *in_flight_;
-    const std::uint8_t value = left_.at(at);
-    try {
-      os::sleep_until(os::now() + settling);
-      const bool there = memory_->read({{at, 0}}).at(at) == value;
-      in_flight_.reset();
-      if (!there) return;
-      done_[at] = value;
-      left_.erase(at);
-    } catch (const std::exception&) {
-    } catch (const os::Interrupted&) {
-    }
   }
 
   int give_account(const std::exception_ptr& cause) {
@@ -174,22 +134,23 @@ class Change {
       answer.set("message", words);
     }
     print_message(words);
-    settle();
-    MemoryImage unknown;
-    if (in_flight_) unknown.insert(left_.extract(*in_flight_));
+    change_->settle();
+    const MemoryImage& written = change_->written();
+    const MemoryImage unknown = change_->unknown();
+    const MemoryImage left = change_->not_written();
     if (json()) {
-      answer.set("written", addresses_json(done_)).set("not_written", addresses_json(left_));
+      answer.set("written", addresses_json(written)).set("not_written", addresses_json(left));
       print_line(answer.set("unknown", addresses_json(unknown)).line());
       return exit_failed;
     }
-    if (done_.empty() && unknown.empty()) print_note("  nothing was written");
+    if (written.empty() && unknown.empty()) print_note("  nothing was written");
     const auto list = [&](std::string_view what, const MemoryImage& image) {
       if (!image.empty()) print_note(fmt::format("  {}: {}", what, addresses_in_words(unit_, image)));
     };
-    list("written and read back", done_);
+    list("written and read back", written);
     list("not known whether written", unknown);
-    list("not written", left_);
-    if (!left_.empty() || !unknown.empty()) print_note("  The same command again writes only what still differs.");
+    list("not written", left);
+    if (!left.empty() || !unknown.empty()) print_note("  The same command again writes only what still differs.");
     return exit_failed;
   }
 
@@ -200,12 +161,7 @@ class Change {
   Access access_;
   bool asks_ = false;
   std::unique_ptr<Connection> encoder_;
-  std::optional<EncoderMemory> memory_;
-  MemoryImage found_;
-  MemoryImage differing_;
-  MemoryImage done_;
-  MemoryImage left_;
-  std::optional<MemoryAddress> in_flight_;
+  std::optional<MemoryChange> change_;
 };
 
 }  // namespace
@@ -214,11 +170,10 @@ int change_memory(const Invocation& invocation, const EncoderAddress& uri, const
   return Change(invocation, uri, wanted, access).run();
 }
 
-MemoryImage read_memory(EncoderMemory& memory, const MemoryImage& image) {
-  Progress progress;
-  return memory.read(image, [&](std::size_t done, std::size_t all) {
-    progress.show(fmt::format("reading {} of {} bytes", done, all));
-  });
+MemoryImage read_memory(Memory& memory, const MemoryImage& image) {
+  MemoryImage found;
+  with_progress("reading", [&](const MemoryProgress& progress) { found = memory.read(image, progress); });
+  return found;
 }
 
 std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,

@@ -2,7 +2,7 @@
 // Brings bytes of an encoder's memory to what they should be: shows, asks, writes what differs, reads back.
 #pragma once
 
-#include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/memory.hpp"
 #include "absenc/client/way/address.hpp"
 #include "tools/absenc/json.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -21,7 +21,7 @@ using namespace client;
 int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access);
 
 /// What the encoder has at the addresses of `image`, with progress on a terminal.
-[[nodiscard]] MemoryImage read_memory(EncoderMemory& memory, const MemoryImage& image);
+[[nodiscard]] MemoryImage read_memory(Memory& memory, const MemoryImage& image);
 
 /// WHERE, FILE, ENCODER: a row for up to 8 bytes that follow each other.
 [[nodiscard]] std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,

@@ -4,8 +4,8 @@
 
 #include <array>
 
+#include "absenc/client/memory.hpp"
 #include "absenc/client/memory/dump.hpp"
-#include "absenc/client/memory/encoder_memory.hpp"
 #include "absenc/client/text/text_file.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
@@ -28,7 +28,7 @@ int run_dump(const Invocation& invocation) {
   if (to_file) require_replaceable(path);
 
   const std::unique_ptr<Connection> encoder = open_connection(uri);
-  EncoderMemory memory(*encoder);
+  Memory memory(*encoder);
   memory.check_model();
   const MemoryImage image = read_memory(memory, dump_addresses(*uri.unit));
   const std::string text = to_dump(*uri.unit, uri.options, image);
@@ -71,7 +71,7 @@ int run_verify(const Invocation& invocation) {
   require_memory(*uri.unit, Access::read);
   const MemoryImage wanted = read_dump(invocation, uri, Access::read);
   const std::unique_ptr<Connection> encoder = open_connection(uri);
-  EncoderMemory memory(*encoder);
+  Memory memory(*encoder);
   memory.check_model();
   const MemoryImage found = read_memory(memory, wanted);
   const MemoryImage wrong = differing(wanted, found);

@@ -238,8 +238,8 @@ class Search {
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
     solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
-    // The same as an exclusive or.
-    if (!frames_.of_bits && shape.width == 8 && poly == 1) return;
+    // The same as an exclusive or, unless its bits are the other way round.
+    if (!frames_.of_bits && shape.width == 8 && poly == 1 && shape.refin == shape.refout) return;
     found_.solutions.push_back(std::move(solution));
   }
 

@@ -43,7 +43,15 @@ std::vector<CheckedFrame> frames_of(const Made& made, std::size_t count, std::mt
   return frames;
 }
 
+// With the polynomial x^8 + 1 it is told as what it is.
+bool is_exclusive_or(const CrcParameters& crc) { return crc.width == 8 && crc.poly == 1 && crc.refin == crc.refout; }
+
 bool says(const CheckSolution& solution, const Made& made) {
+  if (is_exclusive_or(made.parameters)) {
+    return solution.kind == CheckKind::exclusive_or && solution.trailing == made.trailing &&
+           solution.parameters.init == (made.parameters.init ^ made.parameters.xorout) &&
+           std::find(solution.first.begin(), solution.first.end(), made.first) != solution.first.end();
+  }
   return solution.kind == CheckKind::crc && solution.parameters == made.parameters &&
          (made.parameters.width <= 8 || solution.low_first == made.low_first) && solution.padded == made.padded &&
          solution.trailing == made.trailing &&
@@ -174,6 +182,16 @@ TEST(CrcSearch, AnExclusiveOrIsFoundWithItsComplement) {
   ASSERT_FALSE(search.solutions.empty());
   EXPECT_EQ(search.solutions.front().kind, CheckKind::exclusive_or);
   EXPECT_EQ(search.solutions.front().parameters.init, 0xFF);
+}
+
+TEST(CrcSearch, TheCrcThatIsAnExclusiveOrIsFoundWhicheverWayItsBitsGo) {
+  for (const bool refin : {false, true}) {
+    for (const bool refout : {false, true}) {
+      std::mt19937 random(10);
+      const Made made{.parameters = {8, 0x01, 0, refin, refout, 0xFF}, .covered = 11};
+      EXPECT_TRUE(found(find_checks(frames_of(made, 5, random)), made)) << refin << refout;
+    }
+  }
 }
 
 // Eight frames that differ in one bit only are two frames.

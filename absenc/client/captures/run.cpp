@@ -115,6 +115,10 @@ void read_all(capture::Reader& reader, Take&& take) {
 
 }  // namespace
 
+CaptureChoices capture_choices(const std::string& path, const DecodeChoices& choices) {
+  return {path, choices.channels, choices.raw_channels, choices.samples_per_second, choices.baud, choices.parity};
+}
+
 std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   const capture::OpenChoices how{.channels = choices.raw_channels, .samples_per_second = choices.samples_per_second};
   try {

@@ -14,6 +14,7 @@
 #include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/capture/signal.hpp"
+#include "absenc/client/decode.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
@@ -27,6 +28,8 @@ struct CaptureChoices {
   double baud = 0;                       // 0: found from the capture
   std::optional<Parity> parity{};        // none: the protocol's own, or found from the capture
 };
+
+[[nodiscard]] CaptureChoices capture_choices(const std::string& path, const DecodeChoices& choices);
 
 struct CaptureOutcome {
   std::string problem;               // why nothing could be decoded; "": it could

@@ -244,11 +244,27 @@ class Search {
 
 }  // namespace
 
-void rank(std::vector<Candidate>& candidates, std::size_t searches) {
-  for (Candidate& one : candidates) one.hypothesis.tried *= std::max<std::size_t>(searches, 1);
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& one, const Candidate& other) {
-    return capture::is_likelier(one.hypothesis, other.hypothesis);
-  });
+LineSearch parse_search(std::string_view text) {
+  LineSearch search;
+  const std::size_t question = std::min(text.find('?'), text.size());
+  search.place = text.substr(0, question);
+  std::string_view rest = text.substr(std::min(question + 1, text.size()));
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find('&'), rest.size());
+    search.settings.emplace_back(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  for (const std::string& setting : search.settings) {
+    if (find_link_parameter(split_setting(setting).name) != nullptr) continue;
+    throw UsageError(
+        fmt::format("\"{}\" is no setting of a port: the options of the protocol are what is searched for", setting));
+  }
+  const std::string first = search.place.substr(0, search.place.find(':'));
+  if (first != "sim" && find_unit(first) == nullptr) return search;
+  throw UsageError(
+      fmt::format("\"{}\" says which protocol: `absenc read {}` reads it; to identify, give the port "
+                  "alone, as /dev/ttyUSB0, tcp:HOST:PORT or spi:/dev/spidev0.0",
+                  search.place, search.place));
 }
 
 LineFindings search_line(const LineSearch& search) { return Search(search).run(); }

@@ -9,23 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "absenc/capture/search/hypotheses.hpp"
+#include "absenc/client/identify/candidate.hpp"
 #include "absenc/client/way/address.hpp"
 
 namespace absenc::client {
-
-/// A protocol with its options, and what speaks for it.
-struct Candidate {
-  const Unit* unit = nullptr;
-  capture::Hypothesis hypothesis{};
-  std::vector<std::string> link_settings{};  // "baud=9600"; those of the user too
-  bool unasked = false;                      // the encoder sends by itself
-  std::string line{};                        // "RS-485 half duplex, 2.5 Mbit/s"
-  std::string encoder{};                     // "address=3": which of those on the line; "": the only one
-};
-
-/// The likeliest first. `searches`: in which any of them could have been found by chance; each of them pays for all.
-void rank(std::vector<Candidate>& candidates, std::size_t searches);
 
 struct LineSearch {
   std::string place;                    // "/dev/ttyUSB0", "tcp:HOST:PORT", "spi:/dev/spidev0.0"
@@ -46,6 +33,9 @@ struct LineFindings {
   bool out_of_time = false;
   bool interrupted = false;
 };
+
+/// A port with its settings: "/dev/ttyUSB0?latency=50". Throws UsageError for what says a protocol.
+[[nodiscard]] LineSearch parse_search(std::string_view text);
 
 /// Throws os::Failure when the place cannot be opened at all, UsageError.
 [[nodiscard]] LineFindings search_line(const LineSearch& search);

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "absenc/client/memory/image.hpp"
+#include "absenc/client/memory.hpp"
 
 namespace absenc::client {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/client/memory/image.hpp"
+#include "absenc/client/memory.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/client/memory/encoder_memory.hpp"
+#include "absenc/client/memory.hpp"
 
 #include <fmt/format.h>
 
@@ -7,6 +7,7 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
 
 namespace absenc::client {
 
@@ -33,20 +34,23 @@ std::size_t most_at_once(const Unit& unit, const Command& command, MemoryAddress
 
 }  // namespace
 
-void EncoderMemory::check_model() {
-  if (find_command(encoder_->unit(), Verb::read) == nullptr) return;
-  const Outcome outcome = encoder_->read();
-  if (outcome.error != Error::none) throw EncoderFailure(encoder_->trouble(outcome));
+const Unit& Memory::unit() const { return connection_->unit(); }
+
+void Memory::check_model() {
+  if (find_command(unit(), Verb::read) == nullptr) return;
+  const Outcome outcome = connection_->read();
+  if (outcome.error != Error::none) throw EncoderFailure(connection_->trouble(outcome));
 }
 
-MemoryImage EncoderMemory::read(const MemoryImage& image, const Progress& progress) {
-  const Unit& unit = encoder_->unit();
-  const Command& command = *find_command(unit, Verb::memory_read);
+MemoryImage Memory::read(const MemoryImage& image, const MemoryProgress& progress) {
+  require_memory(unit(), Access::read);
+  require_open(unit(), image, Access::read);
+  const Command& command = *find_command(unit(), Verb::memory_read);
   MemoryImage found;
   for (const MemoryRun& run : runs(image)) {
     for (std::size_t done = 0; done < run.bytes.size();) {
       const MemoryAddress at{run.first.page, static_cast<std::uint32_t>(run.first.address + done)};
-      const std::size_t count = std::min(run.bytes.size() - done, most_at_once(unit, command, at));
+      const std::size_t count = std::min(run.bytes.size() - done, most_at_once(unit(), command, at));
       const std::vector<std::uint8_t> bytes = read_run(at, count);
       for (std::uint32_t i = 0; i < count; ++i) found[{at.page, at.address + i}] = bytes[i];
       done += count;
@@ -56,23 +60,23 @@ MemoryImage EncoderMemory::read(const MemoryImage& image, const Progress& progre
   return found;
 }
 
-std::vector<std::uint8_t> EncoderMemory::read_run(MemoryAddress at, std::size_t count) {
-  const Command& command = *find_command(encoder_->unit(), Verb::memory_read);
+std::vector<std::uint8_t> Memory::read_run(MemoryAddress at, std::size_t count) {
+  const Command& command = *find_command(unit(), Verb::memory_read);
   ReadBytes bytes;
-  run_into(*encoder_, command,
+  run_into(*connection_, command,
            role_arguments(
                command,
                {{Role::page, at.page}, {Role::address, at.address}, {Role::count, static_cast<std::int64_t>(count)}}),
            bytes);
   if (bytes.data.size() == count) return bytes.data;
-  throw Failure(fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(encoder_->unit(), at),
-                            bytes.data.size()));
+  throw Failure(
+      fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(unit(), at), bytes.data.size()));
 }
 
-void EncoderMemory::write(MemoryAddress at, std::uint8_t value, Access access) {
-  const Command& command = *find_command(encoder_->unit(), Verb::memory_write);
+void Memory::write(MemoryAddress at, std::uint8_t value, Access access) {
+  const Command& command = *find_command(unit(), Verb::memory_write);
   ReadBytes ignored;
-  run_into(*encoder_, command,
+  run_into(*connection_, command,
            role_arguments(command, {{Role::page, at.page},
                                     {Role::address, at.address},
                                     {Role::value, value},
