@@ -132,6 +132,18 @@ TEST(ClientEncoder, SamplesEndWithTheirCountOrByCancel) {
   EXPECT_THROW(static_cast<void>(encoder.read()), Cancelled);
 }
 
+TEST(ClientEncoder, AnotherEndLeavesCancelAsItIs) {
+  Encoder encoder = open("sim:tformat");
+  bool over = false;
+  encoder.end_when([&] { return over; });
+  EXPECT_TRUE(encoder.read().ready);
+  over = true;
+  EXPECT_THROW(static_cast<void>(encoder.read()), Cancelled);
+  over = false;
+  encoder.cancel();
+  EXPECT_THROW(static_cast<void>(encoder.read()), Cancelled);
+}
+
 // ---- A virtual encoder that others open: half a second for the way, because others may use the machine
 
 TEST(ClientEmulation, EveryUnitOfALineIsServedAndRead) {

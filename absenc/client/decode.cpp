@@ -81,7 +81,7 @@ struct Decoded::Work {
 
   Work(const std::string& path, std::string_view protocol, const DecodeChoices& choices)
       : unit(require_unit(protocol)),
-        run(unit, require_options(unit, choices.model, choices.options), capture_choices(path, choices)),
+        run(unit, require_options(unit, choices.model, choices.options), {path, choices}),
         clock(run.ticks_per_second()),
         columns(columns_of(unit, run.options(), clock.has_time())) {}
 

@@ -2,7 +2,6 @@
 // A capture as rows: what was said on a line, request by request, with its times.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -11,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/input_range.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/link/line.hpp"
 
@@ -37,25 +37,8 @@ struct DecodeChoices {
 /// `message`, which are empty in a good row. A row with an error has no other values than these, its times and frames.
 class Decoded {
  public:
-  struct End {};
-  class Iterator {
-   public:
-    using value_type = Row;
-    using difference_type = std::ptrdiff_t;
-
-    explicit Iterator(Decoded& decoded) : decoded_(&decoded) {}
-    const Row& operator*() const { return *decoded_->row_; }
-    const Row* operator->() const { return decoded_->row_; }
-    Iterator& operator++() {
-      decoded_->advance();
-      return *this;
-    }
-    void operator++(int) { decoded_->advance(); }
-    bool operator==(End) const { return decoded_->row_ == nullptr; }
-
-   private:
-    Decoded* decoded_;
-  };
+  using value_type = Row;
+  using Iterator = InputIterator<Decoded>;
 
   /// As `decode`.
   Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices);
@@ -66,7 +49,9 @@ class Decoded {
 
   /// Waits for the first row. Once. Throws, as each step does, UsageError, Failure.
   [[nodiscard]] Iterator begin();
-  [[nodiscard]] static End end() { return {}; }
+  [[nodiscard]] static Iterator::End end() { return {}; }
+  [[nodiscard]] const Row* current() const { return row_; }
+  void advance();
 
   [[nodiscard]] std::span<const Column> columns() const;
   /// When the range has ended: sentences about what is damaged or missing in the file, and what was found out.
@@ -74,7 +59,6 @@ class Decoded {
 
  private:
   struct Work;
-  void advance();
 
   std::unique_ptr<Work> work_;
   const Row* row_ = nullptr;

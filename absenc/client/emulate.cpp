@@ -39,6 +39,7 @@ struct Emulation::Service {
       : address(virtual_address(text)),
         device(*address.unit, address.options, address.device),
         port(std::make_shared<os::EmulatorPort>(choices.link, choices.tcp)) {
+    port->set_send_slack(send_slack);
     device.power_on(os::now());
     thread = std::jthread([this] { serve(); });
   }

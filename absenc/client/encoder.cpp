@@ -11,6 +11,7 @@
 #include "absenc/client/reading.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/pace.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -49,7 +50,7 @@ Encoder::Encoder(const EncoderAddress& address, Time period)
       connection_(Connection::make(address)),
       period_(period),
       unwrapper_(make_unwrapper(address)) {
-  connection_->end_when([cancelled = cancelled_.get()] { return cancelled->load(); });
+  end_when({});
 }
 Encoder::Encoder(Encoder&&) noexcept = default;
 Encoder& Encoder::operator=(Encoder&&) noexcept = default;
@@ -85,35 +86,43 @@ Answer Encoder::run(std::string_view name, std::span<const std::int64_t> argumen
   return std::move(sink.answer);
 }
 
-Samples Encoder::samples(const SampleChoices& choices) {
-  period_ = choices.rate_hz > 0 ? Time(std::llround(1e9 / choices.rate_hz)) : Time{};
-  return {*this, choices};
+void Encoder::end_when(std::function<bool()> over) {
+  connection_->end_when(
+      [cancelled = cancelled_.get(), over = std::move(over)] { return cancelled->load() || (over && over()); });
 }
 
+void Encoder::wait_until(Time time) const {
+  while (os::now() < time) {
+    if (*cancelled_) throw Cancelled{};
+    os::sleep_until(std::min(time, os::now() + between_looks));
+  }
+}
+
+Samples Encoder::samples(const SampleChoices& choices) { return {*this, choices}; }
+
+Samples::Samples(Encoder& encoder, const SampleChoices& choices)
+    : encoder_(&encoder), count_(choices.count), pace_(std::make_unique<Pace>(choices.rate_hz)) {
+  encoder.period_ = pace_->period();
+}
+Samples::Samples(Samples&&) noexcept = default;
+Samples& Samples::operator=(Samples&&) noexcept = default;
+Samples::~Samples() = default;
+
 Samples::Iterator Samples::begin() {
-  next_ = os::now();
   advance();
   return Iterator(*this);
 }
 
 void Samples::advance() {
-  const Time period = encoder_->period_;
-  ended_ = choices_.count != 0 && taken_ == choices_.count;
+  ended_ = count_ != 0 && taken_ == count_;
   if (ended_) return;
   try {
-    while (taken_ != 0 && os::now() < next_) {
-      if (*encoder_->cancelled_) throw Cancelled{};
-      os::sleep_until(std::min(next_, os::now() + between_looks));
-    }
+    if (taken_ != 0) encoder_->wait_until(pace_->next());
     sample_ = encoder_->next();
+    ++taken_;
   } catch (const Cancelled&) {
     ended_ = true;
-    return;
   }
-  ++taken_;
-  next_ += period;
-  const Time late = os::now() - next_;
-  if (period > Time{} && late > Time{}) next_ += late / period * period;
 }
 
 void Encoder::connect() {
@@ -147,10 +156,7 @@ Sample Encoder::next() {
 }
 
 Sample Encoder::search() {
-  while (os::now() < next_try_) {
-    if (*cancelled_) throw Cancelled{};
-    os::sleep_until(std::min(next_try_, os::now() + between_looks));
-  }
+  wait_until(next_try_);
   const Time now = os::now();
   next_try_ = now + time_between_tries;
   const bool again = was_there_;

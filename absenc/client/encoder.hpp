@@ -4,8 +4,8 @@
 #pragma once
 
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
 #include <memory>
 #include <span>
@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/input_range.hpp"
 #include "absenc/client/memory.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/client/trouble.hpp"
@@ -51,6 +52,7 @@ struct Sample {
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
+class Pace;
 struct EncoderAddress;
 
 /// How an encoder is to be read.
@@ -96,6 +98,9 @@ class Encoder {
   /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
   void cancel();
 
+  /// Waiting ends with Cancelled also from the moment on in which `over` is true. Empty: never.
+  void end_when(std::function<bool()> over);
+
   /// The position starts again from the next reading: after a command that moves the zero.
   void forget_position();
 
@@ -127,6 +132,8 @@ class Encoder {
  private:
   friend class Samples;
 
+  /// Throws Cancelled, os::Interrupted.
+  void wait_until(Time time) const;
   Sample search();
   Sample take(Reading reading);
   void note_restart(Sample& sample, const Reading& reading);
@@ -154,40 +161,26 @@ class Encoder {
 /// An input range of samples, at equal distances that do not drift; one that was missed is left out.
 class Samples {
  public:
-  struct End {};
-  class Iterator {
-   public:
-    using value_type = Sample;
-    using difference_type = std::ptrdiff_t;
+  using value_type = Sample;
+  using Iterator = InputIterator<Samples>;
 
-    explicit Iterator(Samples& samples) : samples_(&samples) {}
-    const Sample& operator*() const { return samples_->sample_; }
-    const Sample* operator->() const { return &samples_->sample_; }
-    Iterator& operator++() {
-      samples_->advance();
-      return *this;
-    }
-    void operator++(int) { samples_->advance(); }
-    bool operator==(End) const { return samples_->ended_; }
-
-   private:
-    Samples* samples_;
-  };
-
-  Samples(Encoder& encoder, const SampleChoices& choices) : encoder_(&encoder), choices_(choices) {}
+  Samples(Encoder& encoder, const SampleChoices& choices);
+  Samples(Samples&&) noexcept;
+  Samples& operator=(Samples&&) noexcept;
+  ~Samples();
 
   /// Takes the first sample. Once.
   [[nodiscard]] Iterator begin();
-  [[nodiscard]] static End end() { return {}; }
-
- private:
+  [[nodiscard]] static Iterator::End end() { return {}; }
+  [[nodiscard]] const Sample* current() const { return ended_ ? nullptr : &sample_; }
   void advance();
 
+ private:
   Encoder* encoder_;
-  SampleChoices choices_;
+  std::uint64_t count_;
+  std::unique_ptr<Pace> pace_;
   Sample sample_{};
   std::uint64_t taken_ = 0;
-  Time next_{};
   bool ended_ = false;
 };
 

@@ -26,7 +26,7 @@ struct SpiEncoder : ::testing::Test {
 };
 
 TEST_F(SpiEncoder, SsiOfEveryLength) {
-  for (const unsigned bits : {7u, 8u, 12u, 13u, 25u}) {
+  for (const std::uint8_t bits : std::initializer_list<std::uint8_t>{7, 8, 12, 13, 25}) {
     WordFormat word;
     word.add({"position", Meaning::position, bits});
     const ssi::Format format{.word = word};

@@ -304,9 +304,10 @@ struct PositionBits {
 
 [[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
   WordFormat format;
-  const WordField turns{"multiturn", Meaning::multiturn, bits.multiturn};
-  if (bits.multiturn_first) format.add(turns);  // a field of 0 bits is refused
-  format.add({"position", Meaning::position, bits.position});
+  const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };
+  const WordField turns{"multiturn", Meaning::multiturn, bits_of(bits.multiturn)};
+  if (bits.multiturn_first) format.add(turns);  // a field of 0 bits is refused, and so is one of too many
+  format.add({"position", Meaning::position, bits_of(bits.position)});
   if (!bits.multiturn_first) format.add(turns);
   return format;
 }

@@ -56,7 +56,7 @@ class WordFieldName {
 struct WordField {
   WordFieldName name{};  // that of the meaning unless another was given
   Meaning meaning = Meaning::skip;
-  unsigned bits = 0;  // 1 to 64; error, warning and parity have 1
+  std::uint8_t bits = 0;  // 1 to 64; error, warning and parity have 1
   bool active_low = false;
 };
 
@@ -169,7 +169,8 @@ constexpr WordFormatError parse_word_field(std::string_view item, WordField& fie
     bits = bits * 10 + static_cast<unsigned>(number[i] - '0');
     if (bits > 64) return {"a field has 1 to 64 bits", number_at};
   }
-  field = {named ? first_of(item, equals) : word, static_cast<Meaning>(meaning), bits, active_low};
+  field = {named ? first_of(item, equals) : word, static_cast<Meaning>(meaning), static_cast<std::uint8_t>(bits),
+           active_low};
   return {};
 }
 

@@ -25,12 +25,12 @@ CaptureChoices capture_choices(const Invocation& invocation, std::string_view pa
   constexpr std::int64_t fastest = 1'000'000'000'000;
   CaptureChoices choices;
   choices.path = path;
-  choices.channels.assign(invocation.texts("--channel").begin(), invocation.texts("--channel").end());
-  choices.raw_channels = static_cast<unsigned>(invocation.number("--raw-channels", 0, 1, 64));
-  choices.samples_per_second = static_cast<std::uint64_t>(invocation.number("--rate", 0, 1, fastest));
-  choices.baud = invocation.real("--baud", 0, 1, 1e9);
-  if (invocation.has("--parity")) choices.parity = parse_parity(invocation.text("--parity"));
-  if (choices.raw_channels != 0 && choices.samples_per_second == 0) {
+  choices.how.channels.assign(invocation.texts("--channel").begin(), invocation.texts("--channel").end());
+  choices.how.raw_channels = static_cast<unsigned>(invocation.number("--raw-channels", 0, 1, 64));
+  choices.how.samples_per_second = static_cast<std::uint64_t>(invocation.number("--rate", 0, 1, fastest));
+  choices.how.baud = invocation.real("--baud", 0, 1, 1e9);
+  if (invocation.has("--parity")) choices.how.parity = parse_parity(invocation.text("--parity"));
+  if (choices.how.raw_channels != 0 && choices.how.samples_per_second == 0) {
     throw UsageError("raw samples have no rate: give the samples a second with --rate");
   }
   return choices;

@@ -61,14 +61,7 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
     }
     return exit_good;
   }
-  const Frame sent = request.frame();
-  const Frame received = reply.frame();
-  const Diagnosis diagnosis = diagnose(unit, options, sent, received);
-  const Explanation explanation =
-      unit.explain == nullptr ? Explanation{} : unit.explain(options, error, sent, received);
-  std::string message = describe(error, explanation.detail, diagnosis.finding);
-  const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
-  if (!advice.empty()) message += fmt::format(": {}", advice);
+  const std::string message = sentence_for(unit, options, error, request.frame(), reply.frame());
   if (json) {
     print_line(Json::object()
                    .set("protocol", unit.id)

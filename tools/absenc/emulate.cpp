@@ -33,8 +33,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A host on a pseudo-terminal waits milliseconds for what takes microseconds on a wire.
-constexpr Time send_slack = 500us;
 constexpr Time late_reply = 50ms;
 constexpr double default_gap_ms = 2;
 
@@ -234,7 +232,7 @@ int emulate_bytes(const Unit& unit, const Options& options, const Invocation& in
   return emulation.run([&](Machine<std::uint8_t>& machine) -> Notes {
     if (invocation.has("--spidev")) return serve_spi(machine, unit, line_settings(unit, options), invocation, end);
     if (!served) return serve_terminal(machine, invocation, end);
-    serve_port(machine, *served, send_slack, end);
+    serve_port(machine, *served, end);
     return {};
   });
 }

@@ -30,28 +30,22 @@ Json flags_to_json(const FieldInfo& field, std::uint64_t bits) {
   return names;
 }
 
-Json to_json(const FieldValue& value) {
-  switch (value.info->kind) {
-    case FieldInfo::Kind::counts:
-      return static_cast<std::uint64_t>(value.number);
-    case FieldInfo::Kind::boolean:
-      return value.number != 0;
-    case FieldInfo::Kind::flags:
-      return flags_to_json(*value.info, static_cast<std::uint64_t>(value.number));
-    case FieldInfo::Kind::real:
-      return value.real;
-    case FieldInfo::Kind::text:
-      return printable(value.bytes);
-    case FieldInfo::Kind::bytes:
-      return fmt::format("{:02x}", fmt::join(value.bytes, ""));
-    case FieldInfo::Kind::number:
-      break;
-  }
-  return value.number;
+Json to_json(const Value& value) {
+  struct Visitor {
+    Json operator()(std::monostate) const { return {}; }
+    Json operator()(const Flags& flags) const { return flags_to_json(*flags.field, flags.bits); }
+    Json operator()(const ByteVector& bytes) const { return fmt::format("{:02x}", fmt::join(bytes, "")); }
+    Json operator()(const std::string& text) const { return text; }
+    Json operator()(bool value) const { return value; }
+    Json operator()(std::int64_t value) const { return value; }
+    Json operator()(std::uint64_t value) const { return value; }
+    Json operator()(double value) const { return value; }
+  };
+  return std::visit(Visitor{}, value);
 }
 
 void JsonFields::put(const FieldValue& value) {
-  fields.set(value.info->name, to_json(value));
+  fields.set(value.info->name, to_json(value_of(value)));
   if (is_of_reading(value.info->role)) judged_.push_back({value.info, true});
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "absenc/client/row.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/json.hpp"
 
@@ -17,7 +18,7 @@ using namespace client;
 /// {"singleturn_bits":17,...}
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 [[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
-[[nodiscard]] Json to_json(const FieldValue& value);
+[[nodiscard]] Json to_json(const Value& value);
 
 /// Puts fields into a JSON object; with a reading, behind what it knows not to hold `singleturn_valid` and the like,
 /// false. What has no such field holds.

@@ -141,10 +141,10 @@ int identify_capture(const Invocation& invocation) {
   progress.clear();
   const auto command = [&](const Candidate& candidate) {
     std::string text = decode_command(candidate) + " " + choices.path;
-    for (const std::string& channel : choices.channels) text += " --channel " + channel;
-    if (choices.raw_channels != 0) text += fmt::format(" --raw-channels {}", choices.raw_channels);
-    if (choices.samples_per_second != 0) text += fmt::format(" --rate {}", choices.samples_per_second);
-    if (choices.baud > 0) text += fmt::format(" --baud {}", choices.baud);
+    for (const std::string& channel : choices.how.channels) text += " --channel " + channel;
+    if (choices.how.raw_channels != 0) text += fmt::format(" --raw-channels {}", choices.how.raw_channels);
+    if (choices.how.samples_per_second != 0) text += fmt::format(" --rate {}", choices.how.samples_per_second);
+    if (choices.how.baud > 0) text += fmt::format(" --baud {}", choices.how.baud);
     return invocation.has("--parity") ? text + fmt::format(" --parity {}", invocation.text("--parity")) : text;
   };
   const int status = show_candidates(findings.candidates, command, invocation.has("--json"));

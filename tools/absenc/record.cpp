@@ -6,12 +6,12 @@
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/pace.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/pace.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/progress.hpp"
 #include "tools/absenc/rate.hpp"
@@ -132,7 +132,7 @@ int run_record(const Invocation& invocation) {
   Recording recording(settings, uri);
   pace.start_at(recording.start());
   const Limits limits{count, seconds > 0 ? recording.start() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never};
-  live.connection().end_when([&limits] { return os::now() >= limits.end; });
+  live.end_when([&limits] { return os::now() >= limits.end; });
   Report report;
   bool good = false;
   bool whole = true;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "absenc/client/emulation/attended.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/host/echo.hpp"
@@ -134,7 +135,7 @@ EncoderAddress parse_served_port(const Unit& unit, std::string_view text) {
   return uri;
 }
 
-void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time send_slack, Time end) {
+void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time end) {
   // Only a host can find out by itself whether it hears itself: it speaks first.
   host::EchoFilter line(uri.echo == host::EchoMode::on ? host::EchoMode::on : host::EchoMode::off);
   line.attach(device);

@@ -21,7 +21,7 @@ using namespace client;
 /// Says that it is ready, and serves until a signal or `end`. A port that goes away is waited for: whoever plugs it in
 /// again finds the encoder as it was. A transfer due within `send_slack` is sent at once.
 /// Throws os::Failure when it cannot be opened at first.
-void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time send_slack, Time end);
+void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time end);
 /// The same on a CAN interface, as "vcan0".
 void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end);
 

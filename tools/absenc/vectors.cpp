@@ -39,7 +39,7 @@ WireFrame frame_of(const Unit& unit, Bytes bytes) {
 struct Comparison final : FieldSink {
   explicit Comparison(const Vector& wanted) : vector(wanted) {}
   void put(const FieldValue& value) override {
-    decoded.set(value.info->name, to_json(value));
+    decoded.set(value.info->name, to_json(value_of(value)));
     for (const Expected& expected : vector.fields) {
       if (expected.field == value.info->name && expected.number == value.number &&
           std::abs(expected.real - value.real) < 1e-9) {
@@ -65,7 +65,7 @@ Json expected_fields(const Unit& unit, const Vector& vector) {
     const FieldInfo* info = find_field(unit, expected.field);
     const std::vector<std::uint8_t> text(expected.text.begin(), expected.text.end());
     const FieldValue value{.info = info, .number = expected.number, .real = expected.real, .bytes = text};
-    fields.set(expected.field, info != nullptr ? to_json(value) : Json(expected.number));
+    fields.set(expected.field, info != nullptr ? to_json(value_of(value)) : Json(expected.number));
   }
   return fields;
 }

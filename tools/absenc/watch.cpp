@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/pace.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/output.hpp"
-#include "tools/absenc/pace.hpp"
 #include "tools/absenc/reading_text.hpp"
 
 namespace absenc::tool {
@@ -117,7 +117,7 @@ void Watch::work(const std::stop_token& stop) {
   try {
     Pace pace(rate_, offset_);
     Encoder live(uri_, pace.period());
-    live.connection().end_when([&] { return stop.stop_requested() && !command_runs_; });
+    live.end_when([&] { return stop.stop_requested() && !command_runs_; });
     Time next = start_ + offset_;
     for (;;) {
       std::optional<Command> command;

@@ -60,7 +60,7 @@ struct Possible final : EvidenceSink {
 // the parity, where characters are damaged: a parity bit that is taken for a stop bit is wrong half of the time.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
-  Speed best{choices_.baud, choices_.parity.value_or(line_.parity)};
+  Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};
   if (choices_.path == "-") return best;
   const auto frames_at = [&](const Speed& speed) {
     Frames frames;
@@ -68,8 +68,8 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
     static_cast<void>(decode_lines(*reader, lines, speed, enough_characters, frames, [](Tick) {}));
     return frames;
   };
-  const bool rate_is_open = choices_.baud == 0 && line_.rate != 0;
-  if (!rate_is_open && choices_.parity) return best;
+  const bool rate_is_open = choices_.how.baud == 0 && line_.rate != 0;
+  if (!rate_is_open && choices_.how.parity) return best;
   Frames at_best = frames_at(best);
   const auto try_at = [&](const Speed& speed, std::uint64_t handicap) {
     const Frames frames = frames_at(speed);
@@ -78,11 +78,11 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
     at_best = frames;
   };
   if (rate_is_open) try_at({static_cast<double>(line_.rate), best.parity}, 0);
-  if (choices_.parity || (at_best.damaged == 0 && at_best.good != 0)) return best;
+  if (choices_.how.parity || (at_best.damaged == 0 && at_best.good != 0)) return best;
   for (const Parity parity : {Parity::none, Parity::odd, Parity::even}) {
     if (parity == line_.parity) continue;
     if (rate_is_open) try_at({static_cast<double>(line_.rate), parity}, 1);
-    try_at({choices_.baud, parity}, 1);
+    try_at({choices_.how.baud, parity}, 1);
   }
   return best;
 }

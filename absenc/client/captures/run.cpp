@@ -115,12 +115,9 @@ void read_all(capture::Reader& reader, Take&& take) {
 
 }  // namespace
 
-CaptureChoices capture_choices(const std::string& path, const DecodeChoices& choices) {
-  return {path, choices.channels, choices.raw_channels, choices.samples_per_second, choices.baud, choices.parity};
-}
-
 std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
-  const capture::OpenChoices how{.channels = choices.raw_channels, .samples_per_second = choices.samples_per_second};
+  const capture::OpenChoices how{.channels = choices.how.raw_channels,
+                                 .samples_per_second = choices.how.samples_per_second};
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
@@ -163,7 +160,7 @@ CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::functio
 }
 
 CaptureRun::Lines CaptureRun::find_lines() const {
-  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
+  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.how.channels);
   Lines lines;
   for (std::size_t i = 0; i < wires.wires.size(); ++i) {
     if (!wires.wires[i]) continue;
@@ -218,7 +215,7 @@ CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const s
   const Lines lines = find_lines();
   const Speed speed = likely_speed(lines);
   CaptureOutcome outcome = decode_lines(*reader_, lines, speed, SIZE_MAX, sink, progress);
-  if (!choices_.parity && speed.parity != line_.parity) {
+  if (!choices_.how.parity && speed.parity != line_.parity) {
     outcome.notes.push_back(fmt::format("the characters have the parity {}, but those of {} usually {}",
                                         name_of(speed.parity), unit_.id, name_of(line_.parity)));
   }
@@ -226,7 +223,7 @@ CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const s
 }
 
 CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
-  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
+  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.how.channels);
   const bool spi = unit_.link == LinkKind::spi;
   const capture::ClockedLine line{.clock = *wires.wires[0],
                                   .in = wires.wires[1],
@@ -278,8 +275,8 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
 
 // The levels of a bus.
 CaptureOutcome CaptureRun::run_bus(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
-  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.channels);
-  const double rate = choices_.baud > 0 ? choices_.baud : static_cast<double>(line_.rate);
+  const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.how.channels);
+  const double rate = choices_.how.baud > 0 ? choices_.how.baud : static_cast<double>(line_.rate);
   const double bit = static_cast<double>(ticks_per_second()) / rate;
   if (bit < 3) {
     throw Failure(
@@ -304,8 +301,8 @@ CaptureOutcome CaptureRun::run_bus(capture::AnnotationSink& sink, const std::fun
 CaptureOutcome CaptureRun::run_frames(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const std::vector<std::string>& channels = reader_->layout().channels;
   std::optional<unsigned> wanted;
-  if (choices_.channels.size() > 1) throw UsageError("--channel: a CAN interface is one channel");
-  if (!choices_.channels.empty()) wanted = find_channel(channels, choices_.channels[0]);
+  if (choices_.how.channels.size() > 1) throw UsageError("--channel: a CAN interface is one channel");
+  if (!choices_.how.channels.empty()) wanted = find_channel(channels, choices_.how.channels[0]);
   const double ticks_per_bit =
       line_.rate == 0 ? 0 : static_cast<double>(ticks_per_second()) / static_cast<double>(line_.rate);
   CaptureOutcome outcome;

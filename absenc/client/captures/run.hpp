@@ -19,17 +19,11 @@
 
 namespace absenc::client {
 
-/// What the user says of a capture.
+/// A capture, and what is said of it.
 struct CaptureChoices {
-  std::string path;                      // "-": standard input
-  std::vector<std::string> channels;     // "D0", "clock=D0", or several of them with commas between
-  unsigned raw_channels = 0;             // 0: it is no raw file
-  std::uint64_t samples_per_second = 0;  // 0: the file tells
-  double baud = 0;                       // 0: found from the capture
-  std::optional<Parity> parity{};        // none: the protocol's own, or found from the capture
+  std::string path;     // "-": standard input
+  DecodeChoices how{};  // its model and options are not looked at: they are given as Options
 };
-
-[[nodiscard]] CaptureChoices capture_choices(const std::string& path, const DecodeChoices& choices);
 
 struct CaptureOutcome {
   std::string problem;               // why nothing could be decoded; "": it could

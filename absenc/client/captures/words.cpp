@@ -50,16 +50,9 @@ std::string message_of(const Unit& unit, const Options& options, const Annotatio
   const bool is_bus_error = annotation.remark == Remark::damaged && annotation.reply.can != nullptr;
   const std::string_view remark =
       is_bus_error ? capture::text_of_error(*annotation.reply.can) : text_of(annotation.remark);
-  if (annotation.error == Error::none) return std::string(remark);
-  const bool decoded = annotation.remark == Remark::none && !annotation.reply.empty();
-  const Diagnosis diagnosis = decoded ? diagnose(unit, options, annotation.request, annotation.reply) : Diagnosis{};
-  const Explanation explanation = decoded && unit.explain != nullptr
-                                      ? unit.explain(options, annotation.error, annotation.request, annotation.reply)
-                                      : Explanation{};
-  if (!remark.empty()) return std::string(remark);
-  std::string message = describe(annotation.error, explanation.detail, diagnosis.finding);
-  const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
-  return advice.empty() ? message : fmt::format("{}: {}", message, advice);
+  if (annotation.error == Error::none || !remark.empty()) return std::string(remark);
+  if (annotation.reply.empty()) return describe(annotation.error, {}, {});
+  return sentence_for(unit, options, annotation.error, annotation.request, annotation.reply);
 }
 
 }  // namespace absenc::client

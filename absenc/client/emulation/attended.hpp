@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stands in front of a machine that a port drives, so that others can do something to it between its steps.
+// How a virtual encoder is driven by a port: others can do something to it between its steps.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +9,10 @@
 #include "absenc/link/step.hpp"
 
 namespace absenc::client {
+
+/// A host on a pseudo-terminal waits milliseconds for what takes microseconds on a wire: a transfer due so soon is sent
+/// at once.
+inline constexpr Time send_slack = std::chrono::microseconds(500);
 
 /// Nothing else runs while `look` does.
 template <class Item>

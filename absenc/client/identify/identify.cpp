@@ -40,7 +40,7 @@ Identified identify_capture(const std::string& path, const DecodeChoices& choice
   if (!choices.model.empty() || !choices.options.empty()) {
     throw UsageError("the model and the options are what is searched for: they cannot be given");
   }
-  const CaptureFindings findings = search_capture(capture_choices(path, choices), [](const std::string&) {});
+  const CaptureFindings findings = search_capture({path, choices}, [](const std::string&) {});
   Identified all{.notes = findings.damages};
   all.notes.insert(all.notes.end(), findings.refusals.begin(), findings.refusals.end());
   for (const Candidate& one : findings.candidates) all.found.push_back(found(one, {}));

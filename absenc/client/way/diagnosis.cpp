@@ -88,4 +88,14 @@ std::string describe(Error error, std::string_view detail, std::string_view find
   return text;
 }
 
+std::string sentence_for(const Unit& unit, const Options& options, Error error, const Frame& request,
+                         const Frame& reply) {
+  const Diagnosis diagnosis = diagnose(unit, options, request, reply);
+  const Explanation explanation =
+      unit.explain != nullptr ? unit.explain(options, error, request, reply) : Explanation{};
+  const std::string message = describe(error, explanation.detail, diagnosis.finding);
+  const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
+  return advice.empty() ? message : fmt::format("{}: {}", message, advice);
+}
+
 }  // namespace absenc::client

@@ -22,4 +22,9 @@ struct Diagnosis {
 /// "<what the error means>: <detail>; <finding>", each part only if there is one.
 [[nodiscard]] std::string describe(Error error, std::string_view detail, std::string_view finding);
 
+/// Of a reply that failed with this error, in one sentence: the same with what the document says of it, and what to
+/// try.
+[[nodiscard]] std::string sentence_for(const Unit& unit, const Options& options, Error error, const Frame& request,
+                                       const Frame& reply);
+
 }  // namespace absenc::client

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <type_traits>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/way/can_log.hpp"
@@ -20,10 +21,15 @@ namespace absenc::client {
 
 namespace {
 
-void take(Link& link, std::shared_ptr<os::StreamPort> port, const EncoderAddress& uri) {
+template <class AnyPort>
+void take(Link& link, std::shared_ptr<AnyPort> port, const EncoderAddress& uri) {
   if (uri.latency) port->set_latency(*uri.latency);
   link.latency = port->latency();
-  link.bytes = port.get();
+  if constexpr (std::is_base_of_v<os::FramePort, AnyPort>) {
+    link.frames = port.get();
+  } else {
+    link.bytes = port.get();
+  }
   link.owner = std::move(port);
 }
 
@@ -76,13 +82,6 @@ Link open_spi(const EncoderAddress& uri) {
   link.bytes = port.get();
   link.owner = port;
   return link;
-}
-
-void take(Link& link, std::shared_ptr<os::FramePort> port, const EncoderAddress& uri) {
-  if (uri.latency) port->set_latency(*uri.latency);
-  link.latency = port->latency();
-  link.frames = port.get();
-  link.owner = std::move(port);
 }
 
 Link open_can(const EncoderAddress& uri) {

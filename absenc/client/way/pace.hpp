@@ -9,7 +9,7 @@
 #include "absenc/core/time.hpp"
 #include "absenc/os/signals.hpp"
 
-namespace absenc::tool {
+namespace absenc::client {
 
 class Pace {
  public:
@@ -70,4 +70,4 @@ class Pace {
   std::uint64_t missed_ = 0;
 };
 
-}  // namespace absenc::tool
+}  // namespace absenc::client
