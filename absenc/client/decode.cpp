@@ -42,36 +42,6 @@ std::vector<Column> columns_of(const Unit& unit, const Options& options, bool ha
   return columns;
 }
 
-/// Puts the fields of one annotation into the values of a row.
-class Fields final : public FieldSink {
- public:
-  Fields(const Unit& unit, std::vector<Value>& values) : fields_(unit.fields), values_(values) {}
-
-  void put(const FieldValue& value) override {
-    if (const std::size_t place = place_of(*value.info); place < fields_.size()) {
-      values_[first_field + place] = value_of(value);
-    }
-  }
-  void put_reading(const Reading& reading) override {
-    for (std::size_t i = 0; i < fields_.size(); ++i) {
-      if (is_of_reading(fields_[i].role) && !holds(fields_[i], reading)) values_[first_field + i] = {};
-    }
-  }
-
- private:
-  // A unit's own field, or one of the same name.
-  [[nodiscard]] std::size_t place_of(const FieldInfo& info) const {
-    std::size_t place = 0;
-    while (place < fields_.size() && &fields_[place] != &info) ++place;
-    if (place < fields_.size()) return place;
-    for (place = 0; place < fields_.size() && fields_[place].name != info.name;) ++place;
-    return place;
-  }
-
-  std::span<const FieldInfo> fields_;
-  std::vector<Value>& values_;
-};
-
 }  // namespace
 
 struct Decoded::Work {
@@ -109,7 +79,7 @@ struct Decoded::Work {
     try {
       const Options& options = run.settle_options();
       Sink sink(*this, options);
-      SequenceWatch watched(unit, options, sink);
+      SequenceWatch watched(sink);
       const CaptureOutcome outcome = run.run(watched, [](capture::Tick) {});
       notes = outcome.notes;
       for (const capture::Damage& damage : outcome.damages) notes.push_back(to_text(damage, clock));
@@ -165,13 +135,32 @@ struct Decoded::Work {
     if (!message.empty()) row.values.back() = message;
     if (annotation.error != Error::none) row.values[columns.size() - 2] = std::string(text_of(annotation.error).name);
     if (!has_fields(annotation)) return;
-    Fields fields(unit, row.values);
-    static_cast<void>(unit.decode(options, annotation.request, annotation.reply, fields));
-    if (annotation.reading == nullptr || annotation.reading->singleturn_bits == 0) return;
-    const Reading& reading = *annotation.reading;
+    fill_fields(annotation.contents, row.values);
+    if (annotation.contents.reading == nullptr || annotation.contents.reading->singleturn_bits == 0) return;
+    const Reading& reading = *annotation.contents.reading;
     if (!reading.ready || !reading.singleturn_valid()) return;
     row.values[at_position] = reading.unit_um > 0 ? micrometres(reading.singleturn, reading.unit_um) / 1000
                                                   : degrees(reading.singleturn, reading.singleturn_bits);
+  }
+
+  // A unit's own field, or one of the same name.
+  [[nodiscard]] std::size_t place_of(const FieldInfo& info) const {
+    const std::span<const FieldInfo> fields = unit.fields;
+    std::size_t place = 0;
+    while (place < fields.size() && &fields[place] != &info) ++place;
+    if (place < fields.size()) return place;
+    place = 0;
+    while (place < fields.size() && fields[place].name != info.name) ++place;
+    return place;
+  }
+
+  void fill_fields(const capture::Contents& contents, std::vector<Value>& values) const {
+    for (const FieldValue& field : contents.fields) {
+      const std::size_t place = place_of(*field.info);
+      if (place == unit.fields.size()) continue;
+      const bool is_valid = contents.reading == nullptr || holds(*field.info, *contents.reading);
+      values[first_field + place] = is_valid ? value_of(field) : Value(Invalid{});
+    }
   }
 
   // ---- In the thread that takes the rows

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/client/reading.hpp"
 
+#include <algorithm>
+
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/core/bits.hpp"
 
@@ -29,19 +31,22 @@ std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
   return both(unit.status, unit.second_status, reading.status);
 }
 
+std::vector<Flags> flags_of(const Unit& unit, const Reading& reading) {
+  const std::vector<Flags> status = status_of(unit, reading);
+  const std::vector<Flags> alarms = alarms_of(unit, reading);
+  std::vector<Flags> all;
+  for (std::size_t i = 0; i < std::max(status.size(), alarms.size()); ++i) {
+    if (i < status.size()) all.push_back(status[i]);
+    if (i < alarms.size()) all.push_back(alarms[i]);
+  }
+  return all;
+}
+
 Reading checked(Reading reading, bool confirmed) {
   if (confirmed || !reading.ready || !reading.singleturn_valid()) return reading;
   reading.singleturn_valid_bits = 0;
   reading.multiturn_valid = false;
   return reading;
-}
-
-std::vector<std::string_view> FieldsWithReading::invalid() const {
-  std::vector<std::string_view> names;
-  for (const FieldInfo* info : names_) {
-    if (reading_ && !holds(*info, *reading_)) names.push_back(info->name);
-  }
-  return names;
 }
 
 }  // namespace absenc::client

@@ -21,27 +21,10 @@ struct Flags {
 [[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
 [[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
 
+/// Both, channel by channel.
+[[nodiscard]] std::vector<Flags> flags_of(const Unit& unit, const Reading& reading);
+
 /// A position that no second one confirmed is not valid.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
-
-/// Hands fields on, and keeps the reading that says which of them hold.
-class FieldsWithReading final : public FieldSink {
- public:
-  explicit FieldsWithReading(FieldSink& sink) : sink_(sink) {}
-  void put(const FieldValue& value) override {
-    names_.push_back(value.info);
-    sink_.put(value);
-  }
-  void put_reading(const Reading& one) override { reading_ = one; }
-
-  [[nodiscard]] const std::optional<Reading>& reading() const { return reading_; }
-  /// The fields that do not hold.
-  [[nodiscard]] std::vector<std::string_view> invalid() const;
-
- private:
-  FieldSink& sink_;
-  std::vector<const FieldInfo*> names_;
-  std::optional<Reading> reading_;
-};
 
 }  // namespace absenc::client

@@ -27,6 +27,7 @@ std::size_t index_of(std::span<const Column> columns, std::string_view name) {
 
 struct Text {
   std::string operator()(std::monostate) const { return {}; }
+  std::string operator()(Invalid) const { return {}; }
   std::string operator()(bool value) const { return value ? "yes" : "no"; }
   std::string operator()(const Flags& flags) const {
     return fmt::format("{}", fmt::join(flag_names(*flags.field, flags.bits), " "));
@@ -85,7 +86,7 @@ void AnswerSink::put(const FieldValue& value) {
 
 void AnswerSink::put_reading(const Reading& reading) {
   for (std::size_t i = 0; i < fields_.size(); ++i) {
-    if (is_of_reading(fields_[i]->role) && !holds(*fields_[i], reading)) answer.values[i] = {};
+    if (is_of_reading(fields_[i]->role) && !holds(*fields_[i], reading)) answer.values[i] = Invalid{};
   }
 }
 

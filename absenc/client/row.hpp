@@ -16,18 +16,29 @@ namespace absenc::client {
 enum class Type : std::uint8_t { int64, uint64, real, boolean, flags, text, bytes };
 
 struct Column {
+  /// How it is shown where all is text.
+  struct Look {
+    std::string_view format{};  // of a real, as for std::format: "{:.6f}"; "": as short as it is exact
+    bool is_detail = false;     // left out where a row is a line of a table
+  };
+
   std::string_view name;
   std::string_view unit;  // "" for a plain number
   Type type;
   std::string_view meaning;
+  Look look{};
 };
 
 using ByteVector = std::vector<std::uint8_t>;
 
-/// In the order of `Type`, behind nothing: it was not told, or does not hold. What does not hold is never shown.
-using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector>;
+/// In place of a value that was told but does not hold: it is never shown.
+struct Invalid {};
 
-/// "12.5", "yes", "over_heat battery_alarm", "1A 00"; "" for nothing.
+/// In the order of `Type`, between nothing, which was not told, and `Invalid`.
+using Value =
+    std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector, Invalid>;
+
+/// "12.5", "yes", "over_heat battery_alarm", "1A 00"; "" for nothing and for what does not hold.
 [[nodiscard]] std::string to_text(const Value& value);
 
 struct Row {

@@ -3,9 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include <iterator>
+#include <span>
 
 #include "absenc/capture/lines/can_line.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -15,6 +14,7 @@
 #include "tools/absenc/field_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/row_text.hpp"
 
 namespace absenc::tool {
 
@@ -29,44 +29,45 @@ using Kind = Annotation::Kind;
 constexpr std::size_t enough_to_print = 1 << 16;
 
 // "data_id=3 singleturn=74565"; "singleturn=INVALID(74565)" where it does not hold.
-std::string field_words(const Unit& unit, const Options& options, const Annotation& annotation) {
-  struct Values final : FieldSink {
-    void put(const FieldValue& value) override { all.push_back({std::string(value.info->name), to_text(value)}); }
-    std::vector<std::pair<std::string, std::string>> all;
-  };
-  Values values;
-  FieldsWithReading fields(values);
-  static_cast<void>(unit.decode(options, annotation.request, annotation.reply, fields));
-  const std::vector<std::string_view> invalid = fields.invalid();
+std::string field_words(const capture::Contents& contents) {
   std::string words;
-  for (const auto& [name, value] : values.all) {
-    const bool is_invalid = std::find(invalid.begin(), invalid.end(), name) != invalid.end();
-    words += (words.empty() ? "" : " ") + name + (is_invalid ? fmt::format("=INVALID({})", value) : "=" + value);
+  for (const FieldValue& field : contents.fields) {
+    const bool is_valid = contents.reading == nullptr || holds(*field.info, *contents.reading);
+    if (!words.empty()) words += ' ';
+    const std::string value = to_text(field);
+    words.append(field.info->name).append(is_valid ? "=" : "=INVALID(").append(value).append(is_valid ? "" : ")");
   }
   return words;
 }
 
-std::string quoted(std::string_view text) {
-  if (text.find_first_of(",\"\n\r") == std::string_view::npos) return std::string(text);
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + '"';
-}
-
-std::string csv_columns(const Unit& unit, bool linear) {
-  const std::string all = csv_header(unit, linear);
-  return all.substr(all.find(',') + 1);
-}
+// Where the columns of CSV begin.
+enum Place : std::size_t { at_time, at_kind, at_request, at_reply, at_turnaround, at_reading };
+enum Behind : std::size_t { at_fields, at_error, at_message, behind_all };
 
 }  // namespace
 
 AnnotationPrinter::AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock,
                                      AnnotationFormat format, ShowBits bits)
-    : unit_(unit), options_(options), clock_(clock), format_(format), bits_(bits) {
+    : unit_(unit),
+      options_(options),
+      clock_(clock),
+      format_(format),
+      bits_(bits),
+      time_format_(clock.format()),
+      reading_(unit, options) {
   if (format != AnnotationFormat::csv) return;
-  const bool linear = unit.resolution(options).unit_um > 0;
-  kept_ = fmt::format("{},kind,request,reply,turnaround_us,{},fields,error,message\n",
-                      clock.has_time() ? "time_s" : "tick", csv_columns(unit, linear));
+  const bool has_time = clock.has_time();
+  columns_ = {{has_time ? "time_s" : "tick", "", has_time ? Type::real : Type::uint64, "", {.format = time_format_}},
+              {"kind", "", Type::text, ""},
+              {"request", "", Type::text, ""},
+              {"reply", "", Type::text, ""},
+              {"turnaround_us", "us", Type::real, "", {.format = "{:.3f}"}}};
+  columns_.insert(columns_.end(), reading_.columns().begin(), reading_.columns().end());
+  columns_.push_back({"fields", "", Type::text, ""});
+  columns_.push_back({"error", "", Type::text, ""});
+  columns_.push_back({"message", "", Type::text, ""});
+  row_.columns = columns_;
+  kept_ = csv_header(columns_) + '\n';
 }
 
 void AnnotationPrinter::put(const Annotation& annotation) {
@@ -92,13 +93,14 @@ std::string AnnotationPrinter::text(const Annotation& annotation) const {
   if (annotation.turnaround && clock_.has_time()) {
     line += fmt::format("  ({})", client::to_text(clock_.time(*annotation.turnaround)));
   }
-  if (annotation.reading != nullptr) {
-    line += "   " + reading_text(unit_, *annotation.reading);
+  if (annotation.contents.reading != nullptr) {
+    line += "   " + reading_text(unit_, *annotation.contents.reading);
   } else if (has_fields(annotation)) {
-    line += "   " + field_words(unit_, options_, annotation);
+    line += "   " + field_words(annotation.contents);
   }
   if (bits_ == ShowBits::yes && has_fields(annotation)) {
-    const std::string places = FieldPlaces(unit_, options_, annotation.request, annotation.reply).text();
+    const std::string places =
+        FieldPlaces(unit_, options_, annotation.request, annotation.reply, annotation.contents).text();
     if (!places.empty()) line += fmt::format("   [{}]", places);
   }
   const std::string message = message_of(unit_, options_, annotation);
@@ -123,15 +125,14 @@ std::string AnnotationPrinter::json(const Annotation& annotation) const {
   json.set("ok", annotation.error == Error::none);
   if (has_fields(annotation)) {
     JsonFields fields;
-    FieldsWithReading numbers(fields);  // whether they hold stands beside them
-    static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, numbers));
+    for (const FieldValue& field : annotation.contents.fields) fields.put(field);
     json.set("fields", fields.fields);
     if (bits_ == ShowBits::yes) {
-      json.set("bits", FieldPlaces(unit_, options_, annotation.request, annotation.reply).json());
+      json.set("bits", FieldPlaces(unit_, options_, annotation.request, annotation.reply, annotation.contents).json());
     }
   }
-  if (annotation.reading != nullptr && annotation.reading->singleturn_bits != 0) {
-    const Reading& reading = *annotation.reading;
+  if (annotation.contents.reading != nullptr && annotation.contents.reading->singleturn_bits != 0) {
+    const Reading& reading = *annotation.contents.reading;
     const bool valid = reading.singleturn_valid() && reading.ready;
     const bool linear = reading.unit_um > 0;
     const double position = linear ? micrometres(reading.singleturn, reading.unit_um) / 1000
@@ -139,32 +140,35 @@ std::string AnnotationPrinter::json(const Annotation& annotation) const {
     json.set(linear ? "position_mm" : "angle_deg", valid ? Json(position) : Json());
     if (reading.multiturn_bits != 0) json.set("turns", reading.multiturn_valid ? Json(reading.multiturn) : Json());
   }
-  if (annotation.reading != nullptr) set_validity(json, *annotation.reading);
+  if (annotation.contents.reading != nullptr) set_validity(json, *annotation.contents.reading);
   if (annotation.error != Error::none) json.set("error", text_of(annotation.error).name);
   const std::string message = message_of(unit_, options_, annotation);
   if (!message.empty()) json.set("message", message);
   return json.line();
 }
 
-std::string AnnotationPrinter::csv(const Annotation& annotation) const {
-  const auto wire = [&](const Frame& frame) {
-    return frame.empty() ? std::string() : to_compact_wire_text(unit_.link, frame);
-  };
-  std::string row = fmt::format("{},{},{},{},", clock_.text(annotation.begin), name_of(annotation.kind),
-                                wire(annotation.request), wire(annotation.reply));
-  if (annotation.turnaround && clock_.has_time()) {
-    row += fmt::format("{:.3f}", static_cast<double>(clock_.time(*annotation.turnaround).count()) / 1000);
-  }
-  if (annotation.reading != nullptr) {
-    const std::string columns = to_csv(unit_, *annotation.reading, 0);
-    row += columns.substr(columns.find(','));
+std::string AnnotationPrinter::csv(const Annotation& annotation) {
+  std::vector<Value>& values = row_.values;
+  values.assign(columns_.size(), {});
+  const std::span<Value> behind = std::span(values).last(behind_all);
+  if (clock_.has_time()) {
+    values[at_time] = clock_.seconds(annotation.begin);
   } else {
-    const std::string columns = csv_columns(unit_, unit_.resolution(options_).unit_um > 0);
-    row += std::string(static_cast<std::size_t>(std::count(columns.begin(), columns.end(), ',')) + 1, ',');
+    values[at_time] = annotation.begin;
   }
-  const std::string fields = has_fields(annotation) ? field_words(unit_, options_, annotation) : std::string();
-  const std::string_view error = annotation.error == Error::none ? "" : text_of(annotation.error).name;
-  return row + fmt::format(",{},{},{}", quoted(fields), error, quoted(message_of(unit_, options_, annotation)));
+  values[at_kind] = std::string(name_of(annotation.kind));
+  if (!annotation.request.empty()) values[at_request] = to_compact_wire_text(unit_.link, annotation.request);
+  if (!annotation.reply.empty()) values[at_reply] = to_compact_wire_text(unit_.link, annotation.reply);
+  if (annotation.turnaround && clock_.has_time()) {
+    values[at_turnaround] = static_cast<double>(clock_.time(*annotation.turnaround).count()) / 1000;
+  }
+  if (const Reading* reading = annotation.contents.reading; reading != nullptr) {
+    reading_.fill(*reading, std::span(values).subspan(at_reading, reading_.columns().size()));
+  }
+  if (has_fields(annotation)) behind[at_fields] = field_words(annotation.contents);
+  if (annotation.error != Error::none) behind[at_error] = std::string(text_of(annotation.error).name);
+  behind[at_message] = message_of(unit_, options_, annotation);
+  return to_csv(row_);
 }
 
 }  // namespace absenc::tool

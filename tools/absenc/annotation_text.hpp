@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/client/captures/words.hpp"
+#include "absenc/client/reading_columns.hpp"
 
 namespace absenc::tool {
 
@@ -29,13 +31,18 @@ class AnnotationPrinter final : public capture::AnnotationSink {
  private:
   [[nodiscard]] std::string text(const capture::Annotation& annotation) const;
   [[nodiscard]] std::string json(const capture::Annotation& annotation) const;
-  [[nodiscard]] std::string csv(const capture::Annotation& annotation) const;
+  [[nodiscard]] std::string csv(const capture::Annotation& annotation);
 
   const Unit& unit_;
   const Options& options_;
   TickClock clock_;
   AnnotationFormat format_;
   ShowBits bits_;
+  // Of CSV.
+  std::string time_format_;
+  ReadingColumns reading_;
+  std::vector<Column> columns_;
+  Row row_;
   std::string kept_;
 };
 

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <functional>
 
 namespace absenc::tool {
 
@@ -20,16 +19,13 @@ std::string ranges_text(const BitRanges& ranges) {
   return text;
 }
 
-FieldPlaces::FieldPlaces(const Unit& unit, const Options& options, Frame request, Frame reply) {
-  struct Sink final : FieldSink {
-    void put(const FieldValue& value) override { use(*value.info); }
-    std::function<void(const FieldInfo&)> use;
-  } sink;
-  sink.use = [&](const FieldInfo& info) {
-    const BitRanges ranges = unit.bits(options, request, reply, info);
-    if (!ranges.empty()) all_.emplace_back(info.name, ranges);
-  };
-  if (unit.bits != nullptr && !reply.empty()) static_cast<void>(unit.decode(options, request, reply, sink));
+FieldPlaces::FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
+                         const capture::Contents& contents) {
+  if (unit.bits == nullptr || reply.empty()) return;
+  for (const FieldValue& field : contents.fields) {
+    const BitRanges ranges = unit.bits(options, request, reply, *field.info);
+    if (!ranges.empty()) all_.emplace_back(field.info->name, ranges);
+  }
 }
 
 std::string FieldPlaces::text() const {

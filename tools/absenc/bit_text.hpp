@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "tools/absenc/json.hpp"
@@ -18,7 +19,8 @@ namespace absenc::tool {
 /// The fields of a good reply of which its unit says where they stand, in order.
 class FieldPlaces {
  public:
-  FieldPlaces(const Unit& unit, const Options& options, Frame request, Frame reply);
+  FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
+              const capture::Contents& contents);
 
   /// "singleturn 16-32, multiturn 48-63"; "" when nothing is told.
   [[nodiscard]] std::string text() const;

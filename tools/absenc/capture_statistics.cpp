@@ -66,7 +66,7 @@ void CaptureStatistics::put(const Annotation& annotation) {
   }
   if (annotation.error != Error::none) return put_error(annotation);
   row_.count = 0;
-  if (annotation.reading != nullptr) trace_.add(annotation.begin, *annotation.reading);
+  if (annotation.contents.reading != nullptr) trace_.add(annotation.begin, *annotation.contents.reading);
 }
 
 void CaptureStatistics::put_error(const Annotation& annotation) {
@@ -82,7 +82,7 @@ void CaptureStatistics::put_error(const Annotation& annotation) {
 void CaptureStatistics::keep(const Annotation& annotation, Kept& kept) const {
   const auto cut = [](Bytes bytes, std::size_t size) { return bytes.first(std::min(bytes.size(), size)); };
   kept.annotation = annotation;
-  kept.annotation.reading = nullptr;
+  kept.annotation.contents = {};
   kept.request.clear();
   kept.reply.clear();
   kept.request.append(cut(annotation.request.bytes, kept.request.capacity()));

@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "absenc/capture/annotate/judge.hpp"
 #include "absenc/client/captures/run.hpp"
 #include "absenc/client/captures/sequence_watch.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -42,20 +43,23 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
   }
 
   const bool json = invocation.has("--json");
-  JsonFields fields;
-  FieldTable rows;
-  FieldsWithReading sink(json ? static_cast<FieldSink&>(fields) : rows);
-  const Error error = unit.decode(options, request.frame(), reply.frame(), sink);
+  capture::Judge judge(unit, options);
+  const Error error = judge.decode(request.frame(), reply.frame());
   if (error == Error::none) {
+    const capture::Contents contents = judge.contents();
     const bool bits = invocation.has("--bits");
-    const FieldPlaces places(unit, options, request.frame(), reply.frame());
+    const FieldPlaces places(unit, options, request.frame(), reply.frame(), contents);
     if (json) {
+      JsonFields fields;
+      for (const FieldValue& field : contents.fields) fields.put(field);
       Json good = Json::object().set("protocol", unit.id).set("ok", true).set("fields", fields.fields);
       if (bits) good.set("bits", places.json());
-      if (sink.reading()) set_validity(good, *sink.reading());
+      if (contents.reading != nullptr) set_validity(good, *contents.reading);
       print_line(good.line());
     } else {
-      if (sink.reading()) rows.put_reading(*sink.reading());
+      FieldTable rows;
+      for (const FieldValue& field : contents.fields) rows.put(field);
+      if (contents.reading != nullptr) rows.put_reading(*contents.reading);
       if (bits) places.add_to(rows.rows);
       print_line(table(rows.rows));
     }
@@ -119,7 +123,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
                                                             : AnnotationFormat::text;
   AnnotationPrinter printer(unit, options, clock, format, invocation.has("--bits") ? ShowBits::yes : ShowBits::no);
   Counted counted(statistics, statistics_only ? nullptr : &printer);
-  SequenceWatch watched(unit, options, counted);
+  SequenceWatch watched(counted);
   Progress progress;
   const bool live = invocation.text("file") == "-";
   const CaptureOutcome outcome = run.run(watched, [&](capture::Tick tick) {

@@ -33,6 +33,7 @@ Json flags_to_json(const FieldInfo& field, std::uint64_t bits) {
 Json to_json(const Value& value) {
   struct Visitor {
     Json operator()(std::monostate) const { return {}; }
+    Json operator()(Invalid) const { return {}; }
     Json operator()(const Flags& flags) const { return flags_to_json(*flags.field, flags.bits); }
     Json operator()(const ByteVector& bytes) const { return fmt::format("{:02x}", fmt::join(bytes, "")); }
     Json operator()(const std::string& text) const { return text; }

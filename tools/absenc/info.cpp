@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "absenc/client/reading_columns.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/os/signals.hpp"
@@ -14,6 +15,7 @@
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/row_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
@@ -115,9 +117,11 @@ class Survey {
     if (heard_ && !same(read_as, resolution_)) return fail(command, contradiction(read_as));
     hear(read_as);
     const Reading reading = checked(*outcome.reading, encoder_->confirmed());
-    Json json = Json::object();
-    set_reading(json, unit, reading, encoder_->confirmed());
-    answers.set(command.name, json);
+    const ReadingColumns columns(unit, encoder_->uri().options);
+    std::vector<Value> values(columns.columns().size());
+    columns.fill(reading, values);
+    Json json = to_json(Row{columns.columns(), std::move(values)});
+    answers.set(command.name, json.set("confirmed", encoder_->confirmed()).set("ok", true));
     add_heading(command);
     position = "  " + reading_text(unit, reading);
     if (const std::string alarms = alarms_in_words(unit, reading); !alarms.empty()) position += '\n' + alarms;

@@ -7,10 +7,12 @@
 #include <array>
 #include <cmath>
 
+#include "absenc/client/sample_rows.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/output.hpp"
 #include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/row_text.hpp"
 #include "tools/absenc/short_names.hpp"
 
 namespace absenc::tool {
@@ -358,12 +360,11 @@ std::string to_line(const Shown& shown) {
 
 Json to_json(const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
-  const Unit& unit = *shown.watch->uri().unit;
+  const EncoderAddress& uri = shown.watch->uri();
   Json json = Json::object().set("encoder", shown.watch->name()).set("state", name_of(snapshot.state));
   json.set("age_s", std::chrono::duration<double>(snapshot.age).count());
-  const double seconds = std::chrono::duration<double>(snapshot.last.at - shown.watch->start()).count();
-  json.set("reading",
-           is_live(snapshot) ? to_json(unit, snapshot.last.reading, seconds, snapshot.last.confirmed) : Json());
+  SampleRows rows(*uri.unit, uri.options, shown.watch->start(), SampleRows::With::reading);
+  json.set("reading", is_live(snapshot) ? to_json(rows.of(snapshot.last)) : Json());
   set_motion(json, is_live(snapshot) ? snapshot.last : Sample{}, unit_um(shown));
   const auto microseconds = [](Time time) { return static_cast<double>(time.count()) / 1e3; };
   json.set("rate_hz", snapshot.rate).set("readings", snapshot.readings);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <string>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/sample_rows.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/client/way/pace.hpp"
@@ -17,6 +17,7 @@
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/rate.hpp"
 #include "tools/absenc/reading_text.hpp"
+#include "tools/absenc/row_text.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {
@@ -28,12 +29,9 @@ enum class Format : std::uint8_t { human, json, csv };
 /// Shows readings and failures as they come, and keeps quiet about what was said already.
 class Display {
  public:
-  Display(const Encoder& live, Format format) : live_(&live), format_(format), start_(os::now()) {
-    const EncoderAddress& uri = live.connection().uri();
-    const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
-    const std::string header = csv_header(*uri.unit, linear);
-    if (format == Format::csv) print_line(fmt::format("{},event", header));
-    commas_ = std::string(static_cast<std::size_t>(std::count(header.begin(), header.end(), ',')) + 1, ',');
+  Display(const Encoder& live, Format format)
+      : live_(&live), format_(format), rows_(live.unit(), live.options(), os::now(), SampleRows::With::reading) {
+    if (format == Format::csv) print_line(csv_header(rows_.columns()));
   }
 
   void show(const Sample& sample) {
@@ -45,7 +43,7 @@ class Display {
         return show_trouble(sample);
       case Sample::Kind::lost:
         print_message(fmt::format("{}\n  Waiting for it to come back.", sample.message));
-        return show_event(sample);
+        return show_row(sample);
       case Sample::Kind::absent:
         if (sample.message != last_absence_) print_message(sample.message);
         last_absence_ = sample.message;
@@ -53,28 +51,14 @@ class Display {
       case Sample::Kind::back:
         last_absence_.clear();
         print_message(sample.message);
-        return show_event(sample);
+        return show_row(sample);
     }
   }
 
  private:
-  [[nodiscard]] double seconds(const Sample& sample) const {
-    return std::chrono::duration<double>(sample.at - start_).count();
-  }
-
-  void show_event(const Sample& sample) const {
-    if (format_ == Format::csv) print_event_row(sample);
-    if (format_ != Format::json) return;
-    print_line(Json::object()
-                   .set("time_s", seconds(sample))
-                   .set("ok", false)
-                   .set("event", event_name(sample))
-                   .set("message", sample.message)
-                   .line());
-  }
-
-  void print_event_row(const Sample& sample) const {
-    print_line(fmt::format("{:.6f}{}{}", seconds(sample), commas_, event_name(sample)));
+  void show_row(const Sample& sample) {
+    if (format_ == Format::csv) print_line(to_csv(rows_.of(sample)));
+    if (format_ == Format::json) print_line(to_json(rows_.of(sample)).line());
   }
 
   void show_reading(const Sample& sample) {
@@ -84,8 +68,7 @@ class Display {
       print_message("no two readings in a row agree as well as the fastest shaft allows");
     }
     told_doubt_ = sample.doubtful;
-    if (format_ == Format::json) return print_line(to_json(unit, reading, seconds(sample), sample.confirmed).line());
-    if (format_ == Format::csv) return print_line(to_csv(unit, reading, seconds(sample)) + ',');
+    if (format_ != Format::human) return show_row(sample);
     print_line(reading_text(unit, reading));
     if (reading.alarms != alarms_) {
       print_note(reading.alarms != 0 ? alarms_in_words(unit, reading) : "  the alarms are gone");
@@ -96,7 +79,7 @@ class Display {
   void show_trouble(const Sample& sample) {
     Trouble trouble = sample.trouble;
     if (format_ == Format::json) return print_line(to_json(trouble).line());
-    if (format_ == Format::csv) print_event_row(sample);
+    if (format_ == Format::csv) show_row(sample);
     if (trouble.error == last_trouble_) trouble.advice.clear();
     last_trouble_ = trouble.error;
     print_message(trouble.text());
@@ -104,8 +87,7 @@ class Display {
 
   const Encoder* live_;
   Format format_;
-  std::string commas_;  // between the time and the event, where there is no reading
-  Time start_;
+  SampleRows rows_;
   std::uint32_t alarms_ = 0;
   bool told_doubt_ = false;
   Error last_trouble_ = Error::none;

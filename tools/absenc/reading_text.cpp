@@ -39,20 +39,6 @@ std::string flags_text(const Flags& flags) {
   return fmt::format("{}", fmt::join(flag_names(*flags.field, flags.bits), " "));
 }
 
-bool has_channels(const Unit& unit) { return unit.second_status != nullptr || unit.second_alarms != nullptr; }
-
-// Channel by channel.
-std::vector<Flags> status_and_alarms(const Unit& unit, const Reading& reading) {
-  const std::vector<Flags> status = status_of(unit, reading);
-  const std::vector<Flags> alarms = alarms_of(unit, reading);
-  std::vector<Flags> all;
-  for (std::size_t i = 0; i < std::max(status.size(), alarms.size()); ++i) {
-    if (i < status.size()) all.push_back(status[i]);
-    if (i < alarms.size()) all.push_back(alarms[i]);
-  }
-  return all;
-}
-
 std::string linear_text(const Reading& reading) {
   const unsigned bits = reading.singleturn_bits;
   const double most = micrometres(low_mask(bits), reading.unit_um);
@@ -89,7 +75,7 @@ namespace {
 
 // The alarms, of encoders without any the status; of two channels both.
 std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
-  if (has_channels(unit)) return status_and_alarms(unit, reading);
+  if (unit.second_status != nullptr || unit.second_alarms != nullptr) return flags_of(unit, reading);
   return unit.alarms != nullptr ? alarms_of(unit, reading) : status_of(unit, reading);
 }
 
@@ -141,92 +127,6 @@ std::string alarms_in_words(const Unit& unit, const Reading& reading) {
     lines += alarms.size() > 1 ? fmt::format("{}:\n{}", flags.field->name, words) : words;
   }
   return lines;
-}
-
-namespace {
-
-// Of two channels each under its own name, and `alarms` all the same: those that either has, for whoever knows no
-// channels.
-void set_flags(Json& json, const Unit& unit, const Reading& reading) {
-  if (!has_channels(unit)) {
-    for (const Flags& flags : status_of(unit, reading)) json.set("status", flags_to_json(*flags.field, flags.bits));
-    for (const Flags& flags : alarms_of(unit, reading)) json.set("alarms", flags_to_json(*flags.field, flags.bits));
-    return;
-  }
-  for (const Flags& flags : status_and_alarms(unit, reading)) {
-    json.set(flags.field->name, flags_to_json(*flags.field, flags.bits));
-  }
-  std::uint32_t either = 0;
-  for (const Flags& flags : alarms_of(unit, reading)) either |= flags.bits;
-  if (unit.alarms != nullptr) json.set("alarms", flags_to_json(*unit.alarms, either));
-}
-
-}  // namespace
-
-void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed) {
-  if (reading.singleturn_bits != 0) {
-    const bool valid = reading.singleturn_valid() && reading.ready;
-    const double um = micrometres(reading.singleturn, reading.unit_um);
-    if (reading.unit_um > 0) {
-      json.set("position_mm", valid ? Json(um / 1000) : Json()).set("position_um", valid ? Json(um) : Json());
-    } else {
-      json.set("angle_deg", valid ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
-    }
-    json.set("singleturn", reading.singleturn).set("singleturn_bits", reading.singleturn_bits);
-    json.set("singleturn_valid", valid).set("singleturn_valid_bits", reading.singleturn_valid_bits);
-  }
-  if (reading.multiturn_bits != 0) {
-    json.set("multiturn", reading.multiturn).set("multiturn_bits", reading.multiturn_bits);
-    json.set("multiturn_valid", reading.multiturn_valid);
-  }
-  set_flags(json, unit, reading);
-  json.set("confirmed", confirmed).set("ok", true);
-}
-
-Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed) {
-  Json json = Json::object().set("time_s", seconds).set("protocol", unit.id);
-  set_reading(json, unit, reading, confirmed);
-  return json;
-}
-
-std::vector<std::string_view> csv_flag_names(const Unit& unit) {
-  if (!has_channels(unit)) return {"status", "alarms"};
-  std::vector<std::string_view> names;
-  for (const Flags& flags : status_and_alarms(unit, {})) names.push_back(flags.field->name);
-  return names;
-}
-
-std::string csv_header(const Unit& unit, bool linear) {
-  return fmt::format("time_s,{},singleturn,singleturn_valid,multiturn,multiturn_valid,{}",
-                     linear ? "position_mm,position_um" : "angle_deg", fmt::join(csv_flag_names(unit), ","));
-}
-
-std::string to_csv(const Unit& unit, const Reading& reading, double seconds) {
-  std::string row = fmt::format("{:.6f},", seconds);
-  if (reading.singleturn_bits != 0) {
-    const bool valid = reading.singleturn_valid() && reading.ready;
-    const bool linear = reading.unit_um > 0;
-    const double um = micrometres(reading.singleturn, reading.unit_um);
-    if (valid && linear) row += fmt::format("{},{}", um / 1000, um);
-    if (valid && !linear) row += fmt::format("{}", degrees(reading.singleturn, reading.singleturn_bits));
-    if (!valid && linear) row += ",";
-    row += fmt::format(",{},{}", reading.singleturn, valid);
-  } else {
-    row += ",,";
-  }
-  if (reading.multiturn_bits != 0) {
-    row += fmt::format(",{},{}", reading.multiturn, reading.multiturn_valid);
-  } else {
-    row += ",,";
-  }
-  if (has_channels(unit)) {
-    for (const Flags& flags : status_and_alarms(unit, reading)) row += ',' + flags_text(flags);
-    return row;
-  }
-  for (const std::vector<Flags>& flags : {status_of(unit, reading), alarms_of(unit, reading)}) {
-    row += ',' + (flags.empty() ? std::string() : flags_text(flags.front()));
-  }
-  return row;
 }
 
 void set_validity(Json& json, const Reading& reading) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position reading for people, as JSON and as CSV. What is not valid never looks like a good number.
+// A position reading for people. What is not valid never looks like a good number.
 #pragma once
 
 #include <cstdint>
@@ -29,23 +29,10 @@ using namespace client;
 /// Of two channels under the name of each; what both raise once.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
-/// Sets everything but the time.
-void set_reading(Json& json, const Unit& unit, const Reading& reading, bool confirmed);
-[[nodiscard]] Json to_json(const Unit& unit, const Reading& reading, double seconds, bool confirmed);
-
 /// Sets singleturn_valid and multiturn_valid, as far as the reading carries them.
 void set_validity(Json& json, const Reading& reading);
 
 /// "0.125" without more decimals than the unit of a count has.
 [[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);
-
-/// The names of the columns of `to_csv`: "time_s,angle_deg,singleturn,...,status,alarms". Two channels have columns of
-/// their own in the place of the last two.
-[[nodiscard]] std::string csv_header(const Unit& unit, bool linear);
-/// Those of the flags alone.
-[[nodiscard]] std::vector<std::string_view> csv_flag_names(const Unit& unit);
-/// Flags are separated by spaces; what the reply does not carry is empty, and so is what is not valid in degrees or
-/// millimetres.
-[[nodiscard]] std::string to_csv(const Unit& unit, const Reading& reading, double seconds);
 
 }  // namespace absenc::tool

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/sample_rows.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/os/line_file.hpp"
 
@@ -52,18 +53,16 @@ class Recording {
   void refuse_parts_of_another_recording() const;
   void open_part();
   [[nodiscard]] std::string header() const;
-  [[nodiscard]] std::string line_of(const Sample& sample) const;
-  [[nodiscard]] std::string gap_line() const;
-  [[nodiscard]] std::string event_line(Time at, std::string_view event, std::string_view missed) const;
+  [[nodiscard]] std::string line_of(const Row& row) const;
   [[nodiscard]] bool wanted(const Sample& sample);
   void write_gap();
 
   RecordingSettings settings_;
   const Unit* unit_;
   Options options_;
-  double unit_um_;  // linear encoders; 0: rotary
   Format format_;
   Time start_;
+  SampleRows rows_;
   std::string started_;  // the same as date and time
   std::optional<os::LineFile> file_;
   unsigned part_ = 0;

@@ -41,7 +41,7 @@ LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks
 Annotator::Annotator(const Unit& unit, const Options& options, const Settings& settings, AnnotationSink& sink)
     : judge_(unit, options),
       settings_(settings),
-      exchanges_(judge_, settings.ticks, sink),
+      exchanges_(Judge(unit, options), settings.ticks, sink),
       sink_(sink),
       options_(options) {
   is_first_ = !settings_.begins_silent;

@@ -31,7 +31,7 @@ void BurstAnnotator::put(const Burst& burst) {
     decode_exchange(burst, annotation);
   }
   if (annotation.error == Error::none) {
-    annotation.reading = judge_.reading();
+    annotation.contents = judge_.contents();
   } else if (burst.cut) {
     annotation.error = Error::none;
     annotation.remark = Remark::cut;
@@ -66,11 +66,11 @@ void CanAnnotator::put(const CanRecord& record) {
   if (answers(record)) return;
   const Frame frame{.bytes = record.frame.bytes(), .can = &record.frame};
   const Error as_reply = judge_.decode({}, frame);
-  if (as_reply == Error::none) return tell(Kind::reply, record, Error::none, Remark::none, judge_.reading());
+  if (as_reply == Error::none) return tell(Kind::reply, record, Error::none, Remark::none, judge_.contents());
   if (judge_.decode(frame, {}) != Error::none) {
     return answers_badly(record) ? void() : tell(Kind::noise, record, as_reply, Remark::none);
   }
-  if (!judge_.is_answered(frame)) return tell(Kind::request, record, Error::none, Remark::none);
+  if (!judge_.is_answered(frame)) return tell(Kind::request, record, Error::none, Remark::none, judge_.contents());
   end_waits(record.frame);
   if (waiting_ == capacity) give_up(0, Remark::unanswered);
   asked_[waiting_++] = record;
@@ -125,7 +125,7 @@ void CanAnnotator::answer(std::size_t index, const CanRecord& record, Error erro
              .end = record.at,
              .request = {.bytes = asked.frame.bytes(), .can = &asked.frame},
              .reply = {.bytes = record.frame.bytes(), .can = &record.frame},
-             .reading = error == Error::none ? judge_.reading() : nullptr,
+             .contents = judge_.contents(),
              .turnaround = record.at - asked.at});
 }
 
@@ -138,9 +138,9 @@ CanRecord CanAnnotator::take(std::size_t index) {
 }
 
 void CanAnnotator::tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
-                        const Reading* reading) {
+                        const Contents& contents) {
   Annotation annotation{
-      .kind = kind, .remark = remark, .error = error, .begin = record.at, .end = record.at, .reading = reading};
+      .kind = kind, .remark = remark, .error = error, .begin = record.at, .end = record.at, .contents = contents};
   const Frame frame{.bytes = record.frame.bytes(), .can = &record.frame};
   (kind == Annotation::Kind::request ? annotation.request : annotation.reply) = frame;
   sink_.put(annotation);

@@ -48,8 +48,7 @@ class CanAnnotator {
   void end_waits(const CanFrame& request);
   void answer(std::size_t index, const CanRecord& record, Error error);
   CanRecord take(std::size_t index);
-  void tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
-            const Reading* reading = nullptr);
+  void tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark, const Contents& contents = {});
   void give_up(std::size_t index, Remark remark);
 
   Judge judge_;

@@ -29,7 +29,7 @@ struct Check final : AnnotationSink {
 
   void put(const Annotation& annotation) override {
     require(annotation.begin <= annotation.end);
-    require(annotation.reading == nullptr || annotation.error == Error::none);
+    require(annotation.contents.reading == nullptr || annotation.error == Error::none);
     const bool is_echo = annotation.remark == Remark::echo;
     bytes += annotation.request.bytes.size() * (is_echo ? 2 : 1) + annotation.reply.bytes.size();
     if (annotation.error != Error::none || annotation.remark == Remark::cut) return;

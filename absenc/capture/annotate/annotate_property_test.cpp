@@ -41,7 +41,7 @@ struct Keeper final : AnnotationSink {
     kept.push_back({annotation.kind, annotation.remark, annotation.error, annotation.begin, annotation.end,
                     Wire(annotation.request.bytes.begin(), annotation.request.bytes.end()),
                     Wire(annotation.reply.bytes.begin(), annotation.reply.bytes.end()),
-                    annotation.reading == nullptr ? std::nullopt : std::optional(*annotation.reading),
+                    annotation.contents.reading == nullptr ? std::nullopt : std::optional(*annotation.contents.reading),
                     annotation.turnaround});
   }
   std::vector<Kept> kept;
@@ -117,7 +117,8 @@ class Truth {
 
  private:
   std::optional<Reading> reading(Error error) {
-    return error == Error::none && judge_.reading() != nullptr ? std::optional(*judge_.reading()) : std::nullopt;
+    return error == Error::none && judge_.contents().reading != nullptr ? std::optional(*judge_.contents().reading)
+                                                                        : std::nullopt;
   }
 
   void add(Kind kind, Remark remark, Error error, const Said& said, std::optional<Reading> read) {

@@ -107,7 +107,7 @@ std::size_t Annotator::answer_here() {
   if (asked.error != Error::none) {
     // What was asked is not known, but an encoder answered it.
     const std::size_t size = overdue ? 0 : reply_at({}, at_);
-    if (size != 0) exchanges_.answer(*which, piece(size), asked.error, asked.remark, nullptr);
+    if (size != 0) exchanges_.answer(*which, piece(size), asked.error, asked.remark, {});
     return size;
   }
   std::size_t& usual = reply_sizes_[asked.storage[0]];
@@ -120,14 +120,17 @@ std::size_t Annotator::answer_here() {
     const std::size_t echoed = may_be_accident ? echoed_answer_size(asked.bytes()) : 0;
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return echoed_answer_here(*which, echoed);
     if (size == 0) return 0;
-    static_cast<void>(judge_.decode({.bytes = asked.bytes()}, {.bytes = rest(at_).first(size)}));  // its reading again
   }
   // Some replies are the same as their requests, which nobody answered and which now come again.
   if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
   if (leaves_rest && usual != 0 && size != usual && !goes_on(size)) return 0;
   last_reply_at_ = at_;
   last_reply_size_ = usual = size;
-  exchanges_.answer(*which, piece(size), Error::none, Remark::none, judge_.reading());
+  // What was looked at meanwhile says something else.
+  if (leaves_rest || overdue) {
+    static_cast<void>(judge_.decode({.bytes = asked.bytes()}, {.bytes = rest(at_).first(size)}));
+  }
+  exchanges_.answer(*which, piece(size), Error::none, Remark::none, judge_.contents());
   return size;
 }
 
@@ -150,7 +153,7 @@ std::size_t Annotator::echoed_answer_size(Bytes request) {
 std::size_t Annotator::echoed_answer_here(std::size_t which, std::size_t size) {
   const std::size_t echo = exchanges_.waiting()[which].bytes().size();
   at_ += echo;
-  exchanges_.answer(which, piece(size - echo), Error::none, Remark::echo, judge_.reading());
+  exchanges_.answer(which, piece(size - echo), Error::none, Remark::echo, judge_.contents());
   at_ -= echo;
   return size;
 }
@@ -214,9 +217,9 @@ std::size_t Annotator::unasked_here() {
   channel_->last_size = size;
   last_reply_size_ = 0;
   const bool good = streams || !exchanges_.has_asked();
-  static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // the look ahead has another reading
+  static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // the look ahead has other contents
   exchanges_.alone(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
-                   good ? Remark::none : Remark::unasked, good ? judge_.reading() : nullptr);
+                   good ? Remark::none : Remark::unasked, good ? judge_.contents() : Contents{});
   return size;
 }
 
@@ -273,7 +276,7 @@ void Annotator::tell_bad(std::size_t size) {
   const std::optional<std::size_t> which = asked_before(bad.begin);
   if (which) {
     const Error error = error_of({.bytes = exchanges_.waiting()[*which].bytes()}, {.bytes = bad.bytes});
-    return exchanges_.answer(*which, bad, unless_cut(error), remark, nullptr);
+    return exchanges_.answer(*which, bad, unless_cut(error), remark, {});
   }
   const bool may_be_request = channel_->carries == Carries::both && is_end && at_ == 0 && !judge_.streams();
   if (may_be_request && !cut && exchanges_.has_asked()) {

@@ -96,7 +96,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
     Finder finder;
     Judge judge(unit, options);
     const bool is_position = said.by == sim::Role::device && judge.decode({}, {.bytes = said.bytes}) == Error::none &&
-                             judge.reading() != nullptr;
+                             judge.contents().reading != nullptr;
     if (!is_position) continue;
     begins.push_back(characters.size() * length);
     sizes.push_back(said.bytes.size());

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "absenc/capture/signal.hpp"
@@ -30,6 +31,12 @@ enum class Remark : std::uint8_t {
 /// A sentence without its end; "" for none.
 [[nodiscard]] std::string_view text_of(Remark remark);
 
+/// What a good frame says.
+struct Contents {
+  std::span<const FieldValue> fields{};  // in the order in which the unit puts them
+  const Reading* reading = nullptr;      // the position, when it carries one
+};
+
 struct Annotation {
   enum class Kind : std::uint8_t {
     exchange,  // a request and its reply
@@ -43,9 +50,10 @@ struct Annotation {
   Error error = Error::none;  // of the whole; with one, nothing of it is to be used
   Tick begin = 0;
   Tick end = 0;
-  Frame request{};  // both valid during the call only
+  // These are valid during the call only.
+  Frame request{};
   Frame reply{};
-  const Reading* reading = nullptr;  // the position, when the reply is good and carries one
+  Contents contents{};               // of what is good and was decoded
   std::optional<Tick> turnaround{};  // from the end of the request to the begin of its reply
 };
 

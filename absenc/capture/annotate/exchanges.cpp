@@ -42,7 +42,7 @@ void Exchanges::ask(const Piece& request, Error error, Remark remark, bool is_re
   if (error == Error::none) has_asked_ = true;
 }
 
-void Exchanges::answer(std::size_t which, const Piece& reply, Error error, Remark remark, const Reading* reading) {
+void Exchanges::answer(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents) {
   if (which > 0) give_up(which);
   const Asked& asked = asked_[0];
   Annotation annotation{.kind = Annotation::Kind::exchange,
@@ -52,7 +52,7 @@ void Exchanges::answer(std::size_t which, const Piece& reply, Error error, Remar
                         .end = reply.end,
                         .request = {.bytes = asked.bytes()},
                         .reply = {.bytes = reply.bytes},
-                        .reading = reading};
+                        .contents = contents};
   if (reply.begin >= asked.end) annotation.turnaround = reply.begin - asked.end;
   const bool whole = remark == Remark::none || remark == Remark::echo;
   if (error == Error::unsupported && whole && !judge_.is_answered(annotation.request)) {
@@ -61,7 +61,7 @@ void Exchanges::answer(std::size_t which, const Piece& reply, Error error, Remar
   } else if (error == Error::none && remark != Remark::cut && overdue(asked, reply.begin)) {
     annotation.error = Error::timeout;
     annotation.remark = Remark::late;
-    annotation.reading = nullptr;
+    annotation.contents = {};
   }
   sink_.put(annotation);
   forget(1);
@@ -72,9 +72,9 @@ void Exchanges::give_up(std::size_t count) {
   forget(count);
 }
 
-void Exchanges::alone(Annotation::Kind kind, const Piece& piece, Error error, Remark remark, const Reading* reading) {
+void Exchanges::alone(Annotation::Kind kind, const Piece& piece, Error error, Remark remark, const Contents& contents) {
   Annotation annotation{
-      .kind = kind, .remark = remark, .error = error, .begin = piece.begin, .end = piece.end, .reading = reading};
+      .kind = kind, .remark = remark, .error = error, .begin = piece.begin, .end = piece.end, .contents = contents};
   (kind == Annotation::Kind::request ? annotation.request : annotation.reply).bytes = piece.bytes;
   sink_.put(annotation);
 }
@@ -89,7 +89,8 @@ void Exchanges::tell_unanswered(const Asked& asked, bool cut) {
   if (asked.error != Error::none) {
     alone(asked.is_request ? Annotation::Kind::request : Annotation::Kind::noise, piece, asked.error, asked.remark);
   } else if (!judge_.is_answered({.bytes = asked.bytes()})) {
-    alone(Annotation::Kind::request, piece, Error::none, Remark::none);
+    static_cast<void>(judge_.decode({.bytes = asked.bytes()}, {}));
+    alone(Annotation::Kind::request, piece, Error::none, Remark::none, judge_.contents());
   } else if (cut || asked.remark == Remark::cut) {
     alone(Annotation::Kind::request, piece, Error::none, Remark::cut);
   } else {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/capture/annotate/judge.hpp"
@@ -45,7 +46,9 @@ class Exchanges {
     [[nodiscard]] Bytes bytes() const { return {storage.data(), size}; }
   };
 
-  Exchanges(Judge& judge, const LineTicks& ticks, AnnotationSink& sink) : judge_(judge), ticks_(ticks), sink_(sink) {}
+  /// `judge` is its own: another keeps what the reply says.
+  Exchanges(Judge judge, const LineTicks& ticks, AnnotationSink& sink)
+      : judge_(std::move(judge)), ticks_(ticks), sink_(sink) {}
 
   [[nodiscard]] std::span<const Asked> waiting() const { return {asked_.data(), waiting_}; }
   /// Whether there was a good request so far.
@@ -55,12 +58,12 @@ class Exchanges {
 
   /// The oldest gives up when there is no more room.
   void ask(const Piece& request, Error error, Remark remark, bool is_request);
-  /// The reply to `waiting()[which]`; those before it had none. `reading` only without an error.
-  void answer(std::size_t which, const Piece& reply, Error error, Remark remark, const Reading* reading);
+  /// The reply to `waiting()[which]`; those before it had none. `contents` only without an error.
+  void answer(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
   /// The first `count` had no reply.
   void give_up(std::size_t count);
   /// What belongs to no request.
-  void alone(Annotation::Kind kind, const Piece& piece, Error error, Remark remark, const Reading* reading = nullptr);
+  void alone(Annotation::Kind kind, const Piece& piece, Error error, Remark remark, const Contents& contents = {});
   /// The capture ends here: what still waits may have been answered behind.
   void finish(Tick end);
 
@@ -70,7 +73,7 @@ class Exchanges {
   void tell_unanswered(const Asked& asked, bool cut);
   void forget(std::size_t count);
 
-  Judge& judge_;
+  Judge judge_;
   LineTicks ticks_;
   AnnotationSink& sink_;
   std::array<Asked, capacity> asked_{};

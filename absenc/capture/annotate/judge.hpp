@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Asks a unit about bytes of a capture: whether they are a frame, and what position it carries.
+// Asks a unit about bytes of a capture: whether they are a frame, and what it says.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
+#include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/core/angle.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -16,13 +19,15 @@ class Judge {
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
-  /// As the unit decodes it; `reading` then tells the position.
+  /// As the unit decodes it; `contents` then tells what it says.
   Error decode(const Frame& request, const Frame& reply) {
-    sink_.found = false;
-    return unit_->decode(options_, request, reply, sink_);
+    kept_.clear();
+    const Error error = unit_->decode(options_, request, reply, kept_);
+    if (error != Error::none) kept_.clear();
+    return error;
   }
-  /// Of the last good reply that was decoded; null when it carries none.
-  [[nodiscard]] const Reading* reading() const { return sink_.found ? &sink_.reading : nullptr; }
+  /// Of what was decoded last, nothing of what was bad. Valid until the next is decoded.
+  [[nodiscard]] Contents contents() const { return {kept_.fields, kept_.has_reading ? &kept_.reading : nullptr}; }
 
   /// The size of the frame that the first byte begins, or 0.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
@@ -41,19 +46,39 @@ class Judge {
   [[nodiscard]] bool streams() const { return unit_->streams != nullptr && unit_->streams(options_); }
 
  private:
-  struct ReadingSink final : FieldSink {
-    void put(const FieldValue&) override {}
+  struct Kept final : FieldSink {
+    void clear() {
+      fields.clear();
+      bytes.clear();
+      has_reading = false;
+    }
+    void put(const FieldValue& value) override {
+      fields.push_back(value);
+      if (!value.bytes.empty()) keep_bytes();
+    }
     void put_reading(const Reading& one) override {
       reading = one;
-      found = true;
+      has_reading = true;
     }
+    // Of the newest field: they are valid during the call only. All of them move when there is no more room.
+    void keep_bytes() {
+      const Bytes added = fields.back().bytes;
+      bytes.insert(bytes.end(), added.begin(), added.end());
+      std::size_t at = 0;
+      for (FieldValue& field : fields) {
+        field.bytes = Bytes(bytes).subspan(at, field.bytes.size());
+        at += field.bytes.size();
+      }
+    }
+    std::vector<FieldValue> fields;
+    std::vector<std::uint8_t> bytes;
     Reading reading{};
-    bool found = false;
+    bool has_reading = false;
   };
 
   const Unit* unit_;
   Options options_;
-  ReadingSink sink_;
+  Kept kept_;
 };
 
 }  // namespace absenc::capture

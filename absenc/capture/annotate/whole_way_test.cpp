@@ -35,7 +35,7 @@ struct Lines final : AnnotationSink {
       }
       line += '|';
     }
-    if (one.reading != nullptr) line += std::to_string(one.reading->singleturn);
+    if (one.contents.reading != nullptr) line += std::to_string(one.contents.reading->singleturn);
     lines.push_back(line);
     times.push_back(one.begin);
   }

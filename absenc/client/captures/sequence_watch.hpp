@@ -14,17 +14,14 @@ namespace absenc::client {
 /// stood becomes a `sequence_mismatch`, as a host that looks at counters would have it.
 class SequenceWatch final : public capture::AnnotationSink {
  public:
-  /// All must outlive it.
-  SequenceWatch(const Unit& unit, const Options& options, capture::AnnotationSink& sink)
-      : unit_(unit), options_(options), sink_(sink) {}
+  /// `sink` must outlive it.
+  explicit SequenceWatch(capture::AnnotationSink& sink) : sink_(sink) {}
 
   void put(const capture::Annotation& annotation) override {
-    using Kind = capture::Annotation::Kind;
     ++count_;
-    const bool is_good = annotation.error == Error::none && annotation.remark != capture::Remark::cut;
     Counter counter;
-    if (is_good && !annotation.reply.empty() && annotation.kind != Kind::noise) {
-      static_cast<void>(unit_.decode(options_, annotation.request, annotation.reply, counter));
+    if (!annotation.reply.empty()) {
+      for (const FieldValue& field : annotation.contents.fields) counter.put(field);
     }
     if (!counter.value) return sink_.put(annotation);
     const Seen now{*counter.value, count_};
@@ -34,7 +31,7 @@ class SequenceWatch final : public capture::AnnotationSink {
     if (!stands) return sink_.put(annotation);
     capture::Annotation repeated = annotation;
     repeated.error = Error::sequence_mismatch;
-    repeated.reading = nullptr;
+    repeated.contents = {};
     sink_.put(repeated);
   }
 
@@ -42,8 +39,8 @@ class SequenceWatch final : public capture::AnnotationSink {
   // With more in between, a counter of 7 bits may have come round.
   static constexpr std::uint64_t most_between = 100;
 
-  struct Counter final : FieldSink {
-    void put(const FieldValue& field) override {
+  struct Counter {
+    void put(const FieldValue& field) {
       if (field.info->role == Role::encoder) address = field.number;
       if (!value && field.info->role == Role::sequence) value = field.number;
     }
@@ -55,8 +52,6 @@ class SequenceWatch final : public capture::AnnotationSink {
     std::uint64_t at;
   };
 
-  const Unit& unit_;
-  const Options& options_;
   capture::AnnotationSink& sink_;
   std::map<std::int64_t, Seen> last_;  // by the address of the encoder
   std::uint64_t count_ = 0;

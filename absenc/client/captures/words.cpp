@@ -31,6 +31,8 @@ std::string TickClock::text(capture::Tick tick) const {
   return has_time() ? fmt::format("{:.{}f}", seconds(tick), digits_) : fmt::format("{}", tick);
 }
 
+std::string TickClock::format() const { return fmt::format("{{:.{}f}}", digits_); }
+
 std::string to_text(const capture::Damage& damage, const TickClock& clock) {
   return fmt::format("{}byte {}, {} {}: {}", damage.note ? "note: " : "the capture is damaged at ", damage.offset,
                      clock.has_time() ? "second" : "tick", clock.text(damage.tick), damage.what);

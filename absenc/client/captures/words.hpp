@@ -22,6 +22,8 @@ class TickClock {
   [[nodiscard]] Time time(capture::Tick ticks) const;
   /// Seconds with as many digits as it takes, or the number of the tick.
   [[nodiscard]] std::string text(capture::Tick tick) const;
+  /// Of seconds, for `Column::Look`.
+  [[nodiscard]] std::string format() const;
 
  private:
   std::uint64_t ticks_per_second_;

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/reading_columns.hpp"
+
+#include "absenc/core/angle.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+bool has_channels(const Unit& unit) { return unit.second_status != nullptr || unit.second_alarms != nullptr; }
+
+constexpr std::string_view flag_words = "names, separated by spaces";
+
+}  // namespace
+
+ReadingColumns::ReadingColumns(const Unit& unit, const Options& options) : unit_(&unit) {
+  const bool is_linear = unit.resolution(options).unit_um > 0;
+  if (is_linear) {
+    columns_ = {{"position_mm", "mm", Type::real, "millimetres, empty when not valid"},
+                {"position_um", "um", Type::real, "micrometres, empty when not valid"}};
+  } else {
+    columns_ = {{"angle_deg", "deg", Type::real, "degrees within the turn, empty when not valid"}};
+  }
+  const Column numbers[] = {
+      {"singleturn", "counts", Type::uint64, "counts"},
+      {"singleturn_bits", "", Type::uint64, "", {.is_detail = true}},
+      {"singleturn_valid", "", Type::boolean, ""},
+      {"singleturn_valid_bits", "", Type::uint64, "", {.is_detail = true}},
+      {"multiturn", "revolutions", Type::uint64, "revolutions as the encoder counts them"},
+      {"multiturn_bits", "", Type::uint64, "", {.is_detail = true}},
+      {"multiturn_valid", "", Type::boolean, ""},
+  };
+  columns_.insert(columns_.end(), std::begin(numbers), std::end(numbers));
+  if (has_channels(unit)) {
+    for (const Flags& flags : flags_of(unit, {})) columns_.push_back({flags.field->name, "", Type::flags, flag_words});
+    columns_.push_back({"alarms", "", Type::flags, flag_words, {.is_detail = true}});
+  } else {
+    columns_.push_back({"status", "", Type::flags, flag_words});
+    columns_.push_back({"alarms", "", Type::flags, flag_words});
+  }
+}
+
+void ReadingColumns::fill(const Reading& reading, std::span<Value> values) const {
+  std::size_t at = 0;
+  const auto put = [&](bool is_carried, Value value) { values[at++] = is_carried ? std::move(value) : Value(); };
+  const bool has_position = reading.singleturn_bits != 0;
+  const bool is_valid = reading.singleturn_valid() && reading.ready;
+  const auto put_position = [&](double position) { put(has_position, is_valid ? Value(position) : Value(Invalid{})); };
+  if (columns_.front().name == "position_mm") {
+    const double um = has_position ? micrometres(reading.singleturn, reading.unit_um) : 0;
+    put_position(um / 1000);
+    put_position(um);
+  } else {
+    put_position(has_position ? degrees(reading.singleturn, reading.singleturn_bits) : 0);
+  }
+  put(has_position, reading.singleturn);
+  put(has_position, std::uint64_t{reading.singleturn_bits});
+  put(has_position, is_valid);
+  put(has_position, std::uint64_t{reading.singleturn_valid_bits});
+  const bool has_turns = reading.multiturn_bits != 0;
+  put(has_turns, reading.multiturn);
+  put(has_turns, std::uint64_t{reading.multiturn_bits});
+  put(has_turns, reading.multiturn_valid);
+
+  const auto put_first = [&](const std::vector<Flags>& flags) {
+    put(!flags.empty(), flags.empty() ? Value() : Value(flags.front()));
+  };
+  if (!has_channels(*unit_)) {
+    put_first(status_of(*unit_, reading));
+    return put_first(alarms_of(*unit_, reading));
+  }
+  for (const Flags& flags : flags_of(*unit_, reading)) put(true, flags);
+  std::uint32_t either = 0;
+  for (const Flags& flags : alarms_of(*unit_, reading)) either |= flags.bits;
+  put(unit_->alarms != nullptr, Flags{unit_->alarms, either});
+}
+
+}  // namespace absenc::client
