@@ -14,6 +14,7 @@
 #include "absenc/client/emulate.hpp"
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/identify.hpp"
+#include "absenc/client/sample_rows.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
@@ -88,6 +89,56 @@ TEST(ClientEncoder, ACommandTellsTypedValues) {
   EXPECT_EQ(read.row().get<std::int64_t>("value"), 0x42);
   EXPECT_EQ(to_text(read["value"]), "66");
   EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(read["vlaue"]); }), HasSubstr("value"));
+}
+
+TEST(ClientEncoder, SettingsAreReadWrittenAndReadBack) {
+  Encoder encoder = open("sim:tformat");
+  Settings settings = encoder.settings();
+  const std::int64_t degrees[] = {85};
+  EXPECT_FALSE(settings.set("overheat-threshold", degrees).was_so);
+  EXPECT_EQ(settings.get("overheat-threshold")["overheat_threshold_c"], Value(std::int64_t{85}));
+  EXPECT_TRUE(settings.set("overheat-threshold", degrees).was_so);
+  const std::int64_t never[] = {0};
+  const SettingChange change = settings.set("overheat-threshold", never);
+  EXPECT_EQ(change.now["overheat_enabled"], Value(false));
+  EXPECT_EQ(change.note, "");
+  const auto misspelt = [&] { static_cast<void>(settings.get("overheat-treshold")); };
+  EXPECT_THAT(thrown_by<UsageError>(misspelt), HasSubstr("overheat-threshold"));
+}
+
+// What it is set to is what it is reached with.
+TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
+  Encoder encoder = open("sim:raa38-modbus");
+  const std::int64_t address[] = {7};
+  EXPECT_THAT(encoder.settings().set("address", address).note, HasSubstr("address=7"));
+  EXPECT_TRUE(encoder.read().singleturn_valid());
+}
+
+TEST(ClientSamples, AreRowsOfNamedValues) {
+  Encoder encoder = open("sim:esl?singleturn=1000&fault=corrupt=0.3");
+  SampleRows rows(encoder.unit(), encoder.options(), Time{}, SampleRows::With::motion);
+  std::size_t good = 0;
+  std::size_t failed = 0;
+  for (const Sample& sample : encoder.samples({.count = 200})) {
+    const Row& row = rows.of(sample);
+    ASSERT_EQ(row.values.size(), rows.columns().size());
+    if (row.get<bool>("ok")) {
+      ++good;
+      EXPECT_EQ(row["event"], Value());
+      const bool is_valid = row.get<bool>("singleturn_valid");
+      EXPECT_EQ(row["singleturn"], Value(sample.reading.singleturn));
+      EXPECT_EQ(std::holds_alternative<double>(row["angle_deg"]), is_valid);
+      EXPECT_EQ(std::holds_alternative<Invalid>(row["angle_deg"]), !is_valid);
+    } else {
+      ++failed;
+      EXPECT_EQ(row["angle_deg"], Value());
+      EXPECT_EQ(row.get<std::string>("event"), event_name(sample));
+      EXPECT_EQ(row.get<std::string>("message"), sample.trouble.message);
+    }
+  }
+  EXPECT_GT(good, 0u);
+  EXPECT_GT(failed, 0u);
+  EXPECT_EQ(rows.of_gap(Time{}, 12).get<std::uint64_t>("missed"), 12u);
 }
 
 TEST(ClientEncoder, AFailureHasWhatWasSentAndWhatToTry) {

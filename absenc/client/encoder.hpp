@@ -16,6 +16,7 @@
 #include "absenc/client/input_range.hpp"
 #include "absenc/client/memory.hpp"
 #include "absenc/client/row.hpp"
+#include "absenc/client/settings.hpp"
 #include "absenc/client/trouble.hpp"
 #include "absenc/host/session.hpp"
 #include "absenc/host/statistics.hpp"
@@ -94,6 +95,9 @@ class Encoder {
 
   /// Its bytes, of an encoder that is connected and while this object stays where it is.
   [[nodiscard]] Memory memory() { return Memory(*connection_); }
+
+  /// What it is set to, of an encoder that is connected and while this object stays where it is.
+  [[nodiscard]] Settings settings() { return Settings(*connection_); }
 
   /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
   void cancel();

@@ -15,6 +15,8 @@ namespace absenc::client {
 struct Flags {
   const FieldInfo* field;
   std::uint32_t bits;
+
+  friend bool operator==(const Flags&, const Flags&) = default;
 };
 
 /// One for each channel that the unit has flags of; none when it has no such field.

@@ -44,6 +44,11 @@ struct Text {
 
 std::string to_text(const Value& value) { return std::visit(Text{}, value); }
 
+std::string to_text(const Column& column, const Value& value) {
+  const std::string text = to_text(value);
+  return column.unit.empty() || text.empty() ? text : fmt::format("{} {}", text, column.unit);
+}
+
 const Value& Row::operator[](std::string_view name) const { return values[index_of(columns, name)]; }
 const Value& Answer::operator[](std::string_view name) const { return values[index_of(columns, name)]; }
 

@@ -32,7 +32,9 @@ struct Column {
 using ByteVector = std::vector<std::uint8_t>;
 
 /// In place of a value that was told but does not hold: it is never shown.
-struct Invalid {};
+struct Invalid {
+  friend bool operator==(const Invalid&, const Invalid&) = default;
+};
 
 /// In the order of `Type`, between nothing, which was not told, and `Invalid`.
 using Value =
@@ -40,6 +42,8 @@ using Value =
 
 /// "12.5", "yes", "over_heat battery_alarm", "1A 00"; "" for nothing and for what does not hold.
 [[nodiscard]] std::string to_text(const Value& value);
+/// The same with its unit: "80 degC".
+[[nodiscard]] std::string to_text(const Column& column, const Value& value);
 
 struct Row {
   std::span<const Column> columns;  // of the maker of the row

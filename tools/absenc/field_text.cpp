@@ -63,10 +63,13 @@ void FieldTable::put(const FieldValue& value) {
   if (!info.unit.empty()) shown += fmt::format(" {}", info.unit);
   if (is_of_reading(info.role)) judged_.push_back({&info, rows.size()});
   rows.push_back({std::string(info.name), shown, std::string(info.meaning)});
-  if (info.kind != FieldInfo::Kind::flags) return;
-  for (std::size_t i = 0; i < info.flags.size(); ++i) {
-    const FlagInfo& flag = info.flags[i];
-    if ((static_cast<std::uint64_t>(value.number) >> i & 1) == 0 || flag.name.empty()) continue;
+  if (info.kind == FieldInfo::Kind::flags) add_flags(rows, info, static_cast<std::uint64_t>(value.number));
+}
+
+void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& field, std::uint64_t bits) {
+  for (std::size_t i = 0; i < field.flags.size(); ++i) {
+    const FlagInfo& flag = field.flags[i];
+    if ((bits >> i & 1) == 0 || flag.name.empty()) continue;
     std::string words(flag.meaning);
     if (!flag.action.empty()) words += fmt::format(": {}", flag.action);
     rows.push_back({fmt::format("  {}", flag.name), "", words});

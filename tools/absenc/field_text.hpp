@@ -35,6 +35,9 @@ struct JsonFields final : FieldSink {
   std::vector<Judged> judged_;
 };
 
+/// A row for each flag that is set: "  over_heat", "", its meaning and what to do.
+void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& field, std::uint64_t bits);
+
 /// Puts fields into the rows of a table: name, value, unit or meaning; a row for each flag that is set.
 struct FieldTable final : FieldSink {
   void put(const FieldValue& value) override;

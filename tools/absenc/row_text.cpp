@@ -67,6 +67,16 @@ std::string to_csv(const Row& row) {
   return line;
 }
 
+std::vector<std::vector<std::string>> to_table(const Row& row) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < row.columns.size(); ++i) {
+    const Column& column = row.columns[i];
+    rows.push_back({std::string(column.name), to_text(column, row.values[i]), std::string(column.meaning)});
+    if (const auto* flags = std::get_if<Flags>(&row.values[i])) add_flags(rows, *flags->field, flags->bits);
+  }
+  return rows;
+}
+
 Json to_json(const Row& row) {
   Json json = Json::object();
   for (std::size_t i = 0; i < row.columns.size(); ++i) {

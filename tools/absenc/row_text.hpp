@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/client/row.hpp"
 #include "tools/absenc/json.hpp"
@@ -18,6 +19,9 @@ using namespace client;
 /// The values under them; what is not told, or does not hold, is empty. Without its end.
 void append_csv(std::string& text, const Row& row);
 [[nodiscard]] std::string to_csv(const Row& row);
+
+/// For `table`: name, value, unit or meaning; a row for each flag that is set.
+[[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
 /// What is not told is left out; what does not hold is null.
 [[nodiscard]] Json to_json(const Row& row);

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/settings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "absenc/os/error.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+Answer answer_to(Connection& encoder, const Command& command, Arguments arguments) {
+  AnswerSink sink;
+  run_into(encoder, command, arguments, sink);
+  return std::move(sink.answer);
+}
+
+std::size_t place_of(const Answer& answer, std::string_view name) {
+  const auto same = [&](const Column& column) { return column.name == name; };
+  return static_cast<std::size_t>(std::find_if(answer.columns.begin(), answer.columns.end(), same) -
+                                  answer.columns.begin());
+}
+
+// What the encoder is left with when the port is lost in the middle.
+Answer write(Connection& encoder, const Command& setter, Arguments arguments) {
+  try {
+    return answer_to(encoder, setter, arguments);
+  } catch (const os::Failure& failure) {
+    AnswerSink left;
+    encoder.report_left(left);
+    if (left.answer.columns.empty()) throw;
+    std::string values;
+    for (std::size_t i = 0; i < left.answer.columns.size(); ++i) {
+      values += fmt::format("\n  {}: {}", left.answer.columns[i].name,
+                            to_text(left.answer.columns[i], left.answer.values[i]));
+    }
+    throw Failure(fmt::format("{}\n{} was written, but what became of it could not be seen:{}", failure.what(),
+                              setter.name, values));
+  }
+}
+
+// The setter has read back what it wrote; this is what the encoder says when it is asked anew.
+void require_same(const Answer& now, const Answer& written, std::string_view name) {
+  for (std::size_t i = 0; i < written.columns.size(); ++i) {
+    const std::size_t place = place_of(now, written.columns[i].name);
+    if (place == now.columns.size() || now.values[place] == written.values[i]) continue;
+    throw Failure(fmt::format("{} was written, but {} reads as {} instead of {}", name, written.columns[i].name,
+                              to_text(now.columns[place], now.values[place]),
+                              to_text(written.columns[i], written.values[i])));
+  }
+}
+
+// What the encoder was set to may be what it is reached with. Returns what is to be said of it.
+std::string follow(Connection& encoder, const Command& setter, std::int64_t value) {
+  const std::span<const Option> options = encoder.unit().options;
+  const auto option = std::find_if(options.begin(), options.end(),
+                                   [&](const Option& one) { return one.name == setter.changes_option; });
+  if (option == options.end()) return {};
+  const std::string text = fmt::format("{}", value);
+  if (!option->choices.empty()) {
+    value = std::find(option->choices.begin(), option->choices.end(), text) - option->choices.begin();
+  }
+  Options changed = encoder.uri().options;
+  std::int64_t& present = changed.values[static_cast<std::size_t>(option - options.begin())];
+  if (std::exchange(present, value) == value) return {};
+  encoder.set_options(changed);
+  return fmt::format("from now on it is reached with {}={}", option->name, text);
+}
+
+}  // namespace
+
+std::vector<const Command*> readable_settings(const Unit& unit) {
+  std::vector<const Command*> settings;
+  for (const Command& command : unit.commands) {
+    if (command.verb == Verb::config_get) settings.push_back(&command);
+  }
+  if (settings.empty()) throw UsageError(fmt::format("{} has no settings", unit.id));
+  return settings;
+}
+
+const Command& require_readable_setting(const Unit& unit, std::string_view name) {
+  std::vector<std::string_view> names;
+  for (const Command* setting : readable_settings(unit)) {
+    if (setting->name == name) return *setting;
+    names.push_back(setting->name);
+  }
+  throw UsageError(fmt::format("{} has no setting \"{}\"{}", unit.id, name, suggestion(name, names)));
+}
+
+Setting require_setting(const Unit& unit, std::string_view name) {
+  const auto is_setter = [](const Command& command) { return command.verb == Verb::config_set; };
+  for (const Command& command : unit.commands) {
+    if (is_setter(command) && command.reads_back.empty() && command.name == name) return {&command, nullptr};
+  }
+  const Command& getter = require_readable_setting(unit, name);
+  for (const Command& command : unit.commands) {
+    if (is_setter(command) && command.reads_back == getter.name) return {&command, &getter};
+  }
+  throw UsageError(fmt::format("{} of {} can only be read", getter.name, unit.id));
+}
+
+Answer Settings::get(std::string_view name) {
+  return answer_to(*connection_, require_readable_setting(connection_->unit(), name), {});
+}
+
+SettingChange Settings::set(std::string_view name, std::span<const std::int64_t> arguments) {
+  const Setting setting = require_setting(connection_->unit(), name);
+  const std::vector<std::int64_t> values = complete_arguments(*setting.setter, arguments);
+  const Answer written = write(*connection_, *setting.setter, values);
+  SettingChange change{.now = written, .note = follow(*connection_, *setting.setter, values.front())};
+  for (std::size_t i = 0; i < written.columns.size(); ++i) {
+    if (written.columns[i].name == "written") change.was_so = written.values[i] == Value(false);
+  }
+  if (setting.getter == nullptr) return change;
+  change.now = answer_to(*connection_, *setting.getter, {});
+  require_same(change.now, written, setting.name());
+  return change;
+}
+
+}  // namespace absenc::client
