@@ -123,7 +123,7 @@ class Tree:
                 path.unlink()
         # What reads behind the end of its bytes is told; warnings are not looked at.
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -D_GLIBCXX_ASSERTIONS"]
-        options += ["-DABSENC_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
+        options += ["-DABSENC_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF", "-DABSENC_UNITY=OFF"]
         if shutil.which("ccache"):
             options.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
         self.run_or_exit(["cmake", "-G", "Ninja", "-S", self.source, "-B", self.build, *options])

@@ -22,7 +22,7 @@ namespace {
 using capture::Annotation;
 
 /// The places of the columns before those of the unit's fields.
-enum Place : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turnaround, at_position, first_field };
+enum At : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turnaround, at_position, first_field };
 
 std::vector<Column> columns_of(const Unit& unit, const Options& options, bool has_time) {
   const bool is_linear = unit.resolution(options).unit_um > 0;

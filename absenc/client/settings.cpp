@@ -16,10 +16,19 @@ namespace absenc::client {
 
 namespace {
 
-Answer answer_to(Connection& encoder, const Command& command, Arguments arguments) {
+struct Told final : FieldSink {
+  void put(const FieldValue& value) override {
+    if (value.info->role == Role::written) was_so = value.number == 0;
+    sink.put(value);
+  }
   AnswerSink sink;
-  run_into(encoder, command, arguments, sink);
-  return std::move(sink.answer);
+  bool was_so = false;
+};
+
+Answer answer_to(Connection& encoder, const Command& command) {
+  Told told;
+  run_into(encoder, command, {}, told);
+  return std::move(told.sink.answer);
 }
 
 std::size_t place_of(const Answer& answer, std::string_view name) {
@@ -29,9 +38,9 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
 }
 
 // What the encoder is left with when the port is lost in the middle.
-Answer write(Connection& encoder, const Command& setter, Arguments arguments) {
+void write(Connection& encoder, const Command& setter, Arguments arguments, Told& told) {
   try {
-    return answer_to(encoder, setter, arguments);
+    run_into(encoder, setter, arguments, told);
   } catch (const os::Failure& failure) {
     AnswerSink left;
     encoder.report_left(left);
@@ -107,19 +116,18 @@ Setting require_setting(const Unit& unit, std::string_view name) {
 }
 
 Answer Settings::get(std::string_view name) {
-  return answer_to(*connection_, require_readable_setting(connection_->unit(), name), {});
+  return answer_to(*connection_, require_readable_setting(connection_->unit(), name));
 }
 
 SettingChange Settings::set(std::string_view name, std::span<const std::int64_t> arguments) {
   const Setting setting = require_setting(connection_->unit(), name);
   const std::vector<std::int64_t> values = complete_arguments(*setting.setter, arguments);
-  const Answer written = write(*connection_, *setting.setter, values);
-  SettingChange change{.now = written, .note = follow(*connection_, *setting.setter, values.front())};
-  for (std::size_t i = 0; i < written.columns.size(); ++i) {
-    if (written.columns[i].name == "written") change.was_so = written.values[i] == Value(false);
-  }
+  Told told;
+  write(*connection_, *setting.setter, values, told);
+  const Answer& written = told.sink.answer;
+  SettingChange change{written, told.was_so, follow(*connection_, *setting.setter, values.front())};
   if (setting.getter == nullptr) return change;
-  change.now = answer_to(*connection_, *setting.getter, {});
+  change.now = answer_to(*connection_, *setting.getter);
   require_same(change.now, written, setting.name());
   return change;
 }

@@ -7,10 +7,6 @@ namespace absenc::host {
 
 namespace {
 
-struct Nowhere final : FieldSink {
-  void put(const FieldValue&) override {}
-};
-
 Frame to_frame(Bytes bytes) { return {.bytes = bytes}; }
 Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty() ? nullptr : &frames.front()}; }
 
@@ -28,13 +24,13 @@ Time OwedReplies<Item>::pause_after(Items request) const {
 
 template <class Item>
 bool OwedReplies<Item>::is_reply(Items request, Items reply) const {
-  Nowhere nowhere;
+  NoFields nowhere;
   return unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) == Error::none;
 }
 
 template <class Item>
 bool OwedReplies<Item>::concerns(Items request, Items reply) const {
-  Nowhere nowhere;
+  NoFields nowhere;
   return !is_can || unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) != Error::unexpected_reply;
 }
 

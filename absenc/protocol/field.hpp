@@ -54,4 +54,9 @@ struct FieldSink {
   constexpr ~FieldSink() = default;
 };
 
+/// For those who ask only whether a frame is good.
+struct NoFields final : FieldSink {
+  constexpr void put(const FieldValue&) override {}
+};
+
 }  // namespace absenc

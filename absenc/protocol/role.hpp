@@ -27,6 +27,7 @@ enum class Role : std::uint8_t {
   force,    // argument: 1: also what is protected, or is so already
   value,    // argument, field: the byte, or what a register holds, most significant byte first
   data,     // field: the bytes, of several or of a register
+  written,  // field: 0: nothing was sent, because it is so already
 };
 
 /// Whether what has this role holds only as long as the reading, or a part of it, does.

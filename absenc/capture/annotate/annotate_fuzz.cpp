@@ -20,10 +20,6 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-struct Nowhere final : FieldSink {
-  void put(const FieldValue&) override {}
-};
-
 struct Check final : AnnotationSink {
   Check(const Unit& one, const Options& its) : unit(one), options(its) {}
 
@@ -34,7 +30,7 @@ struct Check final : AnnotationSink {
     bytes += annotation.request.bytes.size() * (is_echo ? 2 : 1) + annotation.reply.bytes.size();
     if (annotation.error != Error::none || annotation.remark == Remark::cut) return;
     if (annotation.remark == Remark::undocumented) return;
-    Nowhere nowhere;
+    NoFields nowhere;
     require(unit.decode(options, annotation.request, annotation.reply, nowhere) == Error::none);
   }
   const Unit& unit;

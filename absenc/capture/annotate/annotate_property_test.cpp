@@ -296,9 +296,7 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
 
 // Whether one reply of noise in 64 or more passes the check: then what is damaged cannot be told from what is good.
 bool has_weak_check(const Unit& unit, const Options& options) {
-  struct Nowhere final : FieldSink {
-    void put(const FieldValue&) override {}
-  } nowhere;
+  NoFields nowhere;
   sim::Random random(1);
   for (const Vector& vector : unit.vectors) {
     unsigned good = 0;

@@ -13,8 +13,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t block_frames = 1 << 14;
-constexpr std::uint64_t head_bytes = 1 << 16;
-constexpr std::int64_t nanosecond = 1000;  // picoseconds
+constexpr std::uint64_t times_looked_at = 1 << 16;
 
 bool parse_identifier(std::string_view text, CanRecord& record) {
   if (text.size() != 3 && text.size() != 8) return false;
@@ -123,7 +122,7 @@ class CandumpReader final : public ParsedReader {
     std::optional<Instant> last;
     bool first = true;
     bool rises = true;
-    while (lines.next(line) && lines.offset() < head_bytes) {
+    while (lines.next(line) && lines.offset() < times_looked_at) {
       if (trim(line).empty()) continue;
       if (!parse_candump(line, parsed)) break;
       if (std::exchange(first, false)) timed_ = parsed.timed;

@@ -14,8 +14,7 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr std::size_t block_bytes = 1 << 16;
-constexpr std::int64_t nanosecond = 1000;  // picoseconds
+constexpr std::size_t bytes_at_once = 1 << 16;
 
 // Comments are for what people write; the text beside a dump may hold any character.
 std::string_view content_of(std::string_view line, std::optional<HexForm> form) {
@@ -57,7 +56,7 @@ class HexTextReader final : public ParsedReader {
   [[nodiscard]] bool claim(Block& block) override {
     if (done_) return false;
     begin_block(block, index_++, clock_ == Clock::none ? at_ : last_);
-    while (block.bytes.size() < block_bytes) {
+    while (block.bytes.size() < bytes_at_once) {
       if (!take_line(block)) {
         done_ = true;
         break;

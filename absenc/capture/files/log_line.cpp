@@ -15,7 +15,6 @@ namespace {
 constexpr std::string_view blanks = " \t";
 constexpr std::string_view separators = " \t,;|";
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool all_digits(std::string_view text) { return !text.empty() && std::all_of(text.begin(), text.end(), is_digit); }
 
 std::string lower_case(std::string_view text) {

@@ -18,22 +18,23 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr std::uint64_t block_text = 1 << 20;
-constexpr std::size_t most_channels = 1024;
+constexpr std::uint64_t text_at_once = 1 << 20;
+constexpr std::size_t most_columns = 1024;
 
 struct Unit {
   std::string_view name;
   std::uint64_t per_second;
 };
-constexpr std::array<Unit, 5> units = {{{"seconds", 1},
-                                        {"milliseconds", 1'000},
-                                        {"microseconds", 1'000'000},
-                                        {"nanoseconds", 1'000'000'000},
-                                        {"picoseconds", 1'000'000'000'000}}};
+constexpr std::array<Unit, 5> time_units = {{{"seconds", 1},
+                                             {"milliseconds", 1'000},
+                                             {"microseconds", 1'000'000},
+                                             {"nanoseconds", 1'000'000'000},
+                                             {"picoseconds", 1'000'000'000'000}}};
 
 const Unit* find_unit(std::string_view name) {
-  const auto* unit = std::find_if(units.begin(), units.end(), [&](const Unit& one) { return one.name == name; });
-  return unit == units.end() ? nullptr : unit;
+  const auto* unit =
+      std::find_if(time_units.begin(), time_units.end(), [&](const Unit& one) { return one.name == name; });
+  return unit == time_units.end() ? nullptr : unit;
 }
 
 std::string_view take_field(std::string_view& row) {
@@ -86,7 +87,7 @@ class LogicCsv final : public ParsedReader {
     // A block ends before a row with a later time, so that a time never stands in two.
     Tick last = first;
     do {
-      if (at_ != last && lines_.offset() - begin >= block_text) {
+      if (at_ != last && lines_.offset() - begin >= text_at_once) {
         pending_ = true;
         block.end = at_;
         return true;
@@ -107,7 +108,7 @@ class LogicCsv final : public ParsedReader {
       if (const auto rate = parse_rate(text.substr(11))) rate_ = *rate;
     } else if (text.starts_with("Channels (")) {
       std::string_view list = text.substr(std::min(text.find(':'), text.size() - 1) + 1);
-      while (!list.empty() && names_.size() < most_channels) names_.emplace_back(trim(take_field(list)));
+      while (!list.empty() && names_.size() < most_columns) names_.emplace_back(trim(take_field(list)));
     }
   }
 
@@ -153,8 +154,8 @@ class LogicCsv final : public ParsedReader {
   }
 
   void add_column(std::string channel, std::string_view name) {
-    if (layout_.channels.size() == most_channels) {
-      throw OpenError(std::string(name) + " has more than " + std::to_string(most_channels) + " channels");
+    if (layout_.channels.size() == most_columns) {
+      throw OpenError(std::string(name) + " has more than " + std::to_string(most_columns) + " channels");
     }
     layout_.channels.push_back(std::move(channel));
     columns_.push_back(1);

@@ -16,8 +16,6 @@ namespace {
 
 constexpr std::size_t read_at_once = 1 << 18;
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 // A whole number of at most `most` digits, all of `text`.
 template <class Number>
 std::optional<Number> whole(std::string_view text, std::size_t most) {

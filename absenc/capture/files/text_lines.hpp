@@ -17,6 +17,8 @@ namespace absenc::capture {
 /// The longest line that is read as one.
 inline constexpr std::size_t longest_line = 1 << 20;
 
+[[nodiscard]] constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 class TextLines {
  public:
   explicit TextLines(Source& source) : source_(source) {}
@@ -41,6 +43,7 @@ class TextLines {
   bool too_long_ = false;
 };
 
+inline constexpr std::int64_t nanosecond = 1000;  // picoseconds
 inline constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
 
 /// A place in time: of a clock, or from whatever a program counts.

@@ -11,7 +11,7 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr Tick none = std::numeric_limits<Tick>::max();
+constexpr Tick never = std::numeric_limits<Tick>::max();
 constexpr Tick characters_ahead = 12;   // looked at to find the first start bit
 constexpr std::size_t candidates = 16;  // start bits tried: more falling edges in a character are noise
 constexpr std::size_t step = 64;        // changes after which two decoders are compared
@@ -63,7 +63,7 @@ void AsyncDecoder::restart(Start start) {
 
 // Characters from the falling edge `start` on, as long as `needed` ticks of each lie before `limit`. `visit` returns
 // false to stop before the one it was shown. Returns the index of the falling edge to go on from, which may be one
-// behind the edges that are known. `edges_` ends with `none`.
+// behind the edges that are known. `edges_` ends with `never`.
 template <class Visit>
 std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit&& visit) const {
   const Tick* const edges = edges_.data();
@@ -82,7 +82,7 @@ std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit
       levels ^= ~0u << bit;
     }
     const std::size_t next = (levels & 1) != 0 ? i + 2 : j + ((j ^ i) & 1);
-    if (!visit(Candidate{begin, levels, edges[j - 1], bit, next < count ? edges[next] : none})) return i;
+    if (!visit(Candidate{begin, levels, edges[j - 1], bit, next < count ? edges[next] : never})) return i;
     i = next;
   }
   return i;
@@ -178,7 +178,7 @@ std::optional<std::size_t> AsyncDecoder::run(bool final, std::span<const Charact
     unsure_.reset();
   }
   const Tick limit = unsure_.value_or(end_);
-  edges_.push_back(none);
+  edges_.push_back(never);
   std::optional<std::size_t> met;
   std::optional<std::size_t> start = level_ ? 0 : 1;
   if (start_ == Start::look) start = find_start(limit, final);

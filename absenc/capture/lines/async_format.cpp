@@ -73,13 +73,13 @@ std::vector<double> possible_bits(const std::vector<Tick>& lengths) {
   return bits;
 }
 
-struct Part {
+struct Stretch {
   const Changes& changes;
   Tick first;
   Tick end;
 };
 
-AsyncDecoder::Statistics decoded(const Part& part, const AsyncFormat& format) {
+AsyncDecoder::Statistics decoded(const Stretch& part, const AsyncFormat& format) {
   AsyncDecoder decoder(format);
   std::vector<Character> characters;
   decoder.decode(part.changes, part.first, part.end, characters);
@@ -98,7 +98,7 @@ double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick
 }
 
 // The level that lasted longest without a change: a pause, or nothing but a pause.
-bool longest_level(const Part& part) {
+bool longest_level(const Stretch& part) {
   Tick longest = 0;
   Tick since = part.first;
   bool level = part.changes.before;
@@ -116,7 +116,7 @@ bool longest_level(const Part& part) {
   return found;
 }
 
-std::vector<bool> possible_idle(const Part& part, Idle idle) {
+std::vector<bool> possible_idle(const Stretch& part, Idle idle) {
   if (idle != Idle::automatic) return {idle == Idle::high};
   const bool longest = longest_level(part);
   return {longest, !longest};
@@ -126,13 +126,13 @@ std::vector<bool> possible_idle(const Part& part, Idle idle) {
 
 std::optional<AsyncFormat> find_format(const Changes& changes, Tick first, Tick end, const AsyncSettings& settings,
                                        std::uint64_t ticks_per_second) {
-  const Part whole{changes, first, end};
+  const Stretch whole{changes, first, end};
   const bool search = settings.baud == 0;
   if (search && changes.at.size() < fewest_changes) return std::nullopt;
   Changes begin{changes.before, {}};
   const std::size_t tried = std::min(tried_changes, changes.at.size());
   begin.at.assign(changes.at.begin(), changes.at.begin() + static_cast<std::ptrdiff_t>(tried));
-  const Part part{begin, first, tried < changes.at.size() ? changes.at[tried] : end};
+  const Stretch part{begin, first, tried < changes.at.size() ? changes.at[tried] : end};
 
   const std::vector<Tick> lengths = pulses(begin, settings.glitch);
   std::vector<double> bits{search ? 0.0 : static_cast<double>(ticks_per_second) / settings.baud};

@@ -9,7 +9,7 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr Tick none = std::numeric_limits<Tick>::max();
+constexpr Tick no_change = std::numeric_limits<Tick>::max();
 constexpr std::size_t most_periods = 4096;
 
 void put(std::vector<std::uint8_t>& bytes, std::size_t bit, bool level) {
@@ -41,7 +41,7 @@ void ClockedDecoder::Wire::begin(const Changes* changes, Tick first, bool known)
 
 Tick ClockedDecoder::Wire::next() const {
   if (border) return *border;
-  return left.empty() ? none : left.front();
+  return left.empty() ? no_change : left.front();
 }
 
 void ClockedDecoder::Wire::step() {
@@ -136,13 +136,13 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
   begin_part(part);
   for (;;) {
     const Tick clock = clock_.next();
-    const Tick select = format_.has_select ? select_.next() : none;
-    if (clock == none && select == none) break;
+    const Tick select = format_.has_select ? select_.next() : no_change;
+    if (clock == no_change && select == no_change) break;
     if (clock <= select ? clock_changes(clock, targets, bursts) : select_changes(select, targets, bursts)) return true;
   }
   // What the data did behind the last clock counts for the next part.
-  in_.before(none);
-  out_.before(none);
+  in_.before(no_change);
+  out_.before(no_change);
   if (!format_.has_select && open_ && part.end - last_ > format_.pause) {
     seen_pause_ = true;
     close(last_, false, bursts);

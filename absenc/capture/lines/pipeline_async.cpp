@@ -14,14 +14,14 @@ constexpr std::size_t enough_changes = 16384;     // to find what is not known o
 constexpr std::size_t most_changes = 64 * 16384;  // of one line, while another has not enough
 constexpr double fewest_ticks = 2.5;              // of a bit
 
-class Decoding {
+class AsyncDecoding {
  public:
   struct Guess {
     std::vector<AsyncDecoder> decoders;
     std::vector<std::vector<Character>> characters;
   };
 
-  Decoding(std::span<const AsyncFormat> formats, const Sink& sink)
+  AsyncDecoding(std::span<const AsyncFormat> formats, const Sink& sink)
       : formats_(formats), sink_(sink), characters_(formats.size()) {
     for (const AsyncFormat& format : formats) {
       decoders_.emplace_back(format, static_cast<std::uint8_t>(decoders_.size()));
@@ -237,10 +237,10 @@ AsyncOutcome decode_async(Reader& source, std::span<const AsyncLine> lines, unsi
   outcome.problem = find_formats(reader, lines, first, outcome.formats);
   if (!outcome.problem.empty()) return outcome;
 
-  Decoding decoding(outcome.formats, sink);
+  AsyncDecoding decoding(outcome.formats, sink);
   bool wanted = true;
   for (const Levels& levels : std::exchange(first.parts, {})) wanted = wanted && decoding.decode(levels);
-  if (wanted) wanted = BlockRun<Decoding>(reader, decoding, threads).run();
+  if (wanted) wanted = BlockRun<AsyncDecoding>(reader, decoding, threads).run();
   if (wanted) decoding.finish();
   const auto ticks_per_second = static_cast<double>(reader.layout().ticks_per_second);
   for (std::size_t i = 0; i < lines.size(); ++i) {

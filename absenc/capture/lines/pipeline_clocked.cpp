@@ -9,8 +9,8 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr std::size_t enough_changes = 8194;      // of the clock, to find its period
-constexpr std::size_t most_changes = 64 * 16384;  // of the data, while the clock has not enough
+constexpr std::size_t enough_clocks = 8194;    // of the clock, to find its period
+constexpr std::size_t most_data = 64 * 16384;  // of the data, while the clock has not enough
 
 // Where the wires stand among the channels.
 struct Wires {
@@ -35,14 +35,14 @@ struct Wires {
   std::optional<std::size_t> select;
 };
 
-class Decoding {
+class ClockedDecoding {
  public:
   struct Guess {
     std::optional<ClockedDecoder> decoder;
     std::vector<Burst> bursts;
   };
 
-  Decoding(const Wires& wires, const ClockedFormat& format, const Sink& sink)
+  ClockedDecoding(const Wires& wires, const ClockedFormat& format, const Sink& sink)
       : wires_(wires), format_(format), sink_(sink), decoder_(format) {}
 
   bool decode(const Levels& levels) {
@@ -117,14 +117,14 @@ std::string look_for_pause(LevelReader& reader, const ClockedLine& line, std::ve
     if (!std::exchange(begun, true)) clock.before = levels.changes[0].before;
     append(clock, levels.changes[0], levels.first);
     for (std::size_t i = 1; i < levels.changes.size(); ++i) others += levels.changes[i].at.size();
-    return clock.at.size() > enough_changes || others > most_changes;
+    return clock.at.size() > enough_clocks || others > most_data;
   });
   if (const auto found = find_pause(clock)) {
     pause = *found;
     return {};
   }
   const std::string name = reader.name(line.clock);
-  if (clock.at.empty() && others <= most_changes) return no_clock(name);
+  if (clock.at.empty() && others <= most_data) return no_clock(name);
   return name + " changes its level only " + std::to_string(clock.at.size()) + " times, its data " +
          std::to_string(others) + " times, so there is no word: is it the right channel?";
 }
@@ -145,10 +145,10 @@ ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned 
     outcome.problem = look_for_pause(reader, line, parts, outcome.pause);
     if (!outcome.problem.empty()) return outcome;
   }
-  Decoding decoding(wires, {line.rising, line.select.has_value(), line.select_high, outcome.pause}, sink);
+  ClockedDecoding decoding(wires, {line.rising, line.select.has_value(), line.select_high, outcome.pause}, sink);
   bool wanted = true;
   for (const Levels& levels : std::exchange(parts, {})) wanted = wanted && decoding.decode(levels);
-  if (wanted) wanted = BlockRun<Decoding>(reader, decoding, threads).run();
+  if (wanted) wanted = BlockRun<ClockedDecoding>(reader, decoding, threads).run();
   if (!wanted) return outcome;
   decoding.finish();
   if (!decoding.clock_seen())

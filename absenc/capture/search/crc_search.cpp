@@ -17,9 +17,9 @@ constexpr double settled_log2 = -20;    // one in a million
 constexpr int most_common_degree = 63;  // of a common divisor that is taken apart; a longer one says too little
 constexpr unsigned widest = 16;
 
-class Search {
+class CrcSearch {
  public:
-  explicit Search(std::span<const CheckedFrame> frames) : frames_(frames) {}
+  explicit CrcSearch(std::span<const CheckedFrame> frames) : frames_(frames) {}
 
   CheckSearch run() {
     if (frames_.all.size() < 2) return {};
@@ -304,7 +304,7 @@ class Search {
 
 }  // namespace
 
-CheckSearch find_checks(std::span<const CheckedFrame> frames) { return Search(frames).run(); }
+CheckSearch find_checks(std::span<const CheckedFrame> frames) { return CrcSearch(frames).run(); }
 
 unsigned frames_to_settle(const CheckSolution& solution) {
   if (solution.chance_log2 <= settled_log2) return 0;

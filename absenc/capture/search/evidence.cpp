@@ -15,10 +15,6 @@ namespace {
 constexpr unsigned many_attempts = 1u << 20;  // where only one or two frames have to tell
 constexpr unsigned enough_accepted = 256;     // to know a rate to some percent
 
-struct Nowhere final : FieldSink {
-  void put(const FieldValue&) override {}
-};
-
 /// The position of a good reply.
 struct PositionSink final : FieldSink {
   void put(const FieldValue&) override {}
@@ -114,7 +110,7 @@ double acceptance(const Unit& unit, const Options& options, const HeardExchange&
   std::mt19937_64 random(good.reply.bytes.size());  // the same answer each time
   HeardExchange noise = good;
   const std::size_t kept = repeated(good);
-  Nowhere nowhere;
+  NoFields nowhere;
   unsigned accepted = 0;
   unsigned tried = 0;
   for (; tried < attempts && accepted < enough_accepted; ++tried) {
@@ -137,7 +133,7 @@ double acceptance(const Unit& unit, const Options& options, const HeardExchange&
 }
 
 bool explains(const Unit& unit, const Options& options, const HeardExchange& exchange) {
-  Nowhere nowhere;
+  NoFields nowhere;
   const Frame reply = exchange.reply.frame();
   return !reply.empty() && unit.decode(options, exchange.request.frame(), reply, nowhere) == Error::none;
 }

@@ -50,9 +50,9 @@ class Meaning final : public FieldSink {
   std::uint64_t hash_ = 0xCBF29CE484222325u;
 };
 
-class Search {
+class HypothesisSearch {
  public:
-  Search(const Unit& unit, std::span<const HeardExchange> exchanges) : unit_(unit), exchanges_(exchanges) {}
+  HypothesisSearch(const Unit& unit, std::span<const HeardExchange> exchanges) : unit_(unit), exchanges_(exchanges) {}
 
   /// Weighs it, when it explains as much as the best so far.
   void add(const Options& options, bool at_least = false) {
@@ -236,7 +236,7 @@ std::vector<Options> likely_options(const Unit& unit, std::span<const OptionText
 std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
                                         std::span<const HeardExchange> exchanges) {
   if (exchanges.empty()) return {};
-  Search search(unit, exchanges);
+  HypothesisSearch search(unit, exchanges);
   const std::vector<Options> likely = likely_options(unit, settings);
   for (const Options& options : likely) {
     if (options.model != nullptr || !search.explains_all()) search.add(options);

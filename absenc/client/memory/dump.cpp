@@ -16,7 +16,6 @@ namespace absenc::client {
 
 namespace {
 
-constexpr std::size_t bytes_in_line = 16;
 constexpr std::string_view checksum_name = "checksum: ";
 constexpr std::string_view edited = "edited";
 

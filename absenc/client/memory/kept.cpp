@@ -19,8 +19,6 @@ namespace absenc::client {
 
 namespace {
 
-constexpr std::size_t bytes_in_line = 16;
-
 [[noreturn]] void refuse(const std::string& path, const LineReader& lines, std::string_view what) {
   throw Failure(fmt::format("the memory file {}, line {}: {}; it was left as it is", path, lines.number, what));
 }

@@ -13,6 +13,9 @@
 
 namespace absenc::client {
 
+/// Of bytes that are written as text.
+inline constexpr std::size_t bytes_in_line = 16;
+
 /// A frame that owns its bytes.
 struct WireFrame {
   std::vector<std::uint8_t> bytes;

@@ -21,10 +21,6 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
-struct Nowhere final : FieldSink {
-  void put(const FieldValue&) override {}
-};
-
 template <class Item>
 class ConnectionOn final : public Connection {
  public:
@@ -166,7 +162,7 @@ class ConnectionOn final : public Connection {
     };
     const bool takes_echo = session_.echo().mode() == host::EchoMode::on && received.size() > port_.sent.size();
     if (!takes_echo) return diagnosed(received);
-    Nowhere ignored;
+    NoFields ignored;
     if (unit().decode(uri().options, sent, to_frame(received), ignored) == Error::none) {
       return {"it is a good reply if no echo is taken from it", "set echo=off or echo=auto"};
     }

@@ -11,12 +11,8 @@ namespace absenc::client {
 
 namespace {
 
-struct Nowhere final : FieldSink {
-  void put(const FieldValue&) override {}
-};
-
 bool is_good(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
-  Nowhere nowhere;
+  NoFields nowhere;
   return unit.decode(options, request, reply, nowhere) == Error::none;
 }
 

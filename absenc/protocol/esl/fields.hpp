@@ -140,7 +140,7 @@ inline constexpr auto fields = [] {
           {"busy", FieldInfo::Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
       field<&Shown::value>("value", "", "EDF: the byte in memory", Role::value),
       field<&Shown::data>("data", "", "the bytes in memory from `memory_address` on", Role::data),
-      field<&Shown::written>("written", "", "false when the value was there already"),
+      field<&Shown::written>("written", "", "false when the value was there already", Role::written),
       field<&Shown::led_error>("led_error", "", "the LED current is out of its range"),
       field<&Shown::lissajous_error>("lissajous_error", "", "the signals of the disc are out of their range"),
       field<&Shown::safe_singleturn>("safe_singleturn", "counts",

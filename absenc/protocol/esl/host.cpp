@@ -142,7 +142,7 @@ author::Part<Result<Reply>> settled(Dialog& dialog, Request request, bool after_
 }
 
 // When the page is ready. `words`: what the error says where the procedure ends here.
-author::Part<std::uint8_t> select(Dialog& dialog, std::uint8_t page, std::string_view words) {
+author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
   const Result<Reply> reply = co_await settled(dialog, request);
   if (!reply) co_await dialog.stop({reply.error(), words, {}, page_time});
@@ -166,7 +166,7 @@ Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   for (unsigned i = begin; i < end; ++i) {
     if (find_area(page, i) == nullptr) co_return {Error::invalid_argument, unknown_area};
   }
-  co_await select(dialog, page, {});
+  co_await turn_to(dialog, page, {});
   for (unsigned i = begin; i < end; ++i) {
     const std::uint8_t value = co_await read_byte(dialog, page, static_cast<std::uint8_t>(i), {});
     found.bytes.push_back(value);
@@ -193,7 +193,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   found.page = page;
   found.memory_address = address;
   found.value = value;
-  co_await select(dialog, page, nothing_written);
+  co_await turn_to(dialog, page, nothing_written);
   const std::uint8_t before = co_await read_byte(dialog, page, address, nothing_written);
   found.written = before != value;
   if (before == value) co_return done;
@@ -210,7 +210,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
 Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
   const auto page = static_cast<std::uint8_t>(arguments[0]);
   if (!is_page(page)) co_return {Error::invalid_argument, "Table 11 lists no such page; nothing was sent"};
-  co_await select(dialog, page, {});
+  co_await turn_to(dialog, page, {});
   found.page = co_await read_byte(dialog, page, page_select_address, {});
   if (found.page == page) co_return done;
   co_return {Error::cross_check_failed, "another page is selected", {}, eeprom_read_pause};
@@ -221,7 +221,7 @@ Procedure read_error_info(Dialog& dialog, Found& found) {
   const Request which{DataId::read_memory, dialog.format().address, page_select_address};
   const Result<Reply> before = co_await settled(dialog, which);
   const bool known = before && is_page(before->value);
-  co_await select(dialog, register_page, page_may_be_left);
+  co_await turn_to(dialog, register_page, page_may_be_left);
   const std::uint8_t flags = co_await read_byte(dialog, register_page, error_info_address, page_may_be_left);
   found.led_error = (flags & error_info_led) != 0;
   found.lissajous_error = (flags & error_info_lissajous) != 0;

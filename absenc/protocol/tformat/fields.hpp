@@ -80,7 +80,7 @@ inline constexpr auto fields = [] {
       field<&Values::temperature>("temperature_c", "degC", "of the encoder's board, within 3 degC"),
       field<&Values::overheat_enabled>("overheat_enabled", "", "whether over_heat is watched"),
       field<&Values::overheat_threshold>("overheat_threshold_c", "degC", "over_heat above this"),
-      field<&Values::written>("written", "", "false when the value was there already"),
+      field<&Values::written>("written", "", "false when the value was there already", Role::written),
       field<&Values::page_left>(
           "page_left", "",
           "memory page that is left selected, also for whoever reads next: which one was before is not known"));

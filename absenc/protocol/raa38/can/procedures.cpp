@@ -11,7 +11,7 @@ namespace absenc::raa38::can {
 namespace {
 
 using namespace author;
-using Frame = std::optional<CanFrame>;
+using MaybeFrame = std::optional<CanFrame>;
 
 // To know how often a node sends, to 1 % where a carrier hands frames out some milliseconds late.
 constexpr unsigned enough_frames = 4;
@@ -49,7 +49,7 @@ struct Cadence {
 Part<Cadence> hear_node(Dialog& dialog, bool until_enough = false) {
   Cadence cadence;
   for (;;) {
-    const Frame frame = co_await dialog.heard();
+    const MaybeFrame frame = co_await dialog.heard();
     if (!frame) break;
     if (!is_from(*frame, dialog.format().node)) continue;
     cadence.add(dialog.heard_at());
@@ -63,7 +63,7 @@ Part<bool> is_answered(Dialog& dialog, Order order, std::uint8_t value) {
   const std::uint8_t node = dialog.format().node;
   bool answered = false;
   dialog.ask_for(encode(order, node, value), command_window);
-  while (const Frame frame = co_await dialog.heard()) {
+  while (const MaybeFrame frame = co_await dialog.heard()) {
     if (!(*frame == encode_answer(node, order))) continue;
     answered = true;
     dialog.keep();
@@ -72,9 +72,9 @@ Part<bool> is_answered(Dialog& dialog, Order order, std::uint8_t value) {
 }
 
 // What this node answers with to the question where it is.
-Part<Frame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
+Part<MaybeFrame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
   dialog.ask(encode(Order::read, node), pause);
-  Frame frame;
+  MaybeFrame frame;
   do {
     frame = co_await dialog.heard();
   } while (frame && !is_from(*frame, node));
@@ -89,7 +89,7 @@ struct Look {
 };
 
 Part<Look> look(Dialog& dialog, Time pause = {}) {
-  const Frame frame = co_await read(dialog, dialog.format().node, pause);
+  const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
   // Other frames follow before the end is told.
   const Exchange<CanFrame> exchange = dialog.exchange();
@@ -235,7 +235,7 @@ constexpr unsigned everybody = 256;
 // Until the time is over. `asked`: the last number that was asked.
 Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
-  while (const Frame frame = co_await dialog.heard()) {
+  while (const MaybeFrame frame = co_await dialog.heard()) {
     if (function_of(*frame) != Function::reply) continue;
     dialog.keep();
     const unsigned number = node_of(*frame);
@@ -291,7 +291,7 @@ Part<bool> be_alone(Dialog& dialog, Nodes& nodes) {
 }
 
 Part<bool> hear_out(Dialog& dialog) {
-  Frame frame;
+  MaybeFrame frame;
   do {
     frame = co_await dialog.heard();
   } while (frame);
@@ -305,7 +305,7 @@ Part<bool> write(Dialog& dialog, Surveyed& found, Order order, std::uint8_t valu
   found.written = true;
   found.answered = false;
   dialog.ask_for(encode(order, 0, value), answer_window);
-  while (const Frame frame = co_await dialog.heard()) {
+  while (const MaybeFrame frame = co_await dialog.heard()) {
     const Error error = check_configuration_answer(order, *frame);
     if (error != Error::none && error != Error::request_rejected) continue;
     dialog.keep();
@@ -318,9 +318,9 @@ Part<bool> write(Dialog& dialog, Surveyed& found, Order order, std::uint8_t valu
 
 Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node) {
   constexpr std::string_view supply = "switch its supply off and on, then `scan`";
-  const Frame there = co_await read(dialog, node);
+  const MaybeFrame there = co_await read(dialog, node);
   if (node == before) co_return Outcome{there ? Error::none : dialog.missing()};
-  const Frame still = co_await read(dialog, before);
+  const MaybeFrame still = co_await read(dialog, before);
   if (still && there) {
     co_return only(Error::cross_check_failed, "it answers under its old number as well: another node was there",
                    "connect it alone and try again");
@@ -336,12 +336,12 @@ Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
   dialog.configure(bits_per_second, switching_time);
   co_await hear_out(dialog);
   for (int attempt = 0; attempt < rate_attempts; ++attempt) {
-    const Frame there = co_await read(dialog, format.node);
+    const MaybeFrame there = co_await read(dialog, format.node);
     if (there) co_return done;
   }
   dialog.configure(format.bit_rate(), switching_time);
   co_await hear_out(dialog);
-  const Frame back = co_await read(dialog, format.node);
+  const MaybeFrame back = co_await read(dialog, format.node);
   if (back) {
     co_return only(Error::cross_check_failed, "it keeps its old bit rate",
                    "switch its supply off and on, then try the new one");

@@ -91,7 +91,7 @@ struct Definition : author::Declares<Definition, Protocol> {
       field<&Values::singleturn>(
           {"singleturn", counts, "counts", "position within one revolution", {}, Role::position}),
       field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
-      field<&Values::written>("written", "", "whether anything was written: not what is set already"),
+      field<&Values::written>("written", "", "whether anything was written: not what is set already", Role::written),
       field<&Values::answered>("answered", "", "whether the command was answered"),
       field<&Values::mirrored>("mirrored", "", "whether the position is counted the other way since"),
       field<&Values::before>({"before", counts, "counts", "position before the command"}),

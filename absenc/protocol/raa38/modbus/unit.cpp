@@ -186,7 +186,8 @@ struct Definition : author::Declares<Definition, Protocol> {
       field<&Values::baud>("baud", "bit/s", "the baud rate at which it answers"),
       field<&Values::direction>("direction", "", "in which direction it counts"),
       field<&Values::effect>("effect", "", "what became of the position"),
-      field<&Values::written>("written", "", "whether the setting was sent; it is not where it is so already"),
+      field<&Values::written>("written", "", "whether the setting was sent; it is not where it is so already",
+                              Role::written),
       field<&Values::encoder_address>("encoder_address", "", "address that answers", Role::encoder),
       field<&Values::clash>("clash", "", "the answer is damaged every time", Role::clash),
       field<&Values::refuses>("refuses", "", "it answers with an exception: another kind of Modbus slave?"));
