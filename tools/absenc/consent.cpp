@@ -11,7 +11,7 @@
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/output.hpp"
+#include "tools/absenc/text/output.hpp"
 
 namespace absenc::tool {
 

@@ -10,7 +10,7 @@
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/output.hpp"
+#include "tools/absenc/text/output.hpp"
 
 namespace absenc::tool {
 

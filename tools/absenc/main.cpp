@@ -16,12 +16,12 @@
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/encoder_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/help.hpp"
-#include "tools/absenc/output.hpp"
-#include "tools/absenc/run.hpp"
 #include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/encoder_text.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/verbs/run.hpp"
 
 namespace absenc::tool {
 

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "tools/absenc/error.hpp"
-#include "tools/absenc/output.hpp"
+#include "tools/absenc/text/output.hpp"
 
 namespace absenc::tool {
 

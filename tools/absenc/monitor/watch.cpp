@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/monitor/watch.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/pace.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/text/reading_text.hpp"
+
+namespace absenc::tool {
+
+using namespace client;
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t most_lines = 200;
+constexpr Time between_summaries = 100ms;
+constexpr Time between_lines = 200ms;  // of good readings; whatever is wrong gets a line at once
+
+// os::now is the steady clock.
+std::chrono::steady_clock::time_point to_time_point(Time time) {
+  return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
+}
+
+/// The fields of a reply that are not in the line of the reading.
+class OtherFields final : public FieldSink {
+ public:
+  explicit OtherFields(const Unit& unit) : unit_(&unit) {}
+
+  void put(const FieldValue& value) override {
+    const FieldInfo& info = *value.info;
+    // Of two channels the line has no room for the flags.
+    const FieldInfo* in_line = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
+    const bool is_in_line = &info == in_line && unit_->second_status == nullptr && unit_->second_alarms == nullptr;
+    if (is_in_line || info.role == Role::position || info.role == Role::turns) return;
+    const std::string shown = fmt::format("{}{}{}", to_text(value), info.unit.empty() ? "" : " ", info.unit);
+    fields_.emplace_back(info, shown);
+  }
+  void put_reading(const Reading& reading) override { reading_ = reading; }
+
+  [[nodiscard]] std::vector<std::string> texts() const {
+    std::vector<std::string> texts;
+    for (const auto& [info, shown] : fields_)
+      texts.push_back(fmt::format("{} {}", info.name, marked(info, shown, reading_)));
+    return texts;
+  }
+
+ private:
+  const Unit* unit_;
+  std::vector<std::pair<FieldInfo, std::string>> fields_;
+  Reading reading_{};
+};
+
+}  // namespace
+
+std::string_view name_of(Snapshot::State state) {
+  static constexpr std::array<std::string_view, 7> names{"opening", "live",   "silent", "failing",
+                                                         "lost",    "paused", "ended"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+Watch::Watch(std::string name, const EncoderAddress& uri, double rate, Time offset)
+    : name_(std::move(name)),
+      uri_(uri),
+      rate_(rate),
+      offset_(offset),
+      start_(os::now()),
+      known_at_(start_),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+void Watch::stop() {
+  thread_.request_stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+Snapshot Watch::snapshot(bool details) const {
+  const std::lock_guard lock(mutex_);
+  Snapshot snapshot = known_;
+  snapshot.age = os::now() - known_at_;
+  const Time period = rate_ > 0 ? Time(static_cast<std::int64_t>(1e9 / rate_)) : Time{};
+  const bool old = snapshot.age > std::max<Time>(3 * period, 500ms);
+  if (snapshot.state == Snapshot::State::live && old) snapshot.state = Snapshot::State::silent;
+  if (paused_ && snapshot.state != Snapshot::State::ended) snapshot.state = Snapshot::State::paused;
+  if (details) {
+    snapshot.trace.assign(lines_.begin(), lines_.end());
+  } else {
+    snapshot.bad.clear();
+    snapshot.fields.clear();
+  }
+  return snapshot;
+}
+
+void Watch::pause(bool paused) {
+  const std::lock_guard lock(mutex_);
+  paused_ = paused;
+  changed_.notify_all();
+}
+
+void Watch::run(const Command& command) {
+  const std::lock_guard lock(mutex_);
+  command_ = command;
+  known_.notice = fmt::format("{} is running", command.name);
+  changed_.notify_all();
+}
+
+void Watch::work(const std::stop_token& stop) {
+  try {
+    Pace pace(rate_, offset_);
+    Encoder live(uri_, pace.period());
+    live.end_when([&] { return stop.stop_requested() && !command_runs_; });
+    Time next = start_ + offset_;
+    for (;;) {
+      std::optional<Command> command;
+      {
+        std::unique_lock lock(mutex_);
+        changed_.wait_until(lock, stop, to_time_point(next), [&] { return command_.has_value(); });
+        if (paused_) changed_.wait(lock, stop, [&] { return !paused_ || command_.has_value(); });
+        command = std::exchange(command_, std::nullopt);
+      }
+      if (stop.stop_requested()) return;
+      if (command) {
+        command_runs_ = true;
+        run_command(live, *command);
+        command_runs_ = false;
+      } else {
+        publish(live, live.next());
+        next = pace.next();
+      }
+    }
+  } catch (const os::Interrupted&) {  // everybody ends: os::interrupted() tells the others
+  } catch (const os::Ended&) {        // asked to, while the line was never silent
+  } catch (const std::exception& error) {
+    end(error.what());
+  }
+}
+
+void Watch::end(const std::string& why) {
+  add_line(os::now(), why);
+  const std::lock_guard lock(mutex_);
+  known_.state = Snapshot::State::ended;
+  known_.message = why;
+}
+
+void Watch::publish(const Encoder& live, const Sample& sample) {
+  trace(live, sample);
+  const Time now = os::now();
+  const std::lock_guard lock(mutex_);
+  switch (sample.kind) {
+    case Sample::Kind::reading:
+      known_.state = Snapshot::State::live;
+      known_.has_reading = true;
+      known_.last = sample;
+      known_at_ = sample.at;
+      ++known_.readings;
+      break;
+    case Sample::Kind::failed:
+      known_.state = Snapshot::State::failing;
+      known_.message = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);
+      if (!sample.trouble.advice.empty()) known_.message += fmt::format(". Try: {}", sample.trouble.advice);
+      break;
+    case Sample::Kind::lost:
+      known_.state = Snapshot::State::lost;
+      [[fallthrough]];
+    case Sample::Kind::absent:
+      known_.message = sample.message;
+      break;
+    case Sample::Kind::back:
+      break;
+  }
+  const Connection& encoder = live.connection();
+  if (encoder.counters().bad() != known_.counters.bad()) known_.bad = live.bad_exchanges();
+  known_.counters = encoder.counters();
+  known_.losses = live.losses();
+  if (now < next_summary_ && sample.kind == Sample::Kind::reading) return;
+  next_summary_ = now + between_summaries;
+  if (sample.kind == Sample::Kind::reading) {
+    OtherFields fields(encoder.unit());
+    encoder.report(fields);
+    known_.fields = fields.texts();
+  }
+  known_.restarts = live.restarts();
+  known_.rate = live.rate();
+  known_.median = encoder.latencies().percentile(0.5);
+  known_.percentile_99 = encoder.latencies().percentile(0.99);
+  known_.longest = encoder.latencies().longest();
+}
+
+void Watch::trace(const Encoder& live, const Sample& sample) {
+  const Unit& unit = live.connection().unit();
+  switch (sample.kind) {
+    case Sample::Kind::reading: {
+      if (sample.restarted && !restarted_) add_line(sample.at, sample.message);
+      restarted_ = sample.restarted;
+      const bool other_alarms = sample.reading.alarms != alarms_;
+      if (!other_alarms && sample.at < next_line_) return;
+      alarms_ = sample.reading.alarms;
+      next_line_ = sample.at + between_lines;
+      return add_line(sample.at, reading_text(unit, sample.reading));
+    }
+    case Sample::Kind::failed: {
+      std::string text = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);
+      if (!sample.trouble.exchange.empty()) text += fmt::format(" ({})", sample.trouble.exchange);
+      return add_line(sample.at, text);
+    }
+    case Sample::Kind::lost:
+    case Sample::Kind::back:
+      return add_line(sample.at, sample.message);
+    case Sample::Kind::absent:
+      return;
+  }
+}
+
+void Watch::add_line(Time at, const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  lines_.push_back(fmt::format("{:9.3f}  {}", std::chrono::duration<double>(at - start_).count(), text));
+  if (lines_.size() > most_lines) lines_.pop_front();
+}
+
+void Watch::run_command(Encoder& live, const Command& command) {
+  std::string notice;
+  if (!live.connection().connected()) {
+    notice = fmt::format("{} was not done: the port is away", command.name);
+  } else {
+    try {
+      const Outcome outcome = live.connection().run(command, {});
+      live.forget_position();
+      notice = outcome.error == Error::none
+                   ? fmt::format("{}: done, and verified by reading back", command.name)
+                   : fmt::format("{} failed: {}", command.name, live.connection().trouble(outcome).message);
+    } catch (const os::Failure& failure) {  // the next reading will find the port lost
+      notice = fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
+    }
+  }
+  add_line(os::now(), notice);
+  const std::lock_guard lock(mutex_);
+  known_.notice = notice;
+  known_.counters = live.connection().counters();
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/text/encoder_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/text/reading_text.hpp"
+
+namespace absenc::tool {
+
+std::unique_ptr<Connection> open_connection(const EncoderAddress& uri) {
+  std::unique_ptr<Connection> encoder = Connection::open(uri);
+  print_notes(*encoder);
+  return encoder;
+}
+
+void print_notes(const Connection& encoder) {
+  for (const std::string& note : encoder.notes()) print_message(fmt::format("note: {}", note));
+}
+
+std::string summary(const host::Counters& counters) {
+  std::string text = fmt::format("{} good", counters.good);
+  if (counters.bad() != 0) {
+    std::vector<std::string> kinds;
+    for (std::size_t i = 0; i < counters.errors.size(); ++i) {
+      if (counters.errors[i] != 0) kinds.push_back(fmt::format("{} {}", counters.errors[i], error_texts[i].name));
+    }
+    text += fmt::format(", {} failed ({}), {} repeated", counters.bad(), fmt::join(kinds, ", "), counters.repeated);
+  }
+  if (counters.late != 0) text += fmt::format(", {} came too late and were dropped", counters.late);
+  return text;
+}
+
+Json to_json(const Trouble& trouble) {
+  Json json = Json::object().set("ok", false).set("error", text_of(trouble.error).name).set("message", trouble.message);
+  if (!trouble.advice.empty()) json.set("advice", trouble.advice);
+  return json.set("sent", trouble.sent).set("received", trouble.received);
+}
+
+Json errors_to_json(const host::Counters& counters) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < counters.errors.size(); ++i) {
+    if (counters.errors[i] != 0) json.set(error_texts[i].name, counters.errors[i]);
+  }
+  return json;
+}
+
+std::string exchanges_text(const host::Counters& counters, std::uint64_t readings) {
+  const std::string text = summary(counters);
+  if (counters.good <= readings) return text;
+  return fmt::format("{}; {} of the good ones confirmed a position, or were commands", text, counters.good - readings);
+}
+
+void set_motion(Json& json, const Sample& sample, double unit_um) {
+  const Json speed = sample.speed_valid ? Json(sample.speed) : Json();
+  json.set("position", sample.position_valid ? Json(sample.position) : Json());
+  if (unit_um > 0) {
+    const double mm = micrometres(sample.position, unit_um) / 1000;
+    json.set("unwrapped_mm", sample.position_valid ? Json(mm) : Json()).set("speed_mm_s", speed);
+  } else {
+    json.set("speed_rpm", speed);
+  }
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Options and fields as JSON and as the rows of a table.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absenc/client/row.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "tools/absenc/text/json.hpp"
+
+namespace absenc::tool {
+
+using namespace client;
+
+[[nodiscard]] Json to_json(const Option& option, std::int64_t value);
+/// {"singleturn_bits":17,...}
+[[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
+[[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
+[[nodiscard]] Json to_json(const Value& value);
+
+/// Puts fields into a JSON object; with a reading, behind what it knows not to hold `singleturn_valid` and the like,
+/// false. What has no such field holds.
+struct JsonFields final : FieldSink {
+  void put(const FieldValue& value) override;
+  void put_reading(const Reading& reading) override;
+  Json fields = Json::object();
+
+ private:
+  struct Judged {
+    const FieldInfo* info;
+    bool holds;
+  };
+  std::vector<Judged> judged_;
+};
+
+/// A row for each flag that is set: "  over_heat", "", its meaning and what to do.
+void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& field, std::uint64_t bits);
+
+/// Puts fields into the rows of a table: name, value, unit or meaning; a row for each flag that is set.
+struct FieldTable final : FieldSink {
+  void put(const FieldValue& value) override;
+  void put_reading(const Reading& reading) override;
+  std::vector<std::vector<std::string>> rows;
+
+ private:
+  struct Judged {
+    const FieldInfo* info;
+    std::size_t row;
+  };
+  std::vector<Judged> judged_;
+};
+
+}  // namespace absenc::tool

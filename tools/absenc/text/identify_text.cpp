@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/text/identify_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absenc/client/text/unit_text.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/text/field_text.hpp"
+#include "tools/absenc/text/json.hpp"
+#include "tools/absenc/text/output.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+constexpr std::size_t most_shown = 8;
+constexpr double same_likelihood = 0.5;  // a factor of three
+
+// "1 in 16384", "1 in 10^9"
+std::string chance_text(double log10) {
+  if (log10 > -0.05) return "as likely";
+  if (log10 > -6) return fmt::format("1 in {:.0f}", std::pow(10, -log10));
+  return fmt::format("1 in 10^{:.0f}", std::floor(-log10));
+}
+
+std::string settings_text(const Candidate& candidate) {
+  std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
+  if (candidate.unasked) settings.emplace_back("sends by itself");
+  return settings.empty() ? "the defaults" : fmt::format("{}", fmt::join(settings, ", "));
+}
+
+Json to_json(const Candidate& candidate, const std::string& command) {
+  const capture::Evidence& evidence = candidate.hypothesis.evidence;
+  Json json = Json::object().set("protocol", candidate.unit->id);
+  const Model* model = candidate.hypothesis.options.model;
+  json.set("model", model != nullptr ? Json(model->name) : Json());
+  json.set("options", options_to_json(*candidate.unit, candidate.hypothesis.options));
+  json.set("encoder", candidate.encoder.empty() ? Json() : Json(candidate.encoder));
+  json.set("line", candidate.line).set("unasked", candidate.unasked);
+  json.set("explained", evidence.explained).set("tried", evidence.tried).set("distinct", evidence.distinct);
+  json.set("log10_chance", candidate.hypothesis.chance()).set("found", is_found(candidate));
+  return json.set("more_bits_possible", candidate.hypothesis.at_least).set("command", command);
+}
+
+void show_table(std::span<const Candidate> candidates) {
+  std::vector<std::vector<std::string>> rows{{"", "PROTOCOL", "WITH", "LINE", "EXPLAINED", "BY CHANCE"}};
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate& one = candidates[i];
+    const capture::Evidence& evidence = one.hypothesis.evidence;
+    rows.push_back({fmt::format("{}", i + 1), std::string(one.unit->id), settings_text(one), one.line,
+                    fmt::format("{} of {}", evidence.explained, evidence.tried), chance_text(one.hypothesis.chance())});
+  }
+  print_line(table(rows));
+}
+
+bool same_encoder(const Candidate& one, const Candidate& other) {
+  return one.unit != other.unit || one.encoder == other.encoder || one.encoder.empty() || other.encoder.empty();
+}
+
+// The likeliest candidate of each encoder that was found: those of one protocol that answer to different addresses.
+std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
+  std::vector<const Candidate*> all;
+  for (const Candidate& one : candidates) {
+    const bool known =
+        std::any_of(all.begin(), all.end(), [&](const Candidate* other) { return same_encoder(one, *other); });
+    if (is_found(one) && !known) all.push_back(&one);
+  }
+  return all;
+}
+
+std::string advice(std::span<const Candidate> candidates) {
+  const Candidate& best = candidates.front();
+  if (!is_found(best)) {
+    return "this may be chance: nothing speaks for it that noise could not do as well\n"
+           "  Try: turn the shaft a little while it is asked, so that the frames differ; capture more frames";
+  }
+  const auto equal = std::count_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
+    return same_encoder(one, best) && one.hypothesis.is_proven() == best.hypothesis.is_proven() &&
+           one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;
+  });
+  if (equal > 1) {
+    return fmt::format("note: {} of them explain what came equally well: compare their positions while the shaft turns",
+                       equal);
+  }
+  if (const auto found = encoders(candidates); found.size() > 1) {
+    std::vector<std::string> names;
+    for (const Candidate* one : found) names.push_back(one->encoder);
+    return fmt::format("note: {} encoders are on the line: {}", found.size(), fmt::join(names, ", "));
+  }
+  if (best.hypothesis.at_least) {
+    return "note: the position may have more bits: these are the fewest that hold all that came; turn the shaft once";
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string read_command(const Candidate& candidate, std::string_view place) {
+  const std::string address = address_of(candidate, place);
+  const std::string_view quote = address.find('?') == std::string::npos ? "" : "\"";
+  return fmt::format("absenc read {1}{0}{1}", address, quote);
+}
+
+std::string decode_command(const Candidate& candidate) {
+  std::string text = fmt::format("absenc decode {}", candidate.unit->id);
+  for (const std::string& setting : settings_for(*candidate.unit, candidate.hypothesis.options)) {
+    const bool quoted = setting.find(' ') != std::string::npos;
+    text += quoted ? fmt::format(" --option \"{}\"", setting) : fmt::format(" --option {}", setting);
+  }
+  return text;
+}
+
+int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
+                    bool json) {
+  const bool found = !candidates.empty() && is_found(candidates.front());
+  if (json) {
+    Json list = Json::array();
+    for (const Candidate& one : candidates) list.append(to_json(one, command(one)));
+    print_line(Json::object().set("ok", found).set("candidates", list).line());
+    return found ? exit_good : exit_failed;
+  }
+  if (candidates.empty()) return exit_failed;
+  show_table(candidates.first(std::min(candidates.size(), most_shown)));
+  const std::string more = advice(candidates);
+  std::string next = found ? "\ngo on with: " : "";
+  for (const Candidate* one : encoders(candidates)) {
+    print_line(std::exchange(next, "       and: ") + command(*one));
+  }
+  if (!more.empty()) print_message(more);
+  return found ? exit_good : exit_failed;
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// What long work has come to, on the last line of the terminal; nothing where there is none.
+#pragma once
+
+#include <string_view>
+
+#include "absenc/os/process.hpp"
+#include "tools/absenc/text/output.hpp"
+
+namespace absenc::tool {
+
+class Progress {
+ public:
+  Progress() : visible_(os::is_terminal(2)) {}
+  ~Progress() { clear(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  [[nodiscard]] bool visible() const { return visible_; }
+  /// In the place of what was shown before. Nothing else may be printed until `clear`.
+  void show(std::string_view text) {
+    if (!visible_) return;
+    print_prompt("\r\033[K");
+    print_prompt(text);
+    shown_ = true;
+  }
+  void clear() {
+    if (shown_) print_prompt("\r\033[K");
+    shown_ = false;
+  }
+
+ private:
+  bool visible_;
+  bool shown_ = false;
+};
+
+}  // namespace absenc::tool

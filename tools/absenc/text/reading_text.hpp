@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// A position reading for people. What is not valid never looks like a good number.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/client/reading.hpp"
+#include "absenc/core/angle.hpp"
+#include "tools/absenc/text/json.hpp"
+
+namespace absenc::tool {
+
+using namespace client;
+
+/// " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"; of a linear encoder
+/// "  78.96355 mm      78963.55 um   1579271 counts   no alarms"
+[[nodiscard]] std::string reading_text(const Unit& unit, const Reading& reading);
+
+/// Its first part: position and turns.
+[[nodiscard]] std::string place_text(const Reading& reading);
+
+/// What each flag that is set means and what to do, a line each; "" when there is none.
+[[nodiscard]] std::string flags_in_words(const Flags& flags);
+/// Of two channels under the name of each; what both raise once.
+[[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
+
+/// Sets singleturn_valid and multiturn_valid, as far as the reading carries them.
+void set_validity(Json& json, const Reading& reading);
+
+/// "0.125" without more decimals than the unit of a count has.
+[[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);
+
+}  // namespace absenc::tool

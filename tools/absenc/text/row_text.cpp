@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/absenc/text/row_text.hpp"
+
+#include <fmt/format.h>
+
+#include <iterator>
+
+#include "tools/absenc/text/field_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+void append_quoted(std::string& line, std::string_view text) {
+  if (text.find_first_of(",\"\n\r") == std::string_view::npos) {
+    line += text;
+    return;
+  }
+  line += '"';
+  for (const char c : text) line.append(c == '"' ? 2 : 1, c);
+  line += '"';
+}
+
+struct Cell {
+  std::string& line;
+  std::string_view format;
+
+  void operator()(std::monostate) const {}
+  void operator()(Invalid) const {}
+  void operator()(bool value) const { line += value ? "true" : "false"; }
+  void operator()(std::int64_t value) const { fmt::format_to(std::back_inserter(line), "{}", value); }
+  void operator()(std::uint64_t value) const { fmt::format_to(std::back_inserter(line), "{}", value); }
+  void operator()(double value) const {
+    fmt::format_to(std::back_inserter(line), fmt::runtime(format.empty() ? "{}" : format), value);
+  }
+  void operator()(const std::string& text) const { append_quoted(line, text); }
+  template <class Other>
+  void operator()(const Other& other) const {
+    append_quoted(line, client::to_text(Value(other)));
+  }
+};
+
+}  // namespace
+
+std::string csv_header(std::span<const Column> columns) {
+  std::string names;
+  for (const Column& column : columns) {
+    if (!column.look.is_detail) names += fmt::format("{}{}", names.empty() ? "" : ",", column.name);
+  }
+  return names;
+}
+
+void append_csv(std::string& text, const Row& row) {
+  bool is_first = true;
+  for (std::size_t i = 0; i < row.columns.size(); ++i) {
+    const Column& column = row.columns[i];
+    if (column.look.is_detail) continue;
+    if (!is_first) text += ',';
+    is_first = false;
+    std::visit(Cell{text, column.look.format}, row.values[i]);
+  }
+}
+
+std::string to_csv(const Row& row) {
+  std::string line;
+  append_csv(line, row);
+  return line;
+}
+
+std::vector<std::vector<std::string>> to_table(const Row& row) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < row.columns.size(); ++i) {
+    const Column& column = row.columns[i];
+    rows.push_back({std::string(column.name), to_text(column, row.values[i]), std::string(column.meaning)});
+    if (const auto* flags = std::get_if<Flags>(&row.values[i])) add_flags(rows, *flags->field, flags->bits);
+  }
+  return rows;
+}
+
+Json to_json(const Row& row) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < row.columns.size(); ++i) {
+    if (!std::holds_alternative<std::monostate>(row.values[i])) json.set(row.columns[i].name, to_json(row.values[i]));
+  }
+  return json;
+}
+
+}  // namespace absenc::tool

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rows as lines of a table with commas between, and as JSON.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/client/row.hpp"
+#include "tools/absenc/text/json.hpp"
+
+namespace absenc::tool {
+
+using namespace client;
+
+/// The names of the columns, without details.
+[[nodiscard]] std::string csv_header(std::span<const Column> columns);
+/// The values under them; what is not told, or does not hold, is empty. Without its end.
+void append_csv(std::string& text, const Row& row);
+[[nodiscard]] std::string to_csv(const Row& row);
+
+/// For `table`: name, value, unit or meaning; a row for each flag that is set.
+[[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
+
+/// What is not told is left out; what does not hold is null.
+[[nodiscard]] Json to_json(const Row& row);
+
+}  // namespace absenc::tool

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/process.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/text/encoder_text.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/verbs/run.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+struct Measurement {
+  std::vector<Time> latencies;  // of good readings, sorted
+  std::uint64_t failed = 0;
+  Time duration{};
+  Time processor{};
+  std::uint64_t items = 0;
+};
+
+Measurement measure(Connection& encoder, double seconds) {
+  Measurement measurement;
+  encoder.read();  // the first one is read twice, and echo is found out
+  const Time start = os::now();
+  const Time end = start + Time(static_cast<std::int64_t>(seconds * 1e9));
+  const Time processor_before = os::processor_time();
+  const std::uint64_t items_before = encoder.items();
+  Time before = start;
+  try {
+    while (before < end && !os::interrupted()) {
+      const Outcome outcome = encoder.read(host::Take::every);
+      const Time after = os::now();
+      if (outcome.error == Error::none) {
+        measurement.latencies.push_back(after - before);
+      } else {
+        ++measurement.failed;
+      }
+      before = after;
+    }
+  } catch (const os::Interrupted&) {  // what was measured until then counts
+  }
+  measurement.duration = before - start;
+  measurement.processor = os::processor_time() - processor_before;
+  measurement.items = encoder.items() - items_before;
+  std::sort(measurement.latencies.begin(), measurement.latencies.end());
+  return measurement;
+}
+
+// The smallest latency that `share` of the readings do not exceed.
+Time percentile(const std::vector<Time>& sorted, double share) {
+  const auto rank = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
+  return sorted[std::min(rank, sorted.size() - 1)];
+}
+
+struct Percentile {
+  std::string_view name;
+  double share;
+};
+constexpr std::array<Percentile, 4> percentiles{{{"50", 0.5}, {"90", 0.9}, {"99", 0.99}, {"99.9", 0.999}}};
+
+// How much of the time characters were on the line; 0 when the line has no rate, or carries no characters.
+double line_share(const Connection& encoder, const Measurement& measurement) {
+  const LineSettings& line = encoder.uri().line;
+  const LinkKind link = encoder.unit().link;
+  if (line.rate == 0 || (link != LinkKind::half_duplex && link != LinkKind::full_duplex)) return 0;
+  return static_cast<double>(measurement.items) * static_cast<double>(line.character().count()) /
+         static_cast<double>(measurement.duration.count());
+}
+
+double readings_a_second(const Measurement& measurement) {
+  const double seconds = std::chrono::duration<double>(measurement.duration).count();
+  return static_cast<double>(measurement.latencies.size()) / seconds;
+}
+
+double microseconds(Time time) { return static_cast<double>(time.count()) / 1e3; }
+
+Json measurement_json(const Connection& encoder, const Measurement& measurement) {
+  Json latency = Json::object();
+  for (const auto& [name, share] : percentiles) {
+    latency.set(fmt::format("p{}", name), microseconds(percentile(measurement.latencies, share)));
+  }
+  latency.set("max", microseconds(measurement.latencies.back()));
+  const auto count = static_cast<double>(measurement.latencies.size());
+  return Json::object()
+      .set("protocol", encoder.unit().id)
+      .set("seconds", std::chrono::duration<double>(measurement.duration).count())
+      .set("readings", measurement.latencies.size())
+      .set("failed", measurement.failed)
+      .set("readings_per_s", readings_a_second(measurement))
+      .set("latency_us", latency)
+      .set("cpu_us_per_reading", microseconds(measurement.processor) / count)
+      .set("line_share", line_share(encoder, measurement))
+      .set("errors", errors_to_json(encoder.counters()))
+      .set("ok", true);
+}
+
+std::string measurement_text(const Connection& encoder, const Measurement& measurement) {
+  std::string latencies;
+  for (const auto& [name, share] : percentiles) {
+    latencies += fmt::format("{} % {}, ", name, to_text(percentile(measurement.latencies, share)));
+  }
+  const auto count = static_cast<std::int64_t>(measurement.latencies.size());
+  std::vector<std::vector<std::string>> rows{
+      {"readings",
+       fmt::format("{} in {}: {:.0f} a second", count, to_text(measurement.duration), readings_a_second(measurement))},
+      {"latency", fmt::format("{}longest {}", latencies, to_text(measurement.latencies.back()))},
+      {"processor", fmt::format("{} a reading", to_text(measurement.processor / count))},
+      {"exchanges", summary(encoder.counters())},
+  };
+  const double share = line_share(encoder, measurement);
+  if (share > 0) {
+    rows.push_back({"line", fmt::format("what was sent and received fills {:.1f} % of the time at {} baud", 100 * share,
+                                        encoder.uri().line.rate)});
+  }
+  return table(rows);
+}
+
+int run_bench(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const double seconds = invocation.real("--seconds", 5, 0.01, 86400);
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
+  const Outcome first = encoder->read();
+  if (first.error != Error::none) throw EncoderFailure(encoder->trouble(first));
+  const Measurement measurement = measure(*encoder, seconds);
+  if (measurement.latencies.empty()) {
+    throw Failure(fmt::format("there was no good reading; exchanges: {}", summary(encoder->counters())));
+  }
+  print_line(invocation.has("--json") ? measurement_json(*encoder, measurement).line()
+                                      : measurement_text(*encoder, measurement));
+  return measurement.failed == 0 ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 4> bench_parameters{{
+    parameter::encoder,
+    {"--seconds", "S", "how long", "5"},
+    parameter::json,
+    parameter::option,
+}};
+
+constexpr std::array<Example, 2> bench_examples{{
+    {"absenc bench tformat:/dev/ttyUSB0", "how fast this adapter is"},
+    {"absenc bench tformat:tcp:192.168.1.20:4001 --seconds 60 --json", "a serial server for a minute"},
+}};
+
+}  // namespace
+
+const Subcommand bench_subcommand{
+    "bench",  "measure readings a second, latency, errors and processor time", "", bench_parameters, bench_examples,
+    run_bench};
+
+}  // namespace absenc::tool

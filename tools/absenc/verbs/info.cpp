@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+
+#include "absenc/client/reading_columns.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/encoder_text.hpp"
+#include "tools/absenc/text/field_text.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/text/reading_text.hpp"
+#include "tools/absenc/text/row_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+// What needs no argument and exists with these options.
+bool can_be_asked(const EncoderAddress& uri, const Command& command) {
+  const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
+                                          [](const Argument& argument) { return argument.required; });
+  if (needs_argument) return false;
+  const std::vector<std::int64_t> arguments = require_arguments(command, {});
+  const auto storage = std::make_unique<std::byte[]>(uri.unit->host_storage);
+  const Any<Conversation> made =
+      uri.unit->host(uri.options, command, arguments, {storage.get(), uri.unit->host_storage});
+  return made.bytes != nullptr || made.frames != nullptr;
+}
+
+// In this order; the position comes behind them.
+std::vector<const Command*> questions(const EncoderAddress& uri) {
+  std::vector<const Command*> commands;
+  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
+    for (const Command& command : uri.unit->commands) {
+      if (command.verb == verb && can_be_asked(uri, command)) commands.push_back(&command);
+    }
+  }
+  return commands;
+}
+
+std::string resolution_text(const Resolution& resolution) {
+  if (resolution.unit_um > 0) return fmt::format("{} bits of {} um", resolution.singleturn_bits, resolution.unit_um);
+  std::vector<std::string> parts;
+  if (resolution.singleturn_bits != 0) parts.push_back(fmt::format("{} bits in a turn", resolution.singleturn_bits));
+  if (resolution.multiturn_bits != 0) parts.push_back(fmt::format("{} bits of turns", resolution.multiturn_bits));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+Rows identity_rows(const EncoderAddress& uri) {
+  const Unit& unit = *uri.unit;
+  const Model* model = uri.options.model;
+  Rows rows{{"encoder", address_of(uri)}, {"protocol", std::string(unit.name)}};
+  rows.push_back(
+      {"model", model == nullptr ? "none with these options" : fmt::format("{}: {}", model->name, model->meaning)});
+  rows.push_back({"line", line_of(unit.link, uri.line)});
+  std::string_view heading = "options";
+  for (const std::string& option : option_texts(unit, uri.options)) {
+    rows.push_back({std::string(heading), option});
+    heading = "";
+  }
+  return rows;
+}
+
+Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
+  const Unit& unit = *uri.unit;
+  Json bits = Json::object().set("singleturn_bits", resolution.singleturn_bits);
+  bits.set("multiturn_bits", resolution.multiturn_bits);
+  if (resolution.unit_um > 0) bits.set("unit_um", resolution.unit_um);
+  return Json::object()
+      .set("encoder", address_of(uri))
+      .set("protocol", unit.id)
+      .set("model", uri.options.model == nullptr ? Json() : Json(uri.options.model->name))
+      .set("link", name_of(unit.link))
+      .set("rate", uri.line.rate == 0 ? Json() : Json(uri.line.rate))
+      .set("resolution", bits)
+      .set("options", options_to_json(unit, uri.options));
+}
+
+/// Asks the encoder and keeps what it says, for people and for programs.
+class Survey {
+ public:
+  explicit Survey(const EncoderAddress& uri)
+      : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)) {}
+
+  void ask(const Command& command) {
+    const Outcome outcome = encoder_->run(command, require_arguments(command, {}));
+    if (outcome.error != Error::none) return fail(command, encoder_->trouble(outcome));
+    if (outcome.reading != nullptr) hear(resolution_of(*outcome.reading));
+    JsonFields fields;
+    encoder_->report(fields);
+    answers.set(command.name, Json::object().set("ok", true).set("fields", fields.fields));
+    FieldTable table;
+    encoder_->report(table);
+    add_heading(command);
+    for (std::vector<std::string>& row : table.rows) {
+      row.front().insert(0, "  ");
+      rows.push_back(std::move(row));
+    }
+  }
+
+  void read() {
+    const Unit& unit = encoder_->unit();
+    const Outcome outcome = encoder_->read();
+    const Command& command = *find_command(unit, Verb::read);
+    if (outcome.error != Error::none) return fail(command, encoder_->trouble(outcome));
+    if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no position");
+    const Resolution read_as = resolution_of(*outcome.reading);
+    if (heard_ && !same(read_as, resolution_)) return fail(command, contradiction(read_as));
+    hear(read_as);
+    const Reading reading = checked(*outcome.reading, encoder_->confirmed());
+    const ReadingColumns columns(unit, encoder_->uri().options);
+    std::vector<Value> values(columns.columns().size());
+    columns.fill(reading, values);
+    Json json = to_json(Row{columns.columns(), std::move(values)});
+    answers.set(command.name, json.set("confirmed", encoder_->confirmed()).set("ok", true));
+    add_heading(command);
+    position = "  " + reading_text(unit, reading);
+    if (const std::string alarms = alarms_in_words(unit, reading); !alarms.empty()) position += '\n' + alarms;
+    if (reading.singleturn_valid() != outcome.reading->singleturn_valid()) {
+      position += "\n  no two readings in a row agree as well as the fastest shaft allows";
+    }
+  }
+
+  /// What the encoder's answers show; before them, what it was told to be.
+  [[nodiscard]] const Resolution& resolution() const { return resolution_; }
+
+  Json answers = Json::object();
+  Rows rows;
+  std::string position;           // below the rows; "" when it could not be read
+  std::vector<Trouble> troubles;  // one of each kind
+
+ private:
+  void add_heading(const Command& command) {
+    rows.push_back({std::string(command.name), "", std::string(command.meaning)});
+  }
+
+  static Resolution resolution_of(const Reading& reading) {
+    return {reading.singleturn_bits, reading.multiturn_bits, reading.unit_um};
+  }
+  static bool same(const Resolution& a, const Resolution& b) {
+    return a.singleturn_bits == b.singleturn_bits && a.multiturn_bits == b.multiturn_bits && a.unit_um == b.unit_um;
+  }
+
+  // The first who says it, since he was asked who he is.
+  void hear(const Resolution& resolution) {
+    if (!heard_) resolution_ = resolution;
+    heard_ = true;
+  }
+
+  [[nodiscard]] Trouble contradiction(const Resolution& read_as) const {
+    return {.error = Error::cross_check_failed,
+            .message = fmt::format("it would be read as {}, by the options, but the encoder says that it has {}",
+                                   resolution_text(read_as), resolution_text(resolution_)),
+            .advice = "leave the options out that say otherwise, or give those that the encoder says"};
+  }
+
+  void fail(const Command& command, const Trouble& trouble) {
+    answers.set(command.name, to_json(trouble));
+    rows.push_back(
+        {std::string(command.name), "FAILED", fmt::format("{}: {}", text_of(trouble.error).name, trouble.message)});
+    const bool is_known = std::any_of(troubles.begin(), troubles.end(),
+                                      [&](const Trouble& other) { return other.error == trouble.error; });
+    if (!is_known) troubles.push_back(trouble);
+  }
+
+  std::unique_ptr<Connection> encoder_;
+  Resolution resolution_;
+  bool heard_ = false;  // from the encoder
+};
+
+int run_info(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const bool json = invocation.has("--json");
+  if (!json) print_line(table(identity_rows(uri)) + '\n');
+  Survey survey(uri);
+  for (const Command* command : questions(uri)) survey.ask(*command);
+  if (find_command(*uri.unit, Verb::read) != nullptr) survey.read();
+  const bool good = survey.troubles.empty();
+  if (json) {
+    print_line(identity_json(uri, survey.resolution()).set("answers", survey.answers).set("ok", good).line());
+  } else {
+    print_line(table(Rows{{"resolution", resolution_text(survey.resolution())}}) + '\n' + table(survey.rows) +
+               survey.position);
+    for (const Trouble& trouble : survey.troubles) print_message(trouble.text());
+  }
+  return good ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 3> info_parameters{{
+    parameter::encoder,
+    parameter::json,
+    parameter::option,
+}};
+
+constexpr std::array<Example, 2> info_examples{{
+    {"absenc info tformat:/dev/ttyUSB0", "who is there"},
+    {"absenc info sim:tformat --json", "the same of a virtual encoder, for programs"},
+}};
+
+}  // namespace
+
+const Subcommand info_subcommand{
+    "info",
+    "show who is there: the protocol, the model, and all that the encoder says of itself",
+    "First what absenc was told or assumes, then what the encoder answers: its identity, temperature,\n"
+    "settings, position and alarms. What fails is shown in its place and the rest goes on.\n"
+    "Exit status 1 when anything failed.",
+    info_parameters,
+    info_examples,
+    run_info};
+
+}  // namespace absenc::tool

@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/address.hpp"
+#include "absenc/client/way/named_encoder.hpp"
+#include "absenc/protocol/all.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/field_text.hpp"
+#include "tools/absenc/text/output.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+std::string option_values(const Unit& unit, const Model& model) {
+  std::vector<std::string> settings;
+  for (const OptionValue& value : model.values) {
+    const Option& option = unit.options[value.option];
+    settings.push_back(fmt::format("{}={}", option.name, to_text(option, value.value)));
+  }
+  return fmt::format("{}", fmt::join(settings, " "));
+}
+
+std::string argument_names(const Command& command) {
+  std::string text(command.name);
+  for (const Argument& argument : command.arguments) {
+    text += argument.required ? fmt::format(" <{}>", argument.name) : fmt::format(" [{}]", argument.name);
+  }
+  return text;
+}
+
+// Rows indented below their heading; nothing when there are none.
+std::string section(std::string_view heading, Rows rows) {
+  if (rows.empty()) return {};
+  for (auto& row : rows) row.front().insert(0, "  ");
+  return fmt::format("\n{}\n{}", heading, table(rows));
+}
+
+// As this model has it.
+std::string line_of_model(const Unit& unit, const Model& model) {
+  Options options;
+  static_cast<void>(resolve_options(unit, model.name, {}, options));  // a name of its own, and nothing else
+  return line_of(unit.link, line_settings(unit, options));
+}
+
+std::string supported_encoders() {
+  Rows rows{{"PROTOCOL", "MODEL", "WHAT", "LINE"}};
+  for (const Unit* unit : all_units()) {
+    for (const Model& model : unit->models) {
+      rows.push_back(
+          {std::string(unit->id), std::string(model.name), std::string(model.meaning), line_of_model(*unit, model)});
+    }
+    if (unit->models.empty()) rows.push_back({std::string(unit->id), "", std::string(unit->name), line_of(*unit)});
+  }
+  return table(rows) + "\n`absenc list <protocol>` shows its models, options, commands and fields.";
+}
+
+Rows option_rows(const Unit& unit) {
+  Rows rows;
+  for (const Option& option : unit.options) {
+    rows.push_back({std::string(option.name), range_of(option),
+                    fmt::format("default {}", to_text(option, option.default_value)), std::string(option.meaning)});
+  }
+  if (!takes_word(unit)) return rows;
+  std::vector<std::string_view> others;
+  for (const Option& option : unit.options) {
+    if (option.describes_word) others.push_back(option.name);
+  }
+  rows.push_back({std::string(word_option_name), "a word format, see below", "",
+                  fmt::format("the fields of the position word, in place of {}", fmt::join(others, ", "))});
+  return rows;
+}
+
+// As in protocol/word_format.hpp.
+Rows word_rows(const Unit& unit) {
+  if (!takes_word(unit)) return {};
+  return {
+      {"word", "items with a space between them, from the MSB on, as in \"multiturn:12 position:24 error:1!\""},
+      {"item", "[NAME=]MEANING:BITS[!], or gray"},
+      {"", "NAME: letters, digits and _; !: active low; gray: multiturn and position are one Gray-coded number"},
+      {"MEANING", fmt::format("one of {}", fmt::join(meaning_names, ", "))},
+      {"  parity", "even over all bits before it, with ! odd"},
+      {"  value", "any other number: shown by its name"},
+      {"  skip", "nothing; sent as 0"},
+  };
+}
+
+Rows port_rows() {
+  Rows rows;
+  for (const LinkParameter& parameter : link_parameters) {
+    rows.push_back({fmt::format("{}={}", parameter.name, parameter.value), std::string(parameter.places),
+                    std::string(parameter.meaning)});
+  }
+  return rows;
+}
+
+Rows command_rows(const Unit& unit) {
+  Rows rows;
+  for (const Command& command : unit.commands) {
+    std::string meaning(command.meaning);
+    if (command.changes_encoder) meaning += " (changes the encoder)";
+    rows.push_back({argument_names(command), meaning});
+    for (const Argument& argument : command.arguments) {
+      std::string words = fmt::format("{} ({} to {})", argument.meaning, argument.minimum, argument.maximum);
+      if (!argument.required) words += fmt::format(", default {}", argument.default_value);
+      rows.push_back({fmt::format("  {}", argument.name), "  " + words});
+    }
+  }
+  return rows;
+}
+
+Rows register_rows(const Unit& unit) {
+  Rows rows;
+  for (const RegisterInfo& one : unit.registers) {
+    const std::string_view access = !one.writable ? "read only" : one.readable ? "read and write" : "write only";
+    rows.push_back({std::string(one.name), fmt::format("0x{:02X}", one.address),
+                    fmt::format("{} byte{}", one.size, one.size == 1 ? "" : "s"), std::string(access)});
+  }
+  return rows;
+}
+
+Rows memory_rows(const Unit& unit) {
+  Rows rows;
+  for (const MemoryArea& area : unit.memory) {
+    const std::uint32_t last = area.first + area.count - 1;
+    const std::string to = last == area.first ? "" : fmt::format(" to 0x{:02X}", last);
+    std::string writes = area.writable ? "" : "read only";
+    if (!area.protection.empty()) writes = "written only with --force";
+    if (area.write_life != 0 && area.protection.empty()) writes = life_of(area);
+    rows.push_back({fmt::format("page {}: 0x{:02X}{}", area.page, area.first, to), std::string(area.meaning), writes});
+  }
+  return rows;
+}
+
+Rows field_rows(const Unit& unit) {
+  Rows rows;
+  for (const FieldInfo& field : unit.fields) {
+    rows.push_back({std::string(field.name), std::string(field.unit), std::string(field.meaning)});
+    for (const FlagInfo& flag : field.flags) {
+      if (flag.name.empty()) continue;
+      rows.push_back({fmt::format("  {}", flag.name), "", std::string(flag.meaning)});
+      if (!flag.action.empty()) rows.push_back({"", "", fmt::format("  -> {}", flag.action)});
+    }
+  }
+  return rows;
+}
+
+Rows condition_rows(const Unit& unit) {
+  Rows rows;
+  for (const Condition& condition : unit.conditions) {
+    rows.push_back({std::string(condition.name), range_of(condition), fmt::format("normally {}", condition.normal),
+                    std::string(condition.meaning)});
+  }
+  return rows;
+}
+
+std::string details(const Unit& unit) {
+  std::string text = table(Rows{{std::string(unit.id), std::string(unit.name)},
+                                {"document", std::string(unit.document)},
+                                {"line", line_of(unit)}});
+  Rows models;
+  for (const Model& model : unit.models) {
+    models.push_back({std::string(model.name), std::string(model.meaning), option_values(unit, model)});
+  }
+  text += section("Models (--model NAME, or ?model=NAME behind an encoder; the first is the default)", models);
+  text += section("Options (--option NAME=VALUE, or ?NAME=VALUE behind an encoder)", option_rows(unit));
+  text += section("A word format (the position word of an encoder that the options do not describe)", word_rows(unit));
+  text += section("Settings of the port (?NAME=VALUE behind an encoder)", port_rows());
+  text += section(fmt::format("Commands (absenc run {}:PORT <command>)", unit.id), command_rows(unit));
+  text += section(fmt::format("Registers (absenc memory read {}:PORT <name>)", unit.id), register_rows(unit));
+  text += section(fmt::format("Memory (absenc memory read {}:PORT <address> --page P)", unit.id), memory_rows(unit));
+  text += section("Fields", field_rows(unit));
+  text += section(fmt::format("Conditions of the virtual encoder (emulate --condition NAME=VALUE, "
+                              "\"sim:{}?condition=NAME=VALUE\")",
+                              unit.id),
+                  condition_rows(unit));
+  return text;
+}
+
+Json models_json(const Unit& unit) {
+  Json models = Json::array();
+  for (const Model& model : unit.models) {
+    Json options = Json::object();
+    for (const OptionValue& value : model.values) {
+      const Option& option = unit.options[value.option];
+      options.set(option.name, to_json(option, value.value));
+    }
+    models.append(Json::object()
+                      .set("name", model.name)
+                      .set("meaning", model.meaning)
+                      .set("maximum_rpm", model.maximum_rpm)
+                      .set("options", options));
+  }
+  return models;
+}
+
+Json options_json(const Unit& unit) {
+  Json options = Json::array();
+  for (const Option& option : unit.options) {
+    Json json = Json::object().set("name", option.name).set("meaning", option.meaning);
+    json.set("default", to_json(option, option.default_value));
+    if (option.choices.empty()) {
+      json.set("minimum", to_json(option, option.minimum)).set("maximum", to_json(option, option.maximum));
+    } else {
+      Json choices = Json::array();
+      for (std::size_t i = 0; i < option.choices.size(); ++i) {
+        choices.append(to_json(option, static_cast<std::int64_t>(i)));
+      }
+      json.set("choices", choices);
+    }
+    options.append(json);
+  }
+  return options;
+}
+
+Json commands_json(const Unit& unit) {
+  Json commands = Json::array();
+  for (const Command& command : unit.commands) {
+    Json arguments = Json::array();
+    for (const Argument& argument : command.arguments) {
+      Json json = Json::object().set("name", argument.name).set("meaning", argument.meaning);
+      json.set("minimum", argument.minimum).set("maximum", argument.maximum).set("required", argument.required);
+      if (!argument.required) json.set("default", argument.default_value);
+      arguments.append(json);
+    }
+    commands.append(Json::object()
+                        .set("name", command.name)
+                        .set("verb", name_of(command.verb))
+                        .set("meaning", command.meaning)
+                        .set("changes_encoder", command.changes_encoder)
+                        .set("arguments", arguments));
+  }
+  return commands;
+}
+
+Json registers_json(const Unit& unit) {
+  Json registers = Json::array();
+  for (const RegisterInfo& one : unit.registers) {
+    registers.append(Json::object()
+                         .set("name", one.name)
+                         .set("address", one.address)
+                         .set("size", one.size)
+                         .set("readable", one.readable)
+                         .set("writable", one.writable));
+  }
+  return registers;
+}
+
+Json memory_json(const Unit& unit) {
+  Json areas = Json::array();
+  for (const MemoryArea& area : unit.memory) {
+    areas.append(Json::object()
+                     .set("page", area.page)
+                     .set("first", area.first)
+                     .set("count", area.count)
+                     .set("meaning", area.meaning)
+                     .set("writable", area.writable)
+                     .set("in_dump", area.in_dump)
+                     .set("write_life", area.write_life)
+                     .set("write_life_in_total", area.life_in_total)
+                     .set("protection", area.protection));
+  }
+  return areas;
+}
+
+Json fields_json(const Unit& unit) {
+  static constexpr std::array<std::string_view, 7> kinds{"number", "counts", "boolean", "flags",
+                                                         "real",   "text",   "bytes"};
+  Json fields = Json::array();
+  for (const FieldInfo& field : unit.fields) {
+    Json json = Json::object().set("name", field.name).set("kind", kinds[static_cast<std::size_t>(field.kind)]);
+    json.set("unit", field.unit).set("meaning", field.meaning);
+    Json flags = Json::array();
+    for (const FlagInfo& flag : field.flags) {
+      if (flag.name.empty()) continue;
+      flags.append(Json::object().set("name", flag.name).set("meaning", flag.meaning).set("action", flag.action));
+    }
+    if (!flags.empty()) json.set("flags", flags);
+    fields.append(json);
+  }
+  return fields;
+}
+
+Json conditions_json(const Unit& unit) {
+  Json conditions = Json::array();
+  for (const Condition& condition : unit.conditions) {
+    conditions.append(Json::object()
+                          .set("name", condition.name)
+                          .set("unit", condition.unit)
+                          .set("meaning", condition.meaning)
+                          .set("minimum", condition.minimum)
+                          .set("maximum", condition.maximum)
+                          .set("normal", condition.normal));
+  }
+  return conditions;
+}
+
+Json unit_json(const Unit& unit) {
+  static constexpr std::array<std::string_view, 3> parities{"none", "odd", "even"};
+  return Json::object()
+      .set("protocol", unit.id)
+      .set("name", unit.name)
+      .set("document", unit.document)
+      .set("link", name_of(unit.link))
+      .set("line", Json::object()
+                       .set("rate", unit.line.rate == 0 ? Json() : Json(unit.line.rate))
+                       .set("parity", parities[static_cast<std::size_t>(unit.line.parity)])
+                       .set("stop_bits", unit.line.stop_bits))
+      .set("models", models_json(unit))
+      .set("options", options_json(unit))
+      .set("takes_word", takes_word(unit))
+      .set("commands", commands_json(unit))
+      .set("memory", memory_json(unit))
+      .set("registers", registers_json(unit))
+      .set("fields", fields_json(unit))
+      .set("conditions", conditions_json(unit));
+}
+
+Json name_json(std::string_view name, const EncoderAddress& uri) {
+  return Json::object()
+      .set("name", name)
+      .set("encoder", address_of(uri))
+      .set("protocol", uri.unit->id)
+      .set("model", uri.options.model == nullptr ? Json() : Json(uri.options.model->name))
+      .set("options", options_to_json(*uri.unit, uri.options));
+}
+
+// Nothing is shown when one of them is wrong.
+int list_names(bool json) {
+  const SettingsFile config = require_settings_file("the names are those of absenc.toml");
+  Rows rows{{"NAME", "ENCODER", "MODEL"}};
+  std::string lines;
+  for (const FileSection& encoder : config.encoders) {
+    const EncoderAddress uri = parse_address(encoder.name);
+    rows.push_back({encoder.name, address_of(uri), std::string(uri.options.model ? uri.options.model->name : "")});
+    lines += name_json(encoder.name, uri).line() + '\n';
+  }
+  if (!json) print_line(table(rows) + fmt::format("\nThey are written in {}.", config.path));
+  if (json && !lines.empty()) print_line(lines);
+  return exit_good;
+}
+
+int run_list(const Invocation& invocation) {
+  const bool json = invocation.has("--json");
+  if (invocation.has("--names")) {
+    if (invocation.has("protocol")) throw UsageError("--names lists encoders of any protocol: give no protocol");
+    return list_names(json);
+  }
+  if (invocation.has("protocol")) {
+    const Unit& unit = require_unit(invocation.text("protocol"));
+    print_line(json ? unit_json(unit).line() : details(unit));
+    return 0;
+  }
+  if (!json) print_line(supported_encoders());
+  if (json) {
+    for (const Unit* unit : all_units()) print_line(unit_json(*unit).line());
+  }
+  return 0;
+}
+
+constexpr std::array<Parameter, 3> list_parameters{{
+    {"protocol", "", "show the models, options, commands and fields of this one"},
+    {"--names", "", "show the encoders that absenc.toml gives names to, and check their settings"},
+    {"--json", "", "one JSON object a line, one line for each protocol or name"},
+}};
+
+constexpr std::array<Example, 3> list_examples{{
+    {"absenc list", "every supported encoder"},
+    {"absenc list tformat", "all about one protocol"},
+    {"absenc list --names", "your own encoders, by the names you gave them"},
+}};
+
+}  // namespace
+
+const Subcommand list_subcommand{
+    "list",
+    "show the supported encoders, their options and commands, or your own by name",
+    "absenc.toml gives names to encoders, for `absenc read elbow` and every other verb:\n"
+    "  [defaults]             # for every encoder, where they fit\n"
+    "  echo = \"auto\"\n"
+    "  [bus.arm]              # a line that several encoders share\n"
+    "  port = \"/dev/ttyUSB0\"  # or \"tcp:192.168.1.20:4001\", \"spi:/dev/spidev0.0\", or \"sim\"\n"
+    "  latency = 5\n"
+    "  [encoder.elbow]        # all that can stand behind ? in an encoder; lists for what may be repeated\n"
+    "  protocol = \"tformat\"\n"
+    "  bus = \"arm\"            # or port = ...\n"
+    "  model = \"23-bit\"\n"
+    "It is the file that ABSENC_CONFIG names, or else ./absenc.toml, or else ~/.config/absenc/absenc.toml.\n"
+    "What stands behind the name (\"elbow?latency=20\") and --option override it.",
+    list_parameters,
+    list_examples,
+    run_list};
+
+}  // namespace absenc::tool

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+#include <string>
+
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/sample_rows.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/pace.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/rate.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/encoder_text.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/text/reading_text.hpp"
+#include "tools/absenc/text/row_text.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+enum class Format : std::uint8_t { human, json, csv };
+
+/// Shows readings and failures as they come, and keeps quiet about what was said already.
+class Display {
+ public:
+  Display(const Encoder& live, Format format)
+      : live_(&live), format_(format), rows_(live.unit(), live.options(), os::now(), SampleRows::With::reading) {
+    if (format == Format::csv) print_line(csv_header(rows_.columns()));
+  }
+
+  void show(const Sample& sample) {
+    switch (sample.kind) {
+      case Sample::Kind::reading:
+        last_trouble_ = Error::none;
+        return show_reading(sample);
+      case Sample::Kind::failed:
+        return show_trouble(sample);
+      case Sample::Kind::lost:
+        print_message(fmt::format("{}\n  Waiting for it to come back.", sample.message));
+        return show_row(sample);
+      case Sample::Kind::absent:
+        if (sample.message != last_absence_) print_message(sample.message);
+        last_absence_ = sample.message;
+        return;
+      case Sample::Kind::back:
+        last_absence_.clear();
+        print_message(sample.message);
+        return show_row(sample);
+    }
+  }
+
+ private:
+  void show_row(const Sample& sample) {
+    if (format_ == Format::csv) print_line(to_csv(rows_.of(sample)));
+    if (format_ == Format::json) print_line(to_json(rows_.of(sample)).line());
+  }
+
+  void show_reading(const Sample& sample) {
+    const Unit& unit = live_->connection().unit();
+    const Reading& reading = sample.reading;
+    if (sample.doubtful && !told_doubt_) {
+      print_message("no two readings in a row agree as well as the fastest shaft allows");
+    }
+    told_doubt_ = sample.doubtful;
+    if (format_ != Format::human) return show_row(sample);
+    print_line(reading_text(unit, reading));
+    if (reading.alarms != alarms_) {
+      print_note(reading.alarms != 0 ? alarms_in_words(unit, reading) : "  the alarms are gone");
+      alarms_ = reading.alarms;
+    }
+  }
+
+  void show_trouble(const Sample& sample) {
+    Trouble trouble = sample.trouble;
+    if (format_ == Format::json) return print_line(to_json(trouble).line());
+    if (format_ == Format::csv) show_row(sample);
+    if (trouble.error == last_trouble_) trouble.advice.clear();
+    last_trouble_ = trouble.error;
+    print_message(trouble.text());
+  }
+
+  const Encoder* live_;
+  Format format_;
+  SampleRows rows_;
+  std::uint32_t alarms_ = 0;
+  bool told_doubt_ = false;
+  Error last_trouble_ = Error::none;
+  std::string last_absence_;
+};
+
+struct Tally {
+  std::uint64_t good = 0;
+  std::uint64_t bad = 0;
+  bool last_good = false;
+};
+
+// Endless reading survives that the port goes away.
+void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, Tally& tally) {
+  for (std::uint64_t i = 0; count == 0 || i < count; ++i) {
+    if (i > 0) os::sleep_until(pace.next());
+    if (os::interrupted()) throw os::Interrupted{};
+    const Sample sample = live.next();
+    if (sample.kind == Sample::Kind::lost && count != 0) throw os::Failure(os::Failure::Kind::lost, sample.message);
+    tally.last_good = sample.kind == Sample::Kind::reading;
+    tally.good += tally.last_good ? 1 : 0;
+    tally.bad += sample.kind == Sample::Kind::failed ? 1 : 0;
+    display.show(sample);
+  }
+}
+
+int run_read(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const auto count = static_cast<std::uint64_t>(invocation.number("--count", 1, 0, INT64_MAX));
+  Pace pace(readings_a_second(invocation, 10));
+  if (invocation.has("--json") && invocation.has("--csv")) throw UsageError("--json and --csv exclude each other");
+  const Format format = invocation.has("--json") ? Format::json : invocation.has("--csv") ? Format::csv : Format::human;
+
+  Encoder live(uri, pace.period());
+  live.connect();
+  print_notes(live.connection());
+  Display display(live, format);
+  Tally tally;
+  if (count != 0) {
+    read_all(live, display, count, pace, tally);
+    return tally.bad == 0 ? exit_good : exit_failed;
+  }
+  const Time start = os::now();
+  try {
+    read_all(live, display, 0, pace, tally);
+  } catch (const os::Interrupted&) {
+  }
+  print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}; the port went away: {}",
+                            tally.good, tally.bad, to_text(os::now() - start),
+                            exchanges_text(live.connection().counters(), live.readings()), live.losses()));
+  return tally.last_good ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 6> read_parameters{{
+    parameter::encoder,
+    {"--count", "N", "how many readings; 0: until Ctrl-C", "1"},
+    {"--rate", "HZ", "readings a second; 0: as many as the line allows", "10"},
+    {"--json", "", "one JSON object a line, failures too"},
+    {"--csv", "", "comma-separated values with a header"},
+    parameter::option,
+}};
+
+constexpr std::array<Example, 3> read_examples{{
+    {"absenc read tformat:/dev/ttyUSB0", "one reading"},
+    {"absenc read \"tformat:/dev/ttyUSB0?model=23-bit&echo=on\" --count 0 --rate 100 --csv > log.csv",
+     "100 a second into a file, until Ctrl-C; the quotes keep ? and & from the shell"},
+    {"absenc read \"sim:tformat?motion=rpm=60\" --count 0", "a virtual encoder that turns, without hardware"},
+}};
+
+}  // namespace
+
+const Subcommand read_subcommand{
+    "read",
+    "read the position, the turns and the alarms",
+    "Readings go to standard output, messages to standard error. What the encoder says is not valid is\n"
+    "shown as INVALID, and in JSON and CSV by the _valid fields; there the angle is then null or empty.\n"
+    "In CSV, event is empty for a reading; otherwise the row stands for the error of that name that came in its\n"
+    "place, or for the port: lost, back.\n"
+    "Linear encoders, those with a unit_um, have millimetres and micrometres in place of degrees.\n"
+    "Settings of the port: baud=RATE, rs485=auto|on|off, latency=MS, echo=auto|on|off; of sim also\n"
+    "motion=, singleturn=, multiturn=, alarm=, fault=. `absenc list <protocol>` shows the protocol's options.\n"
+    "Exit status 1 when a reading failed; endless reading is judged by its last one.",
+    read_parameters,
+    read_examples,
+    run_read};
+
+}  // namespace absenc::tool

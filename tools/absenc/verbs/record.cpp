@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/pace.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/rate.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/encoder_text.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/text/progress.hpp"
+#include "tools/absenc/verbs/recording.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+/// Says once a second how far it is.
+class Report {
+ public:
+  void show(const Recording& recording, const Encoder& live) {
+    const Time now = os::now();
+    if (!progress_.visible() || now < next_) return;
+    next_ = now + std::chrono::seconds(1);
+    const bool connected = live.connection().connected();
+    progress_.show(fmt::format("{}: {} readings, {}, {} failures, {} bytes", to_text(now - recording.start()),
+                               recording.readings(),
+                               connected ? fmt::format("{:.1f} a second", live.rate()) : "the port is away",
+                               recording.failures(), recording.bytes()));
+  }
+  void clear() { progress_.clear(); }
+
+ private:
+  Progress progress_;
+  Time next_{};
+};
+
+struct Limits {
+  std::uint64_t count;  // 0: none
+  Time end;
+};
+
+// What comes between the readings is told; the file has it too.
+void tell(const Sample& sample, const Encoder& live, Report& report) {
+  if (sample.restarted && live.restarts() == 1) {  // the summary says how often
+    report.clear();
+    print_message(sample.message);
+  }
+  if (sample.kind != Sample::Kind::lost && sample.kind != Sample::Kind::back) return;
+  report.clear();
+  print_message(sample.kind == Sample::Kind::lost ? fmt::format("{}\n  Waiting for it to come back.", sample.message)
+                                                  : sample.message);
+}
+
+// Returns whether the last reading was good.
+bool record_all(Encoder& live, Recording& recording, Pace& pace, const Limits& limits, Report& report) {
+  Sample sample;
+  const auto tell_missed = [&] {
+    const std::uint64_t missed = pace.take_missed();
+    // While the port is away, that it was lost says so.
+    const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
+    if (was_there) recording.miss(missed);
+  };
+  try {
+    while (os::now() < limits.end && !os::interrupted()) {
+      sample = live.next();
+      recording.take(sample);
+      tell(sample, live, report);
+      report.show(recording, live);
+      if (limits.count != 0 && recording.readings() >= limits.count) break;
+      pace.wait(limits.end);
+      tell_missed();
+    }
+  } catch (const os::Interrupted&) {
+  } catch (const os::Ended&) {
+  }
+  tell_missed();
+  return sample.kind == Sample::Kind::reading;
+}
+
+RecordingSettings settings_of(const Invocation& invocation) {
+  RecordingSettings settings;
+  settings.path = invocation.text("--output");
+  settings.encoder = invocation.text("encoder");
+  settings.rate = readings_a_second(invocation, 100);
+  settings.every = static_cast<std::uint64_t>(invocation.number("--every", 1, 1, INT64_MAX));
+  if (invocation.has("--part-size")) {
+    settings.part_size = static_cast<std::uint64_t>(1e6 * invocation.real("--part-size", 0, 0.001, 1e9));
+  }
+  if (invocation.has("--part-time")) {
+    settings.part_time = Time(static_cast<std::int64_t>(1e9 * invocation.real("--part-time", 0, 0.01, 1e9)));
+  }
+  return settings;
+}
+
+// `whole`: what was written is in the files.
+void summarize(const Recording& recording, const Encoder& live, bool whole) {
+  std::string text = fmt::format("{} readings and {} failures in {} {}", recording.readings(), recording.failures(),
+                                 to_text(os::now() - recording.start()),
+                                 whole ? fmt::format("are in {}", recording.names()) : "were written");
+  if (recording.gaps() != 0) {
+    text += fmt::format("; {} readings that were due were not taken, in {} gap{}", recording.missed(), recording.gaps(),
+                        recording.gaps() == 1 ? "" : "s");
+  }
+  if (live.restarts() != 0) {
+    text += fmt::format("; the position started again {} times (event restarted): turns are only right between",
+                        live.restarts());
+  }
+  if (live.losses() != 0) text += fmt::format("; the port went away: {}", live.losses());
+  print_message(fmt::format("{}; exchanges: {}", text, exchanges_text(live.connection().counters(), live.readings())));
+}
+
+int run_record(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const RecordingSettings settings = settings_of(invocation);
+  const double seconds = invocation.real("--for", 0, 0.001, 1e9);
+  const auto count = static_cast<std::uint64_t>(invocation.number("--count", 0, 0, INT64_MAX));
+
+  Pace pace(settings.rate);
+  Encoder live(uri, pace.period());
+  live.connect();
+  print_notes(live.connection());
+  if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
+  Recording recording(settings, uri);
+  pace.start_at(recording.start());
+  const Limits limits{count, seconds > 0 ? recording.start() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never};
+  live.end_when([&limits] { return os::now() >= limits.end; });
+  Report report;
+  bool good = false;
+  bool whole = true;
+  const auto end_early = [&](std::string_view why) {
+    report.clear();
+    print_message(fmt::format("{}: the recording has ended{}", why, whole ? "; what is written so far is whole" : ""));
+    good = false;
+  };
+  try {
+    good = record_all(live, recording, pace, limits, report);
+    recording.finish();
+  } catch (const os::Failure& failure) {
+    whole = failure.kind() != os::Failure::Kind::lost;
+    end_early(failure.what());
+  } catch (const Failure& failure) {
+    end_early(failure.what());
+  }
+  report.clear();
+  summarize(recording, live, whole);
+  return good ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 9> record_parameters{{
+    parameter::encoder,
+    {"--output", "FILE", "where to; the name ends in .csv, or in .jsonl for JSON lines; it must not exist yet", "",
+     true},
+    {"--rate", "HZ", "readings a second; 0: as many as the line allows", "100"},
+    {"--every", "N", "of N readings write one, and each with other alarms than the one before", "1"},
+    {"--count", "N", "end after so many readings in the file", "until Ctrl-C"},
+    {"--for", "SECONDS", "end after this time", "until Ctrl-C"},
+    {"--part-size", "MEGABYTES", "begin another file when one is this large: NAME-0001.csv, NAME-0002.csv ..."},
+    {"--part-time", "SECONDS", "begin another file after this time"},
+    parameter::option,
+}};
+
+constexpr std::array<Example, 2> record_examples{{
+    {"absenc record tformat:/dev/ttyUSB0 --output log.csv", "100 readings a second, until Ctrl-C"},
+    {"absenc record tformat:/dev/ttyUSB0 --output log.jsonl --rate 1000 --every 10 --part-time 3600",
+     "a file an hour, with each tenth of 1000 readings a second"},
+}};
+
+}  // namespace
+
+const Subcommand record_subcommand{
+    "record",
+    "write readings to files, for hours",
+    "Each file begins with the encoder, its model and options, the start time and the units. Lines are handed to\n"
+    "the system as they come: nothing is lost when the command is killed, and a full disk leaves whole lines. When\n"
+    "the port goes away, that is a line, the command waits for it to come back, and that is another line. Readings\n"
+    "that --rate asked for and that could not be taken are a line with their number. A file that is removed or\n"
+    "replaced ends the recording at once, with status 1.\n"
+    "After a pause in which the shaft may have turned too far to know, the position starts again: the event of that\n"
+    "reading is restarted. max_rpm=RPM behind ? says how fast the shaft turns at most.\n"
+    "In CSV, lines before the column names begin with #.",
+    record_parameters,
+    record_examples,
+    run_record};
+
+}  // namespace absenc::tool

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+#include <vector>
+
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/consent.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/text/encoder_text.hpp"
+#include "tools/absenc/text/field_text.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/text/progress.hpp"
+#include "tools/absenc/verbs/run.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+int run_run(const Invocation& invocation) {
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const Command& command = require_command(*uri.unit, invocation.text("command"));
+  const std::vector<std::int64_t> arguments = require_arguments(command, invocation.texts("arguments"));
+  if (command.verb == Verb::scan) return run_scan_command(invocation, uri, command, arguments);
+  return run_command(invocation, uri, command, arguments);
+}
+
+// The newest of what is known so far.
+void show_progress(Progress& progress, const Connection& encoder, const Command& command) {
+  if (!progress.visible()) return;
+  FieldTable so_far;
+  encoder.report(so_far);
+  if (so_far.rows.empty()) return;
+  const std::vector<std::string>& newest = so_far.rows.back();
+  progress.show(fmt::format("{}: {}: {}", command.name, newest[0], newest[1]));
+}
+
+Outcome run_watched(Connection& encoder, const Command& command, Arguments arguments) {
+  Progress progress;
+  try {
+    return encoder.run(command, arguments, [&] { show_progress(progress, encoder, command); });
+  } catch (const os::Interrupted&) {
+    if (!command.changes_encoder) throw;
+    throw Failure(
+        fmt::format("interrupted in the middle of {}: whether it was done is not known, read the encoder "
+                    "before you try again",
+                    command.name));
+  } catch (const os::Failure& failure) {
+    FieldTable left;
+    encoder.report_left(left);
+    if (left.rows.empty()) throw;
+    throw Failure(
+        fmt::format("{}\n{} was broken off and has left:\n{}", failure.what(), command.name, table(left.rows)));
+  }
+}
+
+constexpr std::array<Parameter, 6> run_parameters{{
+    parameter::encoder,
+    parameter::command,
+    parameter::arguments,
+    parameter::yes,
+    parameter::json,
+    parameter::option,
+}};
+
+constexpr std::array<Example, 2> run_examples{{
+    {"absenc run tformat:/dev/ttyUSB0 temperature", "how warm the encoder is"},
+    {"absenc run tformat:/dev/ttyUSB0 memory-write 5 0x42 --yes", "write a byte of its memory without being asked"},
+}};
+
+}  // namespace
+
+int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments) {
+  os::catch_interrupts();
+  if (command.changes_encoder && must_ask(invocation, uri, command.name, command.meaning) &&
+      !confirmed(uri, command.meaning)) {
+    print_message("nothing was changed");
+    return exit_failed;
+  }
+
+  const std::unique_ptr<Connection> encoder = open_connection(uri);
+  const Outcome outcome = run_watched(*encoder, command, arguments);
+  if (outcome.error != Error::none) throw EncoderFailure(encoder->trouble(outcome));
+  JsonFields fields;
+  FieldTable rows;
+  const bool json = invocation.has("--json");
+  encoder->report(json ? static_cast<FieldSink&>(fields) : rows);
+  print_line(json ? Json::object().set("ok", !outcome.aborted).set("fields", fields.fields).line() : table(rows.rows));
+  if (!outcome.aborted) return exit_good;
+  print_message(fmt::format("interrupted: {} ended early, and what it had changed is as it was before", command.name));
+  return exit_failed;
+}
+
+const Subcommand run_subcommand{"run",
+                                "run a command of the protocol: memory, temperature, zero, reset ...",
+                                "Commands that change the encoder ask first. Without a terminal they need --yes.",
+                                run_parameters,
+                                run_examples,
+                                run_run};
+
+}  // namespace absenc::tool
