@@ -13,8 +13,10 @@
 #include "absenc/client/decode.hpp"
 #include "absenc/client/emulate.hpp"
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/find_crc.hpp"
 #include "absenc/client/identify.hpp"
 #include "absenc/client/sample_rows.hpp"
+#include "absenc/core/crc.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
@@ -53,6 +55,33 @@ std::string thrown_by(const Work& work) {
     return thrown.what();
   }
   return "nothing was thrown";
+}
+
+// ---- The check of an unknown encoder
+
+TEST(ClientFindCrc, TellsThePolynomialAndWhichFrameIsOdd) {
+  std::vector<CheckedFrame> frames;
+  constexpr CrcParameters crc{.width = 8, .poly = 0x97, .init = 0x5A, .refin = false, .refout = false, .xorout = 0};
+  for (std::uint8_t i = 0; i < 6; ++i) {
+    const auto byte = [&](int factor) { return static_cast<std::uint8_t>(37 * i * i + factor * (i + 11)); };
+    std::vector<std::uint8_t> frame{byte(3), byte(71), byte(113), byte(29)};
+    if (i % 2 != 0) frame.push_back(byte(57));
+    frame.push_back(static_cast<std::uint8_t>(crc_bitwise(crc, frame)));
+    frames.push_back({frame});
+  }
+  const CheckFindings good = find_crc(frames);
+  ASSERT_FALSE(good.checks.empty());
+  EXPECT_EQ(good.checks[0].name, "crc");
+  EXPECT_EQ(good.checks[0].parameters.poly, crc.poly);
+  EXPECT_EQ(good.checks[0].parameters.init, crc.init);
+  EXPECT_LT(good.checks[0].chance, 1e-3);
+  frames[4].bytes[1] ^= 0x10;
+  const CheckFindings odd = find_crc(frames);
+  EXPECT_TRUE(odd.checks.empty());
+  EXPECT_EQ(odd.odd, 5u);
+  EXPECT_THAT(odd.advice, HasSubstr("frame 5"));
+  const auto one = [&] { static_cast<void>(find_crc(std::span(frames).first(1))); };
+  EXPECT_THAT(thrown_by<UsageError>(one), HasSubstr("give several"));
 }
 
 // ---- An encoder by its name

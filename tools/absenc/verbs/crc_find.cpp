@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <vector>
 
-#include "absenc/capture/search/crc_search.hpp"
+#include "absenc/client/find_crc.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
@@ -19,90 +18,47 @@ namespace absenc::tool {
 
 namespace {
 
-using capture::CheckedFrame;
-using capture::CheckKind;
-using capture::CheckSearch;
-using capture::CheckSolution;
-
 constexpr std::size_t most_shown = 20;
+constexpr std::string_view crc_name = "crc";
 
 std::vector<CheckedFrame> frames_of(const Invocation& invocation) {
-  const std::span<const std::string> hex = invocation.texts("--hex");
-  const std::span<const std::string> bits = invocation.texts("--bits");
-  if (!hex.empty() && !bits.empty()) throw UsageError("give all frames with --hex, or all with --bits");
   std::vector<CheckedFrame> frames;
-  for (const std::string& text : hex) {
+  for (const std::string& text : invocation.texts("--hex")) {
     frames.push_back({parse_wire_text(LinkKind::half_duplex, "--hex", text).bytes});
-    if (frames.back().bytes.size() > capture::longest_checked_frame) {
-      throw UsageError(fmt::format("--hex: {} bytes are more than the {} that can be searched",
-                                   frames.back().bytes.size(), capture::longest_checked_frame));
-    }
   }
-  for (const std::string& text : bits) {
+  const std::span<const std::string> words = invocation.texts("--bits");
+  if (!words.empty() && !frames.empty()) throw UsageError("give all frames with --hex, or all with --bits");
+  for (const std::string& text : words) {
     WireFrame frame = parse_wire_text(LinkKind::clocked, "--bits", text);
-    if (frame.bits > capture::longest_checked_word) {
-      throw UsageError(fmt::format("--bits: {} bits are more than the {} that can be searched", frame.bits,
-                                   capture::longest_checked_word));
-    }
     frames.push_back({std::move(frame.bytes), frame.bits});
-  }
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (frames[i].bytes.size() < 2) throw UsageError(fmt::format("frame {} is too short to hold a check", i + 1));
-  }
-  if (frames.size() < 2) {
-    throw UsageError("one frame fits every polynomial: give several with different data, four to begin with");
   }
   return frames;
 }
-
-/// The shortest frame stands for all where positions are counted from the end.
-struct Positions {
-  explicit Positions(std::span<const CheckedFrame> frames) {
-    for (const CheckedFrame& frame : frames) {
-      const std::size_t size = frame.bits != 0 ? frame.bits : frame.bytes.size();
-      shortest = std::min(shortest, size);
-      longest = std::max(longest, size);
-    }
-    unit = frames.front().bits != 0 ? "bits" : "bytes";
-  }
-  [[nodiscard]] std::size_t check(const CheckSolution& solution) const {
-    return shortest - solution.trailing - solution.check_size;
-  }
-
-  std::size_t shortest = SIZE_MAX;
-  std::size_t longest = 0;
-  std::string_view unit;
-};
 
 std::string hex(std::uint32_t value, unsigned width) { return fmt::format("0x{:0{}X}", value, (width + 3) / 4); }
 
 // All powers but the last: what some documents print in place of the normal notation.
 std::string koopman(const CrcParameters& crc) { return hex((1u << crc.width | crc.poly) >> 1, crc.width); }
 
-/// How often chance would bring such a solution.
-double chance(const CheckSolution& solution) { return std::min(1.0, std::exp2(solution.chance_log2)); }
-
-std::string covered_text(const CheckSolution& solution, const Positions& positions) {
-  const std::string end = positions.shortest == positions.longest ? fmt::format("{}", positions.check(solution) - 1)
-                                                                  : std::string("before the check");
-  return fmt::format("{} {} to {}{}", positions.unit, fmt::join(solution.first, " or "), end,
-                     solution.padded ? " and a 00" : "");
+/// "bytes 0 to 7"; where the lengths differ, positions before the check have no number.
+std::string covered_text(const FoundCheck& check, const CheckFindings& findings, std::string_view unit) {
+  const std::string end = findings.shortest == findings.longest
+                              ? fmt::format("{}", findings.shortest - check.trailing - check.check_size - 1)
+                              : std::string("before the check");
+  return fmt::format("{} {} to {}{}", unit, fmt::join(check.first, " or "), end, check.padded ? " and a 00" : "");
 }
 
-std::string check_text(const CheckSolution& solution) {
+std::string check_text(const FoundCheck& solution) {
   const std::string at = solution.trailing == 0 ? "at the end" : fmt::format("{} before the end", solution.trailing);
   if (solution.parameters.width <= 8 || solution.check_size > 2) return at;
   return fmt::format("{}, {} byte first", at, solution.low_first ? "low" : "high");
 }
 
-std::vector<std::string> row(const CheckSolution& solution, const Positions& positions) {
-  const CrcParameters& crc = solution.parameters;
-  const std::string often = fmt::format("{:.1g}", chance(solution));
-  if (solution.kind != CheckKind::crc) {
-    const std::string_view name = solution.kind == CheckKind::sum          ? "sum"
-                                  : solution.kind == CheckKind::difference ? "- sum"
-                                                                           : "xor";
-    return {std::string(name),
+std::vector<std::string> row(const FoundCheck& check, const CheckFindings& findings, std::string_view unit) {
+  const CrcParameters& crc = check.parameters;
+  const std::string often = fmt::format("{:.1g}", check.chance);
+  if (check.name != crc_name) {
+    return {check.name == "negative_sum" ? "- sum" : std::string(check.name),
             "8",
             "-",
             "-",
@@ -110,109 +66,70 @@ std::vector<std::string> row(const CheckSolution& solution, const Positions& pos
             "-",
             "-",
             "-",
-            covered_text(solution, positions),
-            check_text(solution),
+            covered_text(check, findings, unit),
+            check_text(check),
             often};
   }
   return {"CRC",
           fmt::format("{}", crc.width),
           hex(crc.poly, crc.width),
           koopman(crc),
-          solution.init_open ? "any, as " + hex(crc.init, crc.width) : hex(crc.init, crc.width),
+          check.init_open ? "any, as " + hex(crc.init, crc.width) : hex(crc.init, crc.width),
           crc.refin ? "yes" : "no",
           crc.refout ? "yes" : "no",
           hex(crc.xorout, crc.width),
-          covered_text(solution, positions),
-          check_text(solution),
+          covered_text(check, findings, unit),
+          check_text(check),
           often};
 }
 
-void show(std::span<const CheckSolution> solutions, const Positions& positions) {
+void show(const CheckFindings& findings, std::size_t most, std::string_view unit) {
   std::vector<std::vector<std::string>> rows{
       {"check", "width", "poly", "Koopman", "init", "refin", "refout", "xorout", "covers", "stands", "chance"}};
-  for (const CheckSolution& solution : solutions) rows.push_back(row(solution, positions));
+  const std::size_t shown = std::min(most, findings.checks.size());
+  for (std::size_t i = 0; i < shown; ++i) rows.push_back(row(findings.checks[i], findings, unit));
   print_line(table(rows));
+  const std::size_t left = findings.checks.size() - shown;
+  if (left != 0) print_note(fmt::format("{} more, each likelier to be chance: --all shows them", left));
 }
 
-Json solution_json(const CheckSolution& solution, const Positions& positions) {
-  const CrcParameters& crc = solution.parameters;
-  Json json = Json::object();
-  if (solution.kind == CheckKind::crc) {
-    json.set("check", "crc").set("width", crc.width).set("poly", hex(crc.poly, crc.width));
+Json check_json(const FoundCheck& check, std::string_view unit) {
+  const CrcParameters& crc = check.parameters;
+  Json json = Json::object().set("check", check.name).set("width", crc.width);
+  if (check.name == crc_name) {
+    json.set("poly", hex(crc.poly, crc.width));
     json.set("init", hex(crc.init, crc.width)).set("refin", crc.refin).set("refout", crc.refout);
-    json.set("xorout", hex(crc.xorout, crc.width)).set("init_open", solution.init_open);
-    if (solution.check_size == 2 && positions.unit == "bytes") {
-      json.set("byte_order", solution.low_first ? "low_first" : "high_first");
-    }
-    json.set("padded", solution.padded);
+    json.set("xorout", hex(crc.xorout, crc.width)).set("init_open", check.init_open);
+    if (check.check_size == 2 && unit == "bytes") json.set("byte_order", check.low_first ? "low_first" : "high_first");
+    json.set("padded", check.padded);
   } else {
-    const std::string_view name = solution.kind == CheckKind::sum          ? "sum"
-                                  : solution.kind == CheckKind::difference ? "negative_sum"
-                                                                           : "xor";
-    json.set("check", name).set("width", 8u);
     json.set("init", hex(crc.init, 8));
   }
   Json first = Json::array();
-  for (const std::size_t one : solution.first) first.append(one);
-  json.set("unit", positions.unit).set("covered_from", first).set("check_size", solution.check_size);
-  json.set("behind_check", solution.trailing).set("chance", chance(solution));
-  return json.set("frames_to_settle", capture::frames_to_settle(solution));
-}
-
-/// The one frame without which a check explains all others, or none.
-std::size_t odd_one_out(std::span<const CheckedFrame> frames) {
-  for (std::size_t i = 0; frames.size() >= 5 && i < frames.size(); ++i) {
-    std::vector<CheckedFrame> others(frames.begin(), frames.end());
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    const CheckSearch search = capture::find_checks(others);
-    if (!search.solutions.empty() && capture::frames_to_settle(search.solutions.front()) == 0) return i + 1;
-  }
-  return 0;
-}
-
-// What is still open, in words; "": nothing.
-std::string advice(const CheckSearch& search) {
-  const unsigned more = search.solutions.empty() ? 1 : capture::frames_to_settle(search.solutions.front());
-  if (search.open != 0 && more != 0) return "these frames tell too little: give two more with other data";
-  const CheckSolution& best = search.solutions.front();
-  std::string text;
-  if (more != 0) text = fmt::format("{} more frame{} with other data would settle it", more, more == 1 ? "" : "s");
-  if (best.init_open) {
-    text += fmt::format("{}a frame of another length would tell init from xorout", text.empty() ? "" : "; ");
-  }
-  return text;
+  for (const std::size_t one : check.first) first.append(one);
+  json.set("unit", unit).set("covered_from", first).set("check_size", check.check_size);
+  json.set("behind_check", check.trailing).set("chance", check.chance);
+  return json.set("frames_to_settle", check.frames_to_settle);
 }
 
 int run_crc_find(const Invocation& invocation) {
   const std::vector<CheckedFrame> frames = frames_of(invocation);
-  const Positions positions(frames);
-  const CheckSearch search = capture::find_checks(frames);
-  const bool found = !search.solutions.empty();
+  const CheckFindings findings = find_crc(frames);
+  const bool found = !findings.checks.empty();
+  const std::string_view unit = frames.front().bits != 0 ? "bits" : "bytes";
   if (invocation.has("--json")) {
     Json list = Json::array();
-    for (const CheckSolution& solution : search.solutions) list.append(solution_json(solution, positions));
+    for (const FoundCheck& check : findings.checks) list.append(check_json(check, unit));
     print_line(Json::object().set("ok", found).set("frames", frames.size()).set("solutions", list).line());
   } else if (found) {
-    const std::size_t shown =
-        invocation.has("--all") ? search.solutions.size() : std::min(most_shown, search.solutions.size());
-    show(std::span(search.solutions).first(shown), positions);
-    if (shown != search.solutions.size()) {
-      print_note(fmt::format("{} more, each likelier to be chance: --all shows them", search.solutions.size() - shown));
-    }
+    show(findings, invocation.has("--all") ? SIZE_MAX : most_shown, unit);
   }
-  if (found || search.open != 0) {
-    const std::string text = advice(search);
-    if (!text.empty()) print_note(text);
-    return found ? exit_good : exit_failed;
+  if (!found && !findings.is_open) {
+    print_message(findings.advice);
+  } else if (!findings.advice.empty()) {
+    print_note(findings.advice);
   }
-  const std::size_t odd = odd_one_out(frames);
-  print_message(odd != 0
-                    ? fmt::format("no check of 3 to 16 bits explains all frames, but one explains all except frame {}: "
-                                  "is it damaged? Try again without it",
-                                  odd)
-                    : "no CRC of 3 to 16 bits and no sum explains all frames: are they whole, of one kind, and "
-                      "from the first bit on?");
-  return exit_failed;
+  return found ? exit_good : exit_failed;
 }
 
 constexpr std::array<Parameter, 4> crc_find_parameters{{

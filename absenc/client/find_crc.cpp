@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/find_crc.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "absenc/capture/search/crc_search.hpp"
+#include "absenc/client/error.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+using capture::CheckKind;
+
+using SearchedFrames = std::vector<capture::CheckedFrame>;
+
+SearchedFrames searched(std::span<const CheckedFrame> frames) {
+  SearchedFrames all;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const CheckedFrame& frame = frames[i];
+    if ((frame.bits != 0) != (frames[0].bits != 0)) throw UsageError("all frames are bytes, or all are bits");
+    if (frame.bytes.size() < 2) throw UsageError(fmt::format("frame {} is too short to hold a check", i + 1));
+    if (frame.bits == 0 && frame.bytes.size() > capture::longest_checked_frame) {
+      throw UsageError(fmt::format("{} bytes are more than the {} that can be searched", frame.bytes.size(),
+                                   capture::longest_checked_frame));
+    }
+    if (frame.bits > capture::longest_checked_word) {
+      throw UsageError(
+          fmt::format("{} bits are more than the {} that can be searched", frame.bits, capture::longest_checked_word));
+    }
+    all.push_back({frame.bytes, frame.bits});
+  }
+  if (all.size() < 2) {
+    throw UsageError("one frame fits every polynomial: give several with different data, four to begin with");
+  }
+  return all;
+}
+
+std::string_view name_of(CheckKind kind) {
+  switch (kind) {
+    case CheckKind::sum:
+      return "sum";
+    case CheckKind::difference:
+      return "negative_sum";
+    case CheckKind::exclusive_or:
+      return "xor";
+    case CheckKind::crc:
+      break;
+  }
+  return "crc";
+}
+
+FoundCheck found(const capture::CheckSolution& solution) {
+  return {.name = name_of(solution.kind),
+          .parameters = solution.parameters,
+          .low_first = solution.low_first,
+          .padded = solution.padded,
+          .init_open = solution.init_open,
+          .first = solution.first,
+          .check_size = solution.check_size,
+          .trailing = solution.trailing,
+          .chance = std::min(1.0, std::exp2(solution.chance_log2)),
+          .frames_to_settle = capture::frames_to_settle(solution)};
+}
+
+std::size_t odd_one_out(const SearchedFrames& frames) {
+  for (std::size_t i = 0; frames.size() >= 5 && i < frames.size(); ++i) {
+    SearchedFrames others = frames;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const capture::CheckSearch search = capture::find_checks(others);
+    if (!search.solutions.empty() && capture::frames_to_settle(search.solutions.front()) == 0) return i + 1;
+  }
+  return 0;
+}
+
+std::string advice(const CheckFindings& findings) {
+  if (findings.checks.empty() && !findings.is_open) {
+    if (findings.odd == 0) {
+      return "no CRC of 3 to 16 bits and no sum explains all frames: are they whole, of one kind, and from the first "
+             "bit "
+             "on?";
+    }
+    return fmt::format(
+        "no check of 3 to 16 bits explains all frames, but one explains all except frame {}: is it damaged? Try again "
+        "without it",
+        findings.odd);
+  }
+  const unsigned more = findings.checks.empty() ? 1 : findings.checks.front().frames_to_settle;
+  if (findings.is_open && more != 0) return "these frames tell too little: give two more with other data";
+  std::string text;
+  if (more != 0) text = fmt::format("{} more frame{} with other data would settle it", more, more == 1 ? "" : "s");
+  if (findings.checks.front().init_open) {
+    text += fmt::format("{}a frame of another length would tell init from xorout", text.empty() ? "" : "; ");
+  }
+  return text;
+}
+
+}  // namespace
+
+CheckFindings find_crc(std::span<const CheckedFrame> frames) {
+  const SearchedFrames all = searched(frames);
+  const capture::CheckSearch search = capture::find_checks(all);
+  CheckFindings findings{.shortest = SIZE_MAX, .is_open = search.open != 0};
+  for (const capture::CheckSolution& solution : search.solutions) findings.checks.push_back(found(solution));
+  for (const CheckedFrame& frame : frames) {
+    const std::size_t size = frame.bits != 0 ? frame.bits : frame.bytes.size();
+    findings.shortest = std::min(findings.shortest, size);
+    findings.longest = std::max(findings.longest, size);
+  }
+  if (findings.checks.empty() && !findings.is_open) findings.odd = odd_one_out(all);
+  findings.advice = advice(findings);
+  return findings;
+}
+
+}  // namespace absenc::client
