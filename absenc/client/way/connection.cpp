@@ -8,7 +8,6 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
-#include "absenc/client/way/aborting_port.hpp"
 #include "absenc/client/way/diagnosis.hpp"
 #include "absenc/client/way/shared_link.hpp"
 
@@ -27,8 +26,9 @@ class ConnectionOn final : public Connection {
   explicit ConnectionOn(const EncoderAddress& uri)
       : Connection(uri),
         storage_(std::make_unique<std::byte[]>(uri.unit->host_storage)),
-        session_(*uri.unit, uri.options, aborting_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
+        session_(*uri.unit, uri.options, port_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
     session_.observe(&statistics_);
+    port_.abort = [this] { return session_.abort(); };
   }
 
   void connect() override {
@@ -125,7 +125,7 @@ class ConnectionOn final : public Connection {
       throw UsageError(fmt::format("{} cannot run {} with these options", unit().id, command.name));
     }
     last_ = conversation;
-    return {conversation->error(), conversation->detail(), conversation->advice(), aborting_.take_aborted(),
+    return {conversation->error(), conversation->detail(), conversation->advice(), port_.take_aborted(),
             conversation->reading()};
   }
 
@@ -206,7 +206,6 @@ class ConnectionOn final : public Connection {
 
   std::shared_ptr<SharedLink> link_;
   WatchedPort<Item> port_;
-  AbortingPort<Item> aborting_{port_, [this] { return session_.abort(); }};
   std::unique_ptr<std::byte[]> storage_;
   host::Session<Item> session_;
   host::Statistics<Item> statistics_;

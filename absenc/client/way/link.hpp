@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absenc/client/way/address.hpp"
@@ -26,7 +27,8 @@ struct Link {
 /// Throws os::Failure, UsageError.
 [[nodiscard]] Link open_link(const EncoderAddress& uri);
 
-/// The last request and everything that came back, echo and noise included.
+/// Keeps the last request and everything that came back, echo and noise included, and lets a conversation that first
+/// has to leave the encoder as it was do so when Ctrl-C comes.
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
@@ -52,7 +54,7 @@ class WatchedPort final : public Port<Item> {
 
   Event<Item> wait(const Step<Item>& step) override {
     if (over && over()) throw os::Ended{};
-    const Event<Item> event = port_->wait(step);
+    const Event<Item> event = wait_or_abort(step);
     if (event.kind == Event<Item>::Kind::sent) sent_at = event.at;
     if (event.kind == Event<Item>::Kind::received) {
       if (received.empty()) first_received_at = event.at;
@@ -63,7 +65,11 @@ class WatchedPort final : public Port<Item> {
     return event;
   }
 
-  std::function<bool()> over;  // ends all waiting
+  /// Whether the conversation was asked to end early since this was asked last.
+  [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
+
+  std::function<bool()> over;   // ends all waiting
+  std::function<bool()> abort;  // asks the conversation to end early; returns whether it ends by itself
   std::vector<Item> sent;
   std::vector<Item> received;
   std::size_t clocks = 0;  // of a clocked link, which sends nothing else
@@ -75,8 +81,20 @@ class WatchedPort final : public Port<Item> {
   std::uint64_t items_received = 0;
 
  private:
+  Event<Item> wait_or_abort(const Step<Item>& step) {
+    for (;;) {
+      try {
+        return port_->wait(step);
+      } catch (const os::Interrupted&) {
+        if (!abort()) throw;
+        aborted_ = true;
+      }
+    }
+  }
+
   static constexpr std::size_t most_kept = 1024;
   Port<Item>* port_ = nullptr;
+  bool aborted_ = false;
 };
 
 }  // namespace absenc::client
