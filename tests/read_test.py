@@ -203,13 +203,13 @@ class Trouble(EncoderCase):
     def test_only_echo(self):
         for echo in ("auto", "on", "off"):
             with self.subTest(echo), FakeEncoder([0x1A]) as fake:
-                result = absenc("read", f"tformat:{fake.path}?latency=20&echo={echo}")
+                result = absenc("read", f"tformat:{fake.path}?latency=200&echo={echo}")
                 self.assert_failed(result, "only the request itself came back", "received 1A", "Try: check supply")
 
     def test_one_byte_too_long(self):
         for extra in (0x00, 0x1A):
             with self.subTest(extra), FakeEncoder(GOOD_REPLY + bytes([extra])) as fake:
-                result = absenc("read", f"tformat:{fake.path}?latency=20&echo=off")
+                result = absenc("read", f"tformat:{fake.path}?latency=200&echo=off")
                 self.assert_failed(result, "wrong_length", "the first 11 bytes are a good reply, but 1 byte more came")
 
     def test_one_byte_too_short(self):
