@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Breaks the units in one place at a time and looks whether tests notice.
 
-tests/mutant_rules.py finds the places. Each mutant is compiled in a copy of the sources (build/mutants), and the
-generic tests, as far as they concern its unit, the seeds of its fuzzer and its own tests run until one fails. A mutant
-that survives shows a test that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their
-reason.
+tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled at
+once, each behind a switch, and for each one the generic tests, as far as they concern its unit, the seeds of its fuzzer
+and its own tests run, the fastest first, until one fails. Mutants that cannot be switched (constants) and those that
+survived are compiled one at a time, which tells what is checked at compile time. A mutant that survives shows a test
+that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their reason.
 """
 
 import argparse
@@ -32,6 +33,14 @@ NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|exp
 # Of what the compiler says when a vector or another thing that is checked at compile time no longer holds.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
 HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
+SWITCH_HEADER = Path("absenc/chosen_mutant.hpp")
+SWITCH = """#pragma once
+#include <cstdlib>
+#include <type_traits>
+
+inline const int the_chosen_mutant = std::getenv("CHOSEN_MUTANT") ? std::atoi(std::getenv("CHOSEN_MUTANT")) : 0;
+constexpr bool chosen_mutant(int number) { return !std::is_constant_evaluated() && the_chosen_mutant == number; }
+"""
 OUTCOMES = ("static_assert", "kit", "own", "time", "known", "new", "no C++")
 
 
@@ -151,10 +160,23 @@ class Tree:
         done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
         return None if done.returncode == 0 else done.stdout + done.stderr
 
-    def run(self, program, cpu_limit):
+    def switch_in(self, numbered):
+        """All of these mutants, given by their numbers."""
+        self.write(self.source / SWITCH_HEADER, SWITCH.encode())
+        texts = {path: text for _, path, text in numbered.values()}
+        for path, text in texts.items():
+            here = [(number, one[0]) for number, one in numbered.items() if one[1] == path]
+            switched = f'#include "{SWITCH_HEADER}"\n#line 1\n{mutant_rules.with_switches(text, here)}'
+            self.write(self.source / path.relative_to(ROOT), switched.encode())
+
+    def restore(self, mutants):
+        for path, text in {path: text for _, path, text in mutants}.items():
+            self.write(self.source / path.relative_to(ROOT), text.encode())
+
+    def run(self, program, cpu_limit, number=0):
         """Its exit status and the seconds that it computed; the limit does not count what others compute meanwhile."""
         limits = ["prlimit", f"--cpu={cpu_limit}:{cpu_limit + 1}", f"--as={4 << 30}", "--core=0"]
-        environment = {**self.environment, "GTEST_FILTER": program.tests}
+        environment = {**self.environment, "GTEST_FILTER": program.tests, "CHOSEN_MUTANT": str(number)}
         running = subprocess.Popen(
             [*limits, self.build / "tests" / program.name],
             env=environment,
@@ -200,10 +222,22 @@ class Tree:
             if status != 0:
                 raise SystemExit(f"mutants: without any mutant {program.name} fails with {program.tests}")
             self.limits[program] = int(5 * seconds) + 5
-        return sorted(programs, key=lambda program: (program.is_own, self.limits[program]))
+        return sorted(programs, key=lambda program: (self.limits[program], program.is_own))
+
+    def killed(self, program, number=0):
+        """How; nothing when it passes."""
+        status, _ = self.run(program, self.limits[program], number)
+        return "" if status == 0 else "time" if status in HANGS else "own" if program.is_own else "kit"
+
+    def switched_outcome(self, number, programs):
+        """What became of a mutant that was switched in, and the program that killed it."""
+        for program in programs:
+            if outcome := self.killed(program, number):
+                return outcome, program.name
+        return "survived", ""
 
     def outcome(self, mutant, path, text, programs):
-        """What became of it, and the program that killed it. The source stays as the mutant has it."""
+        """The same of a mutant that is compiled alone. The source stays as the mutant has it."""
         self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
         # Vectors are checked where the unit is described: one file to compile tells most of what is wrong in a header.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
@@ -214,14 +248,13 @@ class Tree:
                 if refused is not None:
                     return ("static_assert" if STATIC_CHECK.search(refused) else "no C++"), target.rpartition("/")[2]
             first = []
-            status, _ = self.run(program, self.limits[program])
-            if status != 0:
-                return ("time" if status in HANGS else "own" if program.is_own else "kit"), program.name
+            if outcome := self.killed(program):
+                return outcome, program.name
         return "survived", ""
 
 
 class Campaign:
-    """Trees work through the mutants, a source at a time."""
+    """Trees work through the mutants, a unit at a time."""
 
     def __init__(self, known, folders, verbose):
         self.known = known
@@ -235,8 +268,7 @@ class Campaign:
         self.failure = None
 
     def add(self, unit, mutants):
-        for path in dict.fromkeys(path for _, path, _ in mutants):
-            self.work.put((unit, [one for one in mutants if one[1] == path]))
+        self.work.put((unit, mutants))
         self.counts[unit] = Counter()
 
     def run(self, trees):
@@ -255,30 +287,59 @@ class Campaign:
             raise self.failure
 
     def serve(self, tree):
-        programs = {}
         try:
             tree.prepare()
             while not self.stopping:
                 unit, mutants = self.work.get_nowait()
-                if unit not in programs:
-                    programs[unit] = tree.programs(unit, self.folders)
-                    names = ", ".join(program.name for program in programs[unit])
-                    print(f"{unit}, which passes without a mutant: {names}", flush=True)
-                for mutant, path, text in mutants:
-                    began = time.monotonic()
-                    result = tree.outcome(mutant, path, text, programs[unit])
-                    if self.stopping:
-                        break
-                    self.note(unit, mutant, path, text, result, time.monotonic() - began)
-                tree.write(tree.source / path.relative_to(ROOT), text.encode())
+                self.compile_alone(tree, unit, self.switch(tree, unit, mutants))
         except queue.Empty:
             pass
         except (SystemExit, OSError) as failure:
             self.failure = None if self.stopping else failure
             self.stopping = True
 
-    def note(self, unit, mutant, path, text, result, seconds):
+    def switch(self, tree, unit, mutants):
+        """Those that are left."""
+        numbered = dict(enumerate([one for one in mutants if one[0].switch], start=1))
+        left = [one for one in mutants if not one[0].switch]
+        if numbered:
+            tree.switch_in(numbered)
+            programs = self.programs(tree, unit)
+            for number, one in numbered.items():
+                began = time.monotonic()
+                result = tree.switched_outcome(number, programs)
+                if self.stopping:
+                    break
+                if result[0] == "survived":
+                    left.append(one)
+                    if self.verbose:
+                        print(f"left to be compiled alone: {one[0].id}", flush=True)
+                else:
+                    self.note(unit, one, result, time.monotonic() - began)
+            tree.restore(mutants)
+        return sorted(left, key=lambda one: (one[1], one[0].start))
+
+    def compile_alone(self, tree, unit, mutants):
+        if not mutants or self.stopping:
+            return
+        programs = self.programs(tree, unit)
+        for one in mutants:
+            began = time.monotonic()
+            result = tree.outcome(*one, programs)
+            tree.restore([one])
+            if self.stopping:
+                break
+            self.note(unit, one, result, time.monotonic() - began)
+
+    def programs(self, tree, unit):
+        programs = tree.programs(unit, self.folders)
+        names = ", ".join(program.name for program in programs)
+        print(f"{unit}, which passes without a mutant: {names}", flush=True)
+        return programs
+
+    def note(self, unit, one, result, seconds):
         outcome, program = result
+        mutant = one[0]
         with self.lock:
             if outcome == "survived":
                 outcome = "known" if mutant.id in self.known else "new"
@@ -288,7 +349,7 @@ class Campaign:
             if self.verbose:
                 print(f"[{seconds:5.1f} s] {outcome:13} {program:20} {mutant.id}", flush=True)
             if outcome in ("new", "no C++"):
-                print(f"{'survived' if outcome == 'new' else outcome}: {shown(mutant, path, text)}", flush=True)
+                print(f"{'survived' if outcome == 'new' else outcome}: {shown(*one)}", flush=True)
 
 
 def print_table(counts):

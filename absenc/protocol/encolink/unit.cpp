@@ -406,6 +406,9 @@ struct Definition {
   static constexpr auto probe = encolink::probe;
   static constexpr auto is_checked = encolink::is_checked;
   static bool streams(const Options& values) { return format(values).stream_rate > 0; }
+  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+    return bits_of(format(values), reply.bytes, field);
+  }
 
   static constexpr Format format(const Options& values) {
     Format made = options.format(values);
