@@ -365,8 +365,9 @@ def choose(found, arguments):
             one
             for one in mutants
             if (not arguments.unit or unit in arguments.unit)
+            and (not arguments.rule or one[0].rule in arguments.rule)
             and (not arguments.file or str(one[1]).endswith(arguments.file))
-            and (one[0].id in arguments.ids if arguments.ids else arguments.fine or one[0].rule in mutant_rules.COARSE)
+            and (one[0].id in arguments.ids if arguments.ids else arguments.fine or one[0].rule in mutant_rules.COARSE or arguments.rule)
         ]
         if wanted:
             chosen[unit] = wanted
@@ -384,6 +385,7 @@ def parse():
     parser.add_argument("ids", nargs="*", help="only these mutants")
     parser.add_argument("--unit", action="append", help="a folder of absenc/protocol, or host; may be given again")
     parser.add_argument("--file", help="only those of this source: the end of its path")
+    parser.add_argument("--rule", action="append", help="only those of this rule: never, half ...; may be given again")
     parser.add_argument("--fine", action="store_true", help="also terms, edges and constants (tests/mutant_rules.py)")
     parser.add_argument("--sample", type=int, metavar="N", help="so many of them, at random")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (%(default)s)")
