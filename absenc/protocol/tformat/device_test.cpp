@@ -339,6 +339,24 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
   EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the count is wrong
 }
 
+// 5.4.2: for the first five seconds without power the counter follows a faster jolt.
+TEST(TformatDevice, TheLimitOfAJoltFallsFiveSecondsAfterPowerOff) {
+  struct Jolt final : Shaft {
+    [[nodiscard]] ShaftState at(Time time) const override {
+      return {.acceleration = time >= when && time < when + 100ms ? 40'000 : 0};
+    }
+    Time when{};
+  } jolt;
+  for (const auto& [when, is_seen] : {std::pair<Time, bool>{4'800ms, false}, {5'100ms, true}}) {
+    jolt.when = when;
+    VirtualEncoder encoder({}, jolt);
+    encoder.power_on(Time{}, PowerOn::skip);
+    encoder.power_off(Time{});
+    encoder.power_on(10s, PowerOn::skip);
+    EXPECT_EQ(encoder.everything(10s).alarms, is_seen ? alarms::over_speed : 0) << when.count();
+  }
+}
+
 TEST(TformatDevice, CountingAndMultiturnErrorsEndWithThePower) {
   Bench bench;
   bench.encoder.raise_alarms(alarms::counting_error | alarms::multiturn_error | alarms::over_speed);
