@@ -110,6 +110,7 @@ class Tree:
         self.source = folder / "source"
         self.build = folder / "tree"
         self.limits = {}
+        self.last_own = None
         self.lock = None
         self.environment = {**os.environ, "CCACHE_BASEDIR": str(folder), "GTEST_FAIL_FAST": "1", "GTEST_BRIEF": "1"}
 
@@ -132,7 +133,7 @@ class Tree:
                 path.unlink()
         # What reads behind the end of its bytes is told; warnings are not looked at.
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -D_GLIBCXX_ASSERTIONS"]
-        options += ["-DABSENC_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
+        options += ["-DABSENC_TESTS=ON", "-DABSENC_SPLIT_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
         if shutil.which("ccache"):
             options.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
         self.run_or_exit(["cmake", "-G", "Ninja", "-S", self.source, "-B", self.build, *options])
@@ -212,7 +213,11 @@ class Tree:
         kit = [Program(name, False) for name in generic_programs()]
         owners = list(folders) if unit == "author" else [unit]
         seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]
-        own = [f"{owner}_test" for owner in owners if any(folders[owner].rglob("*_test.cpp"))]
+        own = [
+            "_".join((owner, *path.relative_to(folders[owner]).with_suffix("").parts))
+            for owner in owners
+            for path in sorted(folders[owner].rglob("*_test.cpp"))
+        ]
         self.run_or_exit(self.build_command(*(program.name for program in kit), *seeds, *own))
         if unit not in ("author", "host"):
             kit = [chosen for program in kit if (chosen := self.concerning(program, unit))]
@@ -242,6 +247,7 @@ class Tree:
         # Vectors are checked where the unit is described: one file to compile tells most of what is wrong in a header.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
         first = [f"CMakeFiles/absenc.dir/{unit}.o"] if (ROOT / unit).exists() else []
+        programs = sorted(programs, key=lambda program: program != self.last_own)
         for program in programs:
             for target in [*first, program.name]:
                 refused = self.compile(target)
@@ -249,6 +255,8 @@ class Tree:
                     return ("static_assert" if STATIC_CHECK.search(refused) else "no C++"), target.rpartition("/")[2]
             first = []
             if outcome := self.killed(program):
+                if program.is_own:
+                    self.last_own = program  # of neighbours it kills the next one, too
                 return outcome, program.name
         return "survived", ""
 
