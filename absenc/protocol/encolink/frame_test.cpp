@@ -71,6 +71,13 @@ TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
   EXPECT_EQ(decode_identity({}).error(), Error::wrong_length);
 }
 
+TEST(EncolinkFrame, ACycleHasItsLength) {
+  const ReplyBytes cycle = encode_cycle(single, {{.singleturn = 5}, 0, channel3::idle});
+  ASSERT_TRUE(decode_cycle(single, cycle).has_value());
+  EXPECT_EQ(decode_cycle(single, cycle.view().first(cycle.size() - 1)).error(), Error::wrong_length);
+  EXPECT_EQ(decode_cycle(single, {}).error(), Error::wrong_length);
+}
+
 TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
   const Identity turns{.frame_bytes = 7, .resolution = 18};
   const Result<Format> asked = complete({}, turns);
