@@ -264,10 +264,11 @@ class Tree:
 class Campaign:
     """Trees work through the mutants, a unit at a time."""
 
-    def __init__(self, known, folders, verbose):
+    def __init__(self, known, folders, verbose, quick):
         self.known = known
         self.folders = folders
         self.verbose = verbose
+        self.quick = quick
         self.counts = {}
         self.revived = []
         self.work = queue.Queue()
@@ -299,7 +300,9 @@ class Campaign:
             tree.prepare()
             while not self.stopping:
                 unit, mutants = self.work.get_nowait()
-                self.compile_alone(tree, unit, self.switch(tree, unit, mutants))
+                left = self.switch(tree, unit, mutants)
+                if not self.quick:
+                    self.compile_alone(tree, unit, left)
         except queue.Empty:
             pass
         except (SystemExit, OSError) as failure:
@@ -395,6 +398,7 @@ def parse():
     parser.add_argument("--file", help="only those of this source: the end of its path")
     parser.add_argument("--rule", action="append", help="only those of this rule: never, half ...; may be given again")
     parser.add_argument("--fine", action="store_true", help="also terms, edges and constants (tests/mutant_rules.py)")
+    parser.add_argument("--quick", action="store_true", help="compile none alone: show which are left")
     parser.add_argument("--sample", type=int, metavar="N", help="so many of them, at random")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time, each in a tree (%(default)s)")
@@ -423,7 +427,7 @@ def main():
         return 0
     known = read_survivors(ROOT / "tests" / "mutants_survivors.txt")
     stale = sorted(set(known) - {mutant.id for mutants in found.values() for mutant, _, _ in mutants})
-    campaign = Campaign(known, folders, arguments.verbose)
+    campaign = Campaign(known, folders, arguments.verbose or arguments.quick, arguments.quick)
     for unit, mutants in chosen.items():
         campaign.add(unit, mutants)
     jobs = max(1, min(arguments.jobs, campaign.work.qsize()))

@@ -71,6 +71,12 @@ TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
   EXPECT_EQ(decode_identity({}).error(), Error::wrong_length);
 }
 
+TEST(EncolinkFrame, AnIdentityOfAnotherKindIsNone) {
+  for (const Identity& other : {Identity{.protocol_version = 3}, Identity{.frame_bytes = 6}}) {
+    EXPECT_EQ(decode_identity(encode_identity(other)).error(), Error::unexpected_reply);
+  }
+}
+
 TEST(EncolinkFrame, ACycleHasItsLength) {
   const ReplyBytes cycle = encode_cycle(single, {{.singleturn = 5}, 0, channel3::idle});
   ASSERT_TRUE(decode_cycle(single, cycle).has_value());
