@@ -77,6 +77,16 @@ TEST(EncolinkFrame, AnIdentityOfAnotherKindIsNone) {
   }
 }
 
+TEST(EncolinkFrame, TheResolutionOfAnIdentityIsANumber) {
+  for (const unsigned bits : {0u, 23u}) {
+    EXPECT_EQ(decode_identity(encode_identity({.resolution = bits})).error(), Error::out_of_range);
+  }
+  ReplyBytes strange = encode_identity({.resolution = 10});
+  strange[11] = '0' - 1;
+  strange[18] = checksum(strange.view().first(18));
+  EXPECT_EQ(decode_identity(strange).error(), Error::out_of_range);
+}
+
 TEST(EncolinkFrame, ACycleHasItsLength) {
   const ReplyBytes cycle = encode_cycle(single, {{.singleturn = 5}, 0, channel3::idle});
   ASSERT_TRUE(decode_cycle(single, cycle).has_value());
