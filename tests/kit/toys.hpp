@@ -110,7 +110,8 @@ struct Toy {
     }
     [[nodiscard]] Error error() const override { return error_; }
     [[nodiscard]] const Reading* reading() const override {
-      return error_ == Error::none && mistake != Mistake::says_nothing ? &reading_ : nullptr;
+      const bool good = state_ == State::done && error_ == Error::none;
+      return good && mistake != Mistake::says_nothing ? &reading_ : nullptr;
     }
     void report(FieldSink& sink) const override {
       if (reading() == nullptr) return;

@@ -185,7 +185,7 @@ struct Report {
     const Bytes reply = host.reply();
     switch (host.error()) {
       case Error::unexpected_reply:
-        if (!of_identity || !decode_identity(reply)) return {};
+        if (!decode_identity(reply)) return {};
         return {
             "the identity says another resolution than the options, or disagrees on whether there are turns: "
             "leave resolution and multiturn_bits out, and it is asked"};
