@@ -147,5 +147,10 @@ TEST(Raa38ModbusProbe, FramesTellRegistersAndHowManyBitsAtLeast) {
   EXPECT_TRUE(says(evidence.reasons, "checksum"));
 }
 
+TEST(Raa38ModbusFrame, ReadingsOfOtherRegistersAreNoPosition) {
+  EXPECT_EQ(decode_reply({}, {.registers = 0}, hex<"01030020f0">).error(), Error::unsupported);
+  EXPECT_EQ(decode_reply({}, {.registers = 3}, hex<"010306000000000005e176">).error(), Error::unsupported);
+}
+
 }  // namespace
 }  // namespace absenc::raa38::rtu
