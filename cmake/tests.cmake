@@ -33,10 +33,18 @@ function(absenc_test name)
   gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
 endfunction()
 
-# GLOB: the tests of the folder alone, GLOB_RECURSE: and of those in it.
+# GLOB: the tests of the folder alone, GLOB_RECURSE: and of those in it. ABSENC_SPLIT_TESTS: of units, each source by itself
+# (tests/mutants.py, which runs no more of them than it needs).
 function(absenc_folder_test name folder glob)
   file(${glob} sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*_test.cpp")
-  if(sources)
+  if(ABSENC_SPLIT_TESTS AND folder MATCHES "^absenc/(host|protocol)")
+    foreach(source IN LISTS sources)
+      cmake_path(RELATIVE_PATH source BASE_DIRECTORY "${PROJECT_SOURCE_DIR}/${folder}" OUTPUT_VARIABLE below)
+      string(REGEX REPLACE "_test\\.cpp$" "" below "${below}")
+      string(REPLACE "/" "_" below "${below}")
+      absenc_test(${name}_${below} "${source}")
+    endforeach()
+  elseif(sources)
     absenc_test(${name} ${sources})
   endif()
 endfunction()

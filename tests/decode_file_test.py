@@ -209,6 +209,16 @@ class Text(Case):
                         "--bits", "--json")
         self.assert_good(result)
         self.assertEqual(json.loads(result.stdout)["bits"]["singleturn"], [{"first": 0, "count": 13}])
+        # What is active low says so; on CAN and over SPI bits count as in every byte.
+        for arguments, field, places in (
+            (["encolink", "--hex", "003e825200"], "warning", [{"first": 16, "count": 1, "inverted": True}]),
+            (["raa38-modbus", "--hex", "0103021234B533"], "singleturn",
+             [{"first": 32, "count": 8}, {"first": 24, "count": 6}]),
+            (["raa38-can", "--hex", "120:4726000000000000"], "singleturn", [{"first": 0, "count": 14}]),
+        ):
+            result = absenc("decode", *arguments, "--bits", "--json")
+            self.assert_good(result)
+            self.assertEqual(json.loads(result.stdout)["bits"][field], places)
 
     def test_times_and_directions(self):
         request, reply = exchange(7)

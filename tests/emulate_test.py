@@ -417,6 +417,34 @@ class Console(EmulateCase):
             self.assertEqual(tell("clear over_heat"), "ok: lowered over_heat")
             self.assertEqual(client.exchange(3)[9], 0x80)
 
+    def test_faults(self):
+        emulator, tell = self.told()
+        with Client.open(emulator.path) as client:
+            self.assertEqual(tell("fault"), "ok: no faults")
+            self.assertEqual(len(client.exchange(3)), 11)
+            self.assertEqual(tell("fault drop=1"), "ok: faults: drop=1")
+            self.assertEqual(len(client.exchange(3)), 10)
+            self.assertEqual(tell("fault drop=0 repeat=1 corrupt=0.01"), "ok: faults: corrupt=0.01, repeat=1")
+            self.assertGreater(len(client.exchange(3)), 11)
+            self.assertEqual(tell("fault"), "ok: faults: corrupt=0.01, repeat=1")
+            self.assertEqual(tell("fault none"), "ok: no faults")
+            reply = client.exchange(3)
+            self.assertEqual((len(reply), client.receive(1, patience=0.02)), (11, b""))
+        self.assertRegex(emulator.end()[2], r"faults injected: 1 drop,.* 1 repeat\n")
+
+    def test_faults_from_the_start(self):
+        emulator, tell = self.told("--fault", "silence=1", protocol="raa38-can")
+        place = f"raa38-can:slcan:{emulator.path}?latency=300"
+        self.assertEqual(absenc("read", place).returncode, 1)
+        self.assertEqual(tell("fault none"), "ok: no faults")
+        self.assert_good(absenc("read", place))
+
+    def test_no_word_of_faults_that_nobody_asked_for(self):
+        emulator, tell = self.told("--also", "address=3", protocol="esl")
+        self.assertEqual(tell("2: fault silence=1"), "ok: 2: faults: silence=1")
+        err = emulator.end()[2]
+        self.assertEqual(err.count("faults injected"), 1, err)
+
     def test_an_encoder_that_sends_by_itself_goes_on(self):
         emulator, tell = self.told("--motion", "rpm=60", "--option", "refresh_hz=200", protocol="raa38")
         with Client.open(emulator.path) as client:
@@ -451,11 +479,12 @@ class Console(EmulateCase):
 
     def test_what_it_does_not_know(self):
         _, tell = self.told()
-        for line, words in [("temprature=85", ['"temprature"', "did you mean temperature?", "power, alarm, clear, help"]),
+        for line, words in [("temprature=85", ['"temprature"', "did you mean temperature?", "power, alarm, clear, fault, help"]),
                             ("x", ['"x"', "battery, temperature, power"]),
                             ("temperature=hot", ["-20 to 127 degC"]), ("temperature=128", ["-20 to 127 degC"]),
                             ("battery=", ["0 to 4750 mV"]), ("battery=1 2", ["0 to 4750 mV"]),
                             ("power", ["power on", "power off"]), ("power of", ["power off"]),
+                            ("fault none corrupt=2", ["from 0 to 1"]), ("fault noise", ["unknown kind", "drop, corrupt"]),
                             ("alarm", ["which alarm?", "over_heat"]), ("alarm overheat", ["did you mean over_heat?"])]:
             with self.subTest(line):
                 answer = tell(line)
@@ -465,7 +494,7 @@ class Console(EmulateCase):
 
     def test_help(self):
         _, tell = self.told()
-        for words in ("battery=0 to 4750 mV", "power off", "alarm NAME", "over_heat"):
+        for words in ("battery=0 to 4750 mV", "power off", "alarm NAME", "over_heat", "fault KIND=RATE, of drop corrupt"):
             self.assertIn(words, tell("help"))
 
     def test_the_end_of_the_input_ends_nothing(self):

@@ -45,6 +45,15 @@ DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
 
+class Switch(NamedTuple):
+    """The same, chosen while a program runs: `IS` in what is put before and behind is whether it is this mutant."""
+
+    start: int
+    end: int
+    before: str
+    behind: str
+
+
 class Mutant(NamedTuple):
     file: str  # below the folder of the sources, as the id has it
     rule: str
@@ -54,9 +63,25 @@ class Mutant(NamedTuple):
     before: str
     after: str
     id: str
+    switch: "Switch | None"
 
     def applied_to(self, text):
         return text[: self.start] + self.after + text[self.end :]
+
+
+def with_switches(text, numbered):
+    """`text` with all mutants in it, given with their numbers; `chosen_mutant(N)` says whether it is that one."""
+    # Those in others are put in between; of those at one place the first is the outermost.
+    inserted = []
+    for order, (number, mutant) in enumerate(numbered):
+        start, end, before, behind = mutant.switch
+        inserted.append(((start, 1, -end, order), before.replace("IS", f"chosen_mutant({number})")))
+        inserted.append(((end, 0, -start, -order), behind))
+    parts, position = [], 0
+    for key, words in sorted(inserted):
+        parts += [text[position : key[0]], words]
+        position = key[0]
+    return "".join(parts) + text[position:]
 
 
 def value_of(number):
@@ -101,7 +126,8 @@ class Finder:
             elif token.text == "violate":
                 self._told(i)
             elif token.text == "co_await" and source[i - 1] in (";", "{", "}", ")", "else"):
-                self._change("skip", i, source.statement(i) - 1, "")
+                end = source.statement(i) - 1
+                self._change("skip", i, end, "", self._switch(i, end, "if (IS) {} else ", ""))
         return sorted(self.found, key=lambda mutant: mutant.start)
 
     def _leave(self, word):
@@ -111,7 +137,11 @@ class Finder:
                 for j in range(i, self.source.partner[i + 1]):
                     self.left_alone[j] = True
 
-    def _change(self, rule, first, last, after):
+    def _switch(self, first, last, before, behind):
+        tokens = self.source.tokens
+        return Switch(tokens[first].start, tokens[last - 1].end, before, behind)
+
+    def _change(self, rule, first, last, after, switch=None):
         """The tokens from `first` up to, without, `last` become `after`."""
         tokens = self.source.tokens
         start, end = tokens[first].start, tokens[last - 1].end
@@ -131,7 +161,7 @@ class Finder:
         seen = self._seen[told] = self._seen.get(told, 0) + 1
         digest = hashlib.sha256(f"{told}\n{seen}".encode()).hexdigest()[:8]
         name = f"{self.file}:{rule}:{digest}"
-        self.found.append(Mutant(self.file, rule, line, start, end, self.source.text[start:end], after, name))
+        self.found.append(Mutant(self.file, rule, line, start, end, self.source.text[start:end], after, name, switch))
 
     # ---- Checks
 
@@ -195,7 +225,8 @@ class Finder:
         is_branch = source[block - 1] == "else" or source[source.partner.get(block - 1, 0) - 1] == "if"
         if source.span(index, index + 3) == "return Error::" and source[index + 4] == ";" and not is_branch:
             if source[index + 3] != "none" and source[index - 1] in (";", "{", "}", ":"):
-                self._change("never", index + 3, index + 4, "none")
+                switch = self._switch(index + 1, index + 4, "(IS ? Error::none : ", ")")
+                self._change("never", index + 3, index + 4, "none", switch)
 
     def _choice(self, index):
         """`good ? value : Error::x`, either way round."""
@@ -214,15 +245,17 @@ class Finder:
         """Each of the terms that `operator` joins is a check of its own."""
         source = self.source
         ends = ENDS_OPERAND | {operator} | ({"||"} if operator == "&&" else set())
+        switch = ("(!IS && (", "))") if harmless == "false" else ("(IS || (", "))")
         begins = [first]
         while (end := source.right(begins[-1], ends)) < last and source[end] == operator:
             begins.append(end + 1)
         if len(begins) == 1 or end < last:
-            self._change("never", first, last, harmless)
+            self._change("never", first, last, harmless, self._switch(first, last, *switch))
             return
-        self._change("never", first, begins[1], "")
+        self._change("never", first, begins[1], "", self._switch(first, begins[1] - 1, *switch))
         for i in range(1, len(begins)):
-            self._change("never", begins[i] - 1, (begins[i + 1 :] + [end + 1])[0] - 1, "")
+            behind = (begins[i + 1 :] + [end + 1])[0] - 1
+            self._change("never", begins[i] - 1, behind, "", self._switch(begins[i], behind, *switch))
 
     def _terms(self, index):
         source = self.source
@@ -247,7 +280,8 @@ class Finder:
     def _told(self, index):
         source = self.source
         if source[index + 1] == "(" and source[index - 1] in (";", "{", "}", "return"):
-            self._change("silent", index, source.partner[index + 1] + 1, "")
+            end = source.partner[index + 1] + 1
+            self._change("silent", index, end, "", self._switch(index, end, "(IS ? void() : ", ")"))
 
     # ---- Constants
 
@@ -261,7 +295,7 @@ class Finder:
             # A constant, or a member with the value it has unless told otherwise: not what a function computes.
             is_member = source[i - 1] in (";", "{", "}") and source.tokens[i + 3].kind == "number" and end == i + 4
             if source[i - 1] == "constexpr" or is_member:
-                self._times(i + 3, end)
+                self._times(i + 3, end, is_constant=True)
                 for j in range(i, end):
                     self.left_alone[j] = True
 
@@ -283,7 +317,7 @@ class Finder:
                     for k in range(j, end):
                         self.left_alone[k] = True
 
-    def _times(self, first, last):
+    def _times(self, first, last, is_constant=False):
         before = f"Time({self.source.span(first, last)})"
         if self.file.endswith(".hpp"):
             changes = {"half": f"{before} / 2", "twice": f"{before} * 2"}
@@ -291,7 +325,8 @@ class Finder:
             changes = {"zero": "Time{}", "ten": f"{before} * 10"}
         is_operand = last == first + 1 and self.source[first - 1] != "="
         for rule, after in changes.items():
-            self._change(rule, first, last, f"({after})" if is_operand else after)
+            switch = None if is_constant else self._switch(first, last, f"(IS ? Time({after}) : Time(", "))")
+            self._change(rule, first, last, f"({after})" if is_operand else after, switch)
 
     def _number(self, index):
         source = self.source

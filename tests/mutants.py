@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Breaks the units in one place at a time and looks whether tests notice.
 
-tests/mutant_rules.py finds the places. Each mutant is compiled in a copy of the sources (build/mutants), and the
-generic tests, as far as they concern its unit, the seeds of its fuzzer and its own tests run until one fails. A mutant
-that survives shows a test that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their
-reason.
+tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled at
+once, each behind a switch, and for each one the generic tests, as far as they concern its unit, the seeds of its fuzzer
+and its own tests run, the fastest first, until one fails. Mutants that cannot be switched (constants) and those that
+survived are compiled one at a time, which tells what is checked at compile time. A mutant that survives shows a test
+that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their reason.
 """
 
 import argparse
@@ -31,7 +32,17 @@ COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
 # Of what the compiler says when a vector or another thing that is checked at compile time no longer holds.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
+# What is switched in meets the first series of faults only; what survives is compiled and meets all (tests/kit).
+FIRST_SERIES = "-" + ":".join(f"*/{series}_*" for series in range(1, 10))
 HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
+SWITCH_HEADER = Path("absenc/chosen_mutant.hpp")
+SWITCH = """#pragma once
+#include <cstdlib>
+#include <type_traits>
+
+inline const int the_chosen_mutant = std::getenv("CHOSEN_MUTANT") ? std::atoi(std::getenv("CHOSEN_MUTANT")) : 0;
+constexpr bool chosen_mutant(int number) { return !std::is_constant_evaluated() && the_chosen_mutant == number; }
+"""
 OUTCOMES = ("static_assert", "kit", "own", "time", "known", "new", "no C++")
 
 
@@ -101,6 +112,7 @@ class Tree:
         self.source = folder / "source"
         self.build = folder / "tree"
         self.limits = {}
+        self.last_own = None
         self.lock = None
         self.environment = {**os.environ, "CCACHE_BASEDIR": str(folder), "GTEST_FAIL_FAST": "1", "GTEST_BRIEF": "1"}
 
@@ -123,7 +135,8 @@ class Tree:
                 path.unlink()
         # What reads behind the end of its bytes is told; warnings are not looked at.
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -D_GLIBCXX_ASSERTIONS"]
-        options += ["-DABSENC_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF", "-DABSENC_UNITY=OFF"]
+        options += ["-DABSENC_TESTS=ON", "-DABSENC_SPLIT_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
+        options += ["-DABSENC_UNITY=OFF"]
         if shutil.which("ccache"):
             options.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
         self.run_or_exit(["cmake", "-G", "Ninja", "-S", self.source, "-B", self.build, *options])
@@ -151,10 +164,24 @@ class Tree:
         done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
         return None if done.returncode == 0 else done.stdout + done.stderr
 
-    def run(self, program, cpu_limit):
+    def switch_in(self, numbered):
+        """All of these mutants, given by their numbers."""
+        self.write(self.source / SWITCH_HEADER, SWITCH.encode())
+        texts = {path: text for _, path, text in numbered.values()}
+        for path, text in texts.items():
+            here = [(number, one[0]) for number, one in numbered.items() if one[1] == path]
+            switched = f'#include "{SWITCH_HEADER}"\n#line 1\n{mutant_rules.with_switches(text, here)}'
+            self.write(self.source / path.relative_to(ROOT), switched.encode())
+
+    def restore(self, mutants):
+        for path, text in {path: text for _, path, text in mutants}.items():
+            self.write(self.source / path.relative_to(ROOT), text.encode())
+
+    def run(self, program, cpu_limit, number=0):
         """Its exit status and the seconds that it computed; the limit does not count what others compute meanwhile."""
         limits = ["prlimit", f"--cpu={cpu_limit}:{cpu_limit + 1}", f"--as={4 << 30}", "--core=0"]
-        environment = {**self.environment, "GTEST_FILTER": program.tests}
+        tests = program.tests + (FIRST_SERIES if number else "")
+        environment = {**self.environment, "GTEST_FILTER": tests, "CHOSEN_MUTANT": str(number)}
         running = subprocess.Popen(
             [*limits, self.build / "tests" / program.name],
             env=environment,
@@ -190,7 +217,11 @@ class Tree:
         kit = [Program(name, False) for name in generic_programs()]
         owners = list(folders) if unit == "author" else [unit]
         seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]
-        own = [f"{owner}_test" for owner in owners if any(folders[owner].rglob("*_test.cpp"))]
+        own = [
+            "_".join((owner, *path.relative_to(folders[owner]).with_suffix("").parts))
+            for owner in owners
+            for path in sorted(folders[owner].rglob("*_test.cpp"))
+        ]
         self.run_or_exit(self.build_command(*(program.name for program in kit), *seeds, *own))
         if unit not in ("author", "host"):
             kit = [chosen for program in kit if (chosen := self.concerning(program, unit))]
@@ -200,33 +231,48 @@ class Tree:
             if status != 0:
                 raise SystemExit(f"mutants: without any mutant {program.name} fails with {program.tests}")
             self.limits[program] = int(5 * seconds) + 5
-        return sorted(programs, key=lambda program: (program.is_own, self.limits[program]))
+        return sorted(programs, key=lambda program: (self.limits[program], program.is_own))
+
+    def killed(self, program, number=0):
+        """How; nothing when it passes."""
+        status, _ = self.run(program, self.limits[program], number)
+        return "" if status == 0 else "time" if status in HANGS else "own" if program.is_own else "kit"
+
+    def switched_outcome(self, number, programs):
+        """What became of a mutant that was switched in, and the program that killed it."""
+        for program in programs:
+            if outcome := self.killed(program, number):
+                return outcome, program.name
+        return "survived", ""
 
     def outcome(self, mutant, path, text, programs):
-        """What became of it, and the program that killed it. The source stays as the mutant has it."""
+        """The same of a mutant that is compiled alone. The source stays as the mutant has it."""
         self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
         # Vectors are checked where the unit is described: one file to compile tells most of what is wrong in a header.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
         first = [f"CMakeFiles/absenc.dir/{unit}.o"] if (ROOT / unit).exists() else []
+        programs = sorted(programs, key=lambda program: program != self.last_own)
         for program in programs:
             for target in [*first, program.name]:
                 refused = self.compile(target)
                 if refused is not None:
                     return ("static_assert" if STATIC_CHECK.search(refused) else "no C++"), target.rpartition("/")[2]
             first = []
-            status, _ = self.run(program, self.limits[program])
-            if status != 0:
-                return ("time" if status in HANGS else "own" if program.is_own else "kit"), program.name
+            if outcome := self.killed(program):
+                if program.is_own:
+                    self.last_own = program  # of neighbours it kills the next one, too
+                return outcome, program.name
         return "survived", ""
 
 
 class Campaign:
-    """Trees work through the mutants, a source at a time."""
+    """Trees work through the mutants, a unit at a time."""
 
-    def __init__(self, known, folders, verbose):
+    def __init__(self, known, folders, verbose, quick):
         self.known = known
         self.folders = folders
         self.verbose = verbose
+        self.quick = quick
         self.counts = {}
         self.revived = []
         self.work = queue.Queue()
@@ -235,8 +281,7 @@ class Campaign:
         self.failure = None
 
     def add(self, unit, mutants):
-        for path in dict.fromkeys(path for _, path, _ in mutants):
-            self.work.put((unit, [one for one in mutants if one[1] == path]))
+        self.work.put((unit, mutants))
         self.counts[unit] = Counter()
 
     def run(self, trees):
@@ -255,30 +300,61 @@ class Campaign:
             raise self.failure
 
     def serve(self, tree):
-        programs = {}
         try:
             tree.prepare()
             while not self.stopping:
                 unit, mutants = self.work.get_nowait()
-                if unit not in programs:
-                    programs[unit] = tree.programs(unit, self.folders)
-                    names = ", ".join(program.name for program in programs[unit])
-                    print(f"{unit}, which passes without a mutant: {names}", flush=True)
-                for mutant, path, text in mutants:
-                    began = time.monotonic()
-                    result = tree.outcome(mutant, path, text, programs[unit])
-                    if self.stopping:
-                        break
-                    self.note(unit, mutant, path, text, result, time.monotonic() - began)
-                tree.write(tree.source / path.relative_to(ROOT), text.encode())
+                left = self.switch(tree, unit, mutants)
+                if not self.quick:
+                    self.compile_alone(tree, unit, left)
         except queue.Empty:
             pass
         except (SystemExit, OSError) as failure:
             self.failure = None if self.stopping else failure
             self.stopping = True
 
-    def note(self, unit, mutant, path, text, result, seconds):
+    def switch(self, tree, unit, mutants):
+        """Those that are left."""
+        numbered = dict(enumerate([one for one in mutants if one[0].switch], start=1))
+        left = [one for one in mutants if not one[0].switch]
+        if numbered:
+            tree.switch_in(numbered)
+            programs = self.programs(tree, unit)
+            for number, one in numbered.items():
+                began = time.monotonic()
+                result = tree.switched_outcome(number, programs)
+                if self.stopping:
+                    break
+                if result[0] == "survived":
+                    left.append(one)
+                    if self.verbose:
+                        print(f"left to be compiled alone: {one[0].id}", flush=True)
+                else:
+                    self.note(unit, one, result, time.monotonic() - began)
+            tree.restore(mutants)
+        return sorted(left, key=lambda one: (one[1], one[0].start))
+
+    def compile_alone(self, tree, unit, mutants):
+        if not mutants or self.stopping:
+            return
+        programs = self.programs(tree, unit)
+        for one in mutants:
+            began = time.monotonic()
+            result = tree.outcome(*one, programs)
+            tree.restore([one])
+            if self.stopping:
+                break
+            self.note(unit, one, result, time.monotonic() - began)
+
+    def programs(self, tree, unit):
+        programs = tree.programs(unit, self.folders)
+        names = ", ".join(program.name for program in programs)
+        print(f"{unit}, which passes without a mutant: {names}", flush=True)
+        return programs
+
+    def note(self, unit, one, result, seconds):
         outcome, program = result
+        mutant = one[0]
         with self.lock:
             if outcome == "survived":
                 outcome = "known" if mutant.id in self.known else "new"
@@ -288,7 +364,7 @@ class Campaign:
             if self.verbose:
                 print(f"[{seconds:5.1f} s] {outcome:13} {program:20} {mutant.id}", flush=True)
             if outcome in ("new", "no C++"):
-                print(f"{'survived' if outcome == 'new' else outcome}: {shown(mutant, path, text)}", flush=True)
+                print(f"{'survived' if outcome == 'new' else outcome}: {shown(*one)}", flush=True)
 
 
 def print_table(counts):
@@ -304,8 +380,9 @@ def choose(found, arguments):
             one
             for one in mutants
             if (not arguments.unit or unit in arguments.unit)
+            and (not arguments.rule or one[0].rule in arguments.rule)
             and (not arguments.file or str(one[1]).endswith(arguments.file))
-            and (one[0].id in arguments.ids if arguments.ids else arguments.fine or one[0].rule in mutant_rules.COARSE)
+            and (one[0].id in arguments.ids if arguments.ids else arguments.fine or one[0].rule in mutant_rules.COARSE or arguments.rule)
         ]
         if wanted:
             chosen[unit] = wanted
@@ -323,7 +400,9 @@ def parse():
     parser.add_argument("ids", nargs="*", help="only these mutants")
     parser.add_argument("--unit", action="append", help="a folder of absenc/protocol, or host; may be given again")
     parser.add_argument("--file", help="only those of this source: the end of its path")
+    parser.add_argument("--rule", action="append", help="only those of this rule: never, half ...; may be given again")
     parser.add_argument("--fine", action="store_true", help="also terms, edges and constants (tests/mutant_rules.py)")
+    parser.add_argument("--quick", action="store_true", help="compile none alone: show which are left")
     parser.add_argument("--sample", type=int, metavar="N", help="so many of them, at random")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time, each in a tree (%(default)s)")
@@ -352,7 +431,7 @@ def main():
         return 0
     known = read_survivors(ROOT / "tests" / "mutants_survivors.txt")
     stale = sorted(set(known) - {mutant.id for mutants in found.values() for mutant, _, _ in mutants})
-    campaign = Campaign(known, folders, arguments.verbose)
+    campaign = Campaign(known, folders, arguments.verbose or arguments.quick, arguments.quick)
     for unit, mutants in chosen.items():
         campaign.add(unit, mutants)
     jobs = max(1, min(arguments.jobs, campaign.work.qsize()))

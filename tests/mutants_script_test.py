@@ -123,6 +123,23 @@ class Rules(unittest.TestCase):
         self.assertEqual(changes("void f() { for (int i = 0; i < 3 && i + 1 < n; ++i) g(i); }"), [])
         self.assertEqual(changes('void f() { g(h<pair<int, 4>>(1), R"(a && b < 2ms)", "1s", \'&\'); }'), [])
 
+    def test_several_are_switched_in_at_once(self):
+        lines = (
+            ("if (a || b) return false;", "if ((!chosen_mutant(1) && (a)) || (!chosen_mutant(2) && (b))) return false;"),
+            ("x = good ? value : Error::y;", "x = (chosen_mutant(1) || (good)) ? value : Error::y;"),
+            ("co_await dialog.ask();", "if (chosen_mutant(1)) {} else co_await dialog.ask();"),
+            ("rest(10ms);", "rest((chosen_mutant(1) ? Time(Time(10ms) / 2) : Time((chosen_mutant(2) ? "
+             "Time(Time(10ms) * 2) : Time(10ms)))));"),
+            ("constexpr Time pause = 40us;", None),
+        )
+        for line, expected in lines:
+            text = f"void f() {{ {line} }}" if expected else line
+            found = [one for one in mutant_rules.find("toy.hpp", text) if one.rule in mutant_rules.COARSE]
+            self.assertEqual(any(one.switch for one in found), expected is not None, line)
+            if expected:
+                switched = mutant_rules.with_switches(text, list(enumerate(found, start=1)))
+                self.assertEqual(switched, f"void f() {{ {expected} }}")
+
     def test_only_the_place_changes(self):
         for found in mutant_rules.find("toy.hpp", TOY):
             broken = found.applied_to(TOY)

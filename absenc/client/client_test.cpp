@@ -258,6 +258,12 @@ TEST(ClientEmulation, WhatIsDoneToItIsSoAtOnce) {
   EXPECT_EQ(thrown_by<EncoderFailure>([&] { static_cast<void>(encoder.read()); }).substr(0, 7), "timeout");
   emulation.power_on();
   EXPECT_EQ(encoder.read().singleturn, 1000u);
+  emulation.set_fault("silence", 1);
+  EXPECT_EQ(thrown_by<EncoderFailure>([&] { static_cast<void>(encoder.run("temperature")); }).substr(0, 7), "timeout");
+  emulation.clear_faults();
+  EXPECT_EQ(to_text(encoder.run("temperature")["temperature_c"]), "85");
+  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_fault("noise", 1); }), HasSubstr("corrupt"));
+  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_fault("corrupt", 1.5); }), HasSubstr("from 0 to 1"));
   EXPECT_THAT(thrown_by<UsageError>([&] { emulation.raise_alarm("over_haet"); }), HasSubstr("over_heat"));
   EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_condition("temprature", 1); }), HasSubstr("temperature"));
   EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_condition("temperature", 1000); }), HasSubstr("must be"));

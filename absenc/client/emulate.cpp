@@ -32,12 +32,17 @@ EncoderAddress virtual_address(std::string_view text) {
                                line_of(*address.unit), address.unit->id));
 }
 
+DeviceSettings with_faults_to_come(DeviceSettings settings) {
+  settings.faults_may_come = true;
+  return settings;
+}
+
 }  // namespace
 
 struct Emulation::Service {
   Service(std::string_view text, const EmulateChoices& choices)
       : address(virtual_address(text)),
-        device(*address.unit, address.options, address.device),
+        device(*address.unit, address.options, with_faults_to_come(address.device)),
         port(std::make_shared<os::EmulatorPort>(choices.link, choices.tcp)) {
     port->set_send_slack(send_slack);
     device.power_on(os::now());
@@ -154,6 +159,19 @@ void Emulation::set_condition(std::string_view name, std::int64_t value) {
   static_cast<void>(require_value(condition, fmt::format("{}", value)));
   const auto index = static_cast<std::size_t>(&condition - unit().conditions.data());
   service_->carry_out([this, index, value](Time now) { service_->device.set_condition(index, value, now); });
+}
+
+void Emulation::set_fault(std::string_view kind, double rate) {
+  const sim::FaultRate fault = require_fault(fmt::format("{}={}", kind, rate));
+  service_->carry_out([this, fault](Time) {
+    sim::FaultRates rates = service_->device.fault_rates();
+    rates[fault.kind] = fault.rate;
+    service_->device.set_faults(rates);
+  });
+}
+
+void Emulation::clear_faults() {
+  service_->carry_out([this](Time) { service_->device.set_faults({.delay = service_->device.fault_rates().delay}); });
 }
 
 std::uint64_t Emulation::answer_count() const {

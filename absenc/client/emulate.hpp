@@ -44,6 +44,11 @@ class Emulation {
   void lower_alarm(std::string_view name);
   /// "temperature", "battery" ... as `absenc list` has them, in their units. Throws UsageError.
   void set_condition(std::string_view name, std::int64_t value);
+  /// "corrupt", "drop" ... as those of `emulate --fault`: how often its replies are damaged from now on, 0 to 1. The
+  /// other kinds stay. Throws UsageError.
+  void set_fault(std::string_view kind, double rate);
+  /// None of any kind.
+  void clear_faults();
 
   /// Requests that were answered.
   [[nodiscard]] std::uint64_t answer_count() const;

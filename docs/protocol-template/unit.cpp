@@ -56,6 +56,7 @@ struct Definition : Declares<Definition, Protocol> {
                                     document = "title of the document";
   static constexpr LinkKind link = LinkKind::half_duplex;
   static constexpr std::size_t frames_size = 1200;
+  static constexpr LineTiming timing{.turnaround_limit = answer_limit};
 
   static constexpr OptionsOf options{option<&Format::address>("address", "of the encoder on its line", 0, 255)};
   static constexpr std::array models{ModelText{"unnamed", "one sentence", 6000, ""}};

@@ -12,6 +12,8 @@ namespace absenc::protocol_name {
 
 using namespace std::chrono_literals;
 
+inline constexpr Time answer_limit = 100us;
+
 /// What the options make of the frames.
 struct Format {
   std::uint8_t address = 1;
@@ -37,7 +39,7 @@ struct Protocol {
   using Reply = protocol_name::Reply;
   static constexpr std::size_t longest_reply = 3;
 
-  static constexpr author::HostTimes host_times(const Format&) { return {.answer_limit = 100us, .gap_limit = 50us}; }
+  static constexpr author::HostTimes host_times(const Format&) { return {.answer_limit = answer_limit, .gap_limit = 50us}; }
   /// What changes the encoder is never sent twice.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {.attempts = request.ask == Ask::position ? 3u : 1u};

@@ -34,6 +34,7 @@ void run_commands(const Unit& unit, const Configuration& way, Findings& findings
       const Ended result = world.run(command, least_arguments(command));
       if (!result.made) break;
       findings.require(result.ended, [&] { return what() + "hangs"; });
+      findings.require(!result.unfounded, [&] { return what() + "has a reading of nothing"; });
       const bool may_fail = !way.is_model || !is_plain(command) || is_refused(command, result.error);
       findings.require(result.good() || may_fail,
                        [&] { return what() + std::string(text_of(result.error).name) + " " + result.detail; });

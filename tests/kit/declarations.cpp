@@ -193,6 +193,9 @@ void refused_arguments(const Unit& unit, const Configuration& way, const Command
 Findings check_declarations(const Unit& unit) {
   Findings findings;
   findings.require(find_command(unit, Verb::read) != nullptr, [] { return "reads no position"; });
+  const auto goes_over_spi = [](const Unit& one) { return one.link == LinkKind::spi || one.link == LinkKind::clocked; };
+  findings.require(unit.over_spi == nullptr || (!goes_over_spi(unit) && goes_over_spi(*unit.over_spi)),
+                   [] { return "its unit over SPI is none"; });
   declared_memory(unit, findings);
   declared_registers(unit, findings);
   declared_settings(unit, findings);

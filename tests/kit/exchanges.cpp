@@ -183,6 +183,7 @@ class Campaign {
     tally_.damaged += result.damaged;
     findings_.require(result.ended, [&] { return where(asked) + "hangs"; });
     if (result.damaged != 0) weigh(asked, result.damaged);
+    findings_.require(!result.unfounded, [&] { return where(asked) + "has a reading of nothing"; });
     if (!result.good()) return;
     ++tally_.accepted;
     const bool may_miss = asked.command->verb == Verb::info && result.faults != 0;  // one of several questions

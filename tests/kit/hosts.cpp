@@ -318,6 +318,45 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
+// How long a reading waits for its reply to begin; none where it asks for nothing.
+template <class Item>
+std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
+  using Kind = typename Step<Item>::Kind;
+  const Command& command = *find_command(unit, Verb::read);
+  std::vector<std::byte> storage(unit.host_storage);
+  Conversation<Item>* conversation = machine_of<Item>(unit.host(options, command, least_arguments(command), storage));
+  if (conversation == nullptr) return std::nullopt;
+  Time now{};
+  Step<Item> step = conversation->next(now);
+  // It may wait for silence first.
+  for (unsigned i = 0; i < 10 && (step.kind == Kind::configure || step.kind == Kind::wait); ++i) {
+    now += std::chrono::milliseconds(1);
+    if (step.kind == Kind::wait) conversation->feed({.kind = Event<Item>::Kind::silence, .at = now});
+    step = conversation->next(now);
+  }
+  if (step.kind != Kind::transfer || step.out.empty()) return std::nullopt;
+  now = std::max(now, step.at);
+  conversation->feed({.kind = Event<Item>::Kind::sent, .at = now});
+  step = conversation->next(now);
+  if (step.kind != Kind::wait) return std::nullopt;
+  return step.answer != Time{} ? step.answer : step.gap;
+}
+
+// A capture takes a reply for late where every host would have given up: no sooner, and not much later.
+void compare_limits(const Unit& unit, Findings& findings) {
+  std::optional<Time> longest;
+  for (const Configuration& way : configurations(unit)) {
+    longest = std::max(longest, unit.link == LinkKind::can ? wait_for_reply<CanFrame>(unit, way.options)
+                                                           : wait_for_reply<std::uint8_t>(unit, way.options));
+  }
+  if (!longest || unit.link == LinkKind::spi || unit.link == LinkKind::clocked) return;
+  const Time limit = unit.timing.turnaround_limit;
+  findings.require(4 * limit >= 3 * *longest && 3 * limit <= 4 * *longest, [&] {
+    return "captures wait " + std::to_string(limit.count()) + " ns for a reply, hosts " +
+           std::to_string(longest->count()) + " ns";
+  });
+}
+
 // Every command has a request in some configuration, or says that it has none of its own.
 void find_requests(const Unit& unit, Findings& findings) {
   const std::vector<Configuration> ways = configurations(unit);
@@ -349,6 +388,7 @@ Findings check_hosts(const Unit& unit) {
   }
   findings.require(readings > 0, [] { return "no vector's position is read by a command"; });
   find_requests(unit, findings);
+  compare_limits(unit, findings);
   return findings;
 }
 

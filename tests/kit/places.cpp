@@ -119,7 +119,7 @@ Findings check_places(const Unit& unit) {
   if (unit.bits == nullptr) return findings;
   Places places(unit, findings);
   look_at_vectors(unit, places);
-  if (unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex) look_at_exchanges(unit, places);
+  if (unit.link != LinkKind::can && unit.link != LinkKind::clocked) look_at_exchanges(unit, places);
   places.conclude();
   return findings;
 }

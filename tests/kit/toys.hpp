@@ -29,6 +29,7 @@ enum class Mistake : std::uint8_t {
   no_condition,    // the virtual encoder is what it is, whatever is set
   never_ends,      // the host waits for ever when nothing comes
   takes_all,       // any arguments make a request
+  gives_up_late,   // captures wait for a reply longer than any host
 };
 
 inline constexpr std::uint8_t ask = 0x5A;
@@ -109,7 +110,8 @@ struct Toy {
     }
     [[nodiscard]] Error error() const override { return error_; }
     [[nodiscard]] const Reading* reading() const override {
-      return error_ == Error::none && mistake != Mistake::says_nothing ? &reading_ : nullptr;
+      const bool good = state_ == State::done && error_ == Error::none;
+      return good && mistake != Mistake::says_nothing ? &reading_ : nullptr;
     }
     void report(FieldSink& sink) const override {
       if (reading() == nullptr) return;
@@ -243,6 +245,7 @@ inline constexpr Unit unit = [] {
   made.id = "toy";
   made.link = LinkKind::half_duplex;
   made.line = {.rate = 1'000'000};
+  made.timing = {.turnaround_limit = mistake == Mistake::gives_up_late ? 10 * answer_limit : answer_limit};
   made.models = Made::models;
   made.fields = fields;
   made.commands = Made::commands;

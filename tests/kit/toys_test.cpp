@@ -96,6 +96,11 @@ TEST(KitToys, AFieldThatStandsElsewhere) {
   EXPECT_THAT(check_places(toy::unit<Mistake::misplaced>).texts(), Contains(HasSubstr("has more bits")));
 }
 
+TEST(KitToys, CapturesThatWaitForLongerThanHosts) {
+  EXPECT_THAT(check_hosts(toy::unit<Mistake::gives_up_late>).texts(),
+              ElementsAre("captures wait 2000000 ns for a reply, hosts 200000 ns"));
+}
+
 TEST(KitToys, AConditionThatNothingShows) {
   EXPECT_THAT(check_conditions(toy::unit<Mistake::no_condition>).texts(),
               ElementsAre("condition eccentricity is not seen by any host, whatever it is"));

@@ -29,6 +29,7 @@ struct Ended {
   bool made = false;   // the unit has a conversation for it
   bool ended = false;  // within the time
   Error error = Error::none;
+  bool unfounded = false;  // it had a reading before anything came, or with an error
   std::string detail{};
   Seen seen{};              // every result, in order
   std::uint64_t damaged{};  // faults that changed bytes while it went on
@@ -94,6 +95,7 @@ class World {
     Conversation<Item>* conversation = machine_of<Item>(unit_.host(options_, command, arguments, storage));
     if (conversation == nullptr) return result;
     result.made = true;
+    result.unfounded = conversation->reading() != nullptr;
     const std::uint64_t changed = changed_bytes();
     const std::uint64_t faults = all_faults();
     const std::uint64_t answered = device_->answer_count();
@@ -111,7 +113,10 @@ class World {
     result.error = conversation->error();
     result.detail = conversation->detail();
     if (result.error == Error::none) conversation->report(result.seen);
-    if (conversation->reading() != nullptr) result.seen.reading = *conversation->reading();
+    if (conversation->reading() != nullptr) {
+      result.seen.reading = *conversation->reading();
+      result.unfounded = result.unfounded || result.error != Error::none;
+    }
     result.damaged = changed_bytes() - changed;
     result.faults = all_faults() - faults;
     result.asked = device_->answer_count() - answered;

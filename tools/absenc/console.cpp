@@ -72,6 +72,7 @@ std::string Console::carry_out_one(VirtualDevice& device, std::string_view line,
   std::string_view rest = line;
   const std::string_view word = take_word(rest);
   if (word == "alarm" || word == "clear") return alarms(device, rest, word == "alarm");
+  if (word == "fault") return faults(device, rest);
   if (word == "help" && is_blank(rest)) return help();
   if (word != "power") return condition(device, line, now);
   const std::string_view state = take_word(rest);
@@ -94,7 +95,7 @@ std::string Console::condition(VirtualDevice& device, std::string_view line, Tim
   const std::string_view name = take_word(before);
   std::vector<std::string_view> known;
   for (const Condition& one : unit_.conditions) known.push_back(one.name);
-  known.insert(known.end(), {"power", "alarm", "clear", "help"});
+  known.insert(known.end(), {"power", "alarm", "clear", "fault", "help"});
   const Condition* found = is_blank(before) ? find_condition(unit_, name) : nullptr;
   if (found == nullptr) {
     const std::string_view near = nearest(name, known);
@@ -121,6 +122,26 @@ std::string Console::alarms(VirtualDevice& device, std::string_view names, bool 
   return fmt::format("{} {}", raise ? "raised" : "lowered", fmt::join(all, ", "));
 }
 
+// Those of other kinds stay as they are.
+std::string Console::faults(VirtualDevice& device, std::string_view wanted) {
+  sim::FaultRates rates = device.fault_rates();
+  for (std::string_view rest = wanted; !is_blank(rest);) {
+    const std::string_view word = take_word(rest);
+    if (word == "none") {
+      rates.rates = {};
+    } else {
+      const sim::FaultRate fault = require_fault(word);
+      rates[fault.kind] = fault.rate;
+    }
+  }
+  if (!is_blank(wanted)) device.set_faults(rates);
+  std::vector<std::string> set;
+  for (std::size_t i = 0; i < rates.rates.size(); ++i) {
+    if (rates.rates[i] > 0) set.push_back(fmt::format("{}={}", sim::fault_names[i], rates.rates[i]));
+  }
+  return set.empty() ? "no faults" : fmt::format("faults: {}", fmt::join(set, ", "));
+}
+
 std::string Console::help() const {
   std::vector<std::string> all;
   for (const Condition& one : unit_.conditions) all.push_back(fmt::format("{}={}", one.name, range_of(one)));
@@ -129,7 +150,8 @@ std::string Console::help() const {
     const std::string names = fmt::format("{}", fmt::join(flag_names(*unit_.alarms, ~0ull), " "));
     all.insert(all.end(), {"alarm NAME", fmt::format("clear NAME, of {}", names)});
   }
-  all.emplace_back("help");
+  all.push_back(fmt::format("fault KIND=RATE, of {}", fmt::join(sim::fault_names, " ")));
+  all.insert(all.end(), {"fault none", "help"});
   if (devices_.size() > 1)
     all.push_back(fmt::format("in front the number of one encoder, as 1: to {}:", devices_.size()));
   return fmt::format("{}", fmt::join(all, "; "));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is written on standard input while virtual encoders run: their conditions, power and alarms.
+// What is written on standard input while virtual encoders run: their conditions, power, alarms and faults.
 #pragma once
 
 #include <string>
@@ -31,6 +31,7 @@ class Console {
   [[nodiscard]] std::string carry_out_one(VirtualDevice& device, std::string_view line, Time now) const;
   [[nodiscard]] std::string condition(VirtualDevice& device, std::string_view line, Time now) const;
   [[nodiscard]] std::string alarms(VirtualDevice& device, std::string_view names, bool raise) const;
+  [[nodiscard]] static std::string faults(VirtualDevice& device, std::string_view wanted);
   [[nodiscard]] std::string help() const;
 
   const Unit& unit_;

@@ -42,26 +42,32 @@ sim::Motion motion_of(const Unit& unit, const Options& options, const DeviceSett
   }
 }
 
-sim::FaultRates fault_rates(const DeviceSettings& settings) {
+sim::FaultRates rates_of(const DeviceSettings& settings) {
   sim::FaultRates rates;
   rates.delay = settings.delay;
-  try {
-    for (const std::string& text : settings.faults) {
-      const sim::FaultRate fault = sim::parse_fault(text);
-      rates[fault.kind] = fault.rate;
-    }
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(error.what());
+  for (const std::string& text : settings.faults) {
+    const sim::FaultRate fault = require_fault(text);
+    rates[fault.kind] = fault.rate;
   }
   return rates;
 }
 
 }  // namespace
 
+sim::FaultRate require_fault(std::string_view text) {
+  try {
+    return sim::parse_fault(text);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+}
+
 VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const DeviceSettings& settings)
     : motion_(motion_of(unit, options, settings)),
       storage_(std::make_unique<std::byte[]>(unit.device_storage)),
       device_(unit.device(options, motion_, {storage_.get(), unit.device_storage})),
+      rates_(rates_of(settings)),
+      had_faults_(!settings.faults.empty()),
       real_power_on_(settings.real_power_on) {
   if (device_.bytes == nullptr && device_.frames == nullptr) {
     throw UsageError(fmt::format("{} has no virtual encoder with these options", unit.id));
@@ -74,11 +80,11 @@ VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const Dev
     conditions_[static_cast<std::size_t>(&condition - unit.conditions.data())] =
         require_value(condition, written.value);
   }
-  if (settings.faults.empty()) return;
-  const sim::FaultRates rates = fault_rates(settings);
-  if (device_.bytes != nullptr) faulty_ = std::make_unique<sim::FaultyDevice>(*device_.bytes, rates, settings.seed);
-  if (device_.frames != nullptr)
-    faulty_node_ = std::make_unique<sim::FaultyNode>(*device_.frames, rates, settings.seed);
+  if (!had_faults_ && !settings.faults_may_come) return;
+  if (device_.bytes != nullptr) faulty_ = std::make_unique<sim::FaultyDevice>(*device_.bytes, rates_, settings.seed);
+  if (device_.frames != nullptr) {
+    faulty_node_ = std::make_unique<sim::FaultyNode>(*device_.frames, rates_, settings.seed);
+  }
 }
 
 Machine<std::uint8_t>* VirtualDevice::bytes() const {
@@ -90,6 +96,7 @@ Machine<CanFrame>* VirtualDevice::frames() const {
 }
 
 const sim::FaultCounts* VirtualDevice::faults() const {
+  if (!had_faults_) return nullptr;
   if (faulty_) return &faulty_->counts();
   return faulty_node_ ? &faulty_node_->counts() : nullptr;
 }
@@ -133,6 +140,13 @@ void VirtualDevice::lower_alarms(std::uint32_t bits) {
 void VirtualDevice::set_condition(std::size_t index, std::int64_t value, Time now) {
   conditions_[index] = value;
   each([&](auto& device) { device.set_condition(index, value, now); });
+}
+
+void VirtualDevice::set_faults(const sim::FaultRates& rates) {
+  rates_ = rates;
+  had_faults_ = true;
+  if (faulty_) faulty_->set_rates(rates);
+  if (faulty_node_) faulty_node_->set_rates(rates);
 }
 
 }  // namespace absenc::client

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/protocol/unit.hpp"
@@ -23,10 +24,14 @@ struct DeviceSettings {
   std::vector<std::string> conditions;  // NAME=VALUE, set before it is switched on
   std::vector<std::string> alarms;      // raised from the start
   std::vector<std::string> faults;      // KIND=RATE
+  bool faults_may_come = false;         // while it runs, also without any at the start
   std::uint64_t seed = 1;               // of the faults
   Time delay = sim::FaultRates{}.delay;
   bool real_power_on = false;  // with the document's start-up time
 };
+
+/// Of `corrupt=0.01`. Throws UsageError, which names the kinds and the range of a rate.
+[[nodiscard]] sim::FaultRate require_fault(std::string_view text);
 
 /// Switched off until `power_on`.
 class VirtualDevice {
@@ -52,11 +57,15 @@ class VirtualDevice {
   void set_condition(std::size_t index, std::int64_t value, Time now);
   [[nodiscard]] std::int64_t condition(std::size_t index) const { return conditions_[index]; }
 
+  /// From its next reply on. Only with `faults_may_come`, or where there were faults at the start.
+  void set_faults(const sim::FaultRates& rates);
+  [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }
+
   [[nodiscard]] const Any<Device>& device() const { return device_; }
   /// What stands on the line: the device, or the device with its faults. Exactly one is set.
   [[nodiscard]] Machine<std::uint8_t>* bytes() const;
   [[nodiscard]] Machine<CanFrame>* frames() const;
-  /// What was injected; null without faults.
+  /// What was injected; null where no fault was ever asked for.
   [[nodiscard]] const sim::FaultCounts* faults() const;
 
  private:
@@ -68,6 +77,8 @@ class VirtualDevice {
   Any<Device> device_;
   std::unique_ptr<sim::FaultyDevice> faulty_;
   std::unique_ptr<sim::FaultyNode> faulty_node_;
+  sim::FaultRates rates_;
+  bool had_faults_;
   std::vector<std::int64_t> conditions_;
   std::uint32_t alarms_ = 0;  // raised at the start
   bool real_power_on_;

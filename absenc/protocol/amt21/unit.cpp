@@ -161,7 +161,10 @@ struct Definition : Declares<Definition, Protocol> {
       command<Nodes<addresses>, scan<Protocol, addresses, request_to>, request<Ask::position>>(
           {"scan", Verb::scan, 0, "ask each of the 64 addresses", {}, false, false}),
   };
-  static constexpr LineTiming timing{.turnaround = turn_around[0], .turnaround_limit = 1ms};
+  static constexpr LineTiming timing{
+      .turnaround = turn_around[0],
+      .turnaround_limit = Protocol::host_times({.rate = rates.size() - 1}).answer_limit,  // of the slowest
+  };
   static constexpr std::array conditions{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
   static constexpr std::string_view source = document;
   static constexpr std::string_view d14 = "singleturn_bits=14 multiturn_bits=14";

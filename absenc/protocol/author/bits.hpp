@@ -16,12 +16,14 @@ namespace absenc::author {
   return ranges;
 }
 
-/// The low `count` bits of a number in `size` bytes from `byte` on, the most significant first.
-[[nodiscard]] constexpr BitRanges big_endian_bits(std::size_t byte, std::size_t size, std::size_t count) {
+/// `count` bits from bit `first` on of a number in `size` bytes from `byte` on, the most significant first.
+[[nodiscard]] constexpr BitRanges big_endian_bits(std::size_t byte, std::size_t size, std::size_t count,
+                                                  std::size_t first = 0) {
   BitRanges ranges;
-  for (std::size_t i = size; i > 0 && count > 0; --i) {
-    const std::size_t here = std::min<std::size_t>(count, 8);
-    ranges.push_back({8 * (byte + i - 1), here});
+  for (std::size_t i = size - first / 8; i > 0 && count > 0; --i) {
+    const std::size_t here = std::min(count, 8 - first % 8);
+    ranges.push_back({8 * (byte + i - 1) + first % 8, here});
+    first += here;
     count -= here;
   }
   return ranges;

@@ -41,7 +41,7 @@ class ClockedHostOf : public ClockedEngine {
   /// The last good reply.
   [[nodiscard]] const Reply& found() const { return found_; }
   [[nodiscard]] const Reading* reading() const final {
-    return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
   }
 
  protected:

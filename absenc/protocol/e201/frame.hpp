@@ -142,7 +142,7 @@ struct Reply {
 [[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
   const std::size_t end = end_of_first_line(bytes);
   const Bytes text = trimmed(bytes.first(end));
-  if (end == 0 || text.empty() || !trimmed(bytes.subspan(end)).empty()) return Error::wrong_length;
+  if (text.empty() || !trimmed(bytes.subspan(end)).empty()) return Error::wrong_length;
   for (const std::uint8_t c : text) {
     if (c < 0x20 || c > 0x7E) return Error::bad_framing;
   }

@@ -243,14 +243,12 @@ struct Definition : Declares<Definition, e201::Protocol> {
     return e201::explain(format, error, request, reply);
   }
 
-  // What follows the CRC is ignored, capitals are the same digits, and SSI has no checksum.
-  static bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
+  // What follows the CRC is ignored, capitals are the same digits, and neither SSI nor text has a checksum.
+  static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
     const Format f = format(values);
-    if (!request.bytes.empty() && request.bytes[0] != letter::samples) return false;  // text
     const Result<std::uint64_t> samples = decode_samples(reply.bytes);
     if (!samples || f.carries == Carries::ssi) return false;
-    const Result<Position> position = decode_position(f, *samples);
-    if (!position) return false;
+    const Position position = decode_position(f, *samples).value();
     const std::size_t character = bit / 8;
     if (character + 1 == samples_length) return true;
     const std::uint8_t right = reply.bytes[character];
@@ -260,7 +258,7 @@ struct Definition : Declares<Definition, e201::Protocol> {
     const auto changed = static_cast<unsigned>(before ^ after);
     if (changed == 0) return false;
     const std::size_t first_changed = character * 4 + static_cast<unsigned>(std::countl_zero(changed << 28));
-    return first_changed < biss::idle_bits + position->ack_bits + 2 + biss::data_bits(f.biss());
+    return first_changed < biss::idle_bits + position.ack_bits + 2 + biss::data_bits(f.biss());
   }
 };
 

@@ -231,12 +231,14 @@ void VirtualEncoder::execute(Time at) {
   if (request.error() == Error::unsupported) return;  // no operation of this number: it stays idle
   AccessStatus status = writes ? AccessStatus::write_checksum : AccessStatus::read_checksum;
   if (request.error() == Error::wrong_length) status = AccessStatus::byte_count;
-  // The registers of an AksIM-4 are others, which are not described.
-  const Register* found =
-      request && format_.generation == Generation::aksim2 ? find_register(request->address) : nullptr;
-  const std::size_t index = found != nullptr ? static_cast<std::size_t>(found - registers.data()) : 0;
-  if (request) status = judge(*request, found);
-  if (request && status == AccessStatus::ok && writes) status = write(index, load_big_endian(request->data), at);
+  std::size_t index = 0;
+  if (request) {
+    // The registers of an AksIM-4 are others, which are not described.
+    const Register* found = format_.generation == Generation::aksim2 ? find_register(request->address) : nullptr;
+    if (found != nullptr) index = static_cast<std::size_t>(found - registers.data());
+    status = judge(*request, found);
+    if (status == AccessStatus::ok && writes) status = write(index, load_big_endian(request->data), at);
+  }
   answer_.push_back(writes ? channel3::write_ready : channel3::read_ready);
   answer_.push_back(static_cast<std::uint8_t>(status));
   if (!request || writes) return;

@@ -158,6 +158,34 @@ TEST(EncolinkDevice, TransmitsByItselfAtItsRate) {
   EXPECT_EQ(ends[95] - ends[0], 19 * 500us);
 }
 
+/// What channel 3 says, a byte a cycle, to a register access.
+RawBytes answer_to(Bench& bench, Bytes access) {
+  std::vector<RawBytes> requests(80, position_request);
+  requests[0] = {0xAA, 0x00};
+  for (std::size_t i = 0; i < access.size(); ++i) requests[1 + i][1] = access[i];
+  const auto replies = bench.ask(requests);
+  RawBytes answer;
+  for (std::size_t first = 1; first + single.cycle_bytes() <= replies.size(); first += single.cycle_bytes()) {
+    RawBytes cycle;
+    for (std::size_t i = 0; i < single.cycle_bytes(); ++i) cycle.push_back(replies[first + i].back());
+    const std::uint8_t told = decode_cycle(single, cycle)->channel3;
+    if (told != channel3::idle && told != channel3::busy) answer.push_back(told);
+  }
+  return answer;
+}
+
+TEST(EncolinkDevice, AnAksim4HasOtherRegisters) {
+  const AccessBytes access = encode_access(read_request(0x4C, 2));
+  for (const auto& [generation, status] :
+       {std::pair<std::string, AccessStatus>{"2", AccessStatus::ok}, {"4", AccessStatus::no_such_register}}) {
+    Bench bench(std::string(testing::single) + " protocol_version=" + generation);
+    const RawBytes answer = answer_to(bench, access);
+    ASSERT_GE(answer.size(), 2u);
+    EXPECT_EQ(answer[0], channel3::read_ready);
+    EXPECT_EQ(answer[1], static_cast<std::uint8_t>(status));
+  }
+}
+
 TEST(EncolinkDevice, KeepsWhatIsSaved) {
   Bench bench;
   EXPECT_EQ(bench.device.memory().size(), 31u);

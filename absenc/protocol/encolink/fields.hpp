@@ -9,6 +9,7 @@
 #include <optional>
 #include <string_view>
 
+#include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
 #include "absenc/protocol/encolink/registers.hpp"
@@ -207,6 +208,46 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
                      (reply.size() == known.frame_bytes() && is_sealed(reply.first(known.position_bytes() + 1)));
   if (!turns) known.multiturn_bits = 0;
   return known;
+}
+
+namespace detail {
+
+constexpr BitRanges identity_bits(const FieldInfo& field) {
+  using author::bits_of;
+  if (&field == frame_fields.of<of<&Values::identity, &Identity::protocol_version>>()) return bits_of(0, 0, 8);
+  if (&field == frame_fields.of<of<&Values::identity, &Identity::frame_bytes>>()) return bits_of(1, 0, 8);
+  return {};  // the resolution is decimal
+}
+
+// Channel 1 is one number, whose lowest two bits are active low.
+constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) {
+  const std::size_t size = format.position_bytes();
+  if (&field == frame_fields.of<of<&Values::position, &Position::singleturn>>()) {
+    return author::big_endian_bits(0, size, format.resolution, 24 - format.resolution);
+  }
+  if (&field == frame_fields.of<&Values::multiturn>()) {
+    return author::big_endian_bits(0, size, static_cast<std::size_t>(format.multiturn_bits), 24 + format.spare_turns());
+  }
+  BitRanges ranges;
+  const std::size_t last = 8 * (size - 1);
+  if (&field == frame_fields.of<of<&Values::position, &Position::error>>()) ranges.push_back({last + 1, 1, true});
+  if (&field == frame_fields.of<of<&Values::position, &Position::warning>>()) ranges.push_back({last, 1, true});
+  return ranges;
+}
+
+}  // namespace detail
+
+/// Where a good reply has a field.
+[[nodiscard]] constexpr BitRanges bits_of(const Format& format, Bytes reply, const FieldInfo& field) {
+  if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) return detail::identity_bits(field);
+  const Format known = assumed(format, reply);
+  const std::size_t behind = known.position_bytes();
+  if (&field == frame_fields.of<&Values::channel2>()) return author::bits_of(behind + 1, 0, 8);
+  if (&field == frame_fields.of<&Values::channel3>()) return author::bits_of(behind + 2, 0, 8);
+  if (&field == frame_fields.of<&Values::status>() || &field == frame_fields.of<detail::alarms_of>()) {
+    return author::big_endian_bits(behind, 2, 16);
+  }
+  return detail::position_bits(known, field);
 }
 
 /// The request alone: two bytes, or all the `ra` bytes of a register access.

@@ -71,6 +71,29 @@ TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
   EXPECT_EQ(decode_identity({}).error(), Error::wrong_length);
 }
 
+TEST(EncolinkFrame, AnIdentityOfAnotherKindIsNone) {
+  for (const Identity& other : {Identity{.protocol_version = 3}, Identity{.frame_bytes = 6}}) {
+    EXPECT_EQ(decode_identity(encode_identity(other)).error(), Error::unexpected_reply);
+  }
+}
+
+TEST(EncolinkFrame, TheResolutionOfAnIdentityIsANumber) {
+  for (const unsigned bits : {0u, 23u}) {
+    EXPECT_EQ(decode_identity(encode_identity({.resolution = bits})).error(), Error::out_of_range);
+  }
+  ReplyBytes strange = encode_identity({.resolution = 10});
+  strange[11] = '0' - 1;
+  strange[18] = checksum(strange.view().first(18));
+  EXPECT_EQ(decode_identity(strange).error(), Error::out_of_range);
+}
+
+TEST(EncolinkFrame, ACycleHasItsLength) {
+  const ReplyBytes cycle = encode_cycle(single, {{.singleturn = 5}, 0, channel3::idle});
+  ASSERT_TRUE(decode_cycle(single, cycle).has_value());
+  EXPECT_EQ(decode_cycle(single, cycle.view().first(cycle.size() - 1)).error(), Error::wrong_length);
+  EXPECT_EQ(decode_cycle(single, {}).error(), Error::wrong_length);
+}
+
 TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
   const Identity turns{.frame_bytes = 7, .resolution = 18};
   const Result<Format> asked = complete({}, turns);
@@ -96,6 +119,7 @@ TEST(EncolinkFrame, EveryAlarmHasItsWords) {
 TEST(EncolinkFrame, BadAccessesAreNamed) {
   EXPECT_EQ(decode_access({}).error(), Error::wrong_length);
   EXPECT_EQ(decode_access(hex<"00CDEF">).error(), Error::wrong_length);
+  EXPECT_EQ(decode_access(hex<"00CDEF89AB59000200">).error(), Error::wrong_length);
   EXPECT_EQ(decode_access(hex<"00CDEF89AC5900020000004C05">).error(), Error::bad_framing);
   EXPECT_EQ(decode_access(hex<"00CDEF89AB5A00020000004C05">).error(), Error::unsupported);
   EXPECT_EQ(decode_access(hex<"00CDEF89AB5900020000004C0500">).error(), Error::wrong_length);
@@ -126,6 +150,8 @@ TEST(EncolinkUnit, EncodesTheBytesThatDoTheWork) {
                          {"save", {}, of(hex<"00CDEF89AB580001000000496342">)},
                          {"memory-write", {0, 0x12345678, 0}, of(hex<"00CDEF89AB58000400000000123456787B">)},
                          {"memory-read", {0x1234, 0}, {}},  // how many bytes?
+                         {"memory-write", {0x1234, 0, 0}, {}},
+                         {"memory-write", {0x64, 1, 0}, {}},  // 20 of them
                          {"memory-write", {0x49, 0x63, 9}, {}}}) {
     std::array<std::uint8_t, 64> bytes{};
     const Result<std::size_t> size = unit.encode({}, *find_command(unit, one.command), one.arguments, bytes);

@@ -115,6 +115,24 @@ TEST_P(EncolinkHost, TheIdentityCountsAgainstTheOptionsWhereItIsAskedFor) {
   EXPECT_EQ(turns.reading->multiturn, 7u);
 }
 
+TEST_P(EncolinkHost, AnIdentityThatSaysOtherwiseEndsWhatTakesSeveralFrames) {
+  Bench bench("resolution=20 multiturn_bits=16", interface);
+  bench.tell("multiturn_bits=0");
+  EXPECT_EQ(bench.run("alarms").error, Error::unexpected_reply);
+}
+
+TEST_P(EncolinkHost, AnIdentityOfAnotherKindSaysNothingOfTheOptions) {
+  Bench bench("resolution=20 multiturn_bits=16", interface);
+  bench.tampered.replies([](unsigned, RawBytes& reply) {
+    if (reply.size() < identity_bytes) return;
+    reply[0] = 3;
+    reply[identity_bytes - 1] = checksum(Bytes(reply).first(identity_bytes - 1));
+  });
+  const Told identify = bench.run("identify");
+  EXPECT_EQ(identify.error, Error::unexpected_reply);
+  EXPECT_FALSE(says(identify.detail, "resolution")) << identify.detail;
+}
+
 TEST_P(EncolinkHost, TheIdentityMayHaveAByteBehindIt) {
   for (const std::string_view told : {std::string_view(""), testing::multi}) {
     Bench bench("resolution=20 multiturn_bits=16 identity_bytes=20", interface);
@@ -167,6 +185,8 @@ TEST_P(EncolinkHost, TheIdentityOfVersion4LeavesRegistersAlone) {
     ASSERT_EQ(info.error, Error::none) << info.detail;
     EXPECT_EQ(info.numbers.at("protocol_version"), 4);
     EXPECT_EQ(info.texts.at("registers"), not_described);
+    ASSERT_TRUE(info.reading);
+    EXPECT_EQ(info.reading->singleturn, 0x12345u);
     EXPECT_EQ(info.texts.count("serial_number"), 0u);
   }
   EXPECT_EQ(bench.device.memory_version(), 0u);
@@ -327,6 +347,22 @@ TEST(EncolinkListen, OneGoodChecksumMayBeAccident) {
   EXPECT_EQ(listen.reading()->singleturn, 0x12345u);
   EXPECT_EQ(listen.skipped(), 7u);
   EXPECT_EQ(listen.next(1ms).kind, Step<std::uint8_t>::Kind::done);
+}
+
+TEST(EncolinkListen, AReadingIsOfWhatStillComes) {
+  using Kind = Step<std::uint8_t>::Kind;
+  const ReplyBytes frame = encode_position(testing::single_format, {.singleturn = 5});
+  Listen listen(testing::single_format, 3);
+  listen.next(Time{});
+  for (int i = 0; i < 2; ++i) {
+    listen.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1ms, .items = frame});
+  }
+  EXPECT_EQ(listen.next(1ms).kind, Kind::emit);
+  EXPECT_NE(listen.reading(), nullptr);
+  const Time limit = listen.next(1ms).at;
+  EXPECT_EQ(listen.next(limit).kind, Kind::done);
+  EXPECT_NE(listen.error(), Error::none);
+  EXPECT_EQ(listen.reading(), nullptr);
 }
 
 TEST(EncolinkListen, SaysWhatItHears) {

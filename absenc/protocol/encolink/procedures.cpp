@@ -220,11 +220,10 @@ Part<bool> command(Dialog& dialog, Found& found, std::uint8_t code) {
   const Fate fate = co_await attempt_write(dialog, found, registers[command_register].address, 1, code);
   const bool untouched = fate == Fate::gone && !found.was_asked;
   if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
-  if (fate == Fate::gone) {
-    co_await dialog.stop({found.why.error, "the encoder stopped answering: the command may have been executed"});
-  }
-  if (fate == Fate::lost) {
-    co_await dialog.stop({found.why.error, "the answer to the command was lost: it may have been executed"});
+  if (fate != Fate::good) {
+    co_await dialog.stop({found.why.error, fate == Fate::gone
+                                               ? "the encoder stopped answering: the command may have been executed"
+                                               : "the answer to the command was lost: it may have been executed"});
   }
   co_return true;
 }
@@ -234,8 +233,8 @@ bool is_near(const Dialog& dialog, std::uint32_t singleturn,
   return author::is_near(dialog.last().singleturn, singleturn, dialog.format().resolution, millidegrees);
 }
 
+// Of a procedure that has had a frame.
 Part<bool> stands_still(Dialog& dialog, Found& found) {
-  co_await next_frame(dialog, found);
   const std::uint32_t first = dialog.last().singleturn;
   const Time looked = dialog.received_at();
   while (dialog.received_at() - looked < author::between_looks) co_await next_frame(dialog, found);
@@ -286,7 +285,7 @@ Procedure read_info(Dialog& dialog, Found& found) {
 namespace {
 
 Procedure read_at(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
-  if (size == 0 || size > access_capacity) co_return {Error::invalid_argument, size_needed};
+  if (size == 0) co_return {Error::invalid_argument, size_needed};
   found.emits = true;
   co_await read(dialog, found, address, size);
   found.address = address;

@@ -272,6 +272,90 @@ TEST_P(EncolinkRegister, AnAnswerMayCome8CyclesLate) {
   }
 }
 
+/// Changes what channel 3 says on a UART, a byte a cycle of seven frames.
+struct OnChannel3 {
+  OnChannel3(Bench& bench, std::function<std::uint8_t(std::uint8_t)> change) : change_(std::move(change)) {
+    bench.tampered.requests([this](unsigned, RawBytes& request) {
+      if (request[0] == 0xAA) at_ = 7;  // the next reply is none of the cycle yet
+    });
+    bench.tampered.replies([this](unsigned, RawBytes& reply) {
+      if (at_ == 7) {
+        at_ = 0;
+        return;
+      }
+      if (reply.size() != 5) return;
+      if (at_ == 5) reply[4] = change_(reply[4]);
+      if (at_ == 6) reply[4] = checksum(Bytes(cycle_).first(6));
+      cycle_[at_] = reply[4];
+      at_ = (at_ + 1) % 7;
+    });
+  }
+  std::function<std::uint8_t(std::uint8_t)> change_;
+  unsigned at_ = 0;
+  RawBytes cycle_ = RawBytes(7);
+};
+
+TEST(EncolinkAccess, AnswersBeginWithReady) {
+  Bench bench(testing::single);
+  const OnChannel3 strange(bench, [](std::uint8_t told) { return told == channel3::read_ready ? 0x77 : told; });
+  const Told read = bench.run("memory-read", {0x4C});
+  EXPECT_EQ(read.error, Error::unexpected_reply);
+  EXPECT_EQ(read.detail, "channel 3 says neither idle nor busy nor ready");
+}
+
+// The encoder counts no calibration, or says that the ring is too eccentric.
+TEST(EncolinkAccess, ASelfCalibrationMayFailOrNeverEnd) {
+  for (const auto& [says, error, words] : std::to_array<std::tuple<std::uint8_t, Error, std::string_view>>(
+           {{calibration::out_of_range, Error::cross_check_failed, "too eccentric"},
+            {0, Error::timeout, "does not end"}})) {
+    Bench bench(testing::single);
+    unsigned reads = 0;
+    unsigned step = 0;  // of the answer: ready, good, the value
+    const OnChannel3 changed(bench, [&, status = says](std::uint8_t told) {
+      if (step == 0)
+        step = told == channel3::read_ready ? 1 : 0;
+      else if (step == 1)
+        step = told == static_cast<std::uint8_t>(AccessStatus::ok) ? 2 : 0;
+      else if (step == 2)
+        return step = 0, reads++ == 0 ? std::uint8_t{0} : status;
+      return told;
+    });
+    const Told told = bench.run("self-calibrate");
+    EXPECT_EQ(told.error, error);
+    EXPECT_TRUE(testing::says(told.detail, words)) << told.detail;
+  }
+}
+
+TEST(EncolinkAccess, WhatCannotBeWrittenIsNotTried) {
+  Bench bench("resolution=20 multiturn_bits=12");
+  const Register* text =
+      std::find_if(registers.begin(), registers.end(), [](const Register& one) { return one.size > 8; });
+  ASSERT_NE(text, registers.end());
+  for (const std::int64_t address : {std::int64_t{0x1234}, std::int64_t{text->address}}) {
+    const Told written = bench.run("memory-write", {address, 0});
+    EXPECT_EQ(written.error, Error::invalid_argument);
+    EXPECT_TRUE(says(written.detail, "how many bytes")) << written.detail;
+  }
+  const Told preset = bench.run("preset-multiturn", {4096});
+  EXPECT_EQ(preset.error, Error::invalid_argument);
+  EXPECT_TRUE(says(preset.detail, "not so many bits")) << preset.detail;
+}
+
+TEST_P(EncolinkRegister, ACommandTellsThePositionWithoutAStatus) {
+  Bench bench(testing::single, interface);
+  const Told save = bench.run("save");
+  EXPECT_EQ(save.numbers.count("singleturn"), 1u);
+  EXPECT_EQ(save.numbers.count("status"), 0u);
+}
+
+TEST_P(EncolinkRegister, APresetNeedsAShaftThatStands) {
+  Bench bench(testing::multi, interface);
+  bench.shaft.spin(30'000, bench.line.now());
+  const Told preset = bench.run("preset-multiturn", {1234});
+  EXPECT_EQ(preset.error, Error::cross_check_failed);
+  EXPECT_TRUE(says(preset.detail, "hold the shaft still")) << preset.detail;
+}
+
 TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({100}));  // while it is busy

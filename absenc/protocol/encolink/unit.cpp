@@ -185,7 +185,7 @@ struct Report {
     const Bytes reply = host.reply();
     switch (host.error()) {
       case Error::unexpected_reply:
-        if (!of_identity || !decode_identity(reply)) return {};
+        if (!decode_identity(reply)) return {};
         return {
             "the identity says another resolution than the options, or disagrees on whether there are turns: "
             "leave resolution and multiturn_bits out, and it is asked"};
@@ -406,6 +406,9 @@ struct Definition {
   static constexpr auto probe = encolink::probe;
   static constexpr auto is_checked = encolink::is_checked;
   static bool streams(const Options& values) { return format(values).stream_rate > 0; }
+  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+    return bits_of(format(values), reply.bytes, field);
+  }
 
   static constexpr Format format(const Options& values) {
     Format made = options.format(values);

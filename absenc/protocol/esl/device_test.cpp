@@ -343,5 +343,22 @@ TEST(EslDevice, FaultsStayInTheirChannel) {
   EXPECT_EQ(reply.redundant, 0u);
 }
 
+// Of a request with a damaged character it answers its own alone, and one of which nothing was understood not at all.
+TEST(EslDevice, ADamagedRequestOfAnotherIsNone) {
+  using Kind = Event<std::uint8_t>::Kind;
+  for (const auto& [begun, is_answered] :
+       std::to_array<std::pair<Wire, bool>>({{{control_field({}, 0, DataId::position)}, true},
+                                             {{control_field({}, 5, DataId::position)}, false},
+                                             {{}, false}})) {
+    Bench bench;
+    Machine<std::uint8_t>& encoder = bench.encoder;
+    encoder.next(1us);
+    if (!begun.empty()) encoder.feed({.kind = Kind::received, .at = 1us, .items = begun});
+    encoder.feed({.kind = Kind::line_error, .at = 2us});
+    encoder.feed({.kind = Kind::silence, .at = 10us});
+    EXPECT_EQ(encoder.next(10us).kind == Step<std::uint8_t>::Kind::transfer, is_answered);
+  }
+}
+
 }  // namespace
 }  // namespace absenc::esl

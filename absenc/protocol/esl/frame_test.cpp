@@ -7,6 +7,9 @@
 #include <bit>
 #include <vector>
 
+#include "absenc/core/hex.hpp"
+#include "absenc/protocol/author/unit_bench_test.hpp"
+#include "absenc/protocol/esl/unit.hpp"
 #include "absenc/sim/random.hpp"
 
 namespace absenc::esl {
@@ -186,6 +189,20 @@ TEST(EslFrame, ValidityOfEachPart) {
   EXPECT_TRUE(to_reading(short_reply).singleturn_valid());
   EXPECT_FALSE(to_reading(short_reply).multiturn_valid);
   EXPECT_EQ(to_reading({.id = DataId::temperature}).singleturn_bits, 0u);
+}
+
+TEST(EslUnit, SaysNothingOfWhatIsNoFrame) {
+  EXPECT_EQ(decode_request({}, {}).error(), Error::wrong_length);
+  const Options values = author::testing::options_of(unit, "");
+  const Bytes request = hex<"0875">;
+  EXPECT_EQ(unit.explain(values, Error::wrong_length, {.bytes = request}, {.bytes = request}).detail, "");
+  for (unsigned byte = 0; byte < 256; ++byte) {
+    const std::array reply{static_cast<std::uint8_t>(byte), std::uint8_t{0}, std::uint8_t{0}};
+    if (data_id(reply[0])) continue;
+    for (const Error error : {Error::bad_checksum, Error::unexpected_reply, Error::cross_check_failed}) {
+      EXPECT_EQ(unit.explain(values, error, {}, {.bytes = reply}).detail, "") << byte;
+    }
+  }
 }
 
 }  // namespace

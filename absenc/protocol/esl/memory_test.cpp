@@ -51,6 +51,7 @@ TEST(EslMemory, WhatTable11LacksIsRefusedBeforeAnythingIsSent) {
   for (const auto& [command, arguments] :
        {std::pair{read, std::vector<std::int64_t>{0, 7}}, std::pair{read, std::vector<std::int64_t>{0x7E, 0, 2}},
         std::pair{write, std::vector<std::int64_t>{page_select_address, 1, 0, 1}},
+        std::pair{write, std::vector<std::int64_t>{0, 1, 7, 1}},
         std::pair{"select-page", std::vector<std::int64_t>{9}}}) {
     const Told refused = bench.run(command, arguments);
     EXPECT_EQ(refused.error, Error::invalid_argument);

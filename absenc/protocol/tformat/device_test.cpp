@@ -18,7 +18,7 @@ using testing::Wire;
 void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
   for (unsigned i = 0; i < times; ++i) {
     EXPECT_EQ(bench.raw({control_field(id)}).size(), 6u);
-    bench.pass(reset_interval);
+    bench.pass(40us);
   }
 }
 
@@ -160,7 +160,7 @@ TEST(TformatDevice, TenRequestsMakeAReset) {
   EXPECT_NE(bench.everything().alarms, 0);  // and this read starts the count again
   reset(bench, DataId::clear_alarms, 9);
   EXPECT_NE(bench.raw({0xBA})[1] & status::alarm, 0);  // the tenth still shows the old errors
-  bench.pass(reset_interval);
+  bench.pass(40us);
   EXPECT_EQ(bench.everything().alarms, 0);
   EXPECT_EQ(bench.everything().multiturn, 7u);
   reset(bench, DataId::reset_multiturn);
@@ -337,6 +337,24 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
   const Reply reply = bench.encoder.everything(bench.line.now());
   EXPECT_EQ(reply.alarms & alarms::over_speed, alarms::over_speed);
   EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the count is wrong
+}
+
+// 5.4.2: for the first five seconds without power the counter follows a faster jolt.
+TEST(TformatDevice, TheLimitOfAJoltFallsFiveSecondsAfterPowerOff) {
+  struct Jolt final : Shaft {
+    [[nodiscard]] ShaftState at(Time time) const override {
+      return {.acceleration = time >= when && time < when + 100ms ? 40'000 : 0};
+    }
+    Time when{};
+  } jolt;
+  for (const auto& [when, is_seen] : {std::pair<Time, bool>{4'800ms, false}, {5'100ms, true}}) {
+    jolt.when = when;
+    VirtualEncoder encoder({}, jolt);
+    encoder.power_on(Time{}, PowerOn::skip);
+    encoder.power_off(Time{});
+    encoder.power_on(10s, PowerOn::skip);
+    EXPECT_EQ(encoder.everything(10s).alarms, is_seen ? alarms::over_speed : 0) << when.count();
+  }
 }
 
 TEST(TformatDevice, CountingAndMultiturnErrorsEndWithThePower) {

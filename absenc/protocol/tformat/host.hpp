@@ -23,7 +23,7 @@ class ReadPosition : public author::HostOf<Protocol> {
   ReadPosition(const Format& format, const Request& request) : ReadPosition(format, request.id) {}
 
   [[nodiscard]] const Reading* reading() const final {
-    return error() == Error::none && id_ != DataId::encoder_id ? &reading_ : nullptr;
+    return reading_.singleturn_bits != 0 || reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
   }
   /// Of the last good exchange.
   [[nodiscard]] const Reply& reply() const { return last(); }

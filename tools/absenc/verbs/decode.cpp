@@ -183,7 +183,9 @@ constexpr std::array<Parameter, 15> decode_parameters{{
     {"--rate", "HZ", "samples a second, where the file does not tell"},
     {"--stats", "", "only what it comes to: counts, errors, turn-around times, the way of the position"},
     {"--csv", "", "a line for each exchange"},
-    {"--bits", "", "also where in the reply each field stands, by the bits as they come on the wire, from 0 on"},
+    {"--bits", "",
+     "also where in the reply each field stands: bit 0 is the least significant of the first byte, on clocked links "
+     "the first on the wire"},
     parameter::model,
     parameter::protocol_option,
     {"--json", "", "one JSON object; of a capture one a line"},

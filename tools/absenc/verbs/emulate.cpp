@@ -331,6 +331,7 @@ DeviceSettings device_settings(const Invocation& invocation) {
   for (const std::string& fault : invocation.texts("--fault")) settings.faults.push_back(fault);
   settings.seed = static_cast<std::uint64_t>(invocation.number("--seed", 1, 0, INT64_MAX));
   settings.delay = late_reply;
+  settings.faults_may_come = true;
   const std::string_view power_on = invocation.text("--power-on", "skip");
   if (power_on != "real" && power_on != "skip") {
     throw UsageError(fmt::format("--power-on is \"{}\", but must be real or skip", power_on));
@@ -346,6 +347,7 @@ EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, c
   for (const std::string& option : invocation.texts("--option")) base += option + '&';
   EncoderAddress uri = parse_address(base + further);
   uri.device.delay = settings.delay;
+  uri.device.faults_may_come = settings.faults_may_come;
   uri.device.real_power_on = settings.real_power_on;
   return uri;
 }
@@ -363,6 +365,7 @@ const Subcommand emulate_subcommand{
     "  NAME=VALUE       set a condition; NAME alone asks for it\n"
     "  power off        and power on, which takes the time of the document\n"
     "  alarm NAME       raise alarms; clear NAME lowers them\n"
+    "  fault KIND=RATE  damage replies as --fault does; fault none ends it\n"
     "  help             what this encoder can be told\n"
     "With --also a line is for all of them, with a number in front for one: \"2: power off\" is the first of --also.\n"
     "At the end, a summary goes to standard error: requests, faults, and the rules that the host broke.",

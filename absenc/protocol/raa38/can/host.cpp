@@ -20,11 +20,13 @@ void Read::heard(const CanFrame& frame, Time at) {
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
   // Nothing tells when the node took the position: after it was asked, or some time before it sent it by itself.
-  reading_ = {.singleturn = *counts,
-              .singleturn_bits = format_.bits,
-              .singleturn_valid_bits = format_.bits,
-              .latched = exchange().sent.empty() ? at : sent_at(),
-              .received = at};
+  if (counts) {
+    reading_ = {.singleturn = *counts,
+                .singleturn_bits = format_.bits,
+                .singleturn_valid_bits = format_.bits,
+                .latched = exchange().sent.empty() ? at : sent_at(),
+                .received = at};
+  }
   finish({counts.error()});
 }
 

@@ -51,7 +51,9 @@ class Read : public author::CanEngine {
 
   [[nodiscard]] const Format& format() const { return format_; }
   [[nodiscard]] const Reading& found() const { return reading_; }
-  [[nodiscard]] const Reading* reading() const final { return error() == Error::none ? &reading_ : nullptr; }
+  [[nodiscard]] const Reading* reading() const final {
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
+  }
 
  private:
   void heard(const CanFrame& frame, Time at) final;

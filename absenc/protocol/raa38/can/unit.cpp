@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/look.hpp"
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/raa38/can/device.hpp"
@@ -139,6 +140,11 @@ struct Definition : author::Declares<Definition, Protocol> {
     if (is_only_named(function_of(*reply.can))) return false;
     const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
     return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
+  }
+  // The node is in the identifier.
+  static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
+    if (&field != fields.of<&Values::singleturn>()) return {};
+    return author::bits_of(0, 0, options.format(values).bits);
   }
   // Nothing answers NMT, SYNC and emergencies, nor the command that enters the configuration.
   static bool is_answered(const Options&, Frame request) {

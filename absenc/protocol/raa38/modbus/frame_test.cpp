@@ -147,5 +147,14 @@ TEST(Raa38ModbusProbe, FramesTellRegistersAndHowManyBitsAtLeast) {
   EXPECT_TRUE(says(evidence.reasons, "checksum"));
 }
 
+TEST(Raa38ModbusFrame, ReadingsOfOtherRegistersAreNoPosition) {
+  EXPECT_EQ(decode_reply({}, {.registers = 0}, hex<"01030020f0">).error(), Error::unsupported);
+  EXPECT_EQ(decode_reply({}, {.registers = 3}, hex<"010306000000000005e176">).error(), Error::unsupported);
+}
+
+TEST(Raa38ModbusFrame, NothingIsSaidOfWhatIsTooShort) {
+  EXPECT_EQ(explain({}, Error::unexpected_reply, hex<"010300000001840a">, hex<"01">).detail, "");
+}
+
 }  // namespace
 }  // namespace absenc::raa38::rtu

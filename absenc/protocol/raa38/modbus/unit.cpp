@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/raa38/modbus/device.hpp"
 #include "absenc/protocol/raa38/modbus/host.hpp"
@@ -215,6 +216,15 @@ struct Definition : author::Declares<Definition, Protocol> {
           {"scan", Verb::scan, 0, "who answers on the line", scan_arguments, false, false}),
   };
 
+  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+    const std::size_t address_at = reply.bytes[1] == function::ask_address ? 2 : 0;
+    if (&field == fields.of<&Values::address>()) return author::bits_of(address_at, 0, 8);
+    if (&field == fields.of<&Values::new_address>()) return author::bits_of(0, 0, 8);
+    if (&field == fields.of<&Values::function>()) return author::bits_of(1, 0, 8);
+    if (&field == fields.of<&Values::parameter>()) return author::bits_of(2, 0, 8);
+    if (&field != fields.of<&Values::singleturn>()) return {};
+    return author::big_endian_bits(3, reply.bytes.size() - 3 - modbus::crc_size, options.format(values).bits);
+  }
   static constexpr Request guess_request(const Format& format, Bytes reply) { return assumed_request(format, reply); }
 
   static constexpr Values values(const Format&, const Request& request) {

@@ -51,5 +51,15 @@ TEST(RaaFrame, ARepeatedFrameReadElsewhereIsNoOtherPosition) {
   }
 }
 
+TEST(Raa38Frame, EveryByteOfARequestIsLookedAt) {
+  const RequestBytes good = encode_request({Request::Kind::read, 3});
+  ASSERT_TRUE(decode_request(good).has_value());
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    RequestBytes wrong = good;
+    wrong[i] = static_cast<std::uint8_t>(wrong[i] ^ 0x10);
+    EXPECT_EQ(decode_request(wrong).error(), Error::unexpected_reply) << i;
+  }
+}
+
 }  // namespace
 }  // namespace absenc::raa38::serial
