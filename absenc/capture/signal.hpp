@@ -47,7 +47,8 @@ struct Character {
   bool is_break = false;
 };
 
-/// A run of clocks: an SPI transfer between two edges of chip select, or a clocked word between two pauses.
+/// A run of clocks: an SPI transfer between two edges of chip select, or a clocked word between two pauses. One that
+/// was cut is marked, because a word without its first bits is a plausible wrong position.
 struct Burst {
   Tick begin = 0;
   Tick end = 0;

@@ -72,7 +72,8 @@ class Memory {
 
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position: an encoder of another model than was said shows itself by that, its memory does not tell.
+  /// Reads the position: an encoder of another model than was said shows itself by that. Its memory does not tell, and
+  /// would take the bytes all the same.
   void check_model();
 
   /// What the encoder has at the addresses of `image`, as dump_addresses has all of them. Throws UsageError for those

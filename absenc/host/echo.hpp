@@ -27,7 +27,8 @@ class EchoFilter final : public Machine<std::uint8_t> {
     sent_.clear();
     held_.clear();
   }
-  /// How the conversation ended. In automatic mode only a good one makes what was found final.
+  /// How the conversation ended. In automatic mode only a good one makes what was found final: a reply that is one byte
+  /// too long looks like an echo at first.
   void conclude(bool good);
 
   void feed(const Event<std::uint8_t>& event) override;

@@ -26,6 +26,10 @@ namespace absenc::host {
 ///    it was, the present request's own is coming;
 /// 4. the request is sent once more where it may be, and its reply is taken; elsewhere the conversation is told that
 ///    none came.
+///
+/// It knows no protocol: whether a reply could be that to another request is asked of Unit::decode. On CAN a node that
+/// sends by itself cannot be told from a late answer. Tests compare with the true shaft (tests/late_reply_test.cpp) and
+/// excuse nothing because it was late.
 template <class Item>
 class ReplyGuard final : public Machine<Item> {
  public:

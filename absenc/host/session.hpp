@@ -30,7 +30,8 @@ struct Counters {
   }
 };
 
-/// Of an encoder that transmits by itself.
+/// Of an encoder that transmits by itself. Whoever reads at a rate of his own wants the newest: what waits in the port
+/// would be shown as of now.
 enum class Take : std::uint8_t {
   newest,  // the first that comes from now on
   every,   // the one after the last, however long ago it came
@@ -64,7 +65,8 @@ class Session {
 
   /// The position. After opening and after silence it is read until two readings in a row agree; when none of ten
   /// does, the last one is returned and `confirmed` is false.
-  /// A conversation that streams goes on where it stopped; `take` says whether with what came meanwhile.
+  /// A conversation that streams goes on where it stopped, because to find the frames anew costs two of them; `take`
+  /// says whether with what came meanwhile.
   const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
     if (streaming_ && take == Take::newest) catch_up(machine(), *port_);
     const Conversation<Item>* conversation = read_once(command);
@@ -112,6 +114,8 @@ class Session {
     return attempt(command, {}, [](const Conversation<Item>&) { return true; });
   }
 
+  // Whole commands are repeated here. Within a procedure that is not repeatable (a reset, a write) its engine repeats
+  // the single requests that only read.
   template <class OnEmit>
   const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     const unsigned attempts = command.repeatable ? attempts_ : 1;

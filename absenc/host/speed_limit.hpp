@@ -8,6 +8,7 @@
 
 namespace absenc::host {
 
+/// There always is a limit: a pause joined on trust showed 0.40 turns for 10.40.
 struct SpeedLimit {
   /// Where nobody says more: what the fastest encoders here are specified for, and faster than linear axes go.
   std::uint32_t rpm = 10'000;

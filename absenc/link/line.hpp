@@ -26,6 +26,7 @@ enum class ExtraWire : std::uint8_t { trigger, clear };
 /// The rate of virtual encoders whose protocol leaves it open.
 inline constexpr std::uint32_t assumed_rate = 115'200;
 
+/// Of spi and clocked links the unit says here how a controller is set up; sim draws its waveforms by the same.
 struct LineSettings {
   std::uint32_t rate = 0;  // bits a second: baud, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;

@@ -7,7 +7,8 @@
 namespace absenc {
 
 /// Carries out steps and reports events. Ports of the operating system throw on failure (os/error.hpp);
-/// a port on a microcontroller reports it as `line_error`.
+/// a port on a microcontroller reports it as `line_error`. An interface here, so that the loop that drives a machine
+/// exists once (host/drive.hpp) and os needs nothing from host.
 template <class Item>
 struct Port {
   /// The port's own clock, which stamps every event; it never runs backwards.

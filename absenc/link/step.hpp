@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The conversation between a protocol and whatever carries it: a machine is fed events and asked for steps.
 // It owns no port and no clock, so the same object runs over a real port, on a microcontroller and in virtual time.
+// Not in core, because it speaks of lines and CAN frames, which core does not know.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +16,11 @@ namespace absenc {
 
 /// What a machine wants next. Times are protocol time: the carrier adds its own latency to `answer` and `gap`.
 /// Item is std::uint8_t (characters, SPI bytes, clocked bits packed MSB first) or CanFrame.
+///
+/// A transfer is handed out once; after it the machine waits. `expect`, `answer` and `gap` stand in both steps: in the
+/// transfer because a microcontroller must prepare its receiver before the last bit is out, in the wait because they
+/// change while items come. A machine that may be fed another event in the very moment of its timer compares the time
+/// in `next` itself.
 template <class Item>
 struct Step {
   enum class Kind : std::uint8_t {
@@ -39,6 +45,10 @@ struct Step {
 };
 
 /// What happened. `at` is the time at which it was complete: the end of the last bit.
+///
+/// A clocked device is told the period of the clock with `selected`, because what it answers depends on it: the ACK of
+/// BiSS, and what a long line makes of it. An SPI device is told with `sent`: between chip select and the first clock
+/// there is a pause, so that the time since `selected` does not tell how fast it was.
 template <class Item>
 struct Event {
   enum class Kind : std::uint8_t {

@@ -38,7 +38,8 @@ void check(bool good, const std::string& what) {
 }
 
 // A socket whose name in the kernel is that of the link: it lives as long as the process that bound it, so that the
-// link of an emulator that was killed is told from one in use, whoever has got the number of its terminal since.
+// link of an emulator that was killed is told from one in use, whoever has got the number of its terminal since. The
+// terminal is not opened for that, which whoever talks there would notice.
 Descriptor bind_name_of(const fs::path& link) {
   struct stat folder {};
   Descriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));

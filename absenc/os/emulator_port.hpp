@@ -17,7 +17,8 @@ namespace absenc::os {
 /// one of 0.2 ms where the device waits for nothing more.
 ///
 /// A device that configures the line hears a terminal only at its own rate. A terminal that nobody has set (the
-/// kernel's 38400 baud) and TCP have none: they are heard at every rate.
+/// kernel's 38400 baud) and TCP have none: they are heard at every rate. So a change of the rate that went wrong shows
+/// without hardware. Devices that share the line (sim::Bus) do not feel it.
 class EmulatorPort final : public StreamPort {
  public:
   /// `link`: path of a symbolic link to the pseudo-terminal, removed at the end; empty: none. It replaces a link to a

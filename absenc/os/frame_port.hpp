@@ -11,9 +11,9 @@ namespace absenc::os {
 /// Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
 ///
 /// A transfer begins at `at`, never earlier; `begin` blocks until then. What came before it, or before `now` was
-/// called, is told with a time that is not later: a conversation can leave it aside, however long it waited in a queue.
-/// `sent` carries the time before the frame was handed over, because nothing tells when the controller got it through:
-/// an answer is never older. `timer` is reported as by StreamPort.
+/// called, is told with a time that is not later: a conversation can leave it aside, however long it waited in a queue,
+/// because answers on CAN carry no number. `sent` carries the time before the frame was handed over, because nothing
+/// tells when the controller got it through: an answer is never older. `timer` is reported as by StreamPort.
 class FramePort : public Port<CanFrame> {
  public:
   FramePort() = default;

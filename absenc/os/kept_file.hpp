@@ -10,7 +10,9 @@
 
 namespace absenc::os {
 
-/// Locked (flock) from the constructor to the end of the object, also while it is replaced.
+/// Locked (flock) from the constructor to the end of the object, also while it is replaced: the lock is on the file
+/// itself, and on each new one before it takes the place. Whoever opened the old one looks whether it still has its
+/// name.
 class KeptFile {
  public:
   /// Makes an empty file where there is none. Throws Failure: `in_use` when another process keeps it, `unsupported`

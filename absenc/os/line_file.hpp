@@ -15,8 +15,8 @@ class LineFile {
   /// Makes the file. Throws Failure: `in_use` when there is one already, `no_permission`, `not_found`, `system`.
   explicit LineFile(const std::string& path);
 
-  /// Hands `lines` to the system at once, so that they survive the end of this process (not of the power: `sync`).
-  /// When they do not all fit, none of them stays. Throws Failure, as `require_there` too.
+  /// Hands `lines` to the system at once, which costs a few us, so that they survive the end of this process (not of
+  /// the power: `sync`). When they do not all fit, none of them stays. Throws Failure, as `require_there` too.
   void append(std::string_view lines);
   /// Waits for the disk. Throws as `append`.
   void sync();

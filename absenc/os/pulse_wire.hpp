@@ -12,7 +12,7 @@ struct gpiod_line;
 namespace absenc::os {
 
 /// Which wire it is. Levels are those of a UART's own pins, where RTS and DTR are low while they are set; a driver of
-/// RS-232 turns them over.
+/// RS-232 turns them over. They are pulsed only where the user names them: opening a port sets both.
 struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
   std::string name{};           // gpio: as `gpioinfo` lists it

@@ -161,7 +161,8 @@ void SerialPort::set_direction(Rs485 rs485) {
 
 void SerialPort::shorten_latency() {
   // USB frames, the receive FIFO's own time-out (4 characters) and scheduling. On a pseudo-terminal it is scheduling
-  // alone, of two processes, which a busy machine may hold up for a time slice or two.
+  // alone, of two processes, which a busy machine may hold up for a time slice or two: 2 ms gave false timeouts. The
+  // limit only matters when something is wrong.
   set_latency(pseudo_ ? 20ms : 10ms);
   if (pseudo_) return;
   serial_struct serial{};

@@ -26,7 +26,8 @@ struct SpiTransfer {
 
 /// One device machine. Whether the controller's mode suits it or not, an edge is what it is: who samples at an edge at
 /// which the other side shifts gets the old bit, and a bit that nobody drives is 1. The device is told a message at
-/// once, with the times at which its parts will be.
+/// once, with the times at which its parts will be. It is no Port, because a message is asked and answered in one call;
+/// who serves it answers when that time has come.
 class SpiDevice {
  public:
   /// `kind`: spi or clocked, otherwise std::invalid_argument. `device` must outlive it.

@@ -38,7 +38,8 @@ struct SpidevSettings {
 
 /// As Documentation/spi/spidev.rst has it, with the module's own limits. The controller sends words of 8 bits on one
 /// wire, at every speed, and selects the chip as it is wired. At first it is in mode 0, as without a word in the device
-/// tree.
+/// tree. It never touches the memory of the program that asks but says which it wants, as the kernel wants it from
+/// CUSE; tests fetch it by pointer.
 class Spidev {
  public:
   explicit Spidev(SpiDevice& device);

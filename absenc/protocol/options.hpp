@@ -17,7 +17,7 @@ namespace absenc {
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
 /// Of an option that says whether other encoders are on the line. `auto`: they are where somebody knows it
-/// (`tell_shared`).
+/// (`tell_shared`): absenc.toml, an open link with several users, a virtual line with several encoders.
 inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
@@ -88,7 +88,8 @@ struct OptionError {
 struct Unit;
 
 /// Option values from a model and single settings, which override it. Without a model name (empty), the first model
-/// that agrees with all the settings is taken; when none does, the unit's defaults, which know no particular model.
+/// that agrees with all the settings is taken, so that the length of a position also brings the id that belongs to it;
+/// when none does, the unit's defaults, which know no particular model.
 /// With a word no model is taken.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);

@@ -8,6 +8,7 @@
 
 namespace absenc {
 
+/// The kit finds a command whose fields or arguments lack the roles it needs.
 enum class Role : std::uint8_t {
   other,  // only its unit knows
   // Of a reading

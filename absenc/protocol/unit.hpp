@@ -54,8 +54,9 @@ struct Command {
   bool changes_encoder = false;
   bool repeatable = true;         // whether the same request may be sent again after an error
   std::string_view reads_back{};  // config_set: the name of the config_get command that reads this setting; "": none
-                                  // can, and the setting has the name of this command
-  std::string_view changes_option{};  // config_set: the option that must follow its first argument
+                                  // can, the setting has the name of this command, which looks at the effect itself
+  std::string_view changes_option{};  // config_set: the option that must follow its first argument; who goes on does
+                                      // so with the new value, on the same open port
 };
 
 /// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments with
@@ -215,7 +216,8 @@ struct Unit {
   std::span<const Vector> vectors;
   const FieldInfo* status;  // the flags of Reading::status; null when the unit has none
   const FieldInfo* alarms;  // the flags of Reading::alarms
-  // Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first.
+  // Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first in one
+  // number: whoever compares alarms sees both, whoever shows them names each.
   const FieldInfo* second_status = nullptr;
   const FieldInfo* second_alarms = nullptr;
   std::size_t host_storage;    // bytes that `host` needs, suitably aligned for any type
@@ -236,11 +238,13 @@ struct Unit {
   /// significant of the first byte on; on clocked links in the order of the wire.
   bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// Where this good reply has a field that it carries: no ranges where it has it in no fixed place, or makes it of
-  /// something else. Null: not told of any.
+  /// something else (Gray code, decimal text). Null: not told of any. It may depend on options and request, so it is
+  /// asked frame by frame; the kit cuts the bits out of good frames and compares them with the field.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
   /// About a reply that `decode` refuses with `error`, what the document says; null: nothing.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
-  /// The line as the options describe it; null: always `line`.
+  /// The line as the options describe it; null: always `line`. Silences measured in characters follow its rate, and a
+  /// conversation that changes the rate must know the old one.
   LineSettings (*settings)(const Options& options) = nullptr;
   /// The unit of the same encoder behind an SPI controller, where that is another one.
   const Unit* over_spi = nullptr;
@@ -248,7 +252,8 @@ struct Unit {
   /// any values explain them all: then `options`, which give what is not probed, become such values, defaults where the
   /// captures do not tell.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
-  /// What these options need beside the data; null: nothing.
+  /// What these options need beside the data, known before a port is opened: the user must say which wire it is, and a
+  /// pseudo-terminal has none. Null: nothing.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;
   LineTiming timing{};
   /// Whether the encoder sends replies that nobody asks for; null: never. On clocked and CAN links it always may.

@@ -66,6 +66,8 @@ struct WordFormatError {
   std::size_t at = 0;  // index into the text
 };
 
+/// A position word is data: options that describe one make it, and so does a text for an encoder nobody has a driver
+/// for. All that decodes and sends words takes this.
 class WordFormat {
  public:
   static constexpr std::size_t maximum_fields = 12;

@@ -9,6 +9,8 @@
 
 namespace absenc::sim {
 
+/// Not a Line: without bits there is no time in which one could be simulated.
+///
 /// Every device hears what comes, and what the others send. Characters that are sent at the same time reach the line as
 /// their AND, as in Line; they are aligned to whole characters.
 class Bus final : public Machine<std::uint8_t> {

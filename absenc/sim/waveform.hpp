@@ -16,7 +16,7 @@
 namespace absenc::sim {
 
 /// Draws what it is told, or what it sees on a line, with levels as of logic: an idle line and a mark are 1. It keeps
-/// no more than what is not settled.
+/// no more than what is not settled: characters of two pairs overlap, and files want their times in order.
 ///
 /// - half duplex: `line`; full duplex: `host` and `device`, by who drives the pair
 /// - beside these, when there were pulses: `trigger`, `clear`, which a pulse pulls to 0

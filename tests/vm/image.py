@@ -15,6 +15,10 @@ import zlib
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc")
 
+# Programs of this computer, so that the tests share what the others use (tests/command_support.py). The kernel is
+# Debian's own, because no test should depend on the one that happens to run here, which a container cannot add modules
+# to. QEMU emulates the processor (run.py): with KVM it would depend on who runs it.
+
 # What they depend on comes with them, but for what the kernel asks for by itself: g_serial its functions.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
            "usb_f_obex", "g_serial"]

@@ -32,7 +32,8 @@ enum class Carries : std::uint8_t {
 ///
 /// Where the line pauses, a frame ends. The first characters of a capture, up to the first pause, may be the end of a
 /// frame or not even characters: they are told as cut. On a line that never pauses, what is believed to be a frame has
-/// a good one next to it.
+/// a good one next to it: a weak checksum finds frames everywhere. On a line of both directions a frame is a request or
+/// a reply by what was said before, never by its bytes alone: some replies equal their requests.
 class Annotator {
  public:
   struct Settings {

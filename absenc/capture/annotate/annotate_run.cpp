@@ -232,7 +232,9 @@ std::size_t Annotator::bad_here() {
   return size;
 }
 
-// Up to where good frames go on; to the end of the run when they do not.
+// Up to where good frames go on; to the end of the run when they do not. What is left over is bad as a whole, unless a
+// frame of the usual size and something good behind it say otherwise: garbage before a good reply makes the exchange
+// bad, as it does live.
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
   // In a stream the next frame stands where it would stand if this one were good.

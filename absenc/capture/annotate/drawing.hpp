@@ -26,7 +26,8 @@ using ScratchFile = std::unique_ptr<std::FILE, CloseFile>;
 /// Where the system has such files; it is gone with the process. Null when there can be none.
 [[nodiscard]] inline ScratchFile temporary_file() { return ScratchFile(std::tmpfile()); }
 
-/// Levels of wires and what they mean, of any length: on the disk until they are written. Ticks are nanoseconds.
+/// Levels of wires and what they mean, of any length: on the disk, a few bytes a change, until it is known which wires
+/// there are and when it ends. The memory it takes does not depend on its length. Ticks are nanoseconds.
 class Drawing {
  public:
   struct Wire {

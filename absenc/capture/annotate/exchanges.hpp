@@ -58,7 +58,8 @@ class Exchanges {
 
   /// The oldest gives up when there is no more room.
   void ask(const Piece& request, Error error, Remark remark, bool is_request);
-  /// The reply to `waiting()[which]`; those before it had none. `contents` only without an error.
+  /// The reply to `waiting()[which]`; those before it had none. `contents` only without an error. A damaged reply has
+  /// answered, too. Behind the limit it is paired all the same, but as a timeout: no host would have taken it.
   void answer(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
   /// The first `count` had no reply.
   void give_up(std::size_t count);

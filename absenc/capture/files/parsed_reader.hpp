@@ -46,7 +46,9 @@ struct Occurrences {
   }
 };
 
-/// A reader whose `claim` does it all.
+/// A reader whose `claim` does it all, in one thread. Of the processor time of `decode --stats`, parsing is 63 to 78 %
+/// for dumps, 66 to 97 % for CSV: decoding beside it hides the rest. Several parsers would have to settle levels, times
+/// and damages between their parts in order; a faster one brought more than a second core could.
 class ParsedReader : public Reader {
  public:
   [[nodiscard]] const Layout& layout() const override { return layout_; }

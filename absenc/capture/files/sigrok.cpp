@@ -23,6 +23,8 @@ namespace absenc::capture {
 
 namespace {
 
+// A piece takes memory in each thread, and libdeflate, which expands it at once, knows no parts: larger ones are left
+// to libzip.
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes 4 MiB, PulseView 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;

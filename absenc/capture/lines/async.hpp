@@ -26,6 +26,9 @@ struct AsyncFormat {
 /// not low at the middle of its start bit is no character. After a wrong stop bit, the next falling edge begins a
 /// character.
 ///
+/// Between parts it keeps the changes from the first character on that is not complete; there is no state in the middle
+/// of one.
+///
 /// A capture may begin inside a character: of the falling edges within the first, that is taken which leads to the
 /// fewest errors in the next twelve characters.
 class AsyncDecoder {

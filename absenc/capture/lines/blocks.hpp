@@ -73,6 +73,10 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
 /// - `bool decode(const Levels&)`: the next part, in order; false: no more is wanted
 /// - `Guess`, and `void guess(const Levels&, Guess&) const`: from any thread, a part whose beginning is not known
 /// - `bool join(const Levels&, Guess&)`: as decode, with what was guessed
+/// A guess takes a character or word to begin with the first change. The true state runs into the block until it begins
+/// one where the guess did too: from there on both depend on nothing but what follows, and the guess is right. Where
+/// they never meet the block is decoded twice, and still right.
+///
 /// decode and join are called by the calling thread. Blocks in flight: two for each thread. What a reader or the
 /// decoding throws is thrown here.
 template <class Decoding>

@@ -31,6 +31,7 @@ struct HeardExchange {
   friend bool operator==(const HeardExchange&, const HeardExchange&) = default;
 };
 
+/// What repeats of the request is no evidence, nor is a reply that comes again.
 struct Evidence {
   std::size_t tried = 0;      // exchanges
   std::size_t explained = 0;  // of them: the reply is good

@@ -10,6 +10,8 @@
 
 namespace absenc::capture {
 
+/// Each try is paid for: here those before it; by `rank` (client/identify) every unit, setting and encoder that was
+/// looked for; in a stream every byte at which a frame might have begun.
 struct Hypothesis {
   Options options{};
   Evidence evidence{};
@@ -25,7 +27,8 @@ struct Hypothesis {
 /// From where on, by `Hypothesis::chance`, something is found and not only possible.
 inline constexpr double is_found = -3;
 
-/// Whether one goes before the other.
+/// Whether one goes before the other: what its frames prove before what only moves like a position, as anything does
+/// that takes every frame.
 [[nodiscard]] inline bool is_likelier(const Hypothesis& one, const Hypothesis& other) {
   if (one.is_proven() != other.is_proven()) return one.is_proven();
   return one.chance() < other.chance();

@@ -56,8 +56,9 @@ struct Possible final : EvidenceSink {
 
 }  // namespace
 
-// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning. So with
-// the parity, where characters are damaged: a parity bit that is taken for a stop bit is wrong half of the time.
+// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning: few
+// changes fit many rates, but only one gives checksums that are right. So with the parity, where characters are
+// damaged: a parity bit that is taken for a stop bit is wrong half of the time.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};

@@ -47,7 +47,8 @@ class CaptureRun {
   /// 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
   /// What the user did not say and only the encoder could be asked for, taken from the frames of the capture; the
-  /// options with it. Not from standard input, which can be read once only.
+  /// options with it. Before anything is decoded: where only a checksum tells a length, the first that fits may be an
+  /// accident. Not from standard input, which can be read once only.
   const Options& settle_options();
   /// Decodes all of it into `sink`; `progress` is called now and then with how far it is. Throws UsageError,
   /// Failure and what `sink` throws.

@@ -14,7 +14,7 @@ namespace absenc::client {
 /// at once.
 inline constexpr Time send_slack = std::chrono::microseconds(500);
 
-/// Nothing else runs while `look` does.
+/// Nothing else runs while `look` does: no thread touches an encoder beside its carrier, and every carrier has timers.
 template <class Item>
 class Attended final : public Machine<Item> {
  public:

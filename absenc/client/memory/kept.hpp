@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of a virtual encoder in a file, for people to read and edit. memory_file.cpp describes the format.
+// The memory of a virtual encoder in a file, for people to read and edit. kept.cpp describes the format.
 #pragma once
 
 #include <optional>

@@ -20,7 +20,8 @@ struct NamedEncoder {
 };
 
 /// Throws UsageError, which names the place in the file: settings that do not exist, protocols and buses that do not
-/// exist, whether they are used or not. Values are left to whoever uses them.
+/// exist, whether they are used or not: a misspelt name must not be silent, wherever it stands. Values are left to
+/// whoever uses them, because they may depend on more than the file: the model behind `?`, a file of motion.
 void check(const SettingsFile& config);
 
 /// From a file that was checked. Throws UsageError, which names the nearest.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // absenc.toml as data: the names it gives to encoders and buses, and what stands below them. The library that reads
-// TOML is seen by config.cpp alone.
+// TOML is seen by settings_file.cpp alone.
 #pragma once
 
 #include <optional>

@@ -41,6 +41,9 @@ class Turns {
   std::uint64_t current_ = 0;
 };
 
+/// Whoever converses has the line for himself. A cycle of all encoders in one machine would be faster on a wire, but
+/// would know one protocol; with turns each keeps its own thread, session and statistics, and a silent one costs the
+/// others its time and nothing else.
 class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}

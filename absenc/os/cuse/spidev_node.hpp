@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A character device of this computer that is served by this process (CUSE): any program that speaks spidev finds a
-// Spidev behind it. A library of its own, because it needs libfuse.
+// Spidev behind it. A library of its own, which is linked by the command only and not installed: nobody who uses
+// absenc-os then gets libfuse.
 #pragma once
 
 #include <cstdint>

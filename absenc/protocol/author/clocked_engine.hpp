@@ -19,7 +19,9 @@ struct ClockedHostTimes {
   Time rest{};             // of the clock before each transfer, after which the encoder takes a new position
 };
 
-/// One transfer after the other; a subclass says how many clocks each has, and what becomes of its bits.
+/// One transfer after the other; a subclass says how many clocks each has, and what becomes of its bits. Whoever is the
+/// clock never waits for a reply: there is no timeout, and nothing is repeated. It rests before the first transfer too,
+/// because somebody may have clocked just before.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) final;

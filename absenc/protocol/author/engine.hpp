@@ -36,7 +36,11 @@ struct Manner {
   ExtraWire wire{};
 };
 
-/// A subclass says what a whole reply is, and what becomes of it. DialogOf makes one from a protocol.
+/// A subclass says what a whole reply is, and what becomes of it. DialogOf makes one from a protocol. CAN and clocked
+/// lines have engines of their own, because something else ends a reply there.
+///
+/// After a wrong reply it waits for silence before it ends or sends again: sending while an encoder sends can destroy
+/// its driver. A good reply ends the exchange at once.
 class Engine : public Conversation<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) final;
@@ -79,7 +83,8 @@ class Engine : public Conversation<std::uint8_t> {
   void set_times(const HostTimes& times) { times_ = times; }
   /// Nothing is sent until `time`; then `woken`.
   void sleep(Time time);
-  /// Nothing is sent for `duration`, which the next step begins: `heard` for all that comes, `woken` at the end.
+  /// Nothing is sent for `duration`, which the next step begins: `heard` for all that comes, `woken` at the end. The
+  /// limit is compared when bytes come, too: a port hands them out before it tells a timer.
   void listen(Time duration);
   /// From within `heard`: goes on.
   void listen_on() { state_ = State::listening; }
