@@ -40,6 +40,8 @@ struct Line<Item>::State {
   std::size_t bits = 0;
   std::size_t expect = 0;
   Time width{};
+  bool hold_low = false;  // clocked: the level of the clock before the transfer
+  Time taken_up{};        // when it was asked for
   Time lead{};  // spi: from chip select to the first clock
   ExtraWire pulse_wire{};
   Time start{};             // of the transfer; CAN: of the frame

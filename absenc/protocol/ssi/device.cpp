@@ -9,7 +9,7 @@ namespace {
 constexpr Time period_of(std::uint32_t khz) { return LineSettings{.rate = khz * 1000}.bits(1); }
 }  // namespace
 
-void VirtualEncoder::selected(Time at, Time period, author::DrivenBits& bits) {
+void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bits) {
   if (period > 0ns && (period < period_of(format_.fastest_khz) || period > period_of(format_.slowest_khz))) {
     violate("clock outside min_clock_khz to max_clock_khz", at);
   }
