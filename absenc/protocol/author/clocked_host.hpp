@@ -46,6 +46,8 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] const Reading* reading() const override {
     return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
+  /// The last that was good, whatever came after it.
+  [[nodiscard]] const Reading& position() const { return reading_; }
 
  protected:
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
