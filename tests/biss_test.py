@@ -2,6 +2,7 @@
 """BiSS of the command: frames of many encoders, safety words, chains, control frames, and registers."""
 import json
 import os
+import tempfile
 import unittest
 
 from command_support import Case, absenc, json_lines
@@ -79,8 +80,13 @@ class Vectors(Case):
 
 
 class Registers(Case):
+    def info(self, encoder):
+        result = absenc("info", encoder, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json_lines(result.stdout)[0]["answers"]["info"]["fields"]
+
     def test_a_register_is_read_and_written(self):
-        info, = json_lines(absenc("info", "sim:biss", "--json").stdout)
+        info = self.info("sim:biss")
         self.assertEqual(info["serial_number"], 1)
         self.assertEqual(info["slaves"], 1)
         self.assertEqual(bytes.fromhex(info["device_id"]), b"Absenc")
@@ -96,8 +102,29 @@ class Registers(Case):
 
     def test_every_encoder_of_a_chain_has_its_own(self):
         for slave in (0, 1, 2):
-            info, = json_lines(absenc("info", f"sim:biss-chain?slaves=3&slave={slave}", "--json").stdout)
+            info = self.info(f"sim:biss-chain?slaves=3&slave={slave}")
             self.assertEqual((info["slave_id"], info["serial_number"], info["slaves"]), (slave, slave + 1, 3))
+
+    def test_an_encoder_that_has_safety_words_has_registers_too(self):
+        self.assertEqual(self.info("sim:biss-safety")["slaves"], 2)
+
+    def test_a_capture_shows_them_beside_the_positions(self):
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "drive.vcd")
+            result = absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4",
+                            "--command", "memory-write 3 0x5A 0 0")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+        control = [row["fields"] for row in rows if row["kind"] == "exchange"]
+        positions = [row for row in rows if row["kind"] == "reply"]
+        self.assertTrue(all(row["ok"] for row in rows if "ok" in row))
+        self.assertGreater(len(positions), 200)
+        times = [row["time_s"] for row in positions]
+        self.assertTrue(all(after - before < 100e-6 for before, after in zip(times, times[1:])))
+        self.assertEqual(bytes.fromhex(control[0]["data"]), bytes([0, 0, 0, 1]))
+        written = [one for one in control if one["operation"] == "write"]
+        self.assertEqual([(one["address"], one["data"]) for one in written], [(3, "5a")])
+        self.assertEqual((control[-1]["operation"], control[-1]["address"], control[-1]["data"]), ("read", 3, "5a"))
 
 
 if __name__ == "__main__":

@@ -2,14 +2,17 @@
 #include "absenc/capture/annotate/annotate_frames.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace absenc::capture {
 
 // ---- Bursts
 
-// Without the clocks that show the idle line before the first bit.
+// Without the clocks that show the idle line before the first bit, and the edge with which a clock that was held low
+// rises again.
 Frame BurstAnnotator::word_of(const Burst& burst) {
-  const std::size_t idle = judge_.unit().line.idle_clocks;
+  const bool rises = std::exchange(after_low_, burst.low_after) && judge_.unit().control_bit != nullptr;
+  const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
   if (idle == 0 || burst.bits <= idle) return {.bytes = burst.in, .bits = burst.bits};
   const std::size_t bits = burst.bits - idle;
   shifted_.assign((bits + 7) / 8, 0);

@@ -61,6 +61,7 @@ class BurstAnnotator {
   std::vector<std::uint8_t> shifted_;  // without the clocks that show the idle line
   std::vector<std::uint8_t> silenced_;  // without the encoder's bit of control communication
   ControlFrames control_;
+  bool after_low_ = false;  // the clock was held low before the next burst
 };
 
 /// CAN frames of any number of nodes, who answer in any order or speak unasked.

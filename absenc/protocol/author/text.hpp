@@ -135,7 +135,7 @@ struct VectorParts {
 
   ByteBuffer<128> request{};
   ByteBuffer<128> reply{};
-  Buffer<Expected, 16> fields{};
+  Buffer<Expected, 24> fields{};
   Error error = Error::none;
 
  private:

@@ -161,14 +161,11 @@ struct Definition {
   static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
   static constexpr void put(FieldSink& sink, const ChainFormat& format, const ChainReply& reply) {
+    put_line_delay(sink, format, reply);
     sink.put({&own_fields[field_ack_bits], reply.ack_bits});
     for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
     const unsigned shown = format.shown();
     put_word(sink, format.channels[shown].word, reply.channels[shown].word, {});
-  }
-  static void put(FieldSink& sink, const ReadPositionOf<ChainFormat>& read) {
-    put(sink, read.format(), read.found());
-    put_line_delay(sink, read.format(), read.found());
   }
   static constexpr void put(FieldSink& sink, const ChainFormat&, const Found& found) {
     register_fields.put(sink, found);

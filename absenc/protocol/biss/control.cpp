@@ -189,6 +189,7 @@ bool ControlMaster::step(bool cds) {
 bool ControlMaster::header(bool cds) {
   if (at_ == 0) {
     if (zeros_ < control_pause) return false;
+    if (cds) return end(Error::bad_framing);  // nobody has been asked
     at_ = 1;
     return true;
   }

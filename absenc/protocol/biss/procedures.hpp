@@ -188,6 +188,9 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   ByteBuffer<control_most> names;
   error = co_await read_registers(dialog, master, names, registers::device_id, registers::end - registers::device_id);
   if (error != Error::none && error != Error::request_rejected) co_return failure_of(error);
+  if (error == Error::request_rejected && !found.eds_bank) {
+    co_return only(error, "the encoder has none of the registers that say who it is");
+  }
   if (error == Error::none) {
     found.device_id.append(names.view().first(6));
     found.manufacturer.append(names.view().subspan(6));

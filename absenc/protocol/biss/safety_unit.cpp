@@ -171,13 +171,10 @@ struct Definition {
   static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
   static constexpr void put(FieldSink& sink, const SafetyFormat& format, const SafetyReply& reply) {
+    put_line_delay(sink, format, reply);
     sink.put({&own_fields[field_ack_bits], reply.ack_bits});
     put_word_of(sink, format.cpw, reply.cpw, false);
     put_word_of(sink, format.spw, reply.spw, true);
-  }
-  static void put(FieldSink& sink, const ReadPositionOf<SafetyFormat>& read) {
-    put(sink, read.format(), read.found());
-    put_line_delay(sink, read.format(), read.found());
   }
   static constexpr void put(FieldSink& sink, const SafetyFormat&, const Found& found) {
     register_fields.put(sink, found);

@@ -91,14 +91,11 @@ struct Definition {
 
   // In the order of the wire.
   static constexpr void put(FieldSink& sink, const Format& format, const Reply& reply) {
+    put_line_delay(sink, format, reply);
     sink.put({&own_fields[field_ack_bits], reply.ack_bits});
     put_word(sink, format.word, reply.word, format.scale);
     if (format.check.life_counter) sink.put({&own_fields[field_life_counter], reply.life_counter});
     if (format.check.width != 0) sink.put({&own_fields[field_crc], reply.crc});
-  }
-  static void put(FieldSink& sink, const ReadPosition& read) {
-    put(sink, read.format(), read.found());
-    put_line_delay(sink, read.format(), read.found());
   }
   static constexpr void put(FieldSink& sink, const Format&, const Found& found) { register_fields.put(sink, found); }
 
