@@ -42,7 +42,7 @@ struct Line<Item>::State {
   Time width{};
   bool hold_low = false;  // clocked: the level of the clock before the transfer
   Time taken_up{};        // when it was asked for
-  Time lead{};  // spi: from chip select to the first clock
+  Time lead{};            // spi: from chip select to the first clock
   ExtraWire pulse_wire{};
   Time start{};             // of the transfer; CAN: of the frame
   std::size_t index = 0;    // the item on the wire

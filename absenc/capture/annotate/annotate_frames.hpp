@@ -58,7 +58,7 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;  // without the clocks that show the idle line
+  std::vector<std::uint8_t> shifted_;   // without the clocks that show the idle line
   std::vector<std::uint8_t> silenced_;  // without the encoder's bit of control communication
   ControlFrames control_;
   bool after_low_ = false;  // the clock was held low before the next burst

@@ -44,8 +44,8 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   ClockedEngine(const ClockedHostTimes& times, MutableBytes storage) : times_(times), storage_(storage) {}
   ~ClockedEngine() = default;
 
-  /// Gives so many clocks, when the clock has rested: at its idle level, or held low. More than there is storage for end the conversation:
-  /// invalid_argument.
+  /// Gives so many clocks, when the clock has rested: at its idle level, or held low. More than there is storage for
+  /// end the conversation: invalid_argument.
   void clock(unsigned count, bool hold_low = false);
   /// The conversation is over. Its texts must stay.
   void finish(const Outcome& outcome);

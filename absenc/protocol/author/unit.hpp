@@ -56,8 +56,8 @@ struct Declares {
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
 /// is none; `status`, `alarms`, `conditions`, `timing`, `is_checked`, `bits`, `memory`, `registers`, `over_spi`,
-/// `probe`, `streams`, `extra_wires`, `control_bit` as in Unit; and `decode`, `frame_end`, `is_answered` themselves, with the
-/// parameters that they have there.
+/// `probe`, `streams`, `extra_wires`, `control_bit` as in Unit; and `decode`, `frame_end`, `is_answered` themselves,
+/// with the parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;

@@ -69,8 +69,8 @@ constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuf
 }
 
 /// All of them turn with one shaft.
-constexpr void show(const ChainFormat& format, const ShaftState& state, std::uint32_t alarms,
-                    std::uint8_t life_counter, ChainReply& reply) {
+constexpr void show(const ChainFormat& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
+                    ChainReply& reply) {
   for (unsigned i = 0; i < format.count; ++i) {
     reply.channels[i] = {.word = word_of(format.channels[i].word, state, alarms), .life_counter = life_counter};
   }

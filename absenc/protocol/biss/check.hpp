@@ -63,7 +63,7 @@ template <class Source, class Bits>
   if constexpr (Source::is_known) {
     constexpr Check check = Source::format.check;
     if constexpr (check.width >= 3 && check.init == 0) {
-      return crc_of<parameters_of(check), check.width <= 8 ? CrcTable::byte : CrcTable::nibble>(bits, first, count);
+      return crc_of < parameters_of(check), check.width <= 8 ? CrcTable::byte : CrcTable::nibble > (bits, first, count);
     } else {
       return crc_bit_by_bit(check, bits, first, count);
     }

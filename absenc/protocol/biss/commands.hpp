@@ -10,8 +10,7 @@
 namespace absenc::biss {
 
 inline constexpr Argument address_argument{"address", "of the register", 0, registers::end - 1, 0, true, Role::address};
-inline constexpr Argument bank_argument{
-    "bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
+inline constexpr Argument bank_argument{"bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
 inline constexpr std::array<Argument, 3> read_arguments{
     {address_argument,
      bank_argument,
@@ -35,7 +34,7 @@ template <class Definition, class F>
   using P = ProtocolOf<F>;
   constexpr auto request = no_request<F>;
   return std::array{
-      author::clocked_reading<Definition, P, ReadPositionOf<F>>(
+      author::clocked_reading<Definition, P, FindPosition<F>>(
           {"position", Verb::read, 0, "position, turns, error and warning"})
           .only_if(is_readable),
       author::command<Definition, P, Found, read_info<F>, request>(

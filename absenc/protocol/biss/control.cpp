@@ -32,7 +32,8 @@ struct ControlBits {
 bool is_good_byte(std::uint16_t bits) { return crc4_of(bits >> 4, 8) == (bits & 0xF); }
 
 void put_locks(ControlFrame& frame, const ControlBits& cds) {
-  for (unsigned i = 0; i < control_slaves && cds[lock_bits_at + i]; ++i) frame.slaves = static_cast<std::uint8_t>(i + 1);
+  for (unsigned i = 0; i < control_slaves && cds[lock_bits_at + i]; ++i)
+    frame.slaves = static_cast<std::uint8_t>(i + 1);
   frame.more_slaves = cds[more_slaves_at];
 }
 

@@ -69,8 +69,8 @@ inline constexpr unsigned header_bits = 15;  // behind the start bit: CTS, ten b
 /// A control frame with what was answered.
 struct ControlFrame {
   ControlRequest request{};
-  std::uint8_t slaves = 0;    // that have an ID, as the lock bits say
-  bool more_slaves = false;   // there are some without
+  std::uint8_t slaves = 0;   // that have an ID, as the lock bits say
+  bool more_slaves = false;  // there are some without
   ByteBuffer<control_most> data;
   Buffer<std::uint16_t, control_most> start_delay;  // of each byte, in frames
   bool next_address_accepted = false;
@@ -125,7 +125,7 @@ class ControlMaster {
   ControlFrame frame_{};
   ByteBuffer<control_most> written_;
   std::uint16_t header_ = 0;
-  std::uint16_t in_ = 0;   // bits of this byte and its CRC
+  std::uint16_t in_ = 0;  // bits of this byte and its CRC
   std::uint16_t out_ = 0;
   std::size_t count_ = 0;  // bytes wanted
   unsigned at_ = 0;        // the frame since the start bit; since that of the byte

@@ -227,9 +227,11 @@ TEST(BissControl, AByteWhoseCrcIsWrongIsNotStored) {
   Target target;
   ControlSlaves slaves(1);
   // A write of 0x55 to 0x48, with one bit of the data wrong.
-  for (const char c : std::string_view("0000000000000011000100100010100110101000100100000")) slaves.take(c == '1', target);
+  for (const char c : std::string_view("0000000000000011000100100010100110101000100100000"))
+    slaves.take(c == '1', target);
   EXPECT_EQ(target.writes, 0);
-  for (const char c : std::string_view("0000000000000011000100100010100110101010100100000")) slaves.take(c == '1', target);
+  for (const char c : std::string_view("0000000000000011000100100010100110101010100100000"))
+    slaves.take(c == '1', target);
   EXPECT_EQ(target.writes, 1);
   EXPECT_EQ(target.values[0][0x48], 0x55);
 }

@@ -61,10 +61,10 @@ std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
   return first + direct + (address - registers::bank_size);
 }
 
-// The data sheet, what tells which encoder this is, and banks that there are not.
+// All but what tells which encoder this is, and banks that there are not.
 bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
   if (slave >= most_slaves) return false;
-  if (address < registers::bank_size) return bank_[slave] < banks && !(write && bank_[slave] == banks - 1);
+  if (address < registers::bank_size) return bank_[slave] < banks;
   if (!write || address == registers::bank_select) return true;
   return address >= registers::device && address < registers::device_id;
 }

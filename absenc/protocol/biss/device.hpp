@@ -18,7 +18,7 @@ struct Behaviour {
   Time line_delay{};       // there and back; SLO is sampled one period of MA after the edge that drives it
   Time edge_noise = 20ns;  // a sample so near to a delayed edge is the old bit or the new one
   Time timeout = 20us;
-  Time register_delay{};   // from what asks for a register to its start bit
+  Time register_delay{};  // from what asks for a register to its start bit
 };
 
 using Samples = author::DrivenBits;
@@ -122,11 +122,10 @@ class VirtualEncoderOf final : public author::ClockedDevice {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   VirtualEncoderOf(const F& format, const Shaft& shaft)
-      : VirtualEncoderOf(
-            format, shaft,
-            {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
-             .line_delay = format.line_delay,
-             .register_delay = format.register_delay}) {}
+      : VirtualEncoderOf(format, shaft,
+                         {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
+                          .line_delay = format.line_delay,
+                          .register_delay = format.register_delay}) {}
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour), slaves_(slaves_of(format)) {}
 

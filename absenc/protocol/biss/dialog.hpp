@@ -62,6 +62,11 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     last_ = detail::decoded(this->format(), samples, Cds::any);
     if (!extended_ && needs_more(last_.error(), samples)) extended_ = true;
     if (last_) {
+      const unsigned head = last_->delay_bits + last_->ack_bits;
+      const unsigned expected = ack_bits(this->format().latency, this->format().period());
+      if (head > expected && !late_.is_again(head)) last_ = Error::truncated;
+    }
+    if (last_) {
       const Error error = moved(*last_);
       if (error != Error::none) last_ = error;
     } else {
@@ -78,6 +83,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   void ended(const author::Outcome& outcome) final { this->finish(outcome); }
 
   Result<Reply> last_ = Error::timeout;
+  LateFrames late_;
   std::uint32_t frames_ = 0;
   std::uint32_t bad_frames_ = 0;
   int life_counter_ = -1;

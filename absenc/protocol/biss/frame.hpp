@@ -18,7 +18,7 @@ namespace absenc::biss {
 
 using namespace std::chrono_literals;
 
-inline constexpr unsigned idle_bits = 2;          // SLO goes low on the second rising edge of MA
+inline constexpr unsigned idle_bits = 2;  // SLO goes low on the second rising edge of MA
 
 inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <type_traits>
+#include <utility>
 
 #include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/biss/frame.hpp"
@@ -52,22 +53,42 @@ using Protocol = ProtocolOf<Format>;
   return format.check.life_counter ? reply.life_counter : -1;
 }
 
-/// One frame; a second one with more clocks where the line, or the encoder, takes longer than was thought. Where there
-/// are life counters two, which must follow each other (sequence_mismatch).
-template <class F>
-class ReadPositionOf : public author::ClockedHostOf<ProtocolOf<F>> {
+/// Where frames begin that come later than was thought: believed is what comes twice. A start bit that gets lost makes
+/// a frame that is late, too, and whose CRC is good once in 64 times.
+class LateFrames {
+ public:
+  /// `head`: clocks before the start bit, beyond those of the idle line; of a delay near a whole clock one more or
+  /// less.
+  [[nodiscard]] bool is_again(unsigned head) {
+    const unsigned before = std::exchange(seen_, head);
+    return before != 0 && head + 1 - before <= 2;
+  }
+
+ private:
+  unsigned seen_ = 0;
+};
+
+/// One frame; where there are life counters two, which must follow each other (sequence_mismatch). With `finds`, more
+/// clocks are given where the line, or the encoder, takes longer than was thought.
+template <class F, bool finds>
+class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
+  using P = ProtocolOf<F>;
+  static constexpr unsigned most_late = 4;  // frames until two of them are alike
 
  public:
-  explicit ReadPositionOf(const F& format) : Base(format) {}
+  explicit PositionReader(const F& format) : Base(format) {}
 
  private:
   void clocked(BitView samples) final {
     const int before = life_counter_of(this->format(), this->found());
     const Error error = this->take(samples);
-    if (!extended_ && needs_more(error, samples)) {
-      extended_ = true;
-      return this->clock(ProtocolOf<F>::all_clocks(this->format()));
+    if constexpr (finds) {
+      const unsigned head = this->found().delay_bits + this->found().ack_bits;
+      const bool expected = tries_ == 0 && head <= ack_bits(this->format().latency, this->format().period());
+      const bool late = error == Error::none ? !expected && !late_.is_again(head) : needs_more(error, samples);
+      if (late && tries_++ < most_late) return this->clock(P::all_clocks(this->format()));
+      if (late) return this->conclude(Error::truncated);
     }
     if (error != Error::none || before < 0) return this->conclude(error);
     const int now = life_counter_of(this->format(), this->found());
@@ -76,12 +97,16 @@ class ReadPositionOf : public author::ClockedHostOf<ProtocolOf<F>> {
       return this->conclude(follows ? Error::none : Error::sequence_mismatch);
     }
     second_ = true;
-    this->clock(extended_ ? ProtocolOf<F>::all_clocks(this->format()) : ProtocolOf<F>::clocks(this->format()));
+    this->clock(tries_ != 0 ? P::all_clocks(this->format()) : P::clocks(this->format()));
   }
 
   bool second_ = false;
-  bool extended_ = false;
+  std::uint8_t tries_ = 0;
+  [[no_unique_address]] std::conditional_t<finds, LateFrames, author::Later> late_{};
 };
-using ReadPosition = ReadPositionOf<Format>;
+/// What a drive that knows its line repeats.
+using ReadPosition = PositionReader<Format, false>;
+template <class F>
+using FindPosition = PositionReader<F, true>;
 
 }  // namespace absenc::biss

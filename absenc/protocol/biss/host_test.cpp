@@ -58,10 +58,15 @@ TEST(BissHost, ErrorBitMakesThePositionInvalid) {
 }
 
 TEST(BissHost, WhatTheLineDoesWrong) {
-  Bench slow(line_settings, turns_19, Behaviour{.latency = 100us});
+  Bench slow(line_settings, turns_19, Behaviour{.latency = 12us});
   ReadPosition truncated(turns_19);
   EXPECT_EQ(slow.run(truncated).error(), Error::truncated);
-  EXPECT_EQ(slow.encoder.violation_count(), 2u);
+  EXPECT_EQ(slow.encoder.violation_count(), 1u);
+  FindPosition<Format> found(turns_19);
+  EXPECT_EQ(slow.run(found).error(), Error::none);
+  Bench slower(line_settings, turns_19, Behaviour{.latency = 100us});
+  FindPosition<Format> too_late(turns_19);
+  EXPECT_EQ(slower.run(too_late).error(), Error::truncated);
   EXPECT_EQ(truncated.reading(), nullptr);
 
   Bench off(line_settings, turns_19);
@@ -78,7 +83,7 @@ TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
   for (const Time delay : {1us, 3us, 17us, 40us}) {
     Bench bench(line_settings, turns_19, Behaviour{.latency = 30us, .line_delay = delay + 500ns});
     bench.shaft.state.position = std::int64_t{275096} << 13;
-    ReadPosition read(turns_19);
+    FindPosition<Format> read(turns_19);
     ASSERT_EQ(bench.run(read).error(), Error::none) << delay.count();
     EXPECT_EQ(read.reading()->singleturn, 275096u);
     EXPECT_EQ(read.found().ack_bits, 30u);

@@ -21,7 +21,8 @@ inline constexpr unsigned control_attempts = 4;  // of what may be asked again
 
 inline constexpr std::string_view no_registers =
     "no encoder answers: it has no registers (or a line that only goes one way), or another ID (slave)";
-inline constexpr std::string_view refused = "the encoder refuses this register: it does not have it, or it is read only";
+inline constexpr std::string_view refused =
+    "the encoder refuses this register: it does not have it, or it is read only";
 
 /// One control frame, to its end.
 template <class F>
@@ -57,8 +58,8 @@ Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
   return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
 }
 
-/// Whether the encoder was late with a byte, or a start bit got lost: no CRC covers CDS, and what follows is then moved,
-/// which the four bits of a byte's CRC may miss.
+/// Whether the encoder was late with a byte, or a start bit got lost: no CRC covers CDS, and what follows is then
+/// moved, which the four bits of a byte's CRC may miss.
 [[nodiscard]] constexpr bool was_late(const ControlFrame& frame) {
   const auto delays = frame.start_delay.view();
   return std::any_of(delays.begin(), delays.end(), [](std::uint16_t delay) { return delay != 0; });
@@ -126,6 +127,9 @@ Procedure read_memory(ControlDialog<F>& dialog, Found& found, Arguments argument
   if (address + count > limit) {
     co_return only(Error::invalid_argument, "a bank ends at address 63, the registers behind it at 127");
   }
+  if (address >= registers::bank_size && bank != 0) {
+    co_return only(Error::invalid_argument, "what is behind the banks is on bank 0");
+  }
   ControlMaster master;
   Error error = co_await select_bank(dialog, master, bank, address);
   if (error == Error::none) error = co_await read_registers(dialog, master, found.bytes, address, count);
@@ -145,7 +149,10 @@ Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments argumen
   const auto value = static_cast<std::uint8_t>(arguments[1]);
   const auto bank = static_cast<unsigned>(arguments[2]);
   const bool force = arguments[3] != 0;
-  const MemoryArea* const area = registers::find_area(address < registers::bank_size ? bank : 0, address);
+  const MemoryArea* const area = registers::find_area(bank, address);
+  if (address >= registers::bank_size && bank != 0) {
+    co_return only(Error::invalid_argument, "what is behind the banks is on bank 0");
+  }
   if (area != nullptr && !area->writable) co_return only(Error::invalid_argument, "this register is read only");
   if (!force && (area == nullptr || !area->protection.empty())) {
     co_return only(Error::invalid_argument, "only the maker says what is written there: force=1 writes it");
@@ -174,8 +181,8 @@ template <class F>
 Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   ControlMaster master;
   ByteBuffer<control_most> sheet;
-  Error error = co_await read_registers(dialog, master, sheet, registers::eds_bank,
-                                        registers::device - registers::eds_bank);
+  Error error =
+      co_await read_registers(dialog, master, sheet, registers::eds_bank, registers::device - registers::eds_bank);
   if (error != Error::none && error != Error::request_rejected) co_return failure_of(error);
   found.slave_id = dialog.format().slave;
   found.slaves = master.frame().slaves;

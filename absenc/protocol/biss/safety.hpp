@@ -15,7 +15,9 @@ struct Channel {
   Check check{};
 };
 
-[[nodiscard]] constexpr unsigned data_bits(const Channel& channel) { return channel.word.bits() + channel.check.bits(); }
+[[nodiscard]] constexpr unsigned data_bits(const Channel& channel) {
+  return channel.word.bits() + channel.check.bits();
+}
 
 /// What a channel says.
 struct ChannelData {
@@ -75,9 +77,8 @@ constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsig
 
 /// Whether both words show the same place, within one count of what they promise.
 [[nodiscard]] constexpr bool agree(const SafetyFormat& format, const SafetyReply& reply) {
-  const unsigned turns =
-      std::min({format.cpw.word.bits_of(Meaning::multiturn), format.spw.word.bits_of(Meaning::multiturn),
-                64u - format.compare_bits});
+  const unsigned turns = std::min({format.cpw.word.bits_of(Meaning::multiturn),
+                                   format.spw.word.bits_of(Meaning::multiturn), 64u - format.compare_bits});
   const unsigned bits = format.compare_bits;
   const std::uint64_t difference = (detail::promised(format.cpw, reply.cpw.word, bits, turns) -
                                     detail::promised(format.spw, reply.spw.word, bits, turns) + 1) &

@@ -91,16 +91,16 @@ struct Definition {
   static constexpr std::size_t frames_size = 2400;
 
   static constexpr OptionsOf options{
-      probeable(option<&Settings::cpw_singleturn_bits>("cpw_singleturn_bits", "control word: bits of the position", 1,
-                                                       64)),
+      probeable(
+          option<&Settings::cpw_singleturn_bits>("cpw_singleturn_bits", "control word: bits of the position", 1, 64)),
       probeable(option<&Settings::cpw_multiturn_bits>("cpw_multiturn_bits", "control word: bits of the turns", 0, 63)),
       option<&Settings::cpw_crc_width>("cpw_crc_width", "control word: bits of the CRC; 0: none", 0, 16),
       option<&Settings::cpw_crc_poly>("cpw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
       option<&Settings::cpw_crc_init>("cpw_crc_init", "its start value", 0, 0xFFFF),
       option<&Settings::cpw_crc_inverted>("cpw_crc_inverted", "whether it is sent inverted"),
       option<&Settings::cpw_life_counter>("cpw_life_counter", "control word: 6 bits that count frames"),
-      probeable(option<&Settings::spw_singleturn_bits>("spw_singleturn_bits", "safety word: bits of the position", 1,
-                                                       64)),
+      probeable(
+          option<&Settings::spw_singleturn_bits>("spw_singleturn_bits", "safety word: bits of the position", 1, 64)),
       probeable(option<&Settings::spw_multiturn_bits>("spw_multiturn_bits", "safety word: bits of the turns", 0, 63)),
       option<&Settings::spw_crc_width>("spw_crc_width", "safety word: bits of the CRC; 0: none", 0, 16),
       option<&Settings::spw_crc_poly>("spw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
@@ -123,10 +123,12 @@ struct Definition {
           100'000'000)),
   };
   static constexpr std::array models{
-      ModelText{"RXH", "24 bits, safety word 16", 0,
-                "cpw_singleturn_bits=24 cpw_multiturn_bits=0 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
-      ModelText{"RXM", "16 bits, safety word 12", 0,
-                "cpw_singleturn_bits=16 cpw_multiturn_bits=0 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
+      ModelText{
+          "RXH", "24 bits, safety word 16", 0,
+          "cpw_singleturn_bits=24 cpw_multiturn_bits=0 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
+      ModelText{
+          "RXM", "16 bits, safety word 12", 0,
+          "cpw_singleturn_bits=16 cpw_multiturn_bits=0 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
       ModelText{
           "RSH", "24 bits and turns, safety word 16 and turns", 0,
           "cpw_singleturn_bits=24 cpw_multiturn_bits=12 spw_singleturn_bits=16 spw_multiturn_bits=12 compare_bits=13"},
@@ -148,12 +150,12 @@ struct Definition {
 
   static constexpr SafetyFormat format(const Options& values) {
     Settings given = options.format(values);
-    given.cpw = {word_with_status({given.cpw_singleturn_bits, given.cpw_multiturn_bits, true}),
-                 {given.cpw_crc_width, given.cpw_crc_poly, given.cpw_crc_init, given.cpw_crc_inverted,
-                  given.cpw_life_counter}};
-    given.spw = {word_with_status({given.spw_singleturn_bits, given.spw_multiturn_bits, true}),
-                 {given.spw_crc_width, given.spw_crc_poly, given.spw_crc_init, given.spw_crc_inverted,
-                  given.spw_life_counter}};
+    given.cpw = {
+        word_with_status({given.cpw_singleturn_bits, given.cpw_multiturn_bits, true}),
+        {given.cpw_crc_width, given.cpw_crc_poly, given.cpw_crc_init, given.cpw_crc_inverted, given.cpw_life_counter}};
+    given.spw = {
+        word_with_status({given.spw_singleturn_bits, given.spw_multiturn_bits, true}),
+        {given.spw_crc_width, given.spw_crc_poly, given.spw_crc_init, given.spw_crc_inverted, given.spw_life_counter}};
     return given;
   }
   static constexpr LineSettings line(const SafetyFormat&) { return line_settings; }

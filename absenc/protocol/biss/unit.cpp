@@ -17,7 +17,6 @@ namespace {
 
 using namespace author;
 
-
 // The members of the check are those of the format, as options are.
 struct Settings : WordSettings<Format> {
   std::uint8_t crc_width = crc6.width;
@@ -42,8 +41,8 @@ struct Definition {
       OptionOf<&Settings::position_bits>{position_bits_option},
       OptionOf<&Settings::unit_pm>{unit_um_option},
       probeable(option<&Settings::crc_width>("crc_width", "bits of the CRC; 0: there is none", 0, 16)),
-      probeable(option<&Settings::crc_poly>("crc_poly", "its polynomial without the highest power: 0x3 is 0x43", 0,
-                                            0xFFFF)),
+      probeable(
+          option<&Settings::crc_poly>("crc_poly", "its polynomial without the highest power: 0x3 is 0x43", 0, 0xFFFF)),
       option<&Settings::crc_init>("crc_init", "its start value", 0, 0xFFFF),
       option<&Settings::crc_inverted>("crc_inverted", "whether it is sent inverted"),
       option<&Settings::life_counter>("life_counter", "6 bits between status bits and CRC that count frames"),

@@ -30,7 +30,7 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
 void VirtualEncoder::clocked(Time at, std::size_t clocks) {
   shifted_ += clocks;
   if (shifted_ < format_.word.bits()) violate("fewer clocks than the word has bits", at);
-  free_at_ = at + format_.monoflop;
+  free_at_ = at + (format_.monoflop == Time{} ? format_.pause : std::min(format_.monoflop, format_.pause));
   count_answer();
 }
 

@@ -31,13 +31,13 @@ struct Format {
   AfterWord after_word = AfterWord::repeat;
   unsigned extra_clocks = 0;  // behind the word, to be compared; as many as the word has bits read it twice
   Scale scale{};
-  bool error_parity = false;     // the last bit is a parity that the encoder inverts when its position is wrong
-  bool padded = false;           // what the word skips is filled with zeros
+  bool error_parity = false;      // the last bit is a parity that the encoder inverts when its position is wrong
+  bool padded = false;            // what the word skips is filled with zeros
   std::uint32_t confirm_rpm = 0;  // the word is read once more: so fast can the shaft have moved; 0: read once
   // What varies by product (RAA38S6 3.5, note).
   Time pause = 50us;  // more than the encoder's monoflop time Tm between two words, or the old one goes on
   std::uint32_t clock_khz = 200;
-  Time monoflop = 20us;  // Tm of the virtual encoder; others have 9 to 41 us
+  Time monoflop = 20us;  // Tm of the virtual encoder, at most `pause`; 0: that. Others have 9 to 41 us
   // Of the virtual encoder: the clock that it allows. 250 kHz is also what Tcs says.
   std::uint32_t slowest_khz = 100;
   std::uint32_t fastest_khz = 250;
@@ -75,9 +75,8 @@ namespace detail {
 
 template <class Source>
 constexpr bool is_padding_zero(const Source& source, BitView bits, std::size_t first) {
-  return source.each([&](auto field) {
-    return field.meaning != Meaning::skip || bits.load(first + field.first, field.bits) == 0;
-  });
+  return source.each(
+      [&](auto field) { return field.meaning != Meaning::skip || bits.load(first + field.first, field.bits) == 0; });
 }
 
 template <class Source>

@@ -39,21 +39,23 @@ struct Protocol {
   return counts <= reach + 1;
 }
 
-/// One word, and the bits behind it that `format.extra_clocks` asks for; with `confirm_rpm` two, of which the second
-/// counts (cross_check_failed).
-class ReadPosition : public author::ClockedHostOf<Protocol> {
+/// One word, and the bits behind it that `format.extra_clocks` asks for.
+using ReadPosition = author::ReadClocked<Protocol>;
+
+/// Two words, of which the second counts: one that the shaft cannot have reached is none (cross_check_failed).
+class ConfirmPosition : public author::ClockedHostOf<Protocol> {
  public:
-  explicit ReadPosition(const Format& format) : ClockedHostOf(format) {}
+  explicit ConfirmPosition(const Format& format) : ClockedHostOf(format) {}
 
  private:
   void clocked(BitView bits) final {
     const Word before = found();
     const Time before_at = first_at_;
     const Error error = take(bits);
-    if (error != Error::none || format().confirm_rpm == 0) return conclude(error);
+    if (error != Error::none) return conclude(error);
     if (second_) {
       return conclude(can_follow(format(), before, found(), begun_at() - before_at) ? Error::none
-                                                                                   : Error::cross_check_failed);
+                                                                                    : Error::cross_check_failed);
     }
     second_ = true;
     first_at_ = begun_at();

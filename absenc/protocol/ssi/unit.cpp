@@ -46,8 +46,9 @@ struct Definition {
       OptionOf<&Settings::multiturn_first>{multiturn_first_option},
       describing_word(option<&Settings::gray>("gray", "turns and position are one Gray-coded number")),
       describing_word(option<&Settings::error_bit>("error_bit", "a bit behind the position", error_bit_choices)),
-      probeable(
-          describing_word(option<&Settings::parity>("parity", "the last bit, over all before it; error: even, and inverted when the position is wrong", parity_choices))),
+      probeable(describing_word(option<&Settings::parity>(
+          "parity", "the last bit, over all before it; error: even, and inverted when the position is wrong",
+          parity_choices))),
       OptionOf<&Settings::after_word>{after_word_option},
       option<&Settings::extra_clocks>(
           "extra_clocks",
@@ -65,13 +66,13 @@ struct Definition {
       decimal<3>(option<&Settings::pause>(
           "pause_us", "the longest pause of the clock after which the old word still goes on (Tm), us", 0,
           1'000'000'000)),
-      decimal<3>(option<&Settings::monoflop>("monoflop_us", "virtual encoder: its monoflop time Tm, us", 0,
-                                             1'000'000'000)),
+      decimal<3>(option<&Settings::monoflop>(
+          "monoflop_us", "virtual encoder: its monoflop time Tm, us, at most pause_us; 0: that", 0, 50'000)),
       option<&Settings::slowest_khz>("min_clock_khz", "virtual encoder: slowest clock that it allows", 1, 10'000),
       option<&Settings::fastest_khz>("max_clock_khz", "virtual encoder: fastest clock that it allows", 1, 10'000),
   };
-  static constexpr std::array models{
-      ModelText{"RAA38S6-12", "RAA38S6 with 12 bits, binary", 0, "bits=12 multiturn_bits=0 gray=false pause_us=500 monoflop_us=500"}};
+  static constexpr std::array models{ModelText{"RAA38S6-12", "RAA38S6 with 12 bits, binary", 0,
+                                               "bits=12 multiturn_bits=0 gray=false pause_us=500 monoflop_us=0"}};
   static constexpr struct { decltype(word_fields) infos; } fields{word_fields};
   static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
   static constexpr auto vectors = ssi::vectors;
@@ -99,7 +100,10 @@ struct Definition {
   }
 
   static constexpr std::array commands{
-      clocked_reading<Definition, Protocol, ReadPosition>({"position", Verb::read, 0, "position and turns"}).only_if(is_usable),
+      clocked_reading<Definition, Protocol>({"position", Verb::read, 0, "position and turns"})
+          .or_when([](const Format& format) { return format.confirm_rpm != 0; },
+                   clocked_reading<Definition, Protocol, ConfirmPosition>({}))
+          .only_if(is_usable),
   };
 
   static constexpr void put(FieldSink& sink, const Format& format, const Word& word) {
