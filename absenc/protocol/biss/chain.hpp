@@ -30,7 +30,8 @@ struct ChainFormat {
 [[nodiscard]] constexpr bool is_usable(const ChainFormat& format) {
   if (format.count > ChainFormat::most || format.slave >= format.count) return false;
   for (unsigned i = 0; i < format.count; ++i) {
-    if (format.channels[i].word.bits_of(Meaning::position) == 0) return false;
+    const Channel& channel = format.channels[i];
+    if (channel.word.bits_of(Meaning::position) == 0 || !is_usable(channel.check)) return false;
   }
   return true;
 }

@@ -26,6 +26,9 @@ struct Check {
   friend constexpr bool operator==(const Check&, const Check&) = default;
 };
 
+/// A polynomial ends in 1, or it is none.
+[[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
+
 inline constexpr Check crc6{};
 /// 0x190D9 with a life counter: that of the safety position word.
 inline constexpr Check crc16{16, 0x90D9, 0, true, true};

@@ -71,6 +71,7 @@ constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsig
 
 /// Whether there is something to compare, and both have it.
 [[nodiscard]] constexpr bool is_usable(const SafetyFormat& format) {
+  if (!is_usable(format.cpw.check) || !is_usable(format.spw.check)) return false;
   return format.compare_bits >= 1 && format.compare_bits <= format.cpw.word.bits_of(Meaning::position) &&
          format.compare_bits <= format.spw.word.bits_of(Meaning::position);
 }

@@ -74,7 +74,9 @@ struct Definition {
   }
   static constexpr LineSettings line(const Format&) { return line_settings; }  // the conversation sets its rate
   static constexpr Resolution resolution(const Format& format) { return resolution_of(format.word, format.scale); }
-  static constexpr bool is_usable(const Format& format) { return absenc::is_usable(format.word); }
+  static constexpr bool is_usable(const Format& format) {
+    return absenc::is_usable(format.word) && biss::is_usable(format.check);
+  }
   static constexpr bool is_readable(const Format& format) {
     return is_usable(format) && absenc::is_usable(format.scale);
   }
