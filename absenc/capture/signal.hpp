@@ -56,6 +56,7 @@ struct Burst {
   std::vector<std::uint8_t> in;   // what the encoder sent, packed MSB first, the last byte left-aligned
   std::vector<std::uint8_t> out;  // SPI: what the host sent
   bool cut = false;               // its beginning or its end was not seen: bits may be missing there
+  bool low_after = false;         // without chip select: the clock rests at its low level in the pause behind it
 };
 
 struct CanRecord {

@@ -41,6 +41,7 @@ struct Step {
   Time gap{};               // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
   Time width{};             // pulse
   ExtraWire wire{};         // pulse
+  bool hold_low = false;    // transfer on a clocked link: until `at` the clock line, which idles high, is held low
   LineSettings settings{};  // configure: `rate`
 };
 
@@ -66,6 +67,7 @@ struct Event {
   std::span<const Item> items{};  // received: valid during the call
   std::size_t bits = 0;           // sent, device side of a clocked link: number of clocks seen
   ExtraWire wire{};               // triggered
+  bool held_low = false;          // selected on a clocked link: the clock line was held low before it, not idle
   Time width{};                   // triggered: how long the pulse lasts; device side, selected on a clocked link and
                                   // sent on an SPI link: the period of the clock; 0: not known
   Time lead{};                    // sent, device side of an SPI link: from chip select to the first clock

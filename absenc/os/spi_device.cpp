@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "absenc/core/bit_view.hpp"
 
@@ -57,6 +58,8 @@ Time SpiDevice::message(std::span<const SpiTransfer> transfers, Time start) {
   return at;
 }
 
+void SpiDevice::rest(std::uint8_t mode) { held_low_ = held_low_ || !idles_high(mode); }
+
 void SpiDevice::wake(Time now) {
   if (now < timer_) return;
   timer_ = never;
@@ -71,7 +74,7 @@ void SpiDevice::select(Time at, Time period) {
   last_out_ = false;
   period_ = lead_ = {};
   selected_at_ = at;
-  feed({.kind = ByteEvent::Kind::selected, .at = at, .width = period});
+  feed({.kind = ByteEvent::Kind::selected, .at = at, .held_low = std::exchange(held_low_, false), .width = period});
 }
 
 void SpiDevice::deselect(Time at) {

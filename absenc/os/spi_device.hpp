@@ -38,6 +38,9 @@ class SpiDevice {
   /// Returns when it ends. On a clocked link a pause of the clock between two transfers ends a word.
   Time message(std::span<const SpiTransfer> transfers, Time start);
 
+  /// The controller was set to another mode between two messages: its clock rests at the level of that until the next.
+  void rest(std::uint8_t mode);
+
   /// When the device wants to be woken.
   [[nodiscard]] Time timer() const { return timer_; }
   /// Nothing happens before `timer()`.
@@ -62,6 +65,7 @@ class SpiDevice {
   Machine<std::uint8_t>* device_;
   Time timer_ = never;
   std::uint64_t wrong_modes_ = 0;
+  bool held_low_ = false;  // since the last message
 
   // Since the chip was selected, or the first clock:
   bool selected_ = false;

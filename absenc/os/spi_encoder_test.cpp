@@ -5,6 +5,7 @@
 #include "absenc/host/drive.hpp"
 #include "absenc/os/fake_spi_test.hpp"
 #include "absenc/protocol/biss/bench_test.hpp"
+#include "absenc/protocol/biss/unit.hpp"
 #include "absenc/protocol/encolink/device.hpp"
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/ssi/device.hpp"
@@ -77,6 +78,20 @@ TEST_F(SpiEncoder, Biss) {
     EXPECT_EQ(kernel.settings().speed, rate);
   }
   EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
+}
+
+TEST_F(SpiEncoder, RegistersAreAskedForByTheLevelOfTheClock) {
+  Options options;
+  ASSERT_EQ(resolve_options(biss::unit, {}, {}, options).kind, OptionError::Kind::none);
+  biss::VirtualEncoder encoder(biss::Format{}, shaft);
+  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
+  SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
+  std::vector<std::byte> storage(biss::unit.host_storage);
+  const Any<Conversation> host = biss::unit.host(options, *find_command(biss::unit, Verb::info), {}, storage);
+  ASSERT_NE(host.bytes, nullptr);
+  ASSERT_TRUE(run(*host.bytes, port));
+  EXPECT_EQ(host.bytes->error(), Error::none);
 }
 
 TEST_F(SpiEncoder, Encolink) {

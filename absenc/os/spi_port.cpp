@@ -108,7 +108,11 @@ void SpiPort::begin(const ByteStep& step) {
     case ByteStep::Kind::transfer:
       // Whoever reads without a pause never waits.
       if (interrupted() && take_interrupt()) throw Interrupted{};
-      reach(step.at);
+      if (step.hold_low) {
+        hold_low(step.at);
+      } else {
+        reach(step.at);
+      }
       transfer(step);
       break;
     case ByteStep::Kind::pulse:
@@ -227,6 +231,20 @@ void SpiPort::set_mode(std::uint8_t mode) {
   }
   throw Failure(Kind::unsupported, "the controller of " + path_ + " refused SPI mode " + std::to_string(mode) +
                                        reason(error) + ": " + advice);
+}
+
+// By the level at which the controller idles, where its driver sets that at once: most do, some with the next message.
+void SpiPort::hold_low(Time until) {
+  const std::uint8_t mode = settings_.spi_mode;
+  try {
+    set_mode(static_cast<std::uint8_t>(mode ^ SPI_CPOL));
+  } catch (const Failure&) {
+    throw Failure(Kind::unsupported, "the controller of " + path_ +
+                                         " cannot hold its clock low between two messages, and registers are asked for "
+                                         "by that: use one with SPI modes 1 and 3, or a microcontroller");
+  }
+  reach(until);
+  set_mode(mode);
 }
 
 void SpiPort::set_word() {

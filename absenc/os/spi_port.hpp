@@ -61,6 +61,7 @@ class SpiPort final : public Port<std::uint8_t> {
   void apply(LineSettings settings);
   void change_rate(std::uint32_t rate);
   void set_mode(std::uint8_t mode);
+  void hold_low(Time until);
   void set_word();
   void set_speed(std::uint32_t speed);
   int control(unsigned long request, void* argument) { return kernel_->control(descriptor_.get(), request, argument); }

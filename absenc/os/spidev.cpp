@@ -145,6 +145,7 @@ int Spidev::set(unsigned long request, Bytes value) {
 int Spidev::set_mode(std::uint32_t wanted) {
   if ((wanted & ~settings_.mode_bits) != 0) return EINVAL;
   settings_.mode = wanted;
+  device_->rest(static_cast<std::uint8_t>(wanted & (SPI_CPHA | SPI_CPOL)));
   return 0;
 }
 

@@ -17,9 +17,9 @@ namespace absenc {
 
 namespace {
 constexpr std::array units{
-    &tformat::unit, &esl::unit,  &encolink::unit,     &encolink::spi_unit, &biss::unit,
-    &ssi::unit,     &e201::unit, &raa38::serial_unit, &raa38::modbus_unit, &raa38::can_unit,
-    &amt21::unit,
+    &tformat::unit, &esl::unit,         &encolink::unit,     &encolink::spi_unit, &biss::unit,
+    &ssi::unit,     &e201::unit,        &raa38::serial_unit, &raa38::modbus_unit, &raa38::can_unit,
+    &amt21::unit,   &biss::safety_unit, &biss::chain_unit,
 };
 }  // namespace
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -263,6 +264,10 @@ struct Unit {
   /// How long after what was last heard this good request may be sent again; null: at once.
   Time (*pause)(const Options& options, Frame request) = nullptr;
   std::span<const Condition> conditions{};  // that can be set of the virtual encoder, also while it runs
+  /// Clocked links whose host says a bit by the level of its clock line in each pause, 1 when it is held low: the index
+  /// of the bit in this reply with which the encoder says one too. Both together are decoded as request and reply, one
+  /// bit for each frame. Nothing: this reply has none. Null: no reply of the unit has.
+  std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
 };
 
 /// Whether a word format may stand in for some of its options.

@@ -43,7 +43,7 @@ inline constexpr Option unit_um_option{.name = "unit_um",
                                        .maximum = 1'000'000'000'000,
                                        .decimals = 6};
 
-inline constexpr std::array<std::string_view, 3> after_word_choices{"repeat", "zero", "one"};
+inline constexpr std::array<std::string_view, 4> after_word_choices{"repeat", "zero", "one", "separated"};
 /// In the order of ssi::AfterWord.
 inline constexpr Option after_word_option{.name = "after_word",
                                           .meaning = "what an SSI encoder sends when it is clocked on",

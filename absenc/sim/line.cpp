@@ -101,7 +101,9 @@ template <class Item>
 Time Line<Item>::settled() const {
   Time time = now_;
   for (const auto& node : nodes_) {
-    if (node->doing != Step<Item>::Kind::transfer || !node->begun) continue;
+    if (node->doing != Step<Item>::Kind::transfer) continue;
+    if (!node->begun && node->hold_low) time = std::min(time, node->taken_up);
+    if (!node->begun) continue;
     time = std::min(time, node->start + node->each * static_cast<std::int64_t>(node->index));
   }
   return time;
@@ -225,6 +227,8 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   state.expect = step.expect;
   state.width = step.width;
   state.pulse_wire = step.wire;
+  state.hold_low = step.hold_low;
+  state.taken_up = now_;
   ++state.begin_generation;
   // Not at once: whoever else is asked or attached at this time comes first, in whatever order.
   if (!driven) schedule(Happening::Kind::begin, step.at, node);

@@ -39,6 +39,7 @@ class Line {
     std::span<const Item> out;
     std::span<const Item> in;
     Time lead{};
+    Time held_low = never;  // clocked: since when the clock line was held low before `start`; never: it was idle
   };
   /// Called for every transfer of SPI or clocked bits, at its end.
   using TransferObserver = std::function<void(const Transfer& transfer)>;

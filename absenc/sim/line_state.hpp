@@ -40,7 +40,9 @@ struct Line<Item>::State {
   std::size_t bits = 0;
   std::size_t expect = 0;
   Time width{};
-  Time lead{};  // spi: from chip select to the first clock
+  bool hold_low = false;  // clocked: the level of the clock before the transfer
+  Time taken_up{};        // when it was asked for
+  Time lead{};            // spi: from chip select to the first clock
   ExtraWire pulse_wire{};
   Time start{};             // of the transfer; CAN: of the frame
   std::size_t index = 0;    // the item on the wire

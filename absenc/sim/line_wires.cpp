@@ -142,7 +142,7 @@ void Line<Item>::begin_transfer(Node node) {
     nodes_[other]->doing = Step<Item>::Kind::wait;
     nodes_[other]->out.clear();
     const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
-    feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .width = period});
+    feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .held_low = host.hold_low, .width = period});
   }
   if (kind_ == LinkKind::spi) host.lead = host.settings.select_lead;
   schedule(Happening::Kind::transferred, now_ + host.lead + host.settings.bits(host.bits), node);
@@ -162,7 +162,9 @@ void Line<Item>::end_transfer(Node node) {
     std::vector<Item> out = host.out;
     out.resize(host.expect, 0);
     const std::size_t bits = host.bits;
-    if (transfer_observer_ && bits > 0) transfer_observer_({host.start, now_, bits, out, in, host.lead});
+    if (transfer_observer_ && bits > 0) {
+      transfer_observer_({host.start, now_, bits, out, in, host.lead, host.hold_low ? host.taken_up : never});
+    }
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (nodes_[other]->role == Role::host) continue;
       nodes_[other]->doing = Step<Item>::Kind::wait;

@@ -128,6 +128,8 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   const auto bits = static_cast<std::int64_t>(seen.bits);
   const std::int64_t idle = settings_.idle_clocks;
   const Scale half{seen.start, seen.end - seen.start, 2 * bits};
+  // It rises again in time for the first edge.
+  if (seen.held_low != never) drive(clock, seen.held_low + half(1) - half(0), half(-1));
   for (std::int64_t i = 0; i < bits + idle; ++i) drive(clock, half(2 * i), half(2 * i + 1));
   for (std::int64_t i = 0; i < bits; ++i) {
     // The first bit of an encoder that answers at once is there before the first edge.

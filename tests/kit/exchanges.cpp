@@ -196,7 +196,7 @@ class Campaign {
                       [&] { return where(asked) + wrong.text + ", though no byte was damaged"; });
     if (unchecked) return;
     ++tally_.wrong;
-    Tally::Command& command = tally_.commands[std::string(asked.command->name)];
+    Tally::Command& command = tally_.commands[called(asked)];
     ++(wrong.position ? command.misplaced : command.mistaken);
   }
 
@@ -266,9 +266,14 @@ class Campaign {
     return {};
   }
 
+  // Options may say what a frame is checked with: what was counted with others is no measure.
+  [[nodiscard]] std::string called(const Asked& asked) const {
+    return std::string(asked.command->name) + (way_.is_model ? "" : " " + way_.text);
+  }
+
   // What a check is worth depends on the frames of the conversation.
   void weigh(const Asked& asked, std::uint64_t damaged) {
-    Tally::Command& command = tally_.commands[std::string(asked.command->name)];
+    Tally::Command& command = tally_.commands[called(asked)];
     command.trials += damaged;
     if (command.weight) return;
     command.weight.emplace();
@@ -280,7 +285,7 @@ class Campaign {
 
   // Whether no bit of one of its replies is covered by a check.
   bool is_unchecked(const Asked& asked) {
-    std::optional<bool>& unchecked = tally_.commands[std::string(asked.command->name)].unchecked;
+    std::optional<bool>& unchecked = tally_.commands[called(asked)].unchecked;
     if (unchecked) return *unchecked;
     const auto frames = frames_of(asked);
     const auto open = [&](const std::pair<Held, Held>& one) {

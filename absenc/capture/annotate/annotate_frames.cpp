@@ -2,14 +2,17 @@
 #include "absenc/capture/annotate/annotate_frames.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace absenc::capture {
 
 // ---- Bursts
 
-// Without the clocks that show the idle line before the first bit.
+// Without the clocks that show the idle line before the first bit, and the edge with which a clock that was held low
+// rises again.
 Frame BurstAnnotator::word_of(const Burst& burst) {
-  const std::size_t idle = judge_.unit().line.idle_clocks;
+  const bool rises = std::exchange(after_low_, burst.low_after) && judge_.unit().control_bit != nullptr;
+  const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
   if (idle == 0 || burst.bits <= idle) return {.bytes = burst.in, .bits = burst.bits};
   const std::size_t bits = burst.bits - idle;
   shifted_.assign((bits + 7) / 8, 0);
@@ -23,10 +26,10 @@ Frame BurstAnnotator::word_of(const Burst& burst) {
 
 void BurstAnnotator::put(const Burst& burst) {
   if (burst.bits == 0) return;
+  bool ends_control = false;
   Annotation annotation{.kind = Annotation::Kind::reply, .begin = burst.begin, .end = burst.end};
   if (judge_.unit().link == LinkKind::clocked) {
-    annotation.reply = word_of(burst);
-    annotation.error = judge_.decode({}, annotation.reply);
+    ends_control = decode_word(burst, annotation);
   } else {
     decode_exchange(burst, annotation);
   }
@@ -37,6 +40,60 @@ void BurstAnnotator::put(const Burst& burst) {
     annotation.remark = Remark::cut;
   }
   sink_.put(annotation);
+  if (ends_control) sink_.put(control_.annotation(judge_));
+}
+
+// Whether a control frame ends with this word.
+bool BurstAnnotator::decode_word(const Burst& burst, Annotation& annotation) {
+  annotation.reply = word_of(burst);
+  const std::optional<std::size_t> place = judge_.control_bit(annotation.reply);
+  const bool answered = place && (annotation.reply.bytes[*place / 8] >> (7 - *place % 8) & 1) != 0;
+  if (answered && control_.may_answer()) {
+    silenced_.assign(annotation.reply.bytes.begin(), annotation.reply.bytes.end());
+    silenced_[*place / 8] = static_cast<std::uint8_t>(silenced_[*place / 8] & ~(0x80u >> *place % 8));
+    annotation.reply.bytes = silenced_;
+  }
+  annotation.error = judge_.decode({}, annotation.reply);
+  return judge_.unit().control_bit != nullptr && control_.put(burst, answered, annotation.error);
+}
+
+void ControlFrames::Bits::add(bool bit) {
+  if (size % 8 == 0) bytes.push_back(0);
+  if (bit) bytes.back() = static_cast<std::uint8_t>(bytes.back() | 0x80u >> size % 8);
+  ++size;
+}
+
+bool ControlFrames::put(const Burst& burst, bool answered, Error error) {
+  const unsigned before = quiet_;
+  quiet_ = burst.low_after ? 0 : std::min(quiet_ + 1, zeros);
+  if (!open_) {
+    if (!burst.low_after || before < zeros) return false;
+    open_ = true;
+    asked_ = {};
+    answered_ = {};
+    begin_ = burst.begin;
+    error_ = Error::none;
+  }
+  asked_.add(burst.low_after);
+  answered_.add(answered);
+  end_ = burst.end;
+  if (error_ == Error::none) error_ = error;
+  open_ = quiet_ < zeros;
+  return !open_;
+}
+
+// A host that lost a word, and with it a bit, does not take what came with it.
+Annotation ControlFrames::annotation(Judge& judge) const {
+  Annotation annotation{.kind = Annotation::Kind::exchange,
+                        .error = error_,
+                        .begin = begin_,
+                        .end = end_,
+                        .request = asked_.frame(),
+                        .reply = answered_.frame()};
+  if (error_ != Error::none) return annotation;
+  annotation.error = judge.decode(annotation.request, annotation.reply);
+  annotation.contents = judge.contents();
+  return annotation;
 }
 
 void BurstAnnotator::decode_exchange(const Burst& burst, Annotation& annotation) {

@@ -13,6 +13,36 @@
 
 namespace absenc::capture {
 
+/// Control frames of clocked links: the bits that the host says with the level of its clock in each pause, and those of
+/// the encoder in the next word. They begin with a 1 behind so many zeros, and end with so many.
+class ControlFrames {
+ public:
+  static constexpr unsigned zeros = 14;
+
+  /// Whether the encoder's bit may be 1: something is asked for.
+  [[nodiscard]] bool may_answer() const { return open_; }
+  /// The next word, and what was wrong with it. True: it is the last of a control frame.
+  bool put(const Burst& burst, bool answered, Error error);
+  /// The one that has ended, decoded; valid until the next word, and until `judge` decodes the next.
+  [[nodiscard]] Annotation annotation(Judge& judge) const;
+
+ private:
+  struct Bits {
+    std::vector<std::uint8_t> bytes;
+    std::size_t size = 0;
+    void add(bool bit);
+    [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = size}; }
+  };
+
+  Bits asked_;
+  Bits answered_;
+  Tick begin_ = 0;
+  Tick end_ = 0;
+  Error error_ = Error::none;
+  unsigned quiet_ = 0;
+  bool open_ = false;
+};
+
 /// SPI exchanges, each a request and its reply, and clocked words, which nobody asks for.
 class BurstAnnotator {
  public:
@@ -23,11 +53,15 @@ class BurstAnnotator {
 
  private:
   void decode_exchange(const Burst& burst, Annotation& annotation);
+  bool decode_word(const Burst& burst, Annotation& annotation);
   [[nodiscard]] Frame word_of(const Burst& burst);
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;  // without the clocks that show the idle line
+  std::vector<std::uint8_t> shifted_;   // without the clocks that show the idle line
+  std::vector<std::uint8_t> silenced_;  // without the encoder's bit of control communication
+  ControlFrames control_;
+  bool after_low_ = false;  // the clock was held low before the next burst
 };
 
 /// CAN frames of any number of nodes, who answer in any order or speak unasked.

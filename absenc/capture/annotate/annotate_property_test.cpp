@@ -86,7 +86,8 @@ class Truth {
     }
   }
   void add(const Burst& burst, const Unit& unit) {
-    const std::size_t idle = unit.link == LinkKind::clocked ? unit.line.idle_clocks : 0;
+    std::size_t idle = unit.link == LinkKind::clocked ? unit.line.idle_clocks : 0;
+    if (std::exchange(after_low_, burst.low_after) && unit.control_bit != nullptr) ++idle;
     Wire bits((burst.bits - idle + 7) / 8);
     for (std::size_t i = idle; i < burst.bits; ++i) {
       const unsigned bit = burst.in[i / 8] >> (7 - i % 8) & 1u;
@@ -94,6 +95,9 @@ class Truth {
     }
     const bool clocked = unit.link == LinkKind::clocked;
     const Frame request{.bytes = clocked ? Bytes{} : Bytes(burst.out).first(2)};
+    const std::optional<std::size_t> place = judge_.control_bit({.bytes = bits, .bits = burst.bits - idle});
+    const bool says_one = place && (bits[*place / 8] >> (7 - *place % 8) & 1) != 0;
+    if (says_one && control_.may_answer()) bits[*place / 8] &= static_cast<std::uint8_t>(~(0x80u >> *place % 8));
     Error error = judge_.decode(request, {.bytes = bits, .bits = clocked ? burst.bits - idle : 0});
     // A host may clock on behind a frame.
     const std::size_t size = clocked ? 0 : judge_.frame_size(Direction::reply, bits);
@@ -111,11 +115,24 @@ class Truth {
                         bits,
                         reading(error),
                         {}});
+    if (unit.control_bit == nullptr || !control_.put(burst, says_one, error)) return;
+    const Annotation said = control_.annotation(judge_);
+    expected.push_back({said.kind,
+                        said.remark,
+                        said.error,
+                        said.begin,
+                        said.end,
+                        Wire(said.request.bytes.begin(), said.request.bytes.end()),
+                        Wire(said.reply.bytes.begin(), said.reply.bytes.end()),
+                        {},
+                        {}});
   }
 
   std::vector<Kept> expected;
 
  private:
+  ControlFrames control_;
+  bool after_low_ = false;
   std::optional<Reading> reading(Error error) {
     return error == Error::none && judge_.contents().reading != nullptr ? std::optional(*judge_.contents().reading)
                                                                         : std::nullopt;

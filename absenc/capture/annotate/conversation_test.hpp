@@ -125,7 +125,11 @@ class Talker {
   }
 
   void hear(const sim::Line<std::uint8_t>::Transfer& transfer) {
-    const std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
+    std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
+    if (transfer.held_low != never) {  // the edge with which the clock rises again takes a bit of the idle line
+      ++idle;
+      if (!talk_.bursts.empty()) talk_.bursts.back().low_after = true;
+    }
     Burst burst{.begin = static_cast<Tick>(transfer.start.count()),
                 .end = static_cast<Tick>(transfer.end.count()),
                 .bits = transfer.bits + idle,

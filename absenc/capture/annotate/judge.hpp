@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
@@ -38,6 +39,11 @@ class Judge {
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
     const std::size_t size = frame_size(Direction::request, bytes);
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
+  }
+
+  /// See Unit.
+  [[nodiscard]] std::optional<std::size_t> control_bit(const Frame& reply) const {
+    return unit_->control_bit != nullptr ? unit_->control_bit(options_, reply) : std::nullopt;
   }
 
   [[nodiscard]] bool is_answered(const Frame& request) const {

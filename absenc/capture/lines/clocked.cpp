@@ -95,6 +95,7 @@ void ClockedDecoder::close(Tick at, bool cut, std::vector<Burst>& bursts) {
   open_ = false;
   burst_.end = at;
   burst_.cut = burst_.cut || cut;
+  burst_.low_after = !format_.has_select && !clock_.level;
   if (burst_.bits > 0) bursts.push_back(std::move(burst_));
   burst_ = {};
 }

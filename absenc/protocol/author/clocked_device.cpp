@@ -16,7 +16,7 @@ ByteStep ClockedDevice::next(Time) {
 void ClockedDevice::feed(const ByteEvent& event) {
   if (event.kind == ByteEvent::Kind::selected && is_on(event.at)) {
     bits_.clear();
-    selected(event.at, event.width, bits_);
+    selected(event.at, event.width, event.held_low, bits_);
     pending_ = driving_ = true;
   } else if (event.kind == ByteEvent::Kind::sent && event.bits > 0 && std::exchange(driving_, false)) {
     clocked(event.at, event.bits);

@@ -24,8 +24,9 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 
-  /// The clock begins, with this period; 0: it is not known. `bits`, empty now, is what the encoder drives.
-  virtual void selected(Time at, Time period, DrivenBits& bits) = 0;
+  /// The clock begins, with this period; 0: it is not known. Whether its line was held low before, and not idle, means
+  /// something to few. `bits`, empty now, is what the encoder drives.
+  virtual void selected(Time at, Time period, bool held_low, DrivenBits& bits) = 0;
   /// The host has stopped after so many clocks, one at least.
   virtual void clocked(Time at, std::size_t clocks) = 0;
 

@@ -10,9 +10,10 @@ using ByteEvent = Event<std::uint8_t>;
 
 // ---- For the subclass
 
-void ClockedEngine::clock(unsigned count) {
+void ClockedEngine::clock(unsigned count, bool hold_low) {
   if (count > 8 * storage_.size()) return finish({.error = Error::invalid_argument});
   count_ = count;
+  hold_low_ = hold_low;
   state_ = State::ready;
 }
 
@@ -36,6 +37,7 @@ ByteStep ClockedEngine::next(Time now) {
     begun_at_ = std::max(now, rested_at_);
     step.kind = ByteStep::Kind::transfer;
     step.at = rested_at_;
+    step.hold_low = hold_low_;
   }
   return step;
 }

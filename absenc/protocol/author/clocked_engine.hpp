@@ -25,7 +25,7 @@ struct ClockedHostTimes {
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) final;
-  Step<std::uint8_t> next(Time now) final;
+  Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
@@ -46,9 +46,9 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   ClockedEngine(const ClockedHostTimes& times, MutableBytes storage) : times_(times), storage_(storage) {}
   ~ClockedEngine() = default;
 
-  /// Gives so many clocks, when the clock has rested. More than there is storage for end the conversation:
-  /// invalid_argument.
-  void clock(unsigned count);
+  /// Gives so many clocks, when the clock has rested: at its idle level, or held low. More than there is storage for
+  /// end the conversation: invalid_argument.
+  void clock(unsigned count, bool hold_low = false);
   /// The conversation is over. Its texts must stay.
   void finish(const Outcome& outcome);
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
@@ -66,6 +66,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   unsigned count_ = 0;  // clocks of this transfer
   State state_ = State::over;
   bool begun_ = false;
+  bool hold_low_ = false;
   Time rested_at_{};
   Time begun_at_{};
   Time sent_at_{};

@@ -30,6 +30,9 @@ concept Clocked = requires {
   P::most_clocks;
 };
 
+struct Later {};
+inline constexpr Later later{};
+
 /// A position with typed replies; a subclass says what becomes of the bits.
 template <Clocked P>
 class ClockedHostOf : public ClockedEngine {
@@ -40,14 +43,16 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] const Format& format() const { return format_; }
   /// The last good reply.
   [[nodiscard]] const Reply& found() const { return found_; }
-  [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
+  [[nodiscard]] const Reading* reading() const override {
+    return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
+  /// The last that was good, whatever came after it.
+  [[nodiscard]] const Reading& position() const { return reading_; }
 
  protected:
-  explicit ClockedHostOf(const Format& format) : ClockedEngine(P::host_times(format), storage_), format_(format) {
-    ask();
-  }
+  explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
+  /// Nothing is clocked before the subclass does.
+  ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
   ~ClockedHostOf() = default;
 
   void ask() { clock(P::clocks(format_)); }
@@ -56,13 +61,16 @@ class ClockedHostOf : public ClockedEngine {
     if (reply) found_ = *reply;
     return reply.error();
   }
-  /// Ends it, with no error by the last good reply, whose position was taken at the first edge of the clock.
+  /// This is the last good reply, whose position was taken at the first edge of the clock.
+  void keep(const Reply& reply) {
+    found_ = reply;
+    reading_ = P::reading(format_, found_);
+    reading_.latched = begun_at();
+    reading_.received = received_at();
+  }
+  /// Ends it, with no error by the last good reply.
   void conclude(Error error) {
-    if (error == Error::none) {
-      reading_ = P::reading(format_, found_);
-      reading_.latched = begun_at();
-      reading_.received = received_at();
-    }
+    if (error == Error::none) keep(found_);
     finish({.error = error});
   }
 

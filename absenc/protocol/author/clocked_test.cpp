@@ -117,7 +117,7 @@ class Device final : public ClockedDevice {
   std::string log;
 
  private:
-  void selected(Time, Time period, DrivenBits& bits) override {
+  void selected(Time, Time period, bool, DrivenBits& bits) override {
     EXPECT_EQ(bits.size(), 0u);
     bits.append(0xA5, 8);
     log += "selected " + std::to_string(period.count()) + " ";

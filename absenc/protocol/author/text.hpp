@@ -28,7 +28,7 @@ struct VectorText {
 
 // Not constexpr, and not defined: who calls one when compiling reads its name in the compiler's message.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
-void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_96_bytes();
+void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
 /// Calls `take(name, value)` for each "name=value" of a text until it returns false; whether all were taken. A value
@@ -133,23 +133,23 @@ struct VectorParts {
     if (!good) fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
   }
 
-  ByteBuffer<96> request{};
-  ByteBuffer<96> reply{};
-  Buffer<Expected, 16> fields{};
+  ByteBuffer<128> request{};
+  ByteBuffer<128> reply{};
+  Buffer<Expected, 24> fields{};
   Error error = Error::none;
 
  private:
-  static constexpr void append(ByteBuffer<96>& bytes, std::string_view hex, bool is_text) {
+  static constexpr void append(ByteBuffer<128>& bytes, std::string_view hex, bool is_text) {
     for (std::size_t i = 0; is_text && i < hex.size(); ++i) {
       if (!bytes.push_back(static_cast<std::uint8_t>(hex[i]))) {
-        a_frame_of_a_vector_is_hexadecimal_and_has_at_most_96_bytes();
+        a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
       }
     }
     if (is_text) return;
     for (std::size_t i = 0; i < hex.size(); i += 2) {
       if (i + 1 == hex.size() || hex_digit(hex[i]) < 0 || hex_digit(hex[i + 1]) < 0 ||
           !bytes.push_back(static_cast<std::uint8_t>(hex_digit(hex[i]) << 4 | hex_digit(hex[i + 1])))) {
-        a_frame_of_a_vector_is_hexadecimal_and_has_at_most_96_bytes();
+        a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
       }
     }
   }

@@ -56,8 +56,8 @@ struct Declares {
 /// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
 /// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
 /// is none; `status`, `alarms`, `conditions`, `timing`, `is_checked`, `bits`, `memory`, `registers`, `over_spi`,
-/// `probe`, `streams`, `extra_wires` as in Unit; and `decode`, `frame_end`, `is_answered` themselves, with the
-/// parameters that they have there.
+/// `probe`, `streams`, `extra_wires`, `control_bit` as in Unit; and `decode`, `frame_end`, `is_answered` themselves,
+/// with the parameters that they have there.
 template <class Definition>
 struct UnitOf {
   using P = typename Definition::Protocol;
@@ -255,8 +255,10 @@ struct UnitOf {
       return decode(values, {.can = vector.request.empty() ? nullptr : &request},
                     {.can = vector.reply.empty() ? nullptr : &reply}, sink);
     } else if constexpr (Clocked<P>) {
+      const auto request = bits_of_text(vector.request);
       const auto bits = bits_of_text(vector.reply);
-      return decode(values, {}, {.bytes = bits.bytes(), .bits = bits.size()}, sink);
+      return decode(values, {.bytes = request.bytes(), .bits = request.size()},
+                    {.bytes = bits.bytes(), .bits = bits.size()}, sink);
     } else {
       return decode(values, {.bytes = vector.request}, {.bytes = vector.reply}, sink);
     }
@@ -334,6 +336,7 @@ struct UnitOf {
     if constexpr (requires { Definition::registers; }) unit.registers = Definition::registers;
     if constexpr (requires { Definition::over_spi; }) unit.over_spi = Definition::over_spi;
     if constexpr (requires { Definition::probe; }) unit.probe = Definition::probe;
+    if constexpr (requires { Definition::control_bit; }) unit.control_bit = Definition::control_bit;
     if constexpr (requires { Definition::streams; }) unit.streams = Definition::streams;
     if constexpr (requires { Definition::extra_wires; }) unit.extra_wires = Definition::extra_wires;
     if constexpr (requires { Definition::explain(Format{}, Error::none, items({}), items({})); }) {

@@ -1,34 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/biss/device.hpp"
 
+#include <algorithm>
+
 namespace absenc::biss {
 
-void Encoder::sample(Time at, Time period, Samples& samples) {
-  samples.clear();
-  // The half of a period without an edge that is longer than the timeout ends the frame: SLO is idle again.
-  if (period / 2 >= behaviour_.timeout) {
-    samples.append(~std::uint64_t{0}, 64);
-    return;
-  }
-  const unsigned ack = ack_bits(behaviour_.latency, period);
-  const Reply reply{.ack_bits = ack, .word = word(at), .life_counter = life_counter_};
-  if (!encode(format_, reply, samples)) {  // not ready within all the clocks that anybody gives
-    samples.clear();
-    samples.append(low_mask(idle_bits), idle_bits);
-    while (samples.size() < Samples::capacity()) samples.append(0, 1);
-  }
-  life_counter_ = (life_counter_ + 1u) & low_mask(life_counter_bits);
-  delay(period, samples);
-  while (samples.size() % 8 != 0) samples.append(0, 1);
-}
-
-// SLO arrives later than the host samples it: by whole clocks, and by chance where an edge falls on a sample.
-void Encoder::delay(Time period, Samples& samples) {
-  if (behaviour_.line_delay == Time{}) return;
-  const auto late = static_cast<unsigned>(behaviour_.line_delay / period);
-  const Time rest = behaviour_.line_delay % period;
-  const bool just_late = late > 0 && rest < behaviour_.edge_noise;
-  const bool nearly_late = period - rest < behaviour_.edge_noise;
+void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples) {
+  if (behaviour.line_delay == Time{}) return;
+  const auto late = static_cast<unsigned>(behaviour.line_delay / period);
+  const Time rest = behaviour.line_delay % period;
+  const bool just_late = late > 0 && rest < behaviour.edge_noise;
+  const bool nearly_late = period - rest < behaviour.edge_noise;
   if (late == 0 && !nearly_late) return;
   const BitBuffer driven = samples;
   samples.clear();
@@ -46,31 +28,74 @@ void Encoder::delay(Time period, Samples& samples) {
   }
 }
 
-VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
-    : VirtualEncoder(format, shaft,
-                     {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
-                      .line_delay = format.line_delay}) {}
+// ---- Registers
 
-void VirtualEncoder::selected(Time at, Time period, Samples& samples) {
-  const Time timeout = encoder_.behaviour().timeout;
-  if (period == Time{}) period = line_settings.bits(1);
-  if (period < shortest_period) violate("MA faster than 10 MHz", at);
-  needed_ = 0;
-  if (at < free_at_) {  // SLO is still low
-    violate("clocked before the BiSS timeout has passed", at);
-    samples.append(0, 64);
-    return;
+namespace {
+// Of each slave: the banks, then what is behind them, without its bank select, which power off forgets.
+constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
+
+constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, manufacturer
+}  // namespace
+
+VirtualRegisters::VirtualRegisters() {
+  for (unsigned slave = 0; slave < most_slaves; ++slave) {
+    const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
+    own[registers::eds_bank - registers::bank_size] = banks - 1;
+    own[registers::profile - registers::bank_size] = 0;
+    own[registers::profile + 1 - registers::bank_size] = 0;
+    own[registers::serial_number + 3 - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);
+    std::copy(identity.begin(), identity.end(), own.begin() + (registers::device_id - registers::bank_size));
   }
-  if (period / 2 >= timeout) violate("MA slower than the BiSS timeout allows", at);
-  encoder_.set_alarms(raised());
-  encoder_.sample(at, period, samples);
-  needed_ = clocks(encoder_.format(), encoder_.behaviour().latency, period);
 }
 
-void VirtualEncoder::clocked(Time at, std::size_t clocks) {
-  if (clocks < needed_) violate("fewer clocks than the frame has bits", at);
-  if (needed_ > 0) count_answer();
-  free_at_ = at + encoder_.behaviour().timeout;
+void VirtualRegisters::power_on() { bank_ = {}; }
+
+void VirtualRegisters::set_time(Time at, Time delay) {
+  now_ = at;
+  delay_ = delay;
 }
+
+std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
+  const std::size_t first = slave * slave_size;
+  if (address < registers::bank_size) return first + bank_[slave] * registers::bank_size + address;
+  return first + direct + (address - registers::bank_size);
+}
+
+// All but what tells which encoder this is, and banks that there are not.
+bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
+  if (slave >= most_slaves) return false;
+  if (address < registers::bank_size) return bank_[slave] < banks;
+  if (!write || address == registers::bank_select) return true;
+  return address >= registers::device && address < registers::device_id;
+}
+
+std::uint8_t VirtualRegisters::read(unsigned slave, unsigned address) {
+  asked_ = false;
+  return address == registers::bank_select ? bank_[slave] : memory_[place(slave, address)];
+}
+
+void VirtualRegisters::write(unsigned slave, unsigned address, std::uint8_t value) {
+  asked_ = false;
+  if (address == registers::bank_select) {
+    bank_[slave] = value;
+  } else {
+    memory_[place(slave, address)] = value;
+    ++written_;
+  }
+}
+
+bool VirtualRegisters::is_ready() const {
+  if (delay_ == Time{}) return true;
+  if (!asked_) {
+    asked_ = true;
+    asked_at_ = now_;
+  }
+  return now_ - asked_at_ >= delay_;
+}
+
+// The commands of the standard, all of which only have to do with the line.
+bool VirtualRegisters::obeys(unsigned slave, unsigned command) const { return slave < most_slaves && command < 2; }
+
+void VirtualRegisters::execute(std::uint8_t, unsigned) {}
 
 }  // namespace absenc::biss

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual BiSS-C encoder: what it puts on SLO at any clock, and the rules of timing that its host breaks.
+// A virtual BiSS-C encoder: what it puts on SLO at any clock, its registers, and the rules of timing that its host
+// breaks.
 #pragma once
 
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/author/clocked_device.hpp"
-#include "absenc/protocol/biss/frame.hpp"
+#include "absenc/protocol/biss/chain.hpp"
+#include "absenc/protocol/biss/control.hpp"
+#include "absenc/protocol/biss/host.hpp"
+#include "absenc/protocol/biss/registers.hpp"
 
 namespace absenc::biss {
 
@@ -14,20 +18,50 @@ struct Behaviour {
   Time line_delay{};       // there and back; SLO is sampled one period of MA after the edge that drives it
   Time edge_noise = 20ns;  // a sample so near to a delayed edge is the old bit or the new one
   Time timeout = 20us;
+  Time register_delay{};  // from what asks for a register to its start bit
 };
 
 using Samples = author::DrivenBits;
 
-/// The encoder without its line: also what stands behind an adapter.
-class Encoder {
+/// What arrives late: by whole clocks, and by chance where an edge falls on a sample.
+class LineDelay {
  public:
-  Encoder(const Format& format, const Shaft& shaft, const Behaviour& behaviour)
+  void apply(const Behaviour& behaviour, Time period, Samples& samples);
+
+ private:
+  std::uint32_t noise_ = 1;
+};
+
+/// The encoder without its line: also what stands behind an adapter.
+template <class F>
+class EncoderOf {
+ public:
+  EncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : format_(format), shaft_(&shaft), behaviour_(behaviour) {}
 
   /// What the host samples when its first falling edge of MA comes `at`: the whole frame, then 0 up to a full byte.
-  void sample(Time at, Time period, Samples& samples);
+  void sample(Time at, Time period, Samples& samples, bool cds = false) {
+    samples.clear();
+    // The half of a period without an edge that is longer than the timeout ends the frame: SLO is idle again.
+    if (period / 2 >= behaviour_.timeout) {
+      samples.append(~std::uint64_t{0}, 64);
+      return;
+    }
+    typename ProtocolOf<F>::Reply reply;
+    reply.ack_bits = ack_bits(behaviour_.latency, period);
+    reply.cds = cds;
+    show(format_, shaft_->at(at), alarms_, life_counter_, reply);
+    if (!encode(format_, reply, samples)) {  // not ready within all the clocks that anybody gives
+      samples.clear();
+      samples.append(low_mask(idle_bits), idle_bits);
+      while (samples.size() < Samples::capacity()) samples.append(0, 1);
+    }
+    life_counter_ = static_cast<std::uint8_t>((life_counter_ + 1u) & low_mask(life_counter_bits));
+    delay_.apply(behaviour_, period, samples);
+    while (samples.size() % 8 != 0) samples.append(0, 1);
+  }
 
-  [[nodiscard]] const Format& format() const { return format_; }
+  [[nodiscard]] const F& format() const { return format_; }
   [[nodiscard]] const Behaviour& behaviour() const { return behaviour_; }
   [[nodiscard]] Word word(Time at) const { return word_of(format_.word, shaft_->at(at), alarms_); }
   [[nodiscard]] bool is_powered() const { return powered_; }
@@ -35,31 +69,107 @@ class Encoder {
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
 
  private:
-  void delay(Time period, Samples& samples);
-
-  Format format_;
+  F format_;
   const Shaft* shaft_;
   Behaviour behaviour_;
   bool powered_ = false;
   std::uint32_t alarms_ = 0;
   std::uint8_t life_counter_ = 0;
-  std::uint32_t noise_ = 1;
+  LineDelay delay_;
 };
+using Encoder = EncoderOf<Format>;
 
-class VirtualEncoder final : public author::ClockedDevice {
+/// The registers of all slaves of a line: what survives power off is `memory`.
+class VirtualRegisters final : public ControlTarget {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder.
-  VirtualEncoder(const Format& format, const Shaft& shaft);
-  VirtualEncoder(const Format& format, const Shaft& shaft, const Behaviour& behaviour)
-      : encoder_(format, shaft, behaviour) {}
+  static constexpr unsigned banks = 4;
+  static constexpr unsigned slave_size = banks * registers::bank_size + (registers::end - registers::bank_size);
+  static constexpr unsigned most_slaves = ChainFormat::most;
+
+  VirtualRegisters();
+  void power_on();
+  /// What is asked for now is there `delay` later.
+  void set_time(Time at, Time delay);
+  [[nodiscard]] MutableBytes memory() { return memory_; }
+  [[nodiscard]] std::uint32_t written() const { return written_; }
+
+  [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
+  [[nodiscard]] std::uint8_t read(unsigned slave, unsigned address) override;
+  void write(unsigned slave, unsigned address, std::uint8_t value) override;
+  [[nodiscard]] bool is_ready() const override;
+  [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
+  void execute(std::uint8_t slaves, unsigned command) override;
 
  private:
-  void selected(Time at, Time period, Samples& samples) override;
-  void clocked(Time at, std::size_t clocks) override;
+  [[nodiscard]] std::size_t place(unsigned slave, unsigned address) const;
 
-  Encoder encoder_;
+  std::array<std::uint8_t, most_slaves * slave_size> memory_{};
+  std::array<std::uint8_t, most_slaves> bank_{};
+  Time now_{};
+  Time delay_{};
+  mutable Time asked_at_{};
+  mutable bool asked_ = false;
+  std::uint32_t written_ = 0;
+};
+
+/// How many slaves these frames carry words of.
+[[nodiscard]] constexpr unsigned slaves_of(const Format&) { return 1; }
+[[nodiscard]] constexpr unsigned slaves_of(const SafetyFormat&) { return 2; }
+[[nodiscard]] constexpr unsigned slaves_of(const ChainFormat& format) { return format.count; }
+
+template <class F>
+class VirtualEncoderOf final : public author::ClockedDevice {
+ public:
+  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  VirtualEncoderOf(const F& format, const Shaft& shaft)
+      : VirtualEncoderOf(format, shaft,
+                         {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
+                          .line_delay = format.line_delay,
+                          .register_delay = format.register_delay}) {}
+  VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
+      : encoder_(format, shaft, behaviour), slaves_(slaves_of(format)) {}
+
+  [[nodiscard]] MutableBytes memory() override { return registers_.memory(); }
+
+ private:
+  void selected(Time at, Time period, bool held_low, Samples& samples) override {
+    const Behaviour& behaviour = encoder_.behaviour();
+    if (period == Time{}) period = line_settings.bits(1);
+    if (period < shortest_period) violate("MA faster than 10 MHz", at);
+    needed_ = 0;
+    if (at < free_at_) {  // SLO is still low
+      violate("clocked before the BiSS timeout has passed", at);
+      samples.append(0, 64);
+      return;
+    }
+    if (period / 2 >= behaviour.timeout) violate("MA slower than the BiSS timeout allows", at);
+    registers_.set_time(at, behaviour.register_delay);
+    const std::uint32_t written = registers_.written();
+    if (clocked_before_) slaves_.take(held_low, registers_);
+    if (registers_.written() != written) change_memory();
+    encoder_.set_alarms(raised());
+    encoder_.sample(at, period, samples, slaves_.cds());
+    needed_ = clocks(encoder_.format(), behaviour.latency, period);
+  }
+  void clocked(Time at, std::size_t clocks) override {
+    if (clocks < needed_) violate("fewer clocks than the frame has bits", at);
+    if (needed_ > 0) count_answer();
+    clocked_before_ = true;
+    free_at_ = at + encoder_.behaviour().timeout;
+  }
+  void started(Time) override {
+    registers_.power_on();
+    slaves_.reset();
+    clocked_before_ = false;
+  }
+
+  EncoderOf<F> encoder_;
+  ControlSlaves slaves_;
+  VirtualRegisters registers_;
   unsigned needed_ = 0;  // clocks of this frame; 0: there is none
   Time free_at_{};       // the timeout after the last clock
+  bool clocked_before_ = false;
 };
+using VirtualEncoder = VirtualEncoderOf<Format>;
 
 }  // namespace absenc::biss

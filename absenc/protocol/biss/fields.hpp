@@ -8,12 +8,22 @@
 
 namespace absenc::biss {
 
-enum FieldIndex : std::size_t { field_ack_bits, field_crc, field_life_counter };
+enum FieldIndex : std::size_t { field_ack_bits, field_crc, field_life_counter, field_line_delay, field_line_delay_us };
 
-inline constexpr std::array<FieldInfo, 3> own_fields{{
+inline constexpr std::array<FieldInfo, 5> own_fields{{
     {"ack_bits", FieldInfo::Kind::number, "", "clocks until the encoder was ready"},
     {"crc", FieldInfo::Kind::number, "", "as sent: inverted"},
     {"life_counter", FieldInfo::Kind::number, "", "counts up with every reading (BiSS Safety)"},
+    {"line_delay_clocks", FieldInfo::Kind::number, "", "whole clocks by which the line is late, there and back"},
+    {"line_delay_us", FieldInfo::Kind::real, "us", "the same at the clock of ma_khz: 100 m of cable make 1 us"},
 }};
+
+/// The delay of the line, where the samples begin with the clock; others may begin anywhere in the idle line.
+template <class F, class ReplyType>
+constexpr void put_line_delay(FieldSink& sink, const F& format, const ReplyType& reply) {
+  if (reply.delay_bits == 0) return;
+  sink.put({&own_fields[field_line_delay], reply.delay_bits});
+  sink.put({&own_fields[field_line_delay_us], 0, reply.delay_bits * 1000.0 / format.ma_khz});
+}
 
 }  // namespace absenc::biss

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS-C frames (unidirectional) as samples of SLO, one for each clock of MA: encode, decode, every check a frame
-// allows, and its times. README.md draws the frame. Sources: RLS "E201-9S Decoding the BiSS information"; BiSS Safety.
+// BiSS-C frames of one encoder as samples of SLO, one for each clock of MA: encode, decode, every check a frame allows,
+// and its times. README.md draws the frame. Sources: RLS "E201-9S Decoding the BiSS information"; BiSS C rev D2.
 #pragma once
 
 #include <algorithm>
@@ -8,25 +8,17 @@
 #include <cstdint>
 
 #include "absenc/core/bit_view.hpp"
-#include "absenc/core/crc.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
+#include "absenc/protocol/biss/check.hpp"
 #include "absenc/protocol/word.hpp"
 
 namespace absenc::biss {
 
 using namespace std::chrono_literals;
 
-/// x^6 + x + 1 over position and both status bits, sent inverted.
-inline constexpr CrcParameters crc6_parameters{6, 0x03, 0, false, false, 0x3F};
-/// 0x190D9 over position, status and life counter, sent inverted (BiSS Safety, safety position word).
-inline constexpr CrcParameters crc16_parameters{16, 0x90D9, 0, false, false, 0xFFFF};
-
-enum class Check : std::uint8_t { crc6, crc16 };
-
-inline constexpr unsigned life_counter_bits = 6;  // before a CRC-16; counts 0 to 63 and goes on at 0
-inline constexpr unsigned idle_bits = 2;          // SLO goes low on the second rising edge of MA
+inline constexpr unsigned idle_bits = 2;  // SLO goes low on the second rising edge of MA
 
 inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
@@ -34,13 +26,15 @@ inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 
 
 struct Format {
   WordFormat word = "position:19 error:1! warning:1!"_word;
-  Check check = Check::crc6;
+  Check check{};
   Scale scale{};
   std::uint32_t ma_khz = 1000;  // 10 to 10 000
   Time latency = 10us;          // the longest that the encoder needs, up to 1 ms: makes the number of clocks
   // Of the virtual encoder.
   Time ready{};  // what it needs itself; 0: as `latency`, but at most 10 us
   Time line_delay{};
+  Time register_delay{};   // until a register that was asked for is there
+  std::uint8_t slave = 0;  // whose registers are meant: 0 to 7, counted from the end of the chain
 
   /// Of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
@@ -55,9 +49,7 @@ struct Format {
 }
 
 /// Word, life counter and CRC: what follows the CDS bit.
-[[nodiscard]] constexpr unsigned data_bits(const Format& format) {
-  return format.word.bits() + (format.check == Check::crc6 ? 6 : life_counter_bits + 16);
-}
+[[nodiscard]] constexpr unsigned data_bits(const Format& format) { return format.word.bits() + format.check.bits(); }
 
 /// ACK bits of an encoder that needs `latency` from the second rising edge of MA until its position is ready. Both up
 /// to a second: a small processor divides 32 bits.
@@ -68,7 +60,8 @@ struct Format {
 }
 
 /// Clocks that a whole frame needs.
-[[nodiscard]] constexpr unsigned clocks(const Format& format, Time latency, Time period) {
+template <class AnyFormat>
+[[nodiscard]] constexpr unsigned clocks(const AnyFormat& format, Time latency, Time period) {
   return idle_bits + ack_bits(latency, period) + 2 + data_bits(format);
 }
 
@@ -76,43 +69,58 @@ template <class WordType>
 struct ReplyWith {
   unsigned ack_bits = 1;
   WordType word{};
-  std::uint8_t life_counter = 0;  // CRC-16 only
+  std::uint8_t life_counter = 0;  // of a check that has one
   std::uint16_t crc = 0;          // as sent
+  unsigned delay_bits = 0;        // idle samples more than those of an encoder at hand: the line's delay, in clocks
+  bool cds = false;               // the encoder's bit of control communication
 };
 using Reply = ReplyWith<Word>;
 
+/// Whether a CDS of 1 is right: only while registers are read and written.
+enum class Cds : std::uint8_t { zero, any };
+
 namespace detail {
 
-// What follows the CDS bit, in `bits` from `first` on.
-template <class Source, class Bits, class ReplyType>
-constexpr Error take_data(const Source& source, const Bits& bits, std::size_t first, ReplyType& reply) {
-  const unsigned word = source.word.bits();
-  std::uint16_t right = 0;
-  if (source.format.check == Check::crc6) {
-    reply.crc = static_cast<std::uint16_t>(bits.load(first + word, 6));
-    right = crc_of<crc6_parameters>(bits, first, word);
-  } else {
-    const unsigned checked = word + life_counter_bits;
-    reply.life_counter = static_cast<std::uint8_t>(bits.load(first + word, life_counter_bits));
-    reply.crc = static_cast<std::uint16_t>(bits.load(first + checked, 16));
-    right = crc_of<crc16_parameters, CrcTable::nibble>(bits, first, checked);
+// A word and what checks it, in `bits` from `first` on.
+template <class Source, class Bits, class Data>
+constexpr Error take_data(const Source& source, const Bits& bits, std::size_t first, Data& data) {
+  const Check& check = source.format.check;
+  std::size_t end = first + source.word.bits();
+  if (check.life_counter) {
+    data.life_counter = static_cast<std::uint8_t>(bits.load(end, life_counter_bits));
+    end += life_counter_bits;
   }
-  return reply.crc == right ? absenc::detail::take_word(source, bits, first, reply.word) : Error::bad_checksum;
+  if (check.width != 0) {
+    data.crc = static_cast<std::uint16_t>(bits.load(end, check.width));
+    if (data.crc != crc_as_sent(source, bits, first, end - first)) return Error::bad_checksum;
+  }
+  return absenc::detail::take_word(source, bits, first, data.word);
 }
 
-template <class Source, class ReplyType>
-constexpr Error take_frame(const Source& source, BitView samples, ReplyType& reply) {
+// Where what follows the CDS bit begins: `size` bits. What is before it goes to `ack_bits`, `delay_bits` and `cds`.
+template <class ReplyType>
+constexpr Error take_head(BitView samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
   if (idle == samples.size) return Error::line_stuck;
   const std::size_t start = samples.end_of_run(idle);
   if (start == samples.size) return idle == 0 ? Error::line_stuck : Error::bad_framing;  // no start bit
-  const std::size_t first = start + 2;
+  first = start + 2;
   if (first > samples.size) return Error::truncated;
-  if (samples[first - 1]) return Error::bad_framing;  // CDS
-  const unsigned size = data_bits(source.format);
+  head.cds = samples[first - 1];
+  if (head.cds && cds == Cds::zero) return Error::bad_framing;
   if (size > samples.size - first) return Error::truncated;
-  reply.ack_bits = static_cast<unsigned>(start - idle);
+  head.delay_bits = idle > idle_bits ? static_cast<unsigned>(idle - idle_bits) : 0;
+  head.ack_bits = static_cast<unsigned>(start - idle);
+  return Error::none;
+}
+
+template <class Source, class ReplyType>
+constexpr Error take_frame(const Source& source, BitView samples, Cds cds, ReplyType& reply) {
+  const unsigned size = data_bits(source.format);
+  std::size_t first = 0;
+  const Error error = take_head(samples, size, cds, reply, first);
+  if (error != Error::none) return error;
   if constexpr (!Source::is_known) {
     return take_data(source, absenc::detail::SomeBits(samples, first, size), 0, reply);
   } else {
@@ -122,45 +130,73 @@ constexpr Error take_frame(const Source& source, BitView samples, ReplyType& rep
 }
 
 template <class Source>
-constexpr auto decode_by(const Source& source, BitView samples) {
+constexpr auto decode_by(const Source& source, BitView samples, Cds cds) {
   Result result = ReplyWith<typename Source::Word>{};
-  const Error error = take_frame(source, samples, *result);
+  const Error error = take_frame(source, samples, cds, *result);
   if (error != Error::none) result = error;
   return result;
+}
+
+// Word, life counter and CRC.
+template <class Format, class Data, std::size_t Capacity>
+constexpr void append_data(const Format& format, const Data& data, BitBuffer<Capacity>& out) {
+  const std::size_t first = out.size();
+  encode_word(format.word, data.word, out);
+  if (format.check.life_counter) out.append(data.life_counter, life_counter_bits);
+  if (format.check.width == 0) return;
+  const Given<Format> source{format, format.word};
+  out.append(crc_as_sent(source, out.view(), first, out.size() - first), format.check.width);
+}
+
+// Idle bits, ACK, start and CDS. False when `size` bits more do not fit.
+template <class ReplyType, std::size_t Capacity>
+constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Capacity>& out) {
+  if (out.capacity() - out.size() < idle_bits + head.delay_bits + head.ack_bits + 2 + size) return false;
+  for (unsigned i = 0; i < idle_bits + head.delay_bits; ++i) out.append(1, 1);
+  for (unsigned i = 0; i < head.ack_bits; ++i) out.append(0, 1);
+  out.append(head.cds ? 0b11 : 0b10, 2);
+  return true;
 }
 
 }  // namespace detail
 
 /// The frame in samples of any length that begin while SLO is idle (1) or in the ACK (0). What follows the CRC is
-/// ignored. Errors: wrong_length (no samples), line_stuck (all alike), bad_framing (no start bit, or CDS is 1),
-/// truncated (the frame goes on behind the samples), bad_checksum (CRC, or the parity of the word).
-[[nodiscard]] constexpr Result<Reply> decode(const Format& format, BitView samples) {
-  return detail::decode_by(Given<Format>{format, format.word}, samples);
+/// ignored. Errors: wrong_length (no samples), line_stuck (all alike), bad_framing (no start bit, or CDS is 1 where it
+/// must not), truncated (the frame goes on behind the samples), bad_checksum (CRC, or the parity of the word).
+[[nodiscard]] constexpr Result<Reply> decode(const Format& format, BitView samples, Cds cds = Cds::zero) {
+  return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
 /// The same of a format that is known when the program is written, at the cost of what a hand would write for it. The
 /// word has `values` only where the format has some.
 template <const Format& format>
-[[nodiscard]] constexpr Result<ReplyWith<typename Known<format>::Word>> decode(BitView samples) {
-  return detail::decode_by(Known<format>{}, samples);
+[[nodiscard]] constexpr Result<ReplyWith<typename Known<format>::Word>> decode(BitView samples, Cds cds = Cds::zero) {
+  return detail::decode_by(Known<format>{}, samples, cds);
 }
 
 /// Appends idle bits, ACK, start, CDS, word and check; `reply.crc` is not used. False when `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out) {
-  if (out.capacity() - out.size() < idle_bits + reply.ack_bits + 2 + data_bits(format)) return false;
-  out.append(low_mask(idle_bits), idle_bits);
-  for (unsigned i = 0; i < reply.ack_bits; ++i) out.append(0, 1);
-  out.append(0b10, 2);
-  const std::size_t first = out.size();
-  encode_word(format.word, reply.word, out);
-  if (format.check == Check::crc6) {
-    out.append(crc_of<crc6_parameters>(out.view(), first, out.size() - first), 6);
-  } else {
-    out.append(reply.life_counter, life_counter_bits);
-    out.append(crc_of<crc16_parameters, CrcTable::nibble>(out.view(), first, out.size() - first), 16);
-  }
+  if (!detail::append_head(reply, data_bits(format), out)) return false;
+  detail::append_data(format, reply, out);
   return true;
+}
+
+/// What a virtual encoder says.
+constexpr void show(const Format& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
+                    Reply& reply) {
+  reply.word = word_of(format.word, state, alarms);
+  reply.life_counter = life_counter;
+}
+
+[[nodiscard]] constexpr Reading reading_of(const Format& format, const Reply& reply) {
+  return to_reading(format.word, reply.word, format.scale);
+}
+
+/// Whether these samples end before a frame does, whose encoder or line may need longer than was thought.
+[[nodiscard]] constexpr bool needs_more(Error error, BitView samples) {
+  if (error == Error::truncated) return true;
+  return error == Error::bad_framing && samples.end_of_run(samples.end_of_run(0)) == samples.size;
 }
 
 }  // namespace absenc::biss

@@ -94,8 +94,10 @@ void agree(std::uint64_t seed) {
     if (!given) continue;
     ++good;
     // What is accepted is the frame that its fields make; what is skipped is not kept.
+    Reply at_hand = *given;
+    at_hand.delay_bits = 0;
     BitBuffer<512> again;
-    EXPECT_TRUE(encode(format, *given, again));
+    EXPECT_TRUE(encode(format, at_hand, again));
     const std::size_t first = view[0] ? view.end_of_run(0) : 0;
     for (std::size_t k = idle_bits; k < again.size() && !skips(format); ++k) {
       ASSERT_EQ(again.view()[k], view[first + k - idle_bits]) << k;
@@ -117,8 +119,12 @@ constexpr Format turns{.word = "multiturn:16 position:32 error:1! warning:1!"_wo
 constexpr Format behind{.word =
                             "position:13 multiturn:51 warning:1 gray parity:1!"_word};  // does not fit into a register
 constexpr Format values{.word = "position:20 temperature=value:8 error:1 skip:3 warning:1!"_word};
-constexpr Format checked{.word = "position:24 error:1! warning:1!"_word, .check = Check::crc16};
-constexpr Format long_checked{.word = "position:64 skip:20 error:1! warning:1!"_word, .check = Check::crc16};
+constexpr Format checked{.word = "position:24 error:1! warning:1!"_word, .check = crc16};
+// 0x197 as RLS writes it, a start value, and none at all.
+constexpr Format other_crc{.word = "position:24 error:1! warning:1!"_word, .check = {8, 0x97}};
+constexpr Format started{.word = "position:24 error:1! warning:1!"_word, .check = {16, 0x90D9, 0x1234, false, false}};
+constexpr Format small_crc{.word = "position:8 error:1! warning:1!"_word, .check = {5, 0x05}};
+constexpr Format long_checked{.word = "position:64 skip:20 error:1! warning:1!"_word, .check = crc16};
 
 TEST(BissFrame, AKnownFormatIsDecodedAsAnyOther) {
   agree<plain>(1);
@@ -127,11 +133,29 @@ TEST(BissFrame, AKnownFormatIsDecodedAsAnyOther) {
   agree<values>(4);
   agree<checked>(5);
   agree<long_checked>(6);
+  agree<other_crc>(7);
+  agree<started>(8);
+  agree<small_crc>(9);
   static_assert(decode<plain>(BitView{}).error() == Error::wrong_length);
 }
 
+TEST(BissFrame, AnyCrcIsThatOfItsDefinition) {
+  sim::Random random(11);
+  for (int i = 0; i < 2'000; ++i) {
+    const auto width = static_cast<std::uint8_t>(3 + random.below(14));
+    const auto mask = static_cast<std::uint16_t>(low_mask(width));
+    const Check check{width, static_cast<std::uint16_t>(random.next() & mask),
+                      static_cast<std::uint16_t>(random.next() & mask), random.chance(0.5), false};
+    std::array<std::uint8_t, 16> bytes{};
+    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random.next());
+    const std::size_t size = 1 + random.below(bytes.size());
+    const std::uint16_t right = crc_bitwise(parameters_of(check), Bytes(bytes).first(size));
+    EXPECT_EQ(detail::crc_bit_by_bit(check, BitView{bytes, 128}, 0, 8 * size), right);
+  }
+}
+
 TEST(BissFrame, SafetyCrcSeesEveryErrorOfThreeBits) {
-  const Format format{.word = word_with_status({.position = 24}), .check = Check::crc16};
+  const Format format{.word = word_with_status({.position = 24}), .check = crc16};
   const BitBuffer<512> samples =
       samples_of(format, {.ack_bits = 4, .word = {.position = 0xABCDEF}, .life_counter = 41}, 2);
   const Result<Reply> good = decode(format, samples.view());

@@ -62,6 +62,11 @@ TEST(BissHost, WhatTheLineDoesWrong) {
   ReadPosition truncated(turns_19);
   EXPECT_EQ(slow.run(truncated).error(), Error::truncated);
   EXPECT_EQ(slow.encoder.violation_count(), 1u);
+  FindPosition<Format> found(turns_19);
+  EXPECT_EQ(slow.run(found).error(), Error::none);
+  Bench slower(line_settings, turns_19, Behaviour{.latency = 100us});
+  FindPosition<Format> too_late(turns_19);
+  EXPECT_EQ(slower.run(too_late).error(), Error::truncated);
   EXPECT_EQ(truncated.reading(), nullptr);
 
   Bench off(line_settings, turns_19);
@@ -72,6 +77,18 @@ TEST(BissHost, WhatTheLineDoesWrong) {
   ReadPosition impossible({.word = turns_19.word, .ma_khz = 10'000, .latency = 1ms});
   EXPECT_EQ(impossible.next(Time{}).kind, Step<std::uint8_t>::Kind::done);
   EXPECT_EQ(impossible.error(), Error::invalid_argument);
+}
+
+TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
+  for (const Time delay : {1us, 3us, 17us, 40us}) {
+    Bench bench(line_settings, turns_19, Behaviour{.latency = 30us, .line_delay = delay + 500ns});
+    bench.shaft.state.position = std::int64_t{275096} << 13;
+    FindPosition<Format> read(turns_19);
+    ASSERT_EQ(bench.run(read).error(), Error::none) << delay.count();
+    EXPECT_EQ(read.reading()->singleturn, 275096u);
+    EXPECT_EQ(read.found().ack_bits, 30u);
+    EXPECT_EQ(read.found().delay_bits, delay / 1us);
+  }
 }
 
 TEST(BissHost, SaysWhatToDo) {
@@ -92,7 +109,7 @@ TEST(BissHost, SaysWhatToDo) {
 
 // ---- BiSS Safety: two frames
 
-const Format safety{.word = word_with_status({.position = 24}), .check = Check::crc16};
+const Format safety{.word = word_with_status({.position = 24}), .check = crc16};
 
 /// What becomes of two frames with these life counters, in the second of which this bit is wrong.
 Error read_safety(std::uint8_t first, std::uint8_t second, std::size_t flip = ~std::size_t{0}) {

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/biss/commands.hpp"
 #include "absenc/protocol/biss/device.hpp"
 #include "absenc/protocol/biss/fields.hpp"
 #include "absenc/protocol/biss/host.hpp"
@@ -16,16 +17,22 @@ namespace {
 
 using namespace author;
 
-using Settings = WordSettings<Format>;
-constexpr std::array<std::string_view, 2> check_choices{"crc6", "crc16"};
+// The members of the check are those of the format, as options are.
+struct Settings : WordSettings<Format> {
+  std::uint8_t crc_width = crc6.width;
+  std::uint16_t crc_poly = crc6.poly;
+  std::uint16_t crc_init = crc6.init;
+  bool crc_inverted = crc6.inverted;
+  bool life_counter = crc6.life_counter;
+};
 
 struct Definition {
   using Protocol = biss::Protocol;
   using Encoder = VirtualEncoder;
-  static constexpr std::string_view id = "biss", name = "BiSS-C (unidirectional)",
+  static constexpr std::string_view id = "biss", name = "BiSS-C",
                                     document = "RLS E201-9S Decoding the BiSS information";
   static constexpr LinkKind link = LinkKind::clocked;
-  static constexpr std::size_t frames_size = 0;
+  static constexpr std::size_t frames_size = 2400;
 
   static constexpr OptionsOf options{
       OptionOf<&Settings::singleturn_bits>{singleturn_bits_option},
@@ -33,8 +40,12 @@ struct Definition {
       OptionOf<&Settings::multiturn_first>{multiturn_first_option},
       OptionOf<&Settings::position_bits>{position_bits_option},
       OptionOf<&Settings::unit_pm>{unit_um_option},
-      probeable(option<&Settings::check>("check", "crc16: BiSS Safety's life counter and CRC-16 behind the status bits",
-                                         check_choices)),
+      probeable(option<&Settings::crc_width>("crc_width", "bits of the CRC; 0: there is none", 0, 16)),
+      probeable(
+          option<&Settings::crc_poly>("crc_poly", "its polynomial without the highest power: 0x3 is 0x43", 0, 0xFFFF)),
+      option<&Settings::crc_init>("crc_init", "its start value", 0, 0xFFFF),
+      option<&Settings::crc_inverted>("crc_inverted", "whether it is sent inverted"),
+      option<&Settings::life_counter>("life_counter", "6 bits between status bits and CRC that count frames"),
       option<&Settings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
       decimal<3>(option<&Settings::latency>(
           "latency_us",
@@ -44,59 +55,55 @@ struct Definition {
       decimal<3>(option<&Settings::ready>(
           "ready_us", "virtual encoder: the time that it needs itself, us; 0: as latency_us, but at most 10", 0,
           1'000'000)),
+      option<&Settings::slave>("slave", "whose registers are meant: 0 is the encoder at the end of the line", 0, 7),
+      decimal<3>(option<&Settings::register_delay>(
+          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
+          100'000'000)),
   };
   static constexpr auto models = position_models;
   static constexpr struct {
-    decltype(joined_fields(word_fields, own_fields)) infos;
-  } fields{joined_fields(word_fields, own_fields)};
+    decltype(joined_fields(joined_fields(word_fields, own_fields), register_fields.infos)) infos;
+  } fields{joined_fields(joined_fields(word_fields, own_fields), register_fields.infos)};
   static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
   static constexpr auto vectors = biss::vectors;
 
   static constexpr Format format(const Options& values) {
-    const Settings given = options.format(values);
+    Settings given = options.format(values);
+    given.check = {given.crc_width, given.crc_poly, given.crc_init, given.crc_inverted, given.life_counter};
     return given.with_word(values, word_with_status(given.bits()), given.position_bits != 0);
   }
   static constexpr LineSettings line(const Format&) { return line_settings; }  // the conversation sets its rate
   static constexpr Resolution resolution(const Format& format) { return resolution_of(format.word, format.scale); }
-  static constexpr bool is_usable(const Format& format) { return absenc::is_usable(format.word); }
+  static constexpr bool is_usable(const Format& format) {
+    return absenc::is_usable(format.word) && biss::is_usable(format.check);
+  }
   static constexpr bool is_readable(const Format& format) {
     return is_usable(format) && absenc::is_usable(format.scale);
   }
 
-  static constexpr std::array commands{
-      clocked_reading<Definition, Protocol, ReadPosition>(
-          {"position", Verb::read, 0, "position, turns, error and warning"})
-          .only_if(is_readable),
-  };
+  static constexpr auto commands = commands_of<Definition, Format>(is_readable);
+  static constexpr const auto& memory = registers::areas;
+
+  /// A frame of the encoder; or, with a request, a control frame: the bits of CDM and of CDS.
+  static constexpr Error decode(const Format& format, Frame asked, Frame reply, FieldSink& sink) {
+    return decode_either<Definition>(format, asked, reply, sink);
+  }
+  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
   // In the order of the wire.
   static constexpr void put(FieldSink& sink, const Format& format, const Reply& reply) {
+    put_line_delay(sink, format, reply);
     sink.put({&own_fields[field_ack_bits], reply.ack_bits});
     put_word(sink, format.word, reply.word, format.scale);
-    if (format.check == Check::crc16) sink.put({&own_fields[field_life_counter], reply.life_counter});
-    sink.put({&own_fields[field_crc], reply.crc});
+    if (format.check.life_counter) sink.put({&own_fields[field_life_counter], reply.life_counter});
+    if (format.check.width != 0) sink.put({&own_fields[field_crc], reply.crc});
   }
+  static constexpr void put(FieldSink& sink, const Format&, const Found& found) { register_fields.put(sink, found); }
 
-  static Explanation explain(const Format& format, Error error, Bytes, Bytes) {
-    switch (error) {
-      case Error::invalid_argument:
-        if (Protocol::clocks(format) <= Protocol::most_clocks) return {};
-        return {"a frame of more than 512 clocks: lower latency_us or ma_khz"};
-      case Error::truncated:
-        return {"ACK and line take longer than latency_us allows at this clock: raise it, or lower the MA clock"};
-      case Error::bad_checksum:
-        return {"the delay of the line may not suit this MA clock: try another one"};
-      default:
-        return {};
-    }
-  }
+  static Explanation explain(const Format& format, Error error, Bytes, Bytes) { return explain_frame(format, error); }
 
-  // Around the end of the idle line a flip only changes the length of the ACK. Within the ACK, and at the start bit, it
-  // moves the frame, which a CRC of 6 bits misses once in 64 times.
-  static bool is_checked(const Options&, Frame, Frame reply, std::size_t bit) {
-    const BitView samples = to_bits(reply);
-    const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
-    return bit + 1 < idle || bit > samples.end_of_run(idle);
+  static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
+    return format(values).check.width != 0 && is_behind_ack(reply, bit);
   }
   // Behind the start bit and CDS.
   static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {

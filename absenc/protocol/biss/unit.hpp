@@ -7,5 +7,9 @@
 namespace absenc::biss {
 
 extern const Unit unit;
+/// A control position word and a safety position word in one frame.
+extern const Unit safety_unit;
+/// Several encoders in one frame.
+extern const Unit chain_unit;
 
 }  // namespace absenc::biss

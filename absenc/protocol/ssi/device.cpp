@@ -9,19 +9,19 @@ namespace {
 constexpr Time period_of(std::uint32_t khz) { return LineSettings{.rate = khz * 1000}.bits(1); }
 }  // namespace
 
-void VirtualEncoder::selected(Time at, Time period, author::DrivenBits& bits) {
+void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bits) {
   if (period > 0ns && (period < period_of(format_.fastest_khz) || period > period_of(format_.slowest_khz))) {
     violate("clock outside min_clock_khz to max_clock_khz", at);
   }
   if (at < free_at_) {  // the shift register goes on
-    violate("clocked again within pause_us", at);
-    shifted_ %= 2 * format_.word.bits();
+    violate("clocked again within monoflop_us", at);
+    shifted_ %= 2 * (format_.word.bits() + (format_.after_word == AfterWord::separated ? 1 : 0));
   } else {
     latched_ = word_of(format_.word, shaft_->at(at), raised());
     shifted_ = 0;
   }
   BitBuffer<WordFormat::maximum_bits> coded;
-  encode_word(format_.word, latched_, coded);
+  encode_whole(format_, latched_, coded);
   const std::size_t wanted = std::max(2 * format_.word.bits(), clocks(format_));
   const std::size_t count = std::min(frame_capacity, (wanted + 7) / 8 * 8);
   for (std::size_t i = 0; i < count; ++i) bits.append(bit_behind(format_, coded.view(), shifted_ + i) ? 1 : 0, 1);
@@ -30,7 +30,7 @@ void VirtualEncoder::selected(Time at, Time period, author::DrivenBits& bits) {
 void VirtualEncoder::clocked(Time at, std::size_t clocks) {
   shifted_ += clocks;
   if (shifted_ < format_.word.bits()) violate("fewer clocks than the word has bits", at);
-  free_at_ = at + format_.pause;
+  free_at_ = at + (format_.monoflop == Time{} ? format_.pause : std::min(format_.monoflop, format_.pause));
   count_answer();
 }
 

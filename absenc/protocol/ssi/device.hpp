@@ -14,7 +14,7 @@ class VirtualEncoder final : public author::ClockedDevice {
   VirtualEncoder(const Format& format, const Shaft& shaft) : format_(format), shaft_(&shaft) {}
 
  private:
-  void selected(Time at, Time period, author::DrivenBits& bits) override;
+  void selected(Time at, Time period, bool held_low, author::DrivenBits& bits) override;
   void clocked(Time at, std::size_t clocks) override;
 
   Format format_;

@@ -19,16 +19,25 @@ inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idl
 inline constexpr Time pause_margin = 10us;  // what the host leaves on top of Tm
 
 /// What the encoder sends when it is clocked on.
-enum class AfterWord : std::uint8_t { repeat, zero, one };
+enum class AfterWord : std::uint8_t {
+  repeat,
+  zero,
+  one,
+  separated,  // a zero, and the word again
+};
 
 struct Format {
   WordFormat word = "position:12"_word;
   AfterWord after_word = AfterWord::repeat;
   unsigned extra_clocks = 0;  // behind the word, to be compared; as many as the word has bits read it twice
   Scale scale{};
-  // What varies by product (3.5, note).
-  Time pause = 500us;  // Tm: more than that between two words, or the old one goes on
+  bool error_parity = false;      // the last bit is a parity that the encoder inverts when its position is wrong
+  bool padded = false;            // what the word skips is filled with zeros
+  std::uint32_t confirm_rpm = 0;  // the word is read once more: so fast can the shaft have moved; 0: read once
+  // What varies by product (RAA38S6 3.5, note).
+  Time pause = 50us;  // more than the encoder's monoflop time Tm between two words, or the old one goes on
   std::uint32_t clock_khz = 200;
+  Time monoflop = 20us;  // Tm of the virtual encoder, at most `pause`; 0: that. Others have 9 to 41 us
   // Of the virtual encoder: the clock that it allows. 250 kHz is also what Tcs says.
   std::uint32_t slowest_khz = 100;
   std::uint32_t fastest_khz = 250;
@@ -43,6 +52,10 @@ inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;
 [[nodiscard]] constexpr bool bit_behind(const Format& format, BitView word, std::size_t index, std::size_t first = 0) {
   const std::size_t bits = format.word.bits();
   if (index < bits || format.after_word == AfterWord::repeat) return word[first + index % bits];
+  if (format.after_word == AfterWord::separated) {
+    const std::size_t place = index % (bits + 1);
+    return place < bits && word[first + place];
+  }
   return format.after_word == AfterWord::one;
 }
 
@@ -50,13 +63,20 @@ namespace detail {
 
 [[nodiscard]] constexpr Error check_length(const Format& format, BitView bits) {
   const std::size_t word = format.word.bits();
-  const bool twice = format.extra_clocks == 0 && bits.size == 2 * word;
+  const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
+  const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
   // More clocks than the word has bits: read as one number, it is larger than any position.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }
   return Error::wrong_length;
+}
+
+template <class Source>
+constexpr bool is_padding_zero(const Source& source, BitView bits, std::size_t first) {
+  return source.each(
+      [&](auto field) { return field.meaning != Meaning::skip || bits.load(first + field.first, field.bits) == 0; });
 }
 
 template <class Source>
@@ -67,6 +87,13 @@ constexpr Result<typename Source::Word> decode_clocked_on(const Source& source, 
     error = absenc::detail::take_word(source, bits, first, word);
   } else {
     error = absenc::detail::take_word(source, absenc::detail::SomeBits(bits, first, source.word.bits()), 0, word);
+  }
+  if (source.format.error_parity && error == Error::bad_checksum) {
+    word.error = true;
+    error = Error::none;
+  }
+  if (source.format.padded && error == Error::none && !is_padding_zero(source, bits, first)) {
+    error = Error::out_of_range;
   }
   bool matches = true;
   for (std::size_t i = source.word.bits(); first + i < bits.size; ++i) {
@@ -107,24 +134,53 @@ template <const Format& format>
   return detail::decode_by(Known<format>{}, bits);
 }
 
+/// The word; where its parity tells an error, with that.
+template <std::size_t Capacity>
+constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Capacity>& out) {
+  BitBuffer<Capacity> right;
+  if (!encode_word(format.word, word, right)) return false;
+  const bool inverted = format.error_parity && word.error;
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    out.append((right.view()[i] != (inverted && i + 1 == right.size())) ? 1 : 0, 1);
+  }
+  return true;
+}
+
 /// Appends the word and what follows it, `count` bits in all. False when `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Word& word, std::size_t count, BitBuffer<Capacity>& out) {
   BitBuffer<WordFormat::maximum_bits> coded;
-  if (!encode_word(format.word, word, coded) || out.capacity() - out.size() < count) return false;
+  if (!encode_whole(format, word, coded) || out.capacity() - out.size() < count) return false;
   for (std::size_t i = 0; i < count; ++i) out.append(bit_behind(format, coded.view(), i) ? 1 : 0, 1);
   return true;
 }
 
 enum class ErrorBit : std::uint8_t { none, active_high, active_low };
 
+/// The tree format, where turns and position meet at a fixed clock: before the turns and behind the position zeros fill
+/// `turns` and `steps` bits up.
+[[nodiscard]] constexpr WordFormat tree_format(const PositionBits& bits, unsigned turns, unsigned steps) {
+  WordFormat word;
+  const auto fill = [&word](unsigned count) {
+    if (count > 0 && count < 64) word.add({"skip", Meaning::skip, static_cast<std::uint8_t>(count)});
+  };
+  if (bits.multiturn > turns || bits.position > steps) return word;
+  fill(turns - bits.multiturn);
+  if (bits.multiturn > 0) word.add({"multiturn", Meaning::multiturn, static_cast<std::uint8_t>(bits.multiturn)});
+  word.add({"position", Meaning::position, static_cast<std::uint8_t>(bits.position)});
+  fill(steps - bits.position);
+  return word;
+}
+
 /// The usual words: counts, Gray-coded or not, an error bit and a parity bit over all bits before it, where wanted.
-[[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
-  WordFormat word = word_format(bits);
+[[nodiscard]] constexpr WordFormat word_with(WordFormat word, bool gray, ErrorBit error, Parity parity) {
   if (gray) word.set_gray();
   if (error != ErrorBit::none) word.add({"error", Meaning::error, 1, error == ErrorBit::active_low});
   if (parity != Parity::none) word.add({"parity", Meaning::parity, 1, parity == Parity::odd});
   return word;
+}
+[[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
+  return word_with(word_format(bits), gray, error, parity);
 }
 
 }  // namespace absenc::ssi

@@ -2,6 +2,8 @@
 // Host side of SSI.
 #pragma once
 
+#include <algorithm>
+
 #include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
 
@@ -24,7 +26,44 @@ struct Protocol {
   }
 };
 
+/// Whether a shaft that turns so fast at most can have gone from one word to the next in this time; or back.
+[[nodiscard]] constexpr bool can_follow(const Format& format, const Word& before, const Word& after, Time between) {
+  const unsigned bits = format.word.bits_of(Meaning::position);
+  const unsigned turns = format.word.bits_of(Meaning::multiturn);
+  const std::uint64_t mask = low_mask(bits + turns);
+  const std::uint64_t way = ((after.multiturn << bits | after.position) - (before.multiturn << bits | before.position));
+  const std::uint64_t counts = std::min(way & mask, (~way + 1) & mask);
+  // Of a turn, in parts of 2^32: a second has 60 times fewer of them than a minute.
+  const auto moved = static_cast<std::uint64_t>(between.count()) / 1000 * format.confirm_rpm / 60 * 4295 + 1;
+  const std::uint64_t reach = bits >= 32 ? moved << (bits - 32) : moved >> (32 - bits);
+  return counts <= reach + 1;
+}
+
 /// One word, and the bits behind it that `format.extra_clocks` asks for.
 using ReadPosition = author::ReadClocked<Protocol>;
+
+/// Two words, of which the second counts: one that the shaft cannot have reached is none (cross_check_failed).
+class ConfirmPosition : public author::ClockedHostOf<Protocol> {
+ public:
+  explicit ConfirmPosition(const Format& format) : ClockedHostOf(format) {}
+
+ private:
+  void clocked(BitView bits) final {
+    const Word before = found();
+    const Time before_at = first_at_;
+    const Error error = take(bits);
+    if (error != Error::none) return conclude(error);
+    if (second_) {
+      return conclude(can_follow(format(), before, found(), begun_at() - before_at) ? Error::none
+                                                                                    : Error::cross_check_failed);
+    }
+    second_ = true;
+    first_at_ = begun_at();
+    ask();
+  }
+
+  Time first_at_{};
+  bool second_ = false;
+};
 
 }  // namespace absenc::ssi

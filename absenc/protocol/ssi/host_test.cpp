@@ -35,15 +35,15 @@ TEST(SsiHost, ReadsTheWord) {
   bench.run(read);
   ASSERT_EQ(read.error(), Error::none);
   EXPECT_EQ(read.reading()->singleturn, 495u);
-  EXPECT_EQ(read.reading()->latched, 510us);
-  EXPECT_EQ(read.reading()->received, 510us + 12 * 5us);
+  EXPECT_EQ(read.reading()->latched, 60us);
+  EXPECT_EQ(read.reading()->received, 60us + 12 * 5us);
   EXPECT_TRUE(read.reading()->singleturn_valid());
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
 }
 
 TEST(SsiHost, ThePauseVariesByProduct) {
   for (const Time pause : {Time(20us), Time(500us), Time(100ms)}) {
-    const Format format{.pause = pause};
+    const Format format{.pause = pause, .monoflop = Time{}};
     Bench bench(format);
     EXPECT_EQ(bench.read(format), 495u);
     bench.shaft.state.position = 0;
@@ -51,9 +51,9 @@ TEST(SsiHost, ThePauseVariesByProduct) {
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
     EXPECT_EQ(bench.encoder.answer_count(), 2u);
   }
-  Bench slow({.pause = 2ms});
+  Bench slow({.pause = 2ms, .monoflop = Time{}});
   for (int i = 0; i < 2; ++i) EXPECT_NE(slow.read({}), 0u);
-  EXPECT_EQ(slow.last_rule(), "clocked again within pause_us");
+  EXPECT_EQ(slow.last_rule(), "clocked again within monoflop_us");
 }
 
 TEST(SsiHost, TurnsGrayParityAndErrorBit) {
@@ -83,13 +83,44 @@ TEST(SsiHost, AWrongNumberOfBitsIsSeenByReadingTwice) {
   EXPECT_EQ(Bench().error({.word = word_format({.position = 13}), .extra_clocks = 13}), Error::cross_check_failed);
 }
 
+TEST(SsiHost, AWordReadOnceMoreMustBeNear) {
+  const Format format{.word = word_format({.position = 17}), .confirm_rpm = 6000};
+  const Word at{.position = 1000};
+  EXPECT_TRUE(can_follow(format, at, at, 100us));
+  // 6000 rpm are 100 turns a second: 1310 counts in 100 us.
+  EXPECT_TRUE(can_follow(format, at, {.position = 2300}, 100us));
+  EXPECT_TRUE(can_follow(format, at, {.position = (1u << 17) - 300}, 100us));
+  EXPECT_FALSE(can_follow(format, at, {.position = 2330}, 100us));
+  EXPECT_FALSE(can_follow(format, at, {.position = 1000 + (1u << 16)}, 100us));
+
+  Bench bench(format);
+  ConfirmPosition read(format);
+  EXPECT_EQ(bench.run(read).error(), Error::none);
+  EXPECT_NE(read.reading(), nullptr);
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);
+}
+
+TEST(SsiHost, AnErrorThatTheParityTellsIsNoPosition) {
+  const Format format{.word = word_with({.position = 13}, false, ErrorBit::none, Parity::even), .error_parity = true};
+  Bench bench(format);
+  ReadPosition good(format);
+  ASSERT_EQ(bench.run(good).error(), Error::none);
+  EXPECT_TRUE(good.reading()->singleturn_valid());
+  bench.encoder.raise_alarms(word_error);
+  ReadPosition alarmed(format);
+  ASSERT_EQ(bench.run(alarmed).error(), Error::none);
+  EXPECT_FALSE(alarmed.reading()->singleturn_valid());
+  EXPECT_EQ(alarmed.reading()->alarms, word_error);
+}
+
 // ---- The virtual encoder, clocked by hand
 
 TEST(SsiDevice, RepeatsItsWordOrSendsZerosOrOnes) {
   for (const auto& [after, wanted] :
        std::to_array<std::pair<AfterWord, std::string_view>>({{AfterWord::repeat, "0001111011110001"},
                                                               {AfterWord::zero, "0001111011110000"},
-                                                              {AfterWord::one, "0001111011111111"}})) {
+                                                              {AfterWord::one, "0001111011111111"},
+                                                              {AfterWord::separated, "0001111011110000"}})) {
     Bench bench({.after_word = after});
     EXPECT_EQ(bench.clock(16), wanted);
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
@@ -97,11 +128,11 @@ TEST(SsiDevice, RepeatsItsWordOrSendsZerosOrOnes) {
 }
 
 TEST(SsiDevice, GoesOnWithTheOldWordWithinThePause) {
-  Bench bench;
+  Bench bench({.pause = 500us, .monoflop = Time{}});
   EXPECT_EQ(bench.clock(12), "000111101111");
   bench.shaft.state.position = 0;
   EXPECT_EQ(bench.clock(4, 499us), "0001");
-  EXPECT_EQ(bench.last_rule(), "clocked again within pause_us");
+  EXPECT_EQ(bench.last_rule(), "clocked again within monoflop_us");
   EXPECT_EQ(bench.clock(12, 100us), "111011110001");
   bench.shaft.state.position = std::int64_t{1} << 20;
   EXPECT_EQ(bench.clock(12, 500us), "000000000001");

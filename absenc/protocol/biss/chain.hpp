@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several BiSS encoders in one frame: after one start bit and one CDS, the word of each with its own check. README.md
+// draws the frame. Source: BiSS C Protocol Description rev D2.
+#pragma once
+
+#include <array>
+
+#include "absenc/protocol/biss/safety.hpp"
+
+namespace absenc::biss {
+
+/// Slave 0 is the farthest from the host, and its word comes last: channel i is that of slave `count - 1 - i`.
+struct ChainFormat {
+  static constexpr unsigned most = 4;
+  std::array<Channel, most> channels{};
+  std::uint8_t count = 2;
+  std::uint8_t slave = 0;  // whose position a reading shows, and whose registers are meant
+  // As in Format.
+  std::uint32_t ma_khz = 1000;
+  Time latency = 10us;
+  Time ready{};
+  Time line_delay{};
+  Time register_delay{};
+
+  [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
+  /// The channel of the slave that a reading shows.
+  [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
+};
+
+[[nodiscard]] constexpr bool is_usable(const ChainFormat& format) {
+  if (format.count > ChainFormat::most || format.slave >= format.count) return false;
+  for (unsigned i = 0; i < format.count; ++i) {
+    const Channel& channel = format.channels[i];
+    if (channel.word.bits_of(Meaning::position) == 0 || !is_usable(channel.check)) return false;
+  }
+  return true;
+}
+
+[[nodiscard]] constexpr unsigned data_bits(const ChainFormat& format) {
+  unsigned bits = 0;
+  for (unsigned i = 0; i < format.count; ++i) bits += data_bits(format.channels[i]);
+  return bits;
+}
+
+struct ChainReply {
+  unsigned ack_bits = 1;
+  std::array<ChannelData, ChainFormat::most> channels{};
+  unsigned delay_bits = 0;
+  bool cds = false;
+};
+
+/// As decode of one word: of a frame of which one word is wrong none is good.
+[[nodiscard]] constexpr Result<ChainReply> decode(const ChainFormat& format, BitView samples, Cds cds = Cds::zero) {
+  if (!is_usable(format)) return Error::invalid_argument;
+  ChainReply reply;
+  std::size_t first = 0;
+  Error error = detail::take_head(samples, data_bits(format), cds, reply, first);
+  for (unsigned i = 0; i < format.count && error == Error::none; ++i) {
+    error = detail::take_channel(format.channels[i], samples, first, reply.channels[i]);
+    first += data_bits(format.channels[i]);
+  }
+  return error == Error::none ? Result(reply) : error;
+}
+
+template <std::size_t Capacity>
+constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out) {
+  if (!detail::append_head(reply, data_bits(format), out)) return false;
+  for (unsigned i = 0; i < format.count; ++i) detail::append_data(format.channels[i], reply.channels[i], out);
+  return true;
+}
+
+/// All of them turn with one shaft.
+constexpr void show(const ChainFormat& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
+                    ChainReply& reply) {
+  for (unsigned i = 0; i < format.count; ++i) {
+    reply.channels[i] = {.word = word_of(format.channels[i].word, state, alarms), .life_counter = life_counter};
+  }
+}
+
+[[nodiscard]] constexpr int life_counter_of(const ChainFormat& format, const ChainReply& reply) {
+  const unsigned shown = format.shown();
+  return format.channels[shown].check.life_counter ? reply.channels[shown].life_counter : -1;
+}
+
+[[nodiscard]] constexpr Reading reading_of(const ChainFormat& format, const ChainReply& reply) {
+  const unsigned shown = format.shown();
+  return to_reading(format.channels[shown].word, reply.channels[shown].word, {});
+}
+
+}  // namespace absenc::biss

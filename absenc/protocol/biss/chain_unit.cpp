@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <tuple>
+
+#include "absenc/protocol/biss/commands.hpp"
+#include "absenc/protocol/biss/device.hpp"
+#include "absenc/protocol/biss/fields.hpp"
+#include "absenc/protocol/biss/unit.hpp"
+#include "absenc/protocol/biss/vectors.hpp"
+#include "absenc/protocol/word_options.hpp"
+
+namespace absenc::biss {
+
+namespace {
+
+using namespace author;
+
+constexpr unsigned most = ChainFormat::most;
+
+// What options say of each word, in the order of the wire.
+template <unsigned>
+struct ChannelSettings {
+  std::uint8_t singleturn_bits = 19;
+  std::uint8_t multiturn_bits = 0;
+  std::uint8_t crc_width = crc6.width;
+  std::uint16_t crc_poly = crc6.poly;
+  std::uint16_t crc_init = crc6.init;
+  bool crc_inverted = true;
+  bool life_counter = false;
+
+  [[nodiscard]] constexpr Channel channel() const {
+    return {word_with_status({singleturn_bits, multiturn_bits, true}),
+            {crc_width, crc_poly, crc_init, crc_inverted, life_counter}};
+  }
+};
+struct Settings : ChainFormat, ChannelSettings<0>, ChannelSettings<1>, ChannelSettings<2>, ChannelSettings<3> {
+  std::uint8_t slaves = 2;
+};
+
+// ---- Names of each channel: channel0_crc_width
+
+template <std::size_t size>
+struct Text {
+  std::array<char, size> characters{};
+  consteval Text(const char (&text)[size]) {
+    for (std::size_t i = 0; i < size; ++i) characters[i] = text[i];
+  }
+};
+
+template <unsigned channel, Text text>
+constexpr auto name_text = [] {
+  constexpr std::string_view prefix = "channel0_";
+  std::array<char, prefix.size() + text.characters.size() - 1> made{};
+  for (std::size_t i = 0; i < prefix.size(); ++i) made[i] = prefix[i];
+  made[prefix.size() - 1 - 1] = static_cast<char>('0' + channel);
+  for (std::size_t i = 0; i + 1 < text.characters.size(); ++i) made[prefix.size() + i] = text.characters[i];
+  return made;
+}();
+template <unsigned channel, Text text>
+constexpr std::string_view name_of{name_text<channel, text>.data(), name_text<channel, text>.size()};
+
+template <unsigned i>
+constexpr auto channel_options() {
+  using Of = ChannelSettings<i>;
+  return std::tuple{
+      option<&Of::singleturn_bits>(name_of<i, "singleturn_bits">, "bits of the position", 1, 64),
+      option<&Of::multiturn_bits>(name_of<i, "multiturn_bits">, "bits of the turns; 0: no turns", 0, 63),
+      option<&Of::crc_width>(name_of<i, "crc_width">, "bits of the CRC; 0: there is none", 0, 16),
+      option<&Of::crc_poly>(name_of<i, "crc_poly">, "its polynomial without the highest power", 0, 0xFFFF),
+      option<&Of::crc_init>(name_of<i, "crc_init">, "its start value", 0, 0xFFFF),
+      option<&Of::crc_inverted>(name_of<i, "crc_inverted">, "whether it is sent inverted"),
+      option<&Of::life_counter>(name_of<i, "life_counter">, "6 bits before the CRC that count frames"),
+  };
+}
+
+constexpr auto options_of_chain = std::apply(
+    [](const auto&... all) { return OptionsOf{all...}; },
+    std::tuple_cat(
+        std::tuple{
+            option<&Settings::slaves>("slaves", "how many encoders are in the chain", 1, most),
+            option<&Settings::slave>(
+                "slave", "whose position is read, and whose registers: 0 is at the end of the line, its word the last",
+                0, most - 1),
+            option<&Settings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
+            decimal<3>(option<&Settings::latency>(
+                "latency_us",
+                "the longest time until the positions are ready, us: of the encoders, and of the line there and back",
+                0, 1'000'000)),
+            option<&Settings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
+                                          100'000),
+            decimal<3>(option<&Settings::register_delay>(
+                "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
+                100'000'000)),
+        },
+        channel_options<0>(), channel_options<1>(), channel_options<2>(), channel_options<3>()));
+
+// ---- Fields of each channel; the shown one has those of any word besides
+
+enum ChannelField : std::size_t { in_multiturn, in_singleturn, in_error, in_warning, in_life_counter, in_crc, in_all };
+
+template <unsigned i>
+constexpr std::array<FieldInfo, in_all> channel_fields_of{{
+    {name_of<i, "multiturn">, FieldInfo::Kind::counts, "revolutions", "its turns", {}, Role::of_position},
+    {name_of<i, "singleturn">, FieldInfo::Kind::counts, "counts", "its position", {}, Role::of_position},
+    {name_of<i, "error">, FieldInfo::Kind::boolean, "", "it says that its position is wrong"},
+    {name_of<i, "warning">, FieldInfo::Kind::boolean, "", "it works near its limits"},
+    {name_of<i, "life_counter">, FieldInfo::Kind::number, "", "counts up with every frame"},
+    {name_of<i, "crc">, FieldInfo::Kind::number, "", "as sent"},
+}};
+constexpr auto channel_fields = joined_fields(joined_fields(channel_fields_of<0>, channel_fields_of<1>),
+                                              joined_fields(channel_fields_of<2>, channel_fields_of<3>));
+
+constexpr void put_channel(FieldSink& sink, const Channel& channel, const ChannelData& data, unsigned index) {
+  const auto put = [&](ChannelField field, std::uint64_t value) {
+    sink.put({&channel_fields[index * in_all + field], static_cast<std::int64_t>(value)});
+  };
+  if (channel.word.find(Meaning::multiturn) != nullptr) put(in_multiturn, data.word.multiturn);
+  put(in_singleturn, data.word.position);
+  put(in_error, data.word.error ? 1 : 0);
+  put(in_warning, data.word.warning ? 1 : 0);
+  if (channel.check.life_counter) put(in_life_counter, data.life_counter);
+  if (channel.check.width != 0) put(in_crc, data.crc);
+}
+
+struct Definition {
+  using Protocol = ProtocolOf<ChainFormat>;
+  using Encoder = VirtualEncoderOf<ChainFormat>;
+  static constexpr std::string_view id = "biss-chain", name = "BiSS-C, several encoders in a chain",
+                                    document = "BiSS C Protocol Description rev D2";
+  static constexpr LinkKind link = LinkKind::clocked;
+  static constexpr std::size_t frames_size = 2400;
+
+  static constexpr const auto& options = options_of_chain;
+  static constexpr std::array models{ModelText{"two-19", "two encoders of 19 bits", 0, "slaves=2"}};
+  static constexpr struct {
+    decltype(joined_fields(joined_fields(word_fields, channel_fields),
+                           joined_fields(own_fields, register_fields.infos))) infos;
+  } fields{joined_fields(joined_fields(word_fields, channel_fields), joined_fields(own_fields, register_fields.infos))};
+  static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
+  static constexpr auto vectors = chain_vectors;
+
+  static constexpr ChainFormat format(const Options& values) {
+    Settings given = options.format(values);
+    given.count = given.slaves;
+    given.channels = {given.ChannelSettings<0>::channel(), given.ChannelSettings<1>::channel(),
+                      given.ChannelSettings<2>::channel(), given.ChannelSettings<3>::channel()};
+    return given;
+  }
+  static constexpr LineSettings line(const ChainFormat&) { return line_settings; }
+  static constexpr Resolution resolution(const ChainFormat& format) {
+    return resolution_of(format.channels[format.shown()].word, {});
+  }
+  static constexpr bool is_usable(const ChainFormat& format) { return biss::is_usable(format); }
+
+  static constexpr auto commands = commands_of<Definition, ChainFormat>(is_usable);
+  static constexpr const auto& memory = registers::areas;
+
+  static constexpr Error decode(const ChainFormat& format, Frame asked, Frame reply, FieldSink& sink) {
+    return decode_either<Definition>(format, asked, reply, sink);
+  }
+  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
+
+  static constexpr void put(FieldSink& sink, const ChainFormat& format, const ChainReply& reply) {
+    put_line_delay(sink, format, reply);
+    sink.put({&own_fields[field_ack_bits], reply.ack_bits});
+    for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
+    const unsigned shown = format.shown();
+    put_word(sink, format.channels[shown].word, reply.channels[shown].word, {});
+  }
+  static constexpr void put(FieldSink& sink, const ChainFormat&, const Found& found) {
+    register_fields.put(sink, found);
+  }
+
+  static Explanation explain(const ChainFormat& format, Error error, Bytes, Bytes) {
+    return explain_frame(format, error);
+  }
+  static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
+    const ChainFormat made = format(values);
+    for (unsigned i = 0; i < made.count; ++i) {
+      if (made.channels[i].check.width == 0) return false;
+    }
+    return is_behind_ack(reply, bit);
+  }
+};
+
+}  // namespace
+
+constinit const Unit chain_unit = UnitOf<Definition>::make();
+
+}  // namespace absenc::biss

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the units of BiSS have in common: the commands of registers, and what goes wrong in words.
+#pragma once
+
+#include <array>
+
+#include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/biss/procedures.hpp"
+
+namespace absenc::biss {
+
+inline constexpr Argument address_argument{"address", "of the register", 0, registers::end - 1, 0, true, Role::address};
+inline constexpr Argument bank_argument{"bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
+inline constexpr std::array<Argument, 3> read_arguments{
+    {address_argument,
+     bank_argument,
+     {"count", "registers from the address on", 1, control_most, 1, false, Role::count}}};
+inline constexpr std::array<Argument, 4> write_arguments{
+    {address_argument,
+     {"value", "the byte", 0, 255, 0, true, Role::value},
+     bank_argument,
+     {"force", "1: also what only the maker knows", 0, 1, 0, false, Role::force}}};
+inline constexpr std::array<Argument, 2> command_arguments{
+    {{"slaves", "bit n is slave n; 0: all, who do not answer", 0, 255}, {"command", "its number", 0, 3}}};
+
+template <class F>
+constexpr author::NoRequest no_request(const F&, Arguments) {
+  return {};
+}
+
+/// A position, and what the registers do.
+template <class Definition, class F>
+[[nodiscard]] constexpr auto commands_of(bool (*is_readable)(const F&)) {
+  using P = ProtocolOf<F>;
+  constexpr auto request = no_request<F>;
+  return std::array{
+      author::clocked_reading<Definition, P, FindPosition<F>>(
+          {"position", Verb::read, 0, "position, turns, error and warning"})
+          .only_if(is_readable),
+      author::command<Definition, P, Found, read_info<F>, request>(
+          {"info", Verb::info, 0, "who is on the line, profile, serial number, device id"})
+          .only_if(is_readable),
+      author::command<Definition, P, Found, read_memory<F>, request>(
+          {"memory-read", Verb::memory_read, 0, "read registers; the bank stays selected", read_arguments})
+          .only_if(is_readable),
+      author::command<Definition, P, Found, write_memory<F>, request>({"memory-write", Verb::memory_write, 0,
+                                                                       "write a register; the bank stays selected",
+                                                                       write_arguments, true, false})
+          .only_if(is_readable),
+      author::command<Definition, P, Found, send_command<F>, request>(
+          {"control-command", Verb::run, 0, "a command of control communication", command_arguments, true, false})
+          .only_if(is_readable),
+  };
+}
+
+template <class F>
+[[nodiscard]] Explanation explain_frame(const F& format, Error error) {
+  switch (error) {
+    case Error::invalid_argument:
+      if (ProtocolOf<F>::clocks(format) <= ProtocolOf<F>::most_clocks) return {};
+      return {"a frame of more than 512 clocks: lower latency_us or ma_khz"};
+    case Error::truncated:
+      return {"ACK and line take longer than latency_us allows at this clock: raise it, or lower the MA clock"};
+    case Error::bad_checksum:
+      return {"the delay of the line may not suit this MA clock: try another one"};
+    default:
+      return {};
+  }
+}
+
+/// Around the end of the idle line a flip only changes the length of the ACK. Within the ACK, and at the start bit, it
+/// moves the frame, which a CRC of 6 bits misses once in 64 times.
+[[nodiscard]] inline bool is_behind_ack(Frame reply, std::size_t bit) {
+  const BitView samples = author::to_bits(reply);
+  const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
+  return bit + 1 < idle || bit > samples.end_of_run(idle);
+}
+
+/// Where a CDS stands: behind the start bit.
+[[nodiscard]] inline std::optional<std::size_t> place_of_cds(Frame reply) {
+  const BitView samples = author::to_bits(reply);
+  if (samples.size == 0) return std::nullopt;
+  const std::size_t start = samples.end_of_run(samples[0] ? samples.end_of_run(0) : 0);
+  return start + 1 < samples.size ? std::optional(start + 1) : std::nullopt;
+}
+
+/// A frame of the encoder; or, with a request, a control frame: the bits of CDM and those of CDS.
+template <class Definition, class F>
+constexpr Error decode_either(const F& format, Frame asked, Frame answered, FieldSink& sink) {
+  if (!asked.empty()) {
+    const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
+    if (!frame) return frame.error();
+    register_fields.put(sink, shown_by(*frame, !answered.empty()));
+    return Error::none;
+  }
+  if (!Definition::is_usable(format)) return Error::invalid_argument;
+  const auto reply = detail::decoded(format, author::to_bits(answered));
+  if (!reply) return reply.error();
+  Definition::put(sink, format, *reply);
+  sink.put_reading(reading_of(format, *reply));
+  return Error::none;
+}
+
+}  // namespace absenc::biss

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the procedures of BiSS registers speak through: frame after frame, each with a position that is decoded and
+// checked, and with the encoder's bit (CDS); the host's bit (CDM) is the level of MA until the next.
+#pragma once
+
+#include "absenc/protocol/author/dialog.hpp"
+#include "absenc/protocol/biss/control.hpp"
+#include "absenc/protocol/biss/host.hpp"
+
+namespace absenc::biss {
+
+template <class F>
+class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author::Routine {
+  using Base = author::ClockedHostOf<ProtocolOf<F>>;
+
+ public:
+  using Reply = typename ProtocolOf<F>::Reply;
+
+  /// The next frame: `const Result<Reply> reply = co_await dialog.frame()`.
+  [[nodiscard]] auto frame() {
+    struct Frame {
+      ControlDialog& dialog;
+      [[nodiscard]] bool await_ready() const { return false; }
+      void await_suspend(std::coroutine_handle<>) { dialog.go_on(); }
+      Result<Reply> await_resume() const { return dialog.last_; }
+    };
+    return Frame{*this};
+  }
+  /// What the host says behind the last frame.
+  void say(bool cdm) { cdm_ = cdm; }
+  /// Frames that were clocked, and those of them that were no good.
+  [[nodiscard]] std::uint32_t frames() const { return frames_; }
+  [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
+  [[nodiscard]] Time now() const { return this->received_at(); }
+  /// Each good position is handed out, before the next frame begins.
+  void emit_positions() { emits_ = true; }
+
+  Step<std::uint8_t> next(Time now) final {
+    if (std::exchange(emitting_, false)) return {.kind = Step<std::uint8_t>::Kind::emit};
+    return Base::next(now);
+  }
+
+ protected:
+  ControlDialog(const F& format, std::span<std::byte> arena) : Base(format, author::later), Routine(arena) {}
+  ~ControlDialog() = default;
+
+ private:
+  // The life counter has moved by one since the last frame, whose place in time is known while all are read.
+  [[nodiscard]] Error moved(const Reply& reply) {
+    const int now = life_counter_of(this->format(), reply);
+    const int before = std::exchange(life_counter_, now);
+    if (now < 0 || before < 0) return Error::none;
+    const auto follows = static_cast<int>((static_cast<unsigned>(before) + 1) & low_mask(life_counter_bits));
+    return now == follows ? Error::none : Error::sequence_mismatch;
+  }
+  void go_on() {
+    const F& format = this->format();
+    this->clock(extended_ ? ProtocolOf<F>::all_clocks(format) : ProtocolOf<F>::clocks(format), cdm_);
+  }
+  void clocked(BitView samples) final {
+    ++frames_;
+    last_ = detail::decoded(this->format(), samples, Cds::any);
+    if (!extended_ && needs_more(last_.error(), samples)) extended_ = true;
+    if (last_) {
+      const unsigned head = last_->delay_bits + last_->ack_bits;
+      const unsigned expected = ack_bits(this->format().latency, this->format().period());
+      if (head > expected && !late_.is_again(head)) last_ = Error::truncated;
+    }
+    if (last_) {
+      const Error error = moved(*last_);
+      if (error != Error::none) last_ = error;
+    } else {
+      life_counter_ = -1;
+    }
+    if (last_) {
+      this->keep(*last_);
+      emitting_ = emits_;
+    } else {
+      ++bad_frames_;
+    }
+    resume();
+  }
+  void ended(const author::Outcome& outcome) final { this->finish(outcome); }
+
+  Result<Reply> last_ = Error::timeout;
+  LateFrames late_;
+  std::uint32_t frames_ = 0;
+  std::uint32_t bad_frames_ = 0;
+  int life_counter_ = -1;
+  bool cdm_ = false;
+  bool extended_ = false;
+  bool emits_ = false;
+  bool emitting_ = false;
+};
+
+}  // namespace absenc::biss

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// What control communication brings, and its fields: of a control frame that was captured, and of procedures.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string_view>
+
+#include "absenc/core/angle.hpp"
+#include "absenc/protocol/author/field.hpp"
+#include "absenc/protocol/biss/control.hpp"
+#include "absenc/protocol/biss/registers.hpp"
+
+namespace absenc::biss {
+
+/// Numbers with a space between them.
+class NumberList {
+ public:
+  constexpr void add(unsigned number) {
+    if (!empty()) text_.push_back(' ');
+    std::array<char, 5> digits{};
+    std::size_t size = 0;
+    do digits[size++] = static_cast<char>('0' + number % 10);
+    while ((number /= 10) != 0 && size < digits.size());
+    while (size > 0) text_.push_back(digits[--size]);
+  }
+  [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
+  [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
+
+ private:
+  Buffer<char, 96> text_;  // what has no room is left out
+};
+
+struct Found {
+  // Of a control frame.
+  std::optional<std::uint8_t> slaves{};
+  std::optional<bool> more_slaves{};
+  std::optional<std::string_view> operation{};
+  std::optional<std::uint8_t> slave_id{};
+  std::optional<std::uint8_t> bank{};
+  std::optional<std::uint8_t> address{};
+  std::optional<std::uint8_t> value{};
+  ByteBuffer<control_most> bytes;
+  bool has_data = false;
+  NumberList start_delay;
+  std::optional<bool> next_address_accepted{};
+  std::optional<std::uint8_t> command{};
+  std::optional<bool> broadcast{};
+  NumberList slave_ids;
+  NumberList acknowledged;
+  std::optional<bool> executed{};
+  // Of procedures.
+  std::optional<bool> written{};  // false: it was there already
+  std::optional<std::uint8_t> eds_bank{};
+  std::optional<std::uint16_t> profile{};
+  std::optional<std::uint64_t> serial_number{};
+  ByteBuffer<6> device_id;
+  ByteBuffer<2> manufacturer;
+  Reading reading{};  // none: positions are not what was asked for
+};
+
+namespace shown {
+constexpr std::optional<Bytes> some(Bytes bytes, bool there) { return there ? std::optional(bytes) : std::nullopt; }
+constexpr std::optional<std::string_view> some(const NumberList& list) {
+  return list.empty() ? std::nullopt : std::optional(list.view());
+}
+constexpr std::optional<Bytes> data(const Found& found) { return some(found.bytes, found.has_data); }
+constexpr std::optional<std::string_view> start_delay(const Found& found) { return some(found.start_delay); }
+constexpr std::optional<std::string_view> slave_ids(const Found& found) { return some(found.slave_ids); }
+constexpr std::optional<std::string_view> acknowledged(const Found& found) { return some(found.acknowledged); }
+constexpr std::optional<Bytes> device_id(const Found& found) { return some(found.device_id, !found.device_id.empty()); }
+constexpr std::optional<Bytes> manufacturer(const Found& found) {
+  return some(found.manufacturer, !found.manufacturer.empty());
+}
+}  // namespace shown
+
+inline constexpr auto register_fields = author::fields_of<Found>(
+    author::field<&Found::slaves>("slaves", "", "how many encoders have an ID"),
+    author::field<&Found::more_slaves>("more_slaves", "", "whether there are some without an ID"),
+    author::field<&Found::operation>("operation", "", "what is asked: read, write or command"),
+    author::field<&Found::slave_id>("slave_id", "", "whose registers: 0 is the encoder at the end of the line"),
+    author::field<&Found::bank>("bank", "", "which bank was selected for it"),
+    author::field<&Found::address>("address", "", "of the first register"),
+    author::field<&Found::value>("value", "", "the register", Role::value),
+    author::field<shown::data>("data", "", "the registers one behind the other", Role::data),
+    author::field<shown::start_delay>("start_delay", "", "how many frames the encoder took for each of them"),
+    author::field<&Found::next_address_accepted>("next_address_accepted", "", "whether the one behind could follow"),
+    author::field<&Found::command>("command", "", "its number"),
+    author::field<&Found::broadcast>("broadcast", "", "whether it is for all, who do not answer"),
+    author::field<shown::slave_ids>("slave_ids", "", "who is addressed"),
+    author::field<shown::acknowledged>("acknowledged", "", "who has acknowledged it"),
+    author::field<&Found::executed>("executed", "", "whether the host had it executed"),
+    author::field<&Found::written>("written", "", "whether it was written: what is there already is not"),
+    author::field<&Found::eds_bank>("eds_bank", "", "bank of the electronic data sheet; 0: none"),
+    author::field<&Found::profile>("profile", "", "of the encoder"),
+    author::field<&Found::serial_number>("serial_number", "", "of the encoder"),
+    author::field<shown::device_id>("device_id", "", "of the encoder"),
+    author::field<shown::manufacturer>("manufacturer", "", "two letters, which the BiSS Association gives"));
+
+/// A control frame as fields; of a request alone what it asks.
+[[nodiscard]] constexpr Found shown_by(const ControlFrame& frame, bool answered) {
+  constexpr std::array<std::string_view, 3> names{"read", "write", "command"};
+  const ControlRequest& request = frame.request;
+  const auto put_mask = [](NumberList& list, std::uint8_t mask) {
+    for (unsigned i = 0; i < control_slaves; ++i) {
+      if ((mask >> i & 1) != 0) list.add(i);
+    }
+  };
+  Found found;
+  found.operation = names[static_cast<std::size_t>(request.operation)];
+  if (answered) {
+    found.slaves = frame.slaves;
+    found.more_slaves = frame.more_slaves;
+  }
+  if (request.is_command()) {
+    found.command = request.command;
+    found.broadcast = request.slaves == 0;
+    put_mask(found.slave_ids, request.slaves);
+    put_mask(found.acknowledged, frame.acknowledged);
+    if (answered) found.executed = frame.executed;
+    return found;
+  }
+  found.slave_id = request.slave;
+  found.address = request.address;
+  if (answered) {
+    found.bytes = frame.data;
+    found.has_data = true;
+    for (const std::uint16_t delay : frame.start_delay.view()) found.start_delay.add(delay);
+    found.next_address_accepted = frame.next_address_accepted;
+  }
+  return found;
+}
+
+}  // namespace absenc::biss

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a host does with the registers of a BiSS encoder, frame by frame, while positions go on being read.
+#pragma once
+
+#include <algorithm>
+
+#include "absenc/protocol/biss/dialog.hpp"
+#include "absenc/protocol/biss/found.hpp"
+
+namespace absenc::biss {
+
+using author::done;
+using author::only;
+using author::Outcome;
+using author::Part;
+using author::Procedure;
+
+/// How long an encoder may take with a start bit, and what a host allows.
+inline constexpr Time start_limit = 20ms;
+inline constexpr unsigned control_attempts = 4;  // of what may be asked again
+
+inline constexpr std::string_view no_registers =
+    "no encoder answers: it has no registers (or a line that only goes one way), or another ID (slave)";
+inline constexpr std::string_view refused =
+    "the encoder refuses this register: it does not have it, or it is read only";
+
+/// One control frame, to its end.
+template <class F>
+Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
+  Time waits_since{};
+  while (!master.is_over()) {
+    const Result<typename ControlDialog<F>::Reply> reply = co_await dialog.frame();
+    if (!reply) {
+      dialog.say(false);
+      master.fail(reply.error());
+      break;
+    }
+    const bool waited = master.is_waiting();
+    dialog.say(master.next(reply->cds));
+    if (!waited) waits_since = dialog.now();
+    if (master.is_waiting() && dialog.now() - waits_since > 2 * start_limit) {
+      dialog.say(false);
+      master.fail(Error::busy);
+    }
+  }
+  co_return master.error();
+}
+
+[[nodiscard]] constexpr Outcome failure_of(Error error) {
+  if (error == Error::timeout) return only(error, no_registers);
+  if (error == Error::request_rejected) return only(error, refused);
+  if (error == Error::busy) return only(error, "the encoder does not begin to answer within 40 ms");
+  return {.error = error, .detail = "the registers were not read"};
+}
+
+/// Whether the same may be asked once more: what a damaged frame spoiled, and a header that the encoder did not get.
+[[nodiscard]] constexpr bool may_pass(Error error) {
+  return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
+}
+
+/// Whether the encoder was late with a byte, or a start bit got lost: no CRC covers CDS, and what follows is then
+/// moved, which the four bits of a byte's CRC may miss.
+[[nodiscard]] constexpr bool was_late(const ControlFrame& frame) {
+  const auto delays = frame.start_delay.view();
+  return std::any_of(delays.begin(), delays.end(), [](std::uint16_t delay) { return delay != 0; });
+}
+
+/// Registers one behind the other, 64 at the most; appended to `bytes`. Those that came late are read until the same
+/// comes twice.
+template <class F>
+Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
+                           unsigned first, std::size_t count) {
+  Error error = Error::none;
+  const unsigned slave = dialog.format().slave;
+  ByteBuffer<control_most> before;
+  for (unsigned attempt = 0; attempt < control_attempts; ++attempt) {
+    master.read(slave, first, count);
+    error = co_await carry(dialog, master);
+    if (!may_pass(error)) break;
+    if (error != Error::none) continue;
+    const Bytes data = master.frame().data;
+    const bool confirmed = std::equal(data.begin(), data.end(), before.view().begin(), before.view().end());
+    if (confirmed || !was_late(master.frame())) {
+      bytes.append(data);
+      co_return Error::none;
+    }
+    before = master.frame().data;
+    error = Error::cross_check_failed;
+  }
+  co_return error;
+}
+
+/// Read again after an error, and compared: whether it was written counts, not what was heard of it.
+template <class F>
+Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
+  const std::array<std::uint8_t, 1> bytes{value};
+  master.write(dialog.format().slave, address, bytes);
+  const Error error = co_await carry(dialog, master);
+  if (error == Error::request_rejected) co_return error;
+  ByteBuffer<control_most> now;
+  const Error read = co_await read_registers(dialog, master, now, address, 1);
+  if (read != Error::none) co_return error != Error::none ? error : read;
+  if (now[0] == value) co_return Error::none;
+  co_return error != Error::none ? error : Error::cross_check_failed;
+}
+
+/// The bank that holds an address, where it is in one.
+template <class F>
+Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
+  if (address >= registers::bank_size) co_return Error::none;
+  ByteBuffer<control_most> selected;
+  const Error error = co_await read_registers(dialog, master, selected, registers::bank_select, 1);
+  // An encoder with one bank need not have the register that selects it.
+  if (error == Error::request_rejected && bank == 0) co_return Error::none;
+  if (error != Error::none || selected[0] == bank) co_return error;
+  const Error written =
+      co_await write_register(dialog, master, registers::bank_select, static_cast<std::uint8_t>(bank));
+  co_return written;
+}
+
+template <class F>
+Procedure read_memory(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+  const auto address = static_cast<unsigned>(arguments[0]);
+  const auto bank = static_cast<unsigned>(arguments[1]);
+  const auto count = static_cast<unsigned>(arguments[2]);
+  const unsigned limit = address < registers::bank_size ? registers::bank_size : registers::end;
+  if (address + count > limit) {
+    co_return only(Error::invalid_argument, "a bank ends at address 63, the registers behind it at 127");
+  }
+  if (address >= registers::bank_size && bank != 0) {
+    co_return only(Error::invalid_argument, "what is behind the banks is on bank 0");
+  }
+  ControlMaster master;
+  Error error = co_await select_bank(dialog, master, bank, address);
+  if (error == Error::none) error = co_await read_registers(dialog, master, found.bytes, address, count);
+  if (error != Error::none) co_return failure_of(error);
+  found.slave_id = dialog.format().slave;
+  found.bank = static_cast<std::uint8_t>(bank);
+  found.address = static_cast<std::uint8_t>(address);
+  found.value = found.bytes[0];
+  found.has_data = count > 1;
+  co_return done;
+}
+
+// The byte is left alone where it is so already: what a register costs to write only its maker knows.
+template <class F>
+Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+  const auto address = static_cast<unsigned>(arguments[0]);
+  const auto value = static_cast<std::uint8_t>(arguments[1]);
+  const auto bank = static_cast<unsigned>(arguments[2]);
+  const bool force = arguments[3] != 0;
+  const MemoryArea* const area = registers::find_area(bank, address);
+  if (address >= registers::bank_size && bank != 0) {
+    co_return only(Error::invalid_argument, "what is behind the banks is on bank 0");
+  }
+  if (area != nullptr && !area->writable) co_return only(Error::invalid_argument, "this register is read only");
+  if (!force && (area == nullptr || !area->protection.empty())) {
+    co_return only(Error::invalid_argument, "only the maker says what is written there: force=1 writes it");
+  }
+  ControlMaster master;
+  Error error = co_await select_bank(dialog, master, bank, address);
+  if (error != Error::none) co_return failure_of(error);
+  ByteBuffer<control_most> before;
+  error = co_await read_registers(dialog, master, before, address, 1);
+  if (error != Error::none) co_return failure_of(error);
+  found.written = before[0] != value || force;
+  if (*found.written) error = co_await write_register(dialog, master, address, value);
+  if (error == Error::cross_check_failed) {
+    co_return only(error, "reading back gave another value: the write has failed");
+  }
+  if (error != Error::none) co_return failure_of(error);
+  found.slave_id = dialog.format().slave;
+  found.bank = static_cast<std::uint8_t>(bank);
+  found.address = static_cast<std::uint8_t>(address);
+  found.value = value;
+  co_return done;
+}
+
+// What of these an encoder refuses it does not have.
+template <class F>
+Procedure read_info(ControlDialog<F>& dialog, Found& found) {
+  ControlMaster master;
+  ByteBuffer<control_most> sheet;
+  Error error =
+      co_await read_registers(dialog, master, sheet, registers::eds_bank, registers::device - registers::eds_bank);
+  if (error != Error::none && error != Error::request_rejected) co_return failure_of(error);
+  found.slave_id = dialog.format().slave;
+  found.slaves = master.frame().slaves;
+  found.more_slaves = master.frame().more_slaves;
+  if (error == Error::none) {
+    found.eds_bank = sheet[0];
+    found.profile = static_cast<std::uint16_t>(sheet[1] << 8 | sheet[2]);
+    found.serial_number = load_big_endian(sheet.view().subspan(3, 4));
+  }
+  ByteBuffer<control_most> names;
+  error = co_await read_registers(dialog, master, names, registers::device_id, registers::end - registers::device_id);
+  if (error != Error::none && error != Error::request_rejected) co_return failure_of(error);
+  if (error == Error::request_rejected && !found.eds_bank) {
+    co_return only(error, "the encoder has none of the registers that say who it is");
+  }
+  if (error == Error::none) {
+    found.device_id.append(names.view().first(6));
+    found.manufacturer.append(names.view().subspan(6));
+  }
+  co_return done;
+}
+
+/// The slaves of a mask; 0: all, who do not answer. Its last bit is said behind one frame more.
+template <class F>
+Procedure send_command(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+  ControlMaster master;
+  master.command(static_cast<std::uint8_t>(arguments[0]), static_cast<unsigned>(arguments[1]));
+  const Error error = co_await carry(dialog, master);
+  const Result<typename ControlDialog<F>::Reply> last = co_await dialog.frame();
+  if (error == Error::request_rejected) co_return only(error, "not every encoder acknowledged: nothing was executed");
+  if (error != Error::none) co_return failure_of(error);
+  if (!last) co_return only(last.error(), "whether the encoders obeyed is not known");
+  found = shown_by(master.frame(), true);
+  co_return done;
+}
+
+}  // namespace absenc::biss

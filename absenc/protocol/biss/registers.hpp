@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// The registers of a BiSS encoder, as its standard profile lays them out. Source: BiSS C Protocol Description rev D2.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::biss::registers {
+
+inline constexpr unsigned bank_size = 0x40;  // 00 to 3F are those of the selected bank
+inline constexpr unsigned bank_select = 0x40;
+inline constexpr unsigned eds_bank = 0x41;       // with the electronic data sheet; 0: there is none
+inline constexpr unsigned profile = 0x42;        // two, as the device id and the manufacturer
+inline constexpr unsigned serial_number = 0x44;  // four
+inline constexpr unsigned device = 0x48;         // to 77: the maker's own
+inline constexpr unsigned device_id = 0x78;      // six
+inline constexpr unsigned manufacturer = 0x7E;
+inline constexpr unsigned end = 0x80;
+
+inline constexpr unsigned known_banks = 4;  // that are listed; an encoder may have up to 256, or none
+
+/// Pages are banks; what is behind the banks is on page 0.
+inline constexpr std::array<MemoryArea, known_banks + 4> areas = [] {
+  const auto bank = [](unsigned page) {
+    return MemoryArea{.page = page,
+                      .first = 0,
+                      .count = bank_size,
+                      .meaning = "bank",
+                      .in_dump = page == 0,
+                      .protection = page == 0 ? "" : "only its maker says what a bank holds"};
+  };
+  return std::array<MemoryArea, known_banks + 4>{{
+      bank(0),
+      {.page = 0, .first = bank_select, .count = 1, .meaning = "bank select", .in_dump = false},
+      {.page = 0,
+       .first = eds_bank,
+       .count = device - eds_bank,
+       .meaning = "EDS bank, profile, serial number",
+       .writable = false},
+      {.page = 0,
+       .first = device,
+       .count = device_id - device,
+       .meaning = "the maker's own",
+       .protection = "only its maker says what is written there"},
+      {.page = 0,
+       .first = device_id,
+       .count = end - device_id,
+       .meaning = "device id, manufacturer",
+       .writable = false},
+      bank(1),
+      bank(2),
+      bank(3),
+  }};
+}();
+
+/// Null for an address that no bank has.
+[[nodiscard]] constexpr const MemoryArea* find_area(unsigned bank, unsigned address) {
+  for (const MemoryArea& area : areas) {
+    if (area.has(bank, address)) return &area;
+  }
+  return nullptr;
+}
+
+}  // namespace absenc::biss::registers

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// BiSS Safety: a control position word and a safety position word of the same shaft in one frame, each under a check of
+// its own. README.md draws the frame. Source: BiSS Safety concept.
+#pragma once
+
+#include <algorithm>
+
+#include "absenc/protocol/biss/frame.hpp"
+
+namespace absenc::biss {
+
+/// One of several words in a frame.
+struct Channel {
+  WordFormat word = "position:19 error:1! warning:1!"_word;
+  Check check{};
+};
+
+[[nodiscard]] constexpr unsigned data_bits(const Channel& channel) {
+  return channel.word.bits() + channel.check.bits();
+}
+
+/// What a channel says.
+struct ChannelData {
+  Word word{};
+  std::uint8_t life_counter = 0;
+  std::uint16_t crc = 0;  // as sent
+};
+
+struct SafetyFormat {
+  Channel cpw{.word = "position:24 error:1! warning:1!"_word};
+  Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};
+  std::uint8_t compare_bits = 13;          // of the position, that both words promise (ACC_MIN)
+  std::int8_t previous_life_counter = -1;  // that of the frame before; -1: not known
+  // As in Format.
+  std::uint32_t ma_khz = 1000;
+  Time latency = 10us;
+  Time ready{};
+  Time line_delay{};
+  Time register_delay{};
+  std::uint8_t slave = 0;
+
+  [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
+};
+
+[[nodiscard]] constexpr unsigned data_bits(const SafetyFormat& format) {
+  return data_bits(format.cpw) + data_bits(format.spw);
+}
+
+struct SafetyReply {
+  unsigned ack_bits = 1;
+  ChannelData cpw{};
+  ChannelData spw{};
+  unsigned delay_bits = 0;
+  bool cds = false;
+};
+
+namespace detail {
+
+template <class Bits>
+constexpr Error take_channel(const Channel& channel, const Bits& samples, std::size_t first, ChannelData& data) {
+  return take_data(Given<Channel>{channel, channel.word}, samples, first, data);
+}
+
+// The upper bits of the position, and the turns where both have them: of a count at the border of a turn they decide.
+constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsigned bits, unsigned turns) {
+  const std::uint64_t position = word.position >> (channel.word.bits_of(Meaning::position) - bits);
+  return ((word.multiturn & low_mask(turns)) << bits | position) & low_mask(turns + bits);
+}
+
+}  // namespace detail
+
+/// Whether there is something to compare, and both have it.
+[[nodiscard]] constexpr bool is_usable(const SafetyFormat& format) {
+  if (!is_usable(format.cpw.check) || !is_usable(format.spw.check)) return false;
+  return format.compare_bits >= 1 && format.compare_bits <= format.cpw.word.bits_of(Meaning::position) &&
+         format.compare_bits <= format.spw.word.bits_of(Meaning::position);
+}
+
+/// Whether both words show the same place, within one count of what they promise.
+[[nodiscard]] constexpr bool agree(const SafetyFormat& format, const SafetyReply& reply) {
+  const unsigned turns = std::min({format.cpw.word.bits_of(Meaning::multiturn),
+                                   format.spw.word.bits_of(Meaning::multiturn), 64u - format.compare_bits});
+  const unsigned bits = format.compare_bits;
+  const std::uint64_t difference = (detail::promised(format.cpw, reply.cpw.word, bits, turns) -
+                                    detail::promised(format.spw, reply.spw.word, bits, turns) + 1) &
+                                   low_mask(turns + bits);
+  return difference <= 2;
+}
+
+/// As decode of one word; and sequence_mismatch (the life counter is not the one behind `previous_life_counter`),
+/// cross_check_failed (the words differ by more than one count of what both promise).
+[[nodiscard]] constexpr Result<SafetyReply> decode(const SafetyFormat& format, BitView samples, Cds cds = Cds::zero) {
+  if (!is_usable(format)) return Error::invalid_argument;
+  SafetyReply reply;
+  std::size_t first = 0;
+  Error error = detail::take_head(samples, data_bits(format), cds, reply, first);
+  if (error == Error::none) error = detail::take_channel(format.cpw, samples, first, reply.cpw);
+  if (error == Error::none) error = detail::take_channel(format.spw, samples, first + data_bits(format.cpw), reply.spw);
+  if (error != Error::none) return error;
+  const bool counts = format.spw.check.life_counter && format.previous_life_counter >= 0;
+  const unsigned follows = static_cast<unsigned>(format.previous_life_counter + 1) & low_mask(life_counter_bits);
+  if (counts && reply.spw.life_counter != follows) return Error::sequence_mismatch;
+  if (!agree(format, reply)) return Error::cross_check_failed;
+  return reply;
+}
+
+template <std::size_t Capacity>
+constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out) {
+  if (!detail::append_head(reply, data_bits(format), out)) return false;
+  detail::append_data(format.cpw, reply.cpw, out);
+  detail::append_data(format.spw, reply.spw, out);
+  return true;
+}
+
+constexpr void show(const SafetyFormat& format, const ShaftState& state, std::uint32_t alarms,
+                    std::uint8_t life_counter, SafetyReply& reply) {
+  reply.cpw = {.word = word_of(format.cpw.word, state, alarms), .life_counter = life_counter};
+  reply.spw = {.word = word_of(format.spw.word, state, alarms), .life_counter = life_counter};
+}
+
+[[nodiscard]] constexpr int life_counter_of(const SafetyFormat& format, const SafetyReply& reply) {
+  return format.spw.check.life_counter ? reply.spw.life_counter : -1;
+}
+
+/// The position is that of the control word; what either word warns of counts.
+[[nodiscard]] constexpr Reading reading_of(const SafetyFormat& format, const SafetyReply& reply) {
+  Word word = reply.cpw.word;
+  word.error = word.error || reply.spw.word.error;
+  word.warning = word.warning || reply.spw.word.warning;
+  return to_reading(format.cpw.word, word, {});
+}
+
+}  // namespace absenc::biss

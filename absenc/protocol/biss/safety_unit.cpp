@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "absenc/protocol/biss/commands.hpp"
+#include "absenc/protocol/biss/device.hpp"
+#include "absenc/protocol/biss/fields.hpp"
+#include "absenc/protocol/biss/unit.hpp"
+#include "absenc/protocol/biss/vectors.hpp"
+#include "absenc/protocol/word_options.hpp"
+
+namespace absenc::biss {
+
+namespace {
+
+using namespace author;
+
+struct Settings : SafetyFormat {
+  std::uint8_t cpw_singleturn_bits = 24;
+  std::uint8_t cpw_multiturn_bits = 0;
+  std::uint8_t cpw_crc_width = crc6.width;
+  std::uint16_t cpw_crc_poly = crc6.poly;
+  std::uint16_t cpw_crc_init = crc6.init;
+  bool cpw_crc_inverted = true;
+  bool cpw_life_counter = false;
+  std::uint8_t spw_singleturn_bits = 16;
+  std::uint8_t spw_multiturn_bits = 0;
+  std::uint8_t spw_crc_width = crc16.width;
+  std::uint16_t spw_crc_poly = crc16.poly;
+  std::uint16_t spw_crc_init = crc16.init;
+  bool spw_crc_inverted = true;
+  bool spw_life_counter = true;
+};
+
+enum SafetyField : std::size_t {
+  field_cpw_multiturn,
+  field_cpw_singleturn,
+  field_angle,
+  field_cpw_error,
+  field_cpw_warning,
+  field_cpw_life_counter,
+  field_cpw_crc,
+  field_spw_multiturn,
+  field_spw_singleturn,
+  field_spw_error,
+  field_spw_warning,
+  field_spw_life_counter,
+  field_spw_crc,
+  field_alarms,
+};
+
+using Kind = FieldInfo::Kind;
+constexpr std::array<FieldInfo, 14> safety_fields{{
+    {"cpw_multiturn", Kind::counts, "revolutions", "turns", {}, Role::turns},
+    {"cpw_singleturn", Kind::counts, "counts", "position within the turn", {}, Role::position},
+    {"angle_deg", Kind::real, "deg", "position within the turn", {}, Role::of_position},
+    {"cpw_error", Kind::boolean, "", "the encoder says that its position is wrong"},
+    {"cpw_warning", Kind::boolean, "", "the encoder works near its limits"},
+    {"cpw_life_counter", Kind::number, "", "counts up with every frame"},
+    {"cpw_crc", Kind::number, "", "as sent: inverted"},
+    {"spw_multiturn", Kind::counts, "revolutions", "turns of the safety word", {}, Role::of_position},
+    {"spw_singleturn", Kind::counts, "counts", "position of the safety word", {}, Role::of_position},
+    {"spw_error", Kind::boolean, "", "the safety word says that its position is wrong"},
+    {"spw_warning", Kind::boolean, "", "the safety word warns"},
+    {"spw_life_counter", Kind::number, "", "counts up with every frame, 63 and then 0"},
+    {"spw_crc", Kind::number, "", "as sent: inverted"},
+    {"alarms", Kind::flags, "", "error and warning of either word", word_flags},
+}};
+
+constexpr void put_word_of(FieldSink& sink, const Channel& channel, const ChannelData& data, bool safety) {
+  const auto put = [&sink, safety](SafetyField cpw, SafetyField spw, std::uint64_t value) {
+    sink.put({&safety_fields[safety ? spw : cpw], static_cast<std::int64_t>(value)});
+  };
+  const unsigned bits = channel.word.bits_of(Meaning::position);
+  if (channel.word.find(Meaning::multiturn) != nullptr) {
+    put(field_cpw_multiturn, field_spw_multiturn, data.word.multiturn);
+  }
+  put(field_cpw_singleturn, field_spw_singleturn, data.word.position);
+  if (!safety) sink.put({&safety_fields[field_angle], 0, degrees(data.word.position, bits)});
+  put(field_cpw_error, field_spw_error, data.word.error ? 1 : 0);
+  put(field_cpw_warning, field_spw_warning, data.word.warning ? 1 : 0);
+  if (channel.check.life_counter) put(field_cpw_life_counter, field_spw_life_counter, data.life_counter);
+  if (channel.check.width != 0) put(field_cpw_crc, field_spw_crc, data.crc);
+}
+
+struct Definition {
+  using Protocol = ProtocolOf<SafetyFormat>;
+  using Encoder = VirtualEncoderOf<SafetyFormat>;
+  static constexpr std::string_view id = "biss-safety", name = "BiSS Safety",
+                                    document = "BiSS C Protocol Description rev D2, BiSS Safety";
+  static constexpr LinkKind link = LinkKind::clocked;
+  static constexpr std::size_t frames_size = 2400;
+
+  static constexpr OptionsOf options{
+      probeable(
+          option<&Settings::cpw_singleturn_bits>("cpw_singleturn_bits", "control word: bits of the position", 1, 64)),
+      probeable(option<&Settings::cpw_multiturn_bits>("cpw_multiturn_bits", "control word: bits of the turns", 0, 63)),
+      option<&Settings::cpw_crc_width>("cpw_crc_width", "control word: bits of the CRC; 0: none", 0, 16),
+      option<&Settings::cpw_crc_poly>("cpw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
+      option<&Settings::cpw_crc_init>("cpw_crc_init", "its start value", 0, 0xFFFF),
+      option<&Settings::cpw_crc_inverted>("cpw_crc_inverted", "whether it is sent inverted"),
+      option<&Settings::cpw_life_counter>("cpw_life_counter", "control word: 6 bits that count frames"),
+      probeable(
+          option<&Settings::spw_singleturn_bits>("spw_singleturn_bits", "safety word: bits of the position", 1, 64)),
+      probeable(option<&Settings::spw_multiturn_bits>("spw_multiturn_bits", "safety word: bits of the turns", 0, 63)),
+      option<&Settings::spw_crc_width>("spw_crc_width", "safety word: bits of the CRC; 0: none", 0, 16),
+      option<&Settings::spw_crc_poly>("spw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
+      option<&Settings::spw_crc_init>("spw_crc_init", "its start value", 0, 0xFFFF),
+      option<&Settings::spw_crc_inverted>("spw_crc_inverted", "whether it is sent inverted"),
+      option<&Settings::spw_life_counter>("spw_life_counter", "safety word: 6 bits that count frames"),
+      option<&Settings::compare_bits>("compare_bits",
+                                      "upper bits of the position in which both words agree within one count", 1, 64),
+      option<&Settings::previous_life_counter>("previous_life_counter",
+                                               "of the frame before the one that is decoded; -1: not known", -1, 63),
+      option<&Settings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
+      decimal<3>(option<&Settings::latency>("latency_us",
+                                            "the longest time until the position is ready, us: of the encoder, and "
+                                            "of the line there and back",
+                                            0, 1'000'000)),
+      option<&Settings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0, 100'000),
+      option<&Settings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0, 7),
+      decimal<3>(option<&Settings::register_delay>(
+          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
+          100'000'000)),
+  };
+  static constexpr std::array models{
+      ModelText{
+          "RXH", "24 bits, safety word 16", 0,
+          "cpw_singleturn_bits=24 cpw_multiturn_bits=0 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
+      ModelText{
+          "RXM", "16 bits, safety word 12", 0,
+          "cpw_singleturn_bits=16 cpw_multiturn_bits=0 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
+      ModelText{
+          "RSH", "24 bits and turns, safety word 16 and turns", 0,
+          "cpw_singleturn_bits=24 cpw_multiturn_bits=12 spw_singleturn_bits=16 spw_multiturn_bits=12 compare_bits=13"},
+      ModelText{
+          "RSM", "16 bits and turns, safety word 12 and turns", 0,
+          "cpw_singleturn_bits=16 cpw_multiturn_bits=12 spw_singleturn_bits=12 spw_multiturn_bits=12 compare_bits=9"},
+      ModelText{
+          "RUH", "24 bits and turns, safety word 16", 0,
+          "cpw_singleturn_bits=24 cpw_multiturn_bits=12 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
+      ModelText{
+          "RUM", "16 bits and turns, safety word 12", 0,
+          "cpw_singleturn_bits=16 cpw_multiturn_bits=12 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
+  };
+  static constexpr struct {
+    decltype(joined_fields(joined_fields(safety_fields, own_fields), register_fields.infos)) infos;
+  } fields{joined_fields(joined_fields(safety_fields, own_fields), register_fields.infos)};
+  static constexpr const FieldInfo* alarms = &safety_fields[field_alarms];
+  static constexpr auto vectors = safety_vectors;
+
+  static constexpr SafetyFormat format(const Options& values) {
+    Settings given = options.format(values);
+    given.cpw = {
+        word_with_status({given.cpw_singleturn_bits, given.cpw_multiturn_bits, true}),
+        {given.cpw_crc_width, given.cpw_crc_poly, given.cpw_crc_init, given.cpw_crc_inverted, given.cpw_life_counter}};
+    given.spw = {
+        word_with_status({given.spw_singleturn_bits, given.spw_multiturn_bits, true}),
+        {given.spw_crc_width, given.spw_crc_poly, given.spw_crc_init, given.spw_crc_inverted, given.spw_life_counter}};
+    return given;
+  }
+  static constexpr LineSettings line(const SafetyFormat&) { return line_settings; }
+  static constexpr Resolution resolution(const SafetyFormat& format) { return resolution_of(format.cpw.word, {}); }
+  static constexpr bool is_usable(const SafetyFormat& format) {
+    return biss::is_usable(format) && absenc::is_usable(format.cpw.word) && absenc::is_usable(format.spw.word);
+  }
+
+  static constexpr auto commands = commands_of<Definition, SafetyFormat>(is_usable);
+  static constexpr const auto& memory = registers::areas;
+
+  static constexpr Error decode(const SafetyFormat& format, Frame asked, Frame reply, FieldSink& sink) {
+    return decode_either<Definition>(format, asked, reply, sink);
+  }
+  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
+
+  static constexpr void put(FieldSink& sink, const SafetyFormat& format, const SafetyReply& reply) {
+    put_line_delay(sink, format, reply);
+    sink.put({&own_fields[field_ack_bits], reply.ack_bits});
+    put_word_of(sink, format.cpw, reply.cpw, false);
+    put_word_of(sink, format.spw, reply.spw, true);
+  }
+  static constexpr void put(FieldSink& sink, const SafetyFormat&, const Found& found) {
+    register_fields.put(sink, found);
+  }
+
+  static Explanation explain(const SafetyFormat& format, Error error, Bytes, Bytes) {
+    if (error == Error::sequence_mismatch) {
+      return {"the life counter of the safety word did not go on by one: a frame was lost, or sent twice"};
+    }
+    if (error == Error::cross_check_failed) return {"control word and safety word show different positions"};
+    return explain_frame(format, error);
+  }
+  static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
+    const SafetyFormat made = format(values);
+    return made.cpw.check.width != 0 && made.spw.check.width != 0 && is_behind_ack(reply, bit);
+  }
+};
+
+}  // namespace
+
+constinit const Unit safety_unit = UnitOf<Definition>::make();
+
+}  // namespace absenc::biss

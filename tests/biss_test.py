@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""BiSS of the command: frames of many encoders, safety words, chains, control frames, and registers."""
+import json
+import os
+import tempfile
+import unittest
+
+from command_support import Case, absenc, json_lines
+from command_test import option_arguments
+
+FORMS = {"biss", "biss-safety", "biss-chain", "biss-control", "biss-control-request"}
+
+
+def vectors():
+    with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "vectors2.json"), encoding="utf-8") as file:
+        return [vector for vector in json.load(file)["vectors"] if vector["protocol"] in FORMS]
+
+
+def decode(unit, *arguments):
+    return json.loads(absenc("decode", unit, "--json", *arguments).stdout)
+
+
+def numbers(text):
+    return [int(number) for number in text.split()]
+
+
+class Vectors(Case):
+    """What a vector calls a list the command shows as text; a channel, or a safety word, by its prefix."""
+
+    def check(self, vector, answer, fields):
+        if "error" in vector:
+            self.assertEqual((answer["ok"], answer.get("error")), (False, vector["error"]), vector["id"])
+            return
+        self.assertTrue(answer["ok"], (vector["id"], answer))
+        for name, value in fields.items():
+            self.assertEqual(answer["fields"].get(name), value, (vector["id"], name))
+
+    def check_word(self, vector):
+        options = dict(vector["options"])
+        options.pop("configuration", None)
+        if vector["protocol"] == "biss-chain":
+            options = {"slaves": len(options["channels"])}
+            for index, channel in enumerate(vector["options"]["channels"]):
+                options |= {f"channel{index}_{name}": value for name, value in channel.items()}
+        arguments = option_arguments(options)
+        fields = {}
+        for name, value in vector.get("fields", {}).items():
+            if isinstance(value, dict):
+                fields |= {f"{name}_{inner}": one for inner, one in value.items()}
+            elif name == "channels":
+                for index, channel in enumerate(value):
+                    fields |= {f"channel{index}_{inner}": one for inner, one in channel.items()}
+            else:
+                fields[name] = value
+        self.check(vector, decode(vector["protocol"], "--hex", vector["response"], *arguments), fields)
+
+    def check_control(self, vector):
+        arguments = ["--request", vector["cdm"]]
+        if "cds" in vector:
+            arguments += ["--hex", vector["cds"]]
+        fields = dict(vector.get("fields", {}))
+        answer = decode("biss", *arguments)
+        if "data" in fields:
+            self.assertEqual(bytes.fromhex(answer["fields"]["data"]), bytes(fields.pop("data")), vector["id"])
+        for name in ("start_delay", "slave_ids", "acknowledged"):
+            if name in fields:
+                self.assertEqual(numbers(answer["fields"].get(name, "")), fields.pop(name), (vector["id"], name))
+        self.check(vector, answer, fields)
+
+    def test_all_of_them(self):
+        seen = set()
+        for vector in vectors():
+            with self.subTest(vector["id"]):
+                seen.add(vector["protocol"])
+                if "cdm" in vector:
+                    self.check_control(vector)
+                else:
+                    self.check_word(vector)
+        self.assertEqual(seen, FORMS)
+
+
+class Registers(Case):
+    def info(self, encoder):
+        result = absenc("info", encoder, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json_lines(result.stdout)[0]["answers"]["info"]["fields"]
+
+    def test_a_register_is_read_and_written(self):
+        info = self.info("sim:biss")
+        self.assertEqual(info["serial_number"], 1)
+        self.assertEqual(info["slaves"], 1)
+        self.assertEqual(bytes.fromhex(info["device_id"]), b"Absenc")
+        bank = absenc("memory", "read", "sim:biss", "0", "--json")
+        self.assertEqual((bank.returncode, bank.stderr), (0, ""))
+        written = absenc("memory", "write", "sim:biss", "3", "0x5A", "--yes", "--json")
+        self.assertEqual(written.returncode, 0, written.stderr)
+
+    def test_an_id_that_nobody_has(self):
+        result = absenc("memory", "read", "sim:biss?slave=3", "0")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("no encoder answers", result.stderr)
+
+    def test_every_encoder_of_a_chain_has_its_own(self):
+        for slave in (0, 1, 2):
+            info = self.info(f"sim:biss-chain?slaves=3&slave={slave}")
+            self.assertEqual((info["slave_id"], info["serial_number"], info["slaves"]), (slave, slave + 1, 3))
+
+    def test_an_encoder_that_has_safety_words_has_registers_too(self):
+        self.assertEqual(self.info("sim:biss-safety")["slaves"], 2)
+
+    def test_a_capture_shows_them_beside_the_positions(self):
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "drive.vcd")
+            result = absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4",
+                            "--command", "memory-write 3 0x5A 0 0")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+        control = [row["fields"] for row in rows if row["kind"] == "exchange"]
+        positions = [row for row in rows if row["kind"] == "reply"]
+        self.assertTrue(all(row["ok"] for row in rows if "ok" in row))
+        self.assertGreater(len(positions), 200)
+        times = [row["time_s"] for row in positions]
+        self.assertTrue(all(after - before < 100e-6 for before, after in zip(times, times[1:])))
+        self.assertEqual(bytes.fromhex(control[0]["data"]), bytes([0, 0, 0, 1]))
+        written = [one for one in control if one["operation"] == "write"]
+        self.assertEqual([(one["address"], one["data"]) for one in written], [(3, "5a")])
+        self.assertEqual((control[-1]["operation"], control[-1]["address"], control[-1]["data"]), ("read", 3, "5a"))
+
+
+if __name__ == "__main__":
+    unittest.main()
