@@ -39,7 +39,9 @@ struct Protocol {
   using Reply = protocol_name::Reply;
   static constexpr std::size_t longest_reply = 3;
 
-  static constexpr author::HostTimes host_times(const Format&) { return {.answer_limit = answer_limit, .gap_limit = 50us}; }
+  static constexpr author::HostTimes host_times(const Format&) {
+    return {.answer_limit = answer_limit, .gap_limit = 50us};
+  }
   /// What changes the encoder is never sent twice.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {.attempts = request.ask == Ask::position ? 3u : 1u};

@@ -67,5 +67,7 @@ TEST(Amt21, TurnsBelongToTheirSideOfZero) {
   }
 }
 
+TEST(Amt21, NothingIsNoRequest) { EXPECT_EQ(Protocol::decode_request({}, {}).error(), Error::wrong_length); }
+
 }  // namespace
 }  // namespace absenc::amt21

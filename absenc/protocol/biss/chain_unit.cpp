@@ -33,7 +33,7 @@ struct ChannelSettings {
             {crc_width, crc_poly, crc_init, crc_inverted, life_counter}};
   }
 };
-struct Settings : ChainFormat, ChannelSettings<0>, ChannelSettings<1>, ChannelSettings<2>, ChannelSettings<3> {
+struct ChainSettings : ChainFormat, ChannelSettings<0>, ChannelSettings<1>, ChannelSettings<2>, ChannelSettings<3> {
   std::uint8_t slaves = 2;
 };
 
@@ -77,18 +77,18 @@ constexpr auto options_of_chain = std::apply(
     [](const auto&... all) { return OptionsOf{all...}; },
     std::tuple_cat(
         std::tuple{
-            option<&Settings::slaves>("slaves", "how many encoders are in the chain", 1, most),
-            option<&Settings::slave>(
+            option<&ChainSettings::slaves>("slaves", "how many encoders are in the chain", 1, most),
+            option<&ChainSettings::slave>(
                 "slave", "whose position is read, and whose registers: 0 is at the end of the line, its word the last",
                 0, most - 1),
-            option<&Settings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
-            decimal<3>(option<&Settings::latency>(
+            option<&ChainSettings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
+            decimal<3>(option<&ChainSettings::latency>(
                 "latency_us",
                 "the longest time until the positions are ready, us: of the encoders, and of the line there and back",
                 0, 1'000'000)),
-            option<&Settings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
-                                          100'000),
-            decimal<3>(option<&Settings::register_delay>(
+            option<&ChainSettings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
+                                               100'000),
+            decimal<3>(option<&ChainSettings::register_delay>(
                 "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
                 100'000'000)),
         },
@@ -122,7 +122,7 @@ constexpr void put_channel(FieldSink& sink, const Channel& channel, const Channe
   if (channel.check.width != 0) put(in_crc, data.crc);
 }
 
-struct Definition {
+struct ChainDefinition {
   using Protocol = ProtocolOf<ChainFormat>;
   using Encoder = VirtualEncoderOf<ChainFormat>;
   static constexpr std::string_view id = "biss-chain", name = "BiSS-C, several encoders in a chain",
@@ -140,7 +140,7 @@ struct Definition {
   static constexpr auto vectors = chain_vectors;
 
   static constexpr ChainFormat format(const Options& values) {
-    Settings given = options.format(values);
+    ChainSettings given = options.format(values);
     given.count = given.slaves;
     given.channels = {given.ChannelSettings<0>::channel(), given.ChannelSettings<1>::channel(),
                       given.ChannelSettings<2>::channel(), given.ChannelSettings<3>::channel()};
@@ -152,11 +152,11 @@ struct Definition {
   }
   static constexpr bool is_usable(const ChainFormat& format) { return biss::is_usable(format); }
 
-  static constexpr auto commands = commands_of<Definition, ChainFormat>(is_usable);
+  static constexpr auto commands = commands_of<ChainDefinition, ChainFormat>(is_usable);
   static constexpr const auto& memory = registers::areas;
 
   static constexpr Error decode(const ChainFormat& format, Frame asked, Frame reply, FieldSink& sink) {
-    return decode_either<Definition>(format, asked, reply, sink);
+    return decode_either<ChainDefinition>(format, asked, reply, sink);
   }
   static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
@@ -185,6 +185,6 @@ struct Definition {
 
 }  // namespace
 
-constinit const Unit chain_unit = UnitOf<Definition>::make();
+constinit const Unit chain_unit = UnitOf<ChainDefinition>::make();
 
 }  // namespace absenc::biss

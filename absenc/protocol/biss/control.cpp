@@ -250,14 +250,14 @@ bool ControlMaster::byte(bool cds) {
   return write && at_ < byte_bits && (out_ >> (byte_bits - 1 - at_) & 1) != 0;
 }
 
-bool ControlMaster::end_byte(bool refused) {
+bool ControlMaster::end_byte(bool is_last) {
   const bool write = frame_.request.operation == Operation::write;
   if (!is_good_byte(in_)) return end(Error::bad_checksum);
   if (write && in_ != out_) return end(Error::unexpected_reply);
   frame_.data.push_back(static_cast<std::uint8_t>(in_ >> 4));
-  frame_.next_address_accepted = !refused;
+  frame_.next_address_accepted = !is_last;
   if (frame_.data.size() == count_) return end(Error::none);
-  if (refused) return end(Error::request_rejected);
+  if (is_last) return end(Error::request_rejected);
   state_ = State::start;
   return true;
 }

@@ -119,7 +119,7 @@ class ControlMaster {
   bool direction(bool cds);
   bool started(bool cds);
   bool byte(bool cds);
-  bool end_byte(bool refused);
+  bool end_byte(bool is_last);
   bool acknowledge(bool cds);
 
   ControlFrame frame_{};

@@ -14,7 +14,7 @@ namespace {
 
 using namespace author;
 
-struct Settings : SafetyFormat {
+struct SafetySettings : SafetyFormat {
   std::uint8_t cpw_singleturn_bits = 24;
   std::uint8_t cpw_multiturn_bits = 0;
   std::uint8_t cpw_crc_width = crc6.width;
@@ -82,7 +82,7 @@ constexpr void put_word_of(FieldSink& sink, const Channel& channel, const Channe
   if (channel.check.width != 0) put(field_cpw_crc, field_spw_crc, data.crc);
 }
 
-struct Definition {
+struct SafetyDefinition {
   using Protocol = ProtocolOf<SafetyFormat>;
   using Encoder = VirtualEncoderOf<SafetyFormat>;
   static constexpr std::string_view id = "biss-safety", name = "BiSS Safety",
@@ -91,34 +91,39 @@ struct Definition {
   static constexpr std::size_t frames_size = 2400;
 
   static constexpr OptionsOf options{
+      probeable(option<&SafetySettings::cpw_singleturn_bits>("cpw_singleturn_bits",
+                                                             "control word: bits of the position", 1, 64)),
       probeable(
-          option<&Settings::cpw_singleturn_bits>("cpw_singleturn_bits", "control word: bits of the position", 1, 64)),
-      probeable(option<&Settings::cpw_multiturn_bits>("cpw_multiturn_bits", "control word: bits of the turns", 0, 63)),
-      option<&Settings::cpw_crc_width>("cpw_crc_width", "control word: bits of the CRC; 0: none", 0, 16),
-      option<&Settings::cpw_crc_poly>("cpw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
-      option<&Settings::cpw_crc_init>("cpw_crc_init", "its start value", 0, 0xFFFF),
-      option<&Settings::cpw_crc_inverted>("cpw_crc_inverted", "whether it is sent inverted"),
-      option<&Settings::cpw_life_counter>("cpw_life_counter", "control word: 6 bits that count frames"),
+          option<&SafetySettings::cpw_multiturn_bits>("cpw_multiturn_bits", "control word: bits of the turns", 0, 63)),
+      option<&SafetySettings::cpw_crc_width>("cpw_crc_width", "control word: bits of the CRC; 0: none", 0, 16),
+      option<&SafetySettings::cpw_crc_poly>("cpw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
+      option<&SafetySettings::cpw_crc_init>("cpw_crc_init", "its start value", 0, 0xFFFF),
+      option<&SafetySettings::cpw_crc_inverted>("cpw_crc_inverted", "whether it is sent inverted"),
+      option<&SafetySettings::cpw_life_counter>("cpw_life_counter", "control word: 6 bits that count frames"),
+      probeable(option<&SafetySettings::spw_singleturn_bits>("spw_singleturn_bits", "safety word: bits of the position",
+                                                             1, 64)),
       probeable(
-          option<&Settings::spw_singleturn_bits>("spw_singleturn_bits", "safety word: bits of the position", 1, 64)),
-      probeable(option<&Settings::spw_multiturn_bits>("spw_multiturn_bits", "safety word: bits of the turns", 0, 63)),
-      option<&Settings::spw_crc_width>("spw_crc_width", "safety word: bits of the CRC; 0: none", 0, 16),
-      option<&Settings::spw_crc_poly>("spw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
-      option<&Settings::spw_crc_init>("spw_crc_init", "its start value", 0, 0xFFFF),
-      option<&Settings::spw_crc_inverted>("spw_crc_inverted", "whether it is sent inverted"),
-      option<&Settings::spw_life_counter>("spw_life_counter", "safety word: 6 bits that count frames"),
-      option<&Settings::compare_bits>("compare_bits",
-                                      "upper bits of the position in which both words agree within one count", 1, 64),
-      option<&Settings::previous_life_counter>("previous_life_counter",
-                                               "of the frame before the one that is decoded; -1: not known", -1, 63),
-      option<&Settings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
-      decimal<3>(option<&Settings::latency>("latency_us",
-                                            "the longest time until the position is ready, us: of the encoder, and "
-                                            "of the line there and back",
-                                            0, 1'000'000)),
-      option<&Settings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0, 100'000),
-      option<&Settings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0, 7),
-      decimal<3>(option<&Settings::register_delay>(
+          option<&SafetySettings::spw_multiturn_bits>("spw_multiturn_bits", "safety word: bits of the turns", 0, 63)),
+      option<&SafetySettings::spw_crc_width>("spw_crc_width", "safety word: bits of the CRC; 0: none", 0, 16),
+      option<&SafetySettings::spw_crc_poly>("spw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
+      option<&SafetySettings::spw_crc_init>("spw_crc_init", "its start value", 0, 0xFFFF),
+      option<&SafetySettings::spw_crc_inverted>("spw_crc_inverted", "whether it is sent inverted"),
+      option<&SafetySettings::spw_life_counter>("spw_life_counter", "safety word: 6 bits that count frames"),
+      option<&SafetySettings::compare_bits>(
+          "compare_bits", "upper bits of the position in which both words agree within one count", 1, 64),
+      option<&SafetySettings::previous_life_counter>(
+          "previous_life_counter", "of the frame before the one that is decoded; -1: not known", -1, 63),
+      option<&SafetySettings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
+      decimal<3>(
+          option<&SafetySettings::latency>("latency_us",
+                                           "the longest time until the position is ready, us: of the encoder, and "
+                                           "of the line there and back",
+                                           0, 1'000'000)),
+      option<&SafetySettings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
+                                          100'000),
+      option<&SafetySettings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0,
+                                     7),
+      decimal<3>(option<&SafetySettings::register_delay>(
           "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
           100'000'000)),
   };
@@ -149,7 +154,7 @@ struct Definition {
   static constexpr auto vectors = safety_vectors;
 
   static constexpr SafetyFormat format(const Options& values) {
-    Settings given = options.format(values);
+    SafetySettings given = options.format(values);
     given.cpw = {
         word_with_status({given.cpw_singleturn_bits, given.cpw_multiturn_bits, true}),
         {given.cpw_crc_width, given.cpw_crc_poly, given.cpw_crc_init, given.cpw_crc_inverted, given.cpw_life_counter}};
@@ -164,11 +169,11 @@ struct Definition {
     return biss::is_usable(format) && absenc::is_usable(format.cpw.word) && absenc::is_usable(format.spw.word);
   }
 
-  static constexpr auto commands = commands_of<Definition, SafetyFormat>(is_usable);
+  static constexpr auto commands = commands_of<SafetyDefinition, SafetyFormat>(is_usable);
   static constexpr const auto& memory = registers::areas;
 
   static constexpr Error decode(const SafetyFormat& format, Frame asked, Frame reply, FieldSink& sink) {
-    return decode_either<Definition>(format, asked, reply, sink);
+    return decode_either<SafetyDefinition>(format, asked, reply, sink);
   }
   static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
@@ -197,6 +202,6 @@ struct Definition {
 
 }  // namespace
 
-constinit const Unit safety_unit = UnitOf<Definition>::make();
+constinit const Unit safety_unit = UnitOf<SafetyDefinition>::make();
 
 }  // namespace absenc::biss
