@@ -18,9 +18,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 /// Says the next byte; gets the last request.
 using Babble = std::function<std::uint8_t(Bytes request)>;
 

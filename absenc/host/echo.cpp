@@ -6,8 +6,6 @@
 namespace absenc::host {
 
 namespace {
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
 
 bool begins_with(Bytes bytes, Bytes start) {
   const std::size_t common = std::min(bytes.size(), start.size());

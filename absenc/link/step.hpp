@@ -83,4 +83,7 @@ struct Machine {
   ~Machine() = default;  // a public virtual destructor would link operator delete
 };
 
+using ByteStep = Step<std::uint8_t>;
+using ByteEvent = Event<std::uint8_t>;
+
 }  // namespace absenc

@@ -11,9 +11,6 @@ namespace absenc::os {
 
 namespace {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 constexpr Time deselected_time = std::chrono::microseconds(10);  // the kernel's own between two transfers
 
 constexpr std::size_t most_heard = 4096;  // bytes of a chip that stays selected: no device listens longer

@@ -23,8 +23,6 @@ namespace absenc::os {
 
 using namespace std::chrono_literals;
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
 using Kind = Failure::Kind;
 
 namespace {

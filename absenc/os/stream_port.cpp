@@ -15,9 +15,6 @@ namespace absenc::os {
 
 using namespace std::chrono_literals;
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 StreamPort::StreamPort() : quiet_since_(os::now()) {}
 
 Time StreamPort::now() {

@@ -21,8 +21,6 @@
 
 namespace absenc::os::testing {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
 using Data = std::vector<std::uint8_t>;
 
 [[nodiscard]] inline Data data(Bytes bytes) { return {bytes.begin(), bytes.end()}; }

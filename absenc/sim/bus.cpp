@@ -8,9 +8,6 @@ namespace absenc::sim {
 
 namespace {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 // What begins later than this is kept here: in the carrier's hands it would keep the others from sending.
 constexpr Time soon = std::chrono::milliseconds(1);
 

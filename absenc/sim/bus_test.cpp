@@ -14,8 +14,6 @@ namespace {
 
 using namespace std::chrono_literals;
 using Wire = std::vector<std::uint8_t>;
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 

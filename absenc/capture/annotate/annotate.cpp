@@ -42,7 +42,6 @@ Annotator::Annotator(const Unit& unit, const Options& options, const Settings& s
     : judge_(unit, options),
       settings_(settings),
       exchanges_(Judge(unit, options), settings.ticks, sink),
-      sink_(sink),
       options_(options) {
   is_first_ = !settings_.begins_silent;
   for (std::size_t i = 0; i < settings_.channel_count; ++i) channels_[i].carries = settings_.channels[i];

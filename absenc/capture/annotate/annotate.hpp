@@ -100,7 +100,6 @@ class Annotator {
   Judge judge_;
   Settings settings_;
   Exchanges exchanges_;
-  AnnotationSink& sink_;
   Options options_;
   std::array<Channel, 2> channels_{};
   std::array<std::size_t, 256> reply_sizes_{};  // of the last good reply to a request with this first byte

@@ -5,9 +5,6 @@
 
 namespace absenc::author {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 ByteStep ClockedDevice::next(Time) {
   if (!std::exchange(pending_, false)) return {.at = never};
   return {.kind = ByteStep::Kind::transfer, .out = bits_.bytes()};

@@ -5,9 +5,6 @@
 
 namespace absenc::author {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 // ---- For the subclass
 
 void ClockedEngine::clock(unsigned count, bool hold_low) {

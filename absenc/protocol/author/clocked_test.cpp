@@ -12,7 +12,6 @@ namespace absenc::author {
 namespace {
 
 using namespace std::chrono_literals;
-using ByteStep = Step<std::uint8_t>;
 using Kind = Event<std::uint8_t>::Kind;
 
 struct Toy {

@@ -5,9 +5,6 @@
 
 namespace absenc::author {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 void Responder::power_off(Time now) {
   EncoderOn::power_off(now);
   forget();

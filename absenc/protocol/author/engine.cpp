@@ -6,9 +6,6 @@
 
 namespace absenc::author {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 // ---- For the subclass
 
 void Engine::send(Bytes request, const Manner& manner, Time earliest) {

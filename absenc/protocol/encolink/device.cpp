@@ -7,9 +7,6 @@ namespace absenc::encolink {
 
 namespace {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8..9] hold the resolution
 constexpr Time access_time = 200us;                         // until an access is executed; assumed
 

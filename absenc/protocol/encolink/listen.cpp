@@ -7,9 +7,6 @@
 
 namespace absenc::encolink {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 Listen::Listen(const Format& format, std::uint32_t count) : format_(format), count_(count) {
   if (!format.known()) {
     end(Error::invalid_argument,

@@ -5,9 +5,6 @@ namespace absenc::modbus {
 
 namespace {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 constexpr Time answer_time = 200us;  // behind the silence that ends a request; the standard gives none
 constexpr Time late = 20ms;          // behind that silence: a client may have given up, and asked again
 

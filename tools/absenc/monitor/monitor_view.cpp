@@ -315,7 +315,8 @@ void draw_help(Screen& screen, int row, int end) {
 std::string question_in(const View& view, int columns) {
   const std::string name = names_in(view, columns - static_cast<int>(view.question.size()) - 5)[view.selected];
   const std::string who = fmt::format("  ({})", name);
-  const std::size_t room = static_cast<std::size_t>(columns) - std::min<std::size_t>(columns, who.size());
+  const auto width = static_cast<std::size_t>(columns);
+  const std::size_t room = width - std::min(width, who.size());
   return view.question.substr(0, room) + who;
 }
 

@@ -5,9 +5,6 @@
 
 namespace absenc::raa38::serial {
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 ByteStep VirtualEncoder::next(Time now) {
   if (std::exchange(pending_, false)) return character();
   const bool streams = format().mode == Mode::timing && is_on(now) && !is_transmitting();

@@ -70,9 +70,6 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
 
 // ---- A stream
 
-using ByteStep = Step<std::uint8_t>;
-using ByteEvent = Event<std::uint8_t>;
-
 Listen::Listen(const Format& format) : format_(format), decoder_(format) {
   if (format.maximum_rpm == 0 || format.period() > Time{}) return;
   fail(Error::invalid_argument, {"max_rpm needs to know how often the encoder transmits", "set refresh_hz as well"});
