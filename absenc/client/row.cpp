@@ -79,19 +79,20 @@ Value value_of(const FieldValue& value) {
 }
 
 void AnswerSink::put(const FieldValue& value) {
-  const auto same = std::find(fields_.begin(), fields_.end(), value.info);
+  const auto same = std::find_if(fields_.begin(), fields_.end(),
+                                 [&](const FieldInfo& field) { return field.name == value.info->name; });
   if (same != fields_.end()) {
     answer.values[static_cast<std::size_t>(same - fields_.begin())] = value_of(value);
     return;
   }
-  fields_.push_back(value.info);
+  fields_.push_back(*value.info);
   answer.columns.push_back(column_of(*value.info));
   answer.values.push_back(value_of(value));
 }
 
 void AnswerSink::put_reading(const Reading& reading) {
   for (std::size_t i = 0; i < fields_.size(); ++i) {
-    if (is_of_reading(fields_[i]->role) && !holds(*fields_[i], reading)) answer.values[i] = Invalid{};
+    if (is_of_reading(fields_[i].role) && !holds(fields_[i], reading)) answer.values[i] = Invalid{};
   }
 }
 

@@ -80,7 +80,7 @@ class AnswerSink final : public FieldSink {
   Answer answer;
 
  private:
-  std::vector<const FieldInfo*> fields_;
+  std::vector<FieldInfo> fields_;
 };
 
 }  // namespace absenc::client

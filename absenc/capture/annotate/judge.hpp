@@ -4,7 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
@@ -16,7 +20,7 @@ namespace absenc::capture {
 class Judge {
  public:
   /// `unit` must outlive it.
-  Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options) {}
+  Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options), kept_(unit.fields) {}
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
@@ -53,14 +57,20 @@ class Judge {
 
  private:
   struct Kept final : FieldSink {
+    explicit Kept(std::span<const FieldInfo> all) : known(all) {}
+
     void clear() {
       fields.clear();
       bytes.clear();
+      made.clear();
       has_reading = false;
     }
     void put(const FieldValue& value) override {
       fields.push_back(value);
       if (!value.bytes.empty()) keep_bytes();
+      const std::less<> before;
+      const bool lasts = !before(value.info, known.data()) && before(value.info, known.data() + known.size());
+      if (!lasts) keep_info();
     }
     void put_reading(const Reading& one) override {
       reading = one;
@@ -76,8 +86,21 @@ class Judge {
         at += field.bytes.size();
       }
     }
+    // The field of a word that the user described is there during the call only.
+    void keep_info() {
+      made.push_back({std::string(fields.back().info->name), *fields.back().info});
+      made.back().info.name = made.back().name;
+      fields.back().info = &made.back().info;
+    }
+
+    struct Made {
+      std::string name;
+      FieldInfo info;
+    };
+    std::span<const FieldInfo> known;
     std::vector<FieldValue> fields;
     std::vector<std::uint8_t> bytes;
+    std::deque<Made> made;
     Reading reading{};
     bool has_reading = false;
   };

@@ -16,7 +16,7 @@ bool all_hex(std::string_view text) {
 }
 
 template <class Number>
-std::optional<Number> whole(std::string_view text, int base) {
+std::optional<Number> number_in(std::string_view text, int base) {
   Number value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
   if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
@@ -66,7 +66,7 @@ bool parse_dump(std::string_view line, HexLine& parsed) {
   }
   line = line.substr(0, line.find('|'));
   const std::string_view offset = take_word(line);
-  parsed.offset = whole<std::uint64_t>(offset, 16);
+  parsed.offset = number_in<std::uint64_t>(offset, 16);
   if (!parsed.offset || offset.size() < 6) return false;
   for (std::string_view word = take_word(line); !word.empty(); word = take_word(line)) {
     if (word.size() != 2 || !append_group(word, parsed.bytes)) {
@@ -85,7 +85,7 @@ bool parse_xxd(std::string_view line, HexLine& parsed) {
   }
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos) return false;
-  parsed.offset = whole<std::uint64_t>(line.substr(0, colon), 16);
+  parsed.offset = number_in<std::uint64_t>(line.substr(0, colon), 16);
   line.remove_prefix(std::min(colon + 2, line.size()));
   return parsed.offset && append_groups(line.substr(0, line.find("  ")), parsed.bytes);
 }
@@ -95,8 +95,8 @@ bool parse_sigrok(std::string_view line, HexLine& parsed) {
   std::string_view rest = line;
   const std::string_view range = take_word(rest);
   if (const std::size_t dash = range.find('-'); dash != std::string_view::npos && !range.ends_with(':')) {
-    parsed.begin = whole<Tick>(range.substr(0, dash), 10);
-    const auto end = whole<Tick>(range.substr(dash + 1), 10);
+    parsed.begin = number_in<Tick>(range.substr(0, dash), 10);
+    const auto end = number_in<Tick>(range.substr(dash + 1), 10);
     if (!parsed.begin || !end || *end < *parsed.begin) return false;
     parsed.end = *end;
     line = rest;

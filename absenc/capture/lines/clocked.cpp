@@ -12,7 +12,7 @@ namespace {
 constexpr Tick no_change = std::numeric_limits<Tick>::max();
 constexpr std::size_t most_periods = 4096;
 
-void put(std::vector<std::uint8_t>& bytes, std::size_t bit, bool level) {
+void put_bit(std::vector<std::uint8_t>& bytes, std::size_t bit, bool level) {
   if (bit % 8 == 0) bytes.push_back(0);
   bytes.back() = static_cast<std::uint8_t>(bytes.back() | (level ? 0x80u >> bit % 8 : 0u));
 }
@@ -105,8 +105,8 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
     close(at, true, bursts);
     open(at, true, nullptr);
   }
-  if (has_in_) put(burst_.in, burst_.bits, in_.before(at));
-  if (has_out_) put(burst_.out, burst_.bits, out_.before(at));
+  if (has_in_) put_bit(burst_.in, burst_.bits, in_.before(at));
+  if (has_out_) put_bit(burst_.out, burst_.bits, out_.before(at));
   ++burst_.bits;
 }
 

@@ -20,7 +20,7 @@ std::string shown(char c) {
   return printable ? fmt::format("'{}'", c) : fmt::format("the byte 0x{:02X}", static_cast<unsigned char>(c));
 }
 
-[[noreturn]] void refuse(std::string_view what, std::string_view text, std::size_t at, std::string_view wanted) {
+[[noreturn]] void refuse_frame(std::string_view what, std::string_view text, std::size_t at, std::string_view wanted) {
   throw UsageError(fmt::format("{}: {} at position {} is not {}", what, shown(text[at]), at + 1, wanted));
 }
 
@@ -44,13 +44,13 @@ std::vector<std::uint8_t> parse_bytes(std::string_view what, std::string_view te
       continue;
     }
     const int high = hex_digit(text[i]);
-    if (high < 0) refuse(what, text, i, "a hexadecimal digit");
+    if (high < 0) refuse_frame(what, text, i, "a hexadecimal digit");
     if (i + 1 == text.size() || separates(text[i + 1])) {
       throw UsageError(
           fmt::format("{}: the byte at position {} has one digit, but bytes have two (0{})", what, i + 1, text[i]));
     }
     const int low = hex_digit(text[i + 1]);
-    if (low < 0) refuse(what, text, i + 1, "a hexadecimal digit");
+    if (low < 0) refuse_frame(what, text, i + 1, "a hexadecimal digit");
     bytes.push_back(static_cast<std::uint8_t>(high << 4 | low));
     inside = true;
     i += 2;
@@ -66,7 +66,7 @@ CanFrame parse_can(std::string_view what, std::string_view text) {
   CanFrame frame;
   for (std::size_t i = 0; i < colon; ++i) {
     const int digit = hex_digit(text[i]);
-    if (digit < 0) refuse(what, text, i, "a hexadecimal digit");
+    if (digit < 0) refuse_frame(what, text, i, "a hexadecimal digit");
     frame.id = frame.id << 4 | static_cast<std::uint32_t>(digit);
   }
   frame.extended = colon > 3;
@@ -92,7 +92,7 @@ CanFrame parse_can(std::string_view what, std::string_view text) {
 void parse_bits(std::string_view what, std::string_view text, WireFrame& frame) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (separates(text[i])) continue;
-    if (text[i] != '0' && text[i] != '1') refuse(what, text, i, "a bit: this wire carries a string of 0 and 1");
+    if (text[i] != '0' && text[i] != '1') refuse_frame(what, text, i, "a bit: this wire carries a string of 0 and 1");
     if (frame.bits % 8 == 0) frame.bytes.push_back(0);
     if (text[i] == '1') frame.bytes.back() |= static_cast<std::uint8_t>(0x80u >> frame.bits % 8);
     ++frame.bits;

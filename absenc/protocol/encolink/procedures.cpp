@@ -30,7 +30,7 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 // ---- Frames
 
 // One that is lost or damaged ends the step of channel 2.
-Part<Error> frame(Dialog& dialog, Found& found, Frames::Request request) {
+Part<Error> ask_frame(Dialog& dialog, Found& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
   found.ended.reset();
@@ -58,8 +58,8 @@ Outcome stopped(const Found& found, Error error) {
 // not come.
 Part<Identity> identify(Dialog& dialog, Found& found, bool trusted) {
   for (;;) {
-    Error error = co_await frame(dialog, found, {Ask::identify});
-    if (error == Error::none) error = co_await frame(dialog, found, {Ask::identity});
+    Error error = co_await ask_frame(dialog, found, {Ask::identify});
+    if (error == Error::none) error = co_await ask_frame(dialog, found, {Ask::identity});
     if (error == Error::none) break;
     if (is_gone(dialog, found)) co_await dialog.stop(stopped(found, error));
   }
@@ -76,7 +76,7 @@ Part<Identity> identify(Dialog& dialog, Found& found, bool trusted) {
 Part<bool> next_frame(Dialog& dialog, Found& found, Ask ask = Ask::position) {
   if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {
-    const Error error = co_await frame(dialog, found, {found.in_step ? Ask::position : ask});
+    const Error error = co_await ask_frame(dialog, found, {found.in_step ? Ask::position : ask});
     if (error == Error::none) co_return true;
     if (is_gone(dialog, found)) co_await dialog.stop({error});
   }
@@ -96,7 +96,7 @@ Part<Error> send(Dialog& dialog, Found& found) {
     Frames::Request request{Ask::reset};
     if (found.in_step) request = {Ask::position, found.access[sent++]};
     found.was_asked = sent == found.access.size();
-    const Error error = co_await frame(dialog, found, request);
+    const Error error = co_await ask_frame(dialog, found, request);
     if (damage(found, error) != Error::none) co_return damage(found, error);
   }
   co_return Error::none;
@@ -105,7 +105,7 @@ Part<Error> send(Dialog& dialog, Found& found) {
 // The next cycle: its byte of channel 3 is one of the answer.
 Part<Error> receive(Dialog& dialog, Found& found) {
   do {
-    const Error error = co_await frame(dialog, found, {});
+    const Error error = co_await ask_frame(dialog, found, {});
     if (damage(found, error) != Error::none) co_return damage(found, error);
   } while (!found.ended);
   co_return Error::none;
@@ -216,7 +216,7 @@ Part<bool> write(Dialog& dialog, Found& found, RegisterIndex index, std::uint64_
   return write(dialog, found, registers[index].address, registers[index].size, value);
 }
 
-Part<bool> command(Dialog& dialog, Found& found, std::uint8_t code) {
+Part<bool> tell(Dialog& dialog, Found& found, std::uint8_t code) {
   const Fate fate = co_await attempt_write(dialog, found, registers[command_register].address, 1, code);
   const bool untouched = fate == Fate::gone && !found.was_asked;
   if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
@@ -331,7 +331,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
 
 Procedure send_command(Dialog& dialog, Found& found, std::uint8_t code) {
   found.emits = true;
-  co_await command(dialog, found, code);
+  co_await tell(dialog, found, code);
   co_return done;
 }
 
@@ -353,7 +353,7 @@ Procedure zero(Dialog& dialog, Found& found, Arguments arguments) {
                "offset_sign or offset_unit"};
   }
   found.tell(position_offset, found.data);
-  if (arguments[0] != 0) co_await command(dialog, found, commands::save);
+  if (arguments[0] != 0) co_await tell(dialog, found, commands::save);
   co_return done;
 }
 
@@ -368,7 +368,7 @@ Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments) {
   if (dialog.last().multiturn != turns) {
     co_return {Error::cross_check_failed, "the preset is written, but the turns are others: hold the shaft still"};
   }
-  if (arguments[1] != 0) co_await command(dialog, found, commands::save);
+  if (arguments[1] != 0) co_await tell(dialog, found, commands::save);
   co_return done;
 }
 
@@ -376,7 +376,7 @@ Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments) {
 Procedure self_calibrate(Dialog& dialog, Found& found) {
   co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];
-  co_await command(dialog, found, commands::self_calibrate);
+  co_await tell(dialog, found, commands::self_calibrate);
   found.running = true;
   std::uint8_t status = before;
   const Time started = dialog.received_at();

@@ -48,7 +48,7 @@ struct Asked {
   bool accepted = false;
 };
 
-Asked asked_by(const Profile& profile, const Capture& capture) {
+Asked asked_in(const Profile& profile, const Capture& capture) {
   const Bytes bytes = capture.request.empty() ? capture.reply : capture.request;
   const std::optional<DataId> id = data_id(bytes[0]);
   if (!id) return {};
@@ -65,7 +65,7 @@ Asked asked_by(const Profile& profile, const Capture& capture) {
 // An encoder answers only what it accepts, and reports a wrong parity bit only where there is one.
 Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
-  const Asked asked = asked_by(profile, capture);
+  const Asked asked = asked_in(profile, capture);
   if (!asked.accepted) return capture.request.empty() ? Check::other_command : Check::request_not_accepted;
   const Profile as_sent = asked.parity_wrong ? with_other_parity(profile) : profile;
   Reply reply;
@@ -119,7 +119,7 @@ void judge_sequence(Profile& best, std::span<const Capture> captures, std::array
       known = false;
       continue;
     }
-    const Asked asked = asked_by(best, captures[i]);
+    const Asked asked = asked_in(best, captures[i]);
     if (!has_sequence(asked.request.id)) continue;
     ++safety;
     Reply reply;
@@ -186,10 +186,10 @@ namespace {
 
 // The request's parity bit was wrong only if the other scope makes another one.
 bool parity_is_it(const Profile& profile, const Capture& capture) {
-  const Asked asked = asked_by(profile, capture);
+  const Asked asked = asked_in(profile, capture);
   Reply reply;
   return asked.accepted && check_reply(profile, asked.request, capture.reply, reply) == Check::parity_reported &&
-         asked_by(with_other_parity(profile), capture).parity_wrong;
+         asked_in(with_other_parity(profile), capture).parity_wrong;
 }
 
 // Each value of each option that changes replies.

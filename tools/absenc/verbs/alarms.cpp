@@ -41,7 +41,7 @@ Json in_words(const Flags& flags) {
   return json;
 }
 
-void show(const Unit& unit, const Reading& reading) {
+void show_alarms(const Unit& unit, const Reading& reading) {
   for (const auto& [flags, told_when_none] : flags_of(unit, reading)) {
     const std::string words = flags_in_words(flags);
     if (!words.empty()) print_line(fmt::format("{}:\n{}", flags.field->name, words));
@@ -68,7 +68,7 @@ int run_alarms(const Invocation& invocation) {
   if (invocation.has("--json")) {
     show_json(*uri.unit, *outcome.reading);
   } else {
-    show(*uri.unit, *outcome.reading);
+    show_alarms(*uri.unit, *outcome.reading);
   }
   return exit_good;
 }

@@ -83,7 +83,7 @@ std::vector<std::string> row(const FoundCheck& check, const CheckFindings& findi
           often};
 }
 
-void show(const CheckFindings& findings, std::size_t most, std::string_view unit) {
+void show_checks(const CheckFindings& findings, std::size_t most, std::string_view unit) {
   std::vector<std::vector<std::string>> rows{
       {"check", "width", "poly", "Koopman", "init", "refin", "refout", "xorout", "covers", "stands", "chance"}};
   const std::size_t shown = std::min(most, findings.checks.size());
@@ -122,7 +122,7 @@ int run_crc_find(const Invocation& invocation) {
     for (const FoundCheck& check : findings.checks) list.append(check_json(check, unit));
     print_line(Json::object().set("ok", found).set("frames", frames.size()).set("solutions", list).line());
   } else if (found) {
-    show(findings, invocation.has("--all") ? SIZE_MAX : most_shown, unit);
+    show_checks(findings, invocation.has("--all") ? SIZE_MAX : most_shown, unit);
   }
   if (!found && !findings.is_open) {
     print_message(findings.advice);

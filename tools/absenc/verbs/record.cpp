@@ -101,7 +101,7 @@ RecordingSettings settings_of(const Invocation& invocation) {
 }
 
 // `whole`: what was written is in the files.
-void summarize(const Recording& recording, const Encoder& live, bool whole) {
+void summarize_recording(const Recording& recording, const Encoder& live, bool whole) {
   std::string text = fmt::format("{} readings and {} failures in {} {}", recording.readings(), recording.failures(),
                                  to_text(os::now() - recording.start()),
                                  whole ? fmt::format("are in {}", recording.names()) : "were written");
@@ -151,7 +151,7 @@ int run_record(const Invocation& invocation) {
     end_early(failure.what());
   }
   report.clear();
-  summarize(recording, live, whole);
+  summarize_recording(recording, live, whole);
   return good ? exit_good : exit_failed;
 }
 

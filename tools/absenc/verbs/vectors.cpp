@@ -18,7 +18,7 @@ namespace absenc::tool {
 namespace {
 
 // "name=value name=value"
-std::vector<OptionText> settings_of(const Vector& vector) {
+std::vector<OptionText> vector_settings(const Vector& vector) {
   std::vector<OptionText> settings;
   std::string_view rest = vector.options;
   while (!rest.empty()) {
@@ -30,7 +30,7 @@ std::vector<OptionText> settings_of(const Vector& vector) {
 }
 
 // A vector keeps its frames as bytes: the text of a CAN frame or of a clocked word, or the bytes themselves.
-WireFrame frame_of(const Unit& unit, Bytes bytes) {
+WireFrame vector_frame(const Unit& unit, Bytes bytes) {
   if (bytes.empty()) return {};
   if (unit.link != LinkKind::can && unit.link != LinkKind::clocked) return {{bytes.begin(), bytes.end()}, 0, {}};
   return parse_wire_text(unit.link, "vector", std::string(bytes.begin(), bytes.end()));
@@ -72,8 +72,8 @@ Json expected_fields(const Unit& unit, const Vector& vector) {
 
 Json vector_json(const Unit& unit, const Vector& vector) {
   Json settings = Json::object();
-  const Options options = require_options(unit, {}, settings_of(vector));
-  for (const OptionText& setting : settings_of(vector)) {
+  const Options options = require_options(unit, {}, vector_settings(vector));
+  for (const OptionText& setting : vector_settings(vector)) {
     const auto option = std::find_if(unit.options.begin(), unit.options.end(),
                                      [&](const Option& one) { return one.name == setting.name; });
     const auto index = static_cast<std::size_t>(option - unit.options.begin());
@@ -82,17 +82,17 @@ Json vector_json(const Unit& unit, const Vector& vector) {
   Json json = Json::object();
   json.set("id", vector.id).set("protocol", unit.id).set("description", vector.meaning);
   json.set("source", vector.source).set("options", settings);
-  json.set("request", to_compact_wire_text(unit.link, frame_of(unit, vector.request).frame()));
-  json.set("response", to_compact_wire_text(unit.link, frame_of(unit, vector.reply).frame()));
+  json.set("request", to_compact_wire_text(unit.link, vector_frame(unit, vector.request).frame()));
+  json.set("response", to_compact_wire_text(unit.link, vector_frame(unit, vector.reply).frame()));
   if (vector.error != Error::none) return json.set("error", text_of(vector.error).name);
   return json.set("fields", expected_fields(unit, vector));
 }
 
 bool holds(const Unit& unit, const Vector& vector) {
-  const WireFrame request = frame_of(unit, vector.request);
-  const WireFrame reply = frame_of(unit, vector.reply);
+  const WireFrame request = vector_frame(unit, vector.request);
+  const WireFrame reply = vector_frame(unit, vector.reply);
   Comparison comparison(vector);
-  const Options options = require_options(unit, {}, settings_of(vector));
+  const Options options = require_options(unit, {}, vector_settings(vector));
   const Error error = unit.decode(options, request.frame(), reply.frame(), comparison);
   return error == vector.error && comparison.matches == vector.fields.size();
 }
@@ -111,8 +111,8 @@ int run_vectors(const Invocation& invocation) {
       const bool ok = holds(*unit, vector);
       good = good && ok;
       rows.push_back({std::string(vector.id), ok ? "ok" : "WRONG",
-                      to_compact_wire_text(unit->link, frame_of(*unit, vector.request).frame()),
-                      to_compact_wire_text(unit->link, frame_of(*unit, vector.reply).frame()),
+                      to_compact_wire_text(unit->link, vector_frame(*unit, vector.request).frame()),
+                      to_compact_wire_text(unit->link, vector_frame(*unit, vector.reply).frame()),
                       vector.error == Error::none ? "good" : std::string(text_of(vector.error).name),
                       std::string(vector.meaning)});
     }
