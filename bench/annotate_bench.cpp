@@ -18,7 +18,8 @@ constexpr Tick pause = 64;
 
 struct Count final : AnnotationSink {
   void put(const Annotation& annotation) override {
-    if (annotation.error == Error::none && annotation.contents.reading != nullptr) positions += annotation.contents.reading->singleturn;
+    if (annotation.error == Error::none && annotation.contents.reading != nullptr)
+      positions += annotation.contents.reading->singleturn;
     ++count;
   }
   std::uint64_t count = 0;
