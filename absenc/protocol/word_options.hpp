@@ -87,7 +87,8 @@ struct WordSettings : Format {
 
 /// Where a field of a word that begins at bit `first` stands. What is Gray-coded stands in no bits of its own.
 [[nodiscard]] constexpr BitRanges place_in_word(const WordFormat& format, const FieldInfo& field, std::size_t first) {
-  const auto is = [&field](WordFieldIndex index) { return &field == &word_fields[index]; };
+  // By name: who keeps a decoded frame keeps copies of the fields that are no unit's own.
+  const auto is = [&field](WordFieldIndex index) { return field.name == word_fields[index].name; };
   const auto shows = [&](const WordField& one) {
     switch (one.meaning) {
       case Meaning::position:
