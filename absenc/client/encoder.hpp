@@ -54,6 +54,7 @@ struct Sample {
 };
 
 class Pace;
+class Recording;
 struct EncoderAddress;
 
 /// How an encoder is to be read.
@@ -134,6 +135,7 @@ class Encoder {
   [[nodiscard]] const Connection& connection() const { return *connection_; }
 
  private:
+  friend class Recording;
   friend class Samples;
 
   /// Throws Cancelled, os::Interrupted.

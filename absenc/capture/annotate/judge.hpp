@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,7 +19,7 @@ namespace absenc::capture {
 class Judge {
  public:
   /// `unit` must outlive it.
-  Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options), kept_(unit.fields) {}
+  Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options), kept_(options.has_word()) {}
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
@@ -57,7 +56,7 @@ class Judge {
 
  private:
   struct Kept final : FieldSink {
-    explicit Kept(std::span<const FieldInfo> all) : known(all) {}
+    explicit Kept(bool has_word) : is_described(has_word) {}
 
     void clear() {
       fields.clear();
@@ -68,9 +67,7 @@ class Judge {
     void put(const FieldValue& value) override {
       fields.push_back(value);
       if (!value.bytes.empty()) keep_bytes();
-      const std::less<> before;
-      const bool lasts = !before(value.info, known.data()) && before(value.info, known.data() + known.size());
-      if (!lasts) keep_info();
+      if (is_described) keep_info();
     }
     void put_reading(const Reading& one) override {
       reading = one;
@@ -86,7 +83,7 @@ class Judge {
         at += field.bytes.size();
       }
     }
-    // The field of a word that the user described is there during the call only.
+    // The fields of a word that the user described are there during the call only.
     void keep_info() {
       made.push_back({std::string(fields.back().info->name), *fields.back().info});
       made.back().info.name = made.back().name;
@@ -97,7 +94,7 @@ class Judge {
       std::string name;
       FieldInfo info;
     };
-    std::span<const FieldInfo> known;
+    bool is_described;  // a word by the user
     std::vector<FieldValue> fields;
     std::vector<std::uint8_t> bytes;
     std::deque<Made> made;

@@ -26,19 +26,22 @@ class Pace {
     return next_;
   }
 
-  /// Sleeps until the next time, or `end`. Throws as os::sleep_until.
-  void wait(Time end = never) {
+  /// Sleeps until the next time, or `end`. Throws as `sleep_until` does.
+  template <class SleepUntil>
+  void wait(Time end, SleepUntil sleep_until) {
     if (period_ == Time{}) return;
     next_ += period_;
     leave_out(end);
     try {
-      os::sleep_until(std::min(next_, end));
+      sleep_until(std::min(next_, end));
     } catch (...) {
       leave_out(end);
       throw;
     }
     leave_out(end);
   }
+
+  void wait() { wait(never, os::sleep_until); }
 
   /// How many times before the end `wait` has left out since this was last asked, because they were over: whoever took
   /// longer than a period, or was stopped, has missed them.

@@ -8,12 +8,12 @@
 #include <cmath>
 
 #include "absenc/client/sample_rows.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/short_names.hpp"
 #include "tools/absenc/text/encoder_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/reading_text.hpp"
-#include "tools/absenc/text/row_text.hpp"
 
 namespace absenc::tool {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "absenc/client/text/json.hpp"
 #include "tools/absenc/monitor/screen.hpp"
 #include "tools/absenc/monitor/watch.hpp"
-#include "tools/absenc/text/json.hpp"
 
 namespace absenc::tool {
 

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "absenc/capture/lines/can_line.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/client/way/diagnosis.hpp"
@@ -14,7 +15,6 @@
 #include "tools/absenc/text/field_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/reading_text.hpp"
-#include "tools/absenc/text/row_text.hpp"
 
 namespace absenc::tool {
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/unit.hpp"
-#include "tools/absenc/text/json.hpp"
 
 namespace absenc::tool {
 

@@ -13,10 +13,10 @@
 #include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/client/captures/position_trace.hpp"
 #include "absenc/client/captures/run.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/host/statistics.hpp"
 #include "absenc/protocol/unit.hpp"
 #include "tools/absenc/text/annotation_text.hpp"
-#include "tools/absenc/text/json.hpp"
 
 namespace absenc::tool {
 

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/client/way/connection.hpp"
-#include "tools/absenc/text/json.hpp"
 
 namespace absenc::tool {
 

@@ -3,7 +3,6 @@
 #include "absenc/client/text/unit_text.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 namespace absenc::tool {
 
@@ -22,27 +21,6 @@ Json options_to_json(const Unit& unit, const Options& options) {
     json.set(unit.options[i].name, to_json(unit.options[i], options[i]));
   }
   return json;
-}
-
-Json flags_to_json(const FieldInfo& field, std::uint64_t bits) {
-  Json names = Json::array();
-  for (const std::string_view name : flag_names(field, bits)) names.append(name);
-  return names;
-}
-
-Json to_json(const Value& value) {
-  struct Visitor {
-    Json operator()(std::monostate) const { return {}; }
-    Json operator()(Invalid) const { return {}; }
-    Json operator()(const Flags& flags) const { return flags_to_json(*flags.field, flags.bits); }
-    Json operator()(const ByteVector& bytes) const { return fmt::format("{:02x}", fmt::join(bytes, "")); }
-    Json operator()(const std::string& text) const { return text; }
-    Json operator()(bool value) const { return value; }
-    Json operator()(std::int64_t value) const { return value; }
-    Json operator()(std::uint64_t value) const { return value; }
-    Json operator()(double value) const { return value; }
-  };
-  return std::visit(Visitor{}, value);
 }
 
 void JsonFields::put(const FieldValue& value) {
@@ -74,6 +52,16 @@ void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& fie
     if (!flag.action.empty()) words += fmt::format(": {}", flag.action);
     rows.push_back({fmt::format("  {}", flag.name), "", words});
   }
+}
+
+std::vector<std::vector<std::string>> to_table(const Row& row) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < row.columns.size(); ++i) {
+    const Column& column = row.columns[i];
+    rows.push_back({std::string(column.name), to_text(column, row.values[i]), std::string(column.meaning)});
+    if (const auto* flags = std::get_if<Flags>(&row.values[i])) add_flags(rows, *flags->field, flags->bits);
+  }
+  return rows;
 }
 
 void FieldTable::put_reading(const Reading& reading) {

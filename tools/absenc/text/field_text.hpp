@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "absenc/client/row.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "tools/absenc/text/json.hpp"
 
 namespace absenc::tool {
 
@@ -17,8 +17,6 @@ using namespace client;
 [[nodiscard]] Json to_json(const Option& option, std::int64_t value);
 /// {"singleturn_bits":17,...}
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
-[[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
-[[nodiscard]] Json to_json(const Value& value);
 
 /// Puts fields into a JSON object; with a reading, behind what it knows not to hold `singleturn_valid` and the like,
 /// false. What has no such field holds.
@@ -37,6 +35,9 @@ struct JsonFields final : FieldSink {
 
 /// A row for each flag that is set: "  over_heat", "", its meaning and what to do.
 void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& field, std::uint64_t bits);
+
+/// For `table`: name, value, unit or meaning; a row for each flag that is set.
+[[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
 /// Puts fields into the rows of a table: name, value, unit or meaning; a row for each flag that is set.
 struct FieldTable final : FieldSink {

@@ -8,10 +8,10 @@
 #include <cmath>
 #include <utility>
 
+#include "absenc/client/text/json.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/text/field_text.hpp"
-#include "tools/absenc/text/json.hpp"
 #include "tools/absenc/text/output.hpp"
 
 namespace absenc::tool {

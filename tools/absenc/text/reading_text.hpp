@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "absenc/client/reading.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/core/angle.hpp"
-#include "tools/absenc/text/json.hpp"
 
 namespace absenc::tool {
 

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "absenc/client/find_crc.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/text/json.hpp"
 #include "tools/absenc/text/output.hpp"
 
 namespace absenc::tool {

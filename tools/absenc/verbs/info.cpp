@@ -6,6 +6,7 @@
 #include <array>
 
 #include "absenc/client/reading_columns.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/os/signals.hpp"
@@ -16,7 +17,6 @@
 #include "tools/absenc/text/field_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/reading_text.hpp"
-#include "tools/absenc/text/row_text.hpp"
 
 namespace absenc::tool {
 

@@ -3,9 +3,9 @@
 #pragma once
 
 #include "absenc/client/memory.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/client/way/address.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/text/json.hpp"
 
 namespace absenc::tool {
 

@@ -6,6 +6,7 @@
 
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/sample_rows.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/client/way/pace.hpp"
@@ -18,7 +19,6 @@
 #include "tools/absenc/text/encoder_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/reading_text.hpp"
-#include "tools/absenc/text/row_text.hpp"
 
 namespace absenc::tool {
 

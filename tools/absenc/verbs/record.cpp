@@ -4,6 +4,7 @@
 #include <array>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/recording.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/client/way/pace.hpp"
@@ -16,7 +17,6 @@
 #include "tools/absenc/text/encoder_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/progress.hpp"
-#include "tools/absenc/verbs/recording.hpp"
 
 namespace absenc::tool {
 
@@ -42,11 +42,6 @@ class Report {
   Time next_{};
 };
 
-struct Limits {
-  std::uint64_t count;  // 0: none
-  Time end;
-};
-
 // What comes between the readings is told; the file has it too.
 void tell(const Sample& sample, const Encoder& live, Report& report) {
   if (sample.restarted && live.restarts() == 1) {  // the summary says how often
@@ -59,43 +54,21 @@ void tell(const Sample& sample, const Encoder& live, Report& report) {
                                                   : sample.message);
 }
 
-// Returns whether the last reading was good.
-bool record_all(Encoder& live, Recording& recording, Pace& pace, const Limits& limits, Report& report) {
-  Sample sample;
-  const auto tell_missed = [&] {
-    const std::uint64_t missed = pace.take_missed();
-    // While the port is away, that it was lost says so.
-    const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
-    if (was_there) recording.miss(missed);
-  };
-  try {
-    while (os::now() < limits.end && !os::interrupted()) {
-      sample = live.next();
-      recording.take(sample);
-      tell(sample, live, report);
-      report.show(recording, live);
-      if (limits.count != 0 && recording.readings() >= limits.count) break;
-      pace.wait(limits.end);
-      tell_missed();
-    }
-  } catch (const os::Interrupted&) {
-  } catch (const os::Ended&) {
-  }
-  tell_missed();
-  return sample.kind == Sample::Kind::reading;
-}
-
 RecordingSettings settings_of(const Invocation& invocation) {
   RecordingSettings settings;
   settings.path = invocation.text("--output");
   settings.encoder = invocation.text("encoder");
-  settings.rate = readings_a_second(invocation, 100);
+  settings.rate_hz = readings_a_second(invocation, 100);
   settings.every = static_cast<std::uint64_t>(invocation.number("--every", 1, 1, INT64_MAX));
   if (invocation.has("--part-size")) {
-    settings.part_size = static_cast<std::uint64_t>(1e6 * invocation.real("--part-size", 0, 0.001, 1e9));
+    settings.part_bytes = static_cast<std::uint64_t>(1e6 * invocation.real("--part-size", 0, 0.001, 1e9));
   }
   if (invocation.has("--part-time")) {
     settings.part_time = Time(static_cast<std::int64_t>(1e9 * invocation.real("--part-time", 0, 0.01, 1e9)));
+  }
+  settings.count = static_cast<std::uint64_t>(invocation.number("--count", 0, 0, INT64_MAX));
+  if (invocation.has("--for")) {
+    settings.duration = Time(static_cast<std::int64_t>(1e9 * invocation.real("--for", 0, 0.001, 1e9)));
   }
   return settings;
 }
@@ -121,18 +94,11 @@ int run_record(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const RecordingSettings settings = settings_of(invocation);
-  const double seconds = invocation.real("--for", 0, 0.001, 1e9);
-  const auto count = static_cast<std::uint64_t>(invocation.number("--count", 0, 0, INT64_MAX));
-
-  Pace pace(settings.rate);
-  Encoder live(uri, pace.period());
+  Encoder live(uri, Pace(settings.rate_hz).period());
   live.connect();
   print_notes(live.connection());
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
-  Recording recording(settings, uri);
-  pace.start_at(recording.start());
-  const Limits limits{count, seconds > 0 ? recording.start() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never};
-  live.end_when([&limits] { return os::now() >= limits.end; });
+  Recording recording(settings, live);
   Report report;
   bool good = false;
   bool whole = true;
@@ -142,8 +108,10 @@ int run_record(const Invocation& invocation) {
     good = false;
   };
   try {
-    good = record_all(live, recording, pace, limits, report);
-    recording.finish();
+    good = recording.run([&](const Sample& sample) {
+      tell(sample, live, report);
+      report.show(recording, live);
+    });
   } catch (const os::Failure& failure) {
     whole = failure.kind() != os::Failure::Kind::lost;
     end_early(failure.what());

@@ -14,8 +14,8 @@
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/text/encoder_text.hpp"
+#include "tools/absenc/text/field_text.hpp"
 #include "tools/absenc/text/output.hpp"
-#include "tools/absenc/text/row_text.hpp"
 
 namespace absenc::tool {
 

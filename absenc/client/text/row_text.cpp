@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/absenc/text/row_text.hpp"
+#include "absenc/client/text/row_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <iterator>
 
-#include "tools/absenc/text/field_text.hpp"
+#include "absenc/client/text/unit_text.hpp"
 
-namespace absenc::tool {
+namespace absenc::client {
 
 namespace {
 
@@ -36,7 +37,7 @@ struct Cell {
   void operator()(const std::string& text) const { append_quoted(line, text); }
   template <class Other>
   void operator()(const Other& other) const {
-    append_quoted(line, client::to_text(Value(other)));
+    append_quoted(line, to_text(Value(other)));
   }
 };
 
@@ -67,14 +68,25 @@ std::string to_csv(const Row& row) {
   return line;
 }
 
-std::vector<std::vector<std::string>> to_table(const Row& row) {
-  std::vector<std::vector<std::string>> rows;
-  for (std::size_t i = 0; i < row.columns.size(); ++i) {
-    const Column& column = row.columns[i];
-    rows.push_back({std::string(column.name), to_text(column, row.values[i]), std::string(column.meaning)});
-    if (const auto* flags = std::get_if<Flags>(&row.values[i])) add_flags(rows, *flags->field, flags->bits);
-  }
-  return rows;
+Json flags_to_json(const FieldInfo& field, std::uint64_t bits) {
+  Json names = Json::array();
+  for (const std::string_view name : flag_names(field, bits)) names.append(name);
+  return names;
+}
+
+Json to_json(const Value& value) {
+  struct Visitor {
+    Json operator()(std::monostate) const { return {}; }
+    Json operator()(Invalid) const { return {}; }
+    Json operator()(const Flags& flags) const { return flags_to_json(*flags.field, flags.bits); }
+    Json operator()(const ByteVector& bytes) const { return fmt::format("{:02x}", fmt::join(bytes, "")); }
+    Json operator()(const std::string& text) const { return text; }
+    Json operator()(bool value) const { return value; }
+    Json operator()(std::int64_t value) const { return value; }
+    Json operator()(std::uint64_t value) const { return value; }
+    Json operator()(double value) const { return value; }
+  };
+  return std::visit(Visitor{}, value);
 }
 
 Json to_json(const Row& row) {
@@ -85,4 +97,4 @@ Json to_json(const Row& row) {
   return json;
 }
 
-}  // namespace absenc::tool
+}  // namespace absenc::client

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <type_traits>
 
-namespace absenc::tool {
+namespace absenc::client {
 
 class Json {
  public:
@@ -46,4 +46,4 @@ class Json {
   std::unique_ptr<Value> value_;
 };
 
-}  // namespace absenc::tool
+}  // namespace absenc::client

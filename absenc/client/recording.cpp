@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/absenc/verbs/recording.hpp"
+#include "absenc/client/recording.hpp"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -13,12 +13,15 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/pace.hpp"
+#include "absenc/os/line_file.hpp"
 #include "absenc/os/signals.hpp"
-#include "tools/absenc/error.hpp"
-#include "tools/absenc/text/row_text.hpp"
 
-namespace absenc::tool {
+namespace absenc::client {
 
 namespace {
 
@@ -33,12 +36,11 @@ std::string date_and_time() {
 
 }  // namespace
 
-Recording::Recording(const RecordingSettings& settings, const EncoderAddress& uri)
+Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
     : settings_(settings),
-      unit_(uri.unit),
-      options_(uri.options),
+      encoder_(encoder),
       start_(os::now()),
-      rows_(*uri.unit, uri.options, start_, SampleRows::With::motion),
+      rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion),
       started_(date_and_time()) {
   const std::string ending = fs::path(settings.path).extension();
   if (ending != ".csv" && ending != ".jsonl" && ending != ".ndjson") {
@@ -48,12 +50,47 @@ Recording::Recording(const RecordingSettings& settings, const EncoderAddress& ur
                     settings.path));
   }
   format_ = ending == ".csv" ? Format::csv : Format::json_lines;
-  if (settings_.part_size || settings_.part_time) refuse_parts_of_another_recording();
+  if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();
   open_part();
 }
 
+Recording::~Recording() = default;
+
+std::uint64_t Recording::bytes() const { return finished_bytes_ + file_->size(); }
+
+bool Recording::run(const std::function<void(const Sample&)>& heard) {
+  const Time end = settings_.duration ? start_ + *settings_.duration : never;
+  encoder_.end_when([end] { return os::now() >= end; });
+  Pace pace(settings_.rate_hz);
+  pace.start_at(start_);
+  Sample sample;
+  const auto tell_missed = [&] {
+    const std::uint64_t missed = pace.take_missed();
+    // While the port is away, that it was lost says so.
+    const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
+    if (was_there) miss(missed);
+  };
+  try {
+    while (os::now() < end && !os::interrupted()) {
+      sample = encoder_.next();
+      take(sample);
+      if (heard) heard(sample);
+      if (settings_.count != 0 && readings_ >= settings_.count) break;
+      pace.wait(end, [this](Time time) { encoder_.wait_until(time); });
+      tell_missed();
+    }
+  } catch (const os::Interrupted&) {
+  } catch (const Cancelled&) {
+  }
+  encoder_.end_when({});
+  tell_missed();
+  write_gap();
+  file_->sync();
+  return sample.kind == Sample::Kind::reading;
+}
+
 std::string Recording::part_path(unsigned part) const {
-  if (!settings_.part_size && !settings_.part_time) return settings_.path;
+  if (!settings_.part_bytes && !settings_.part_time) return settings_.path;
   const fs::path path(settings_.path);
   const std::string name = fmt::format("{}-{:04}{}", path.stem().string(), part, path.extension().string());
   return path.parent_path() / name;
@@ -83,20 +120,22 @@ void Recording::open_part() {
   }
   ++part_;
   part_start_ = os::now();
-  file_.emplace(part_path(part_));
+  file_ = std::make_unique<os::LineFile>(part_path(part_));
   file_->append(header());
 }
 
 std::string Recording::header() const {
-  const std::vector<std::string> options = option_texts(*unit_, options_);
+  const std::vector<std::string> options = option_texts(encoder_.unit(), encoder_.options());
   std::vector<Column> explained;
   std::copy_if(rows_.columns().begin(), rows_.columns().end(), std::back_inserter(explained),
                [](const Column& column) { return !column.look.is_detail && !column.meaning.empty(); });
-  const std::string_view model = options_.model != nullptr ? options_.model->name : "none";
+  const Model* known = encoder_.options().model;
+  const std::string_view model = known != nullptr ? known->name : "none";
   if (format_ == Format::json_lines) {
-    Json json = Json::object().set("absenc_record", 1).set("encoder", settings_.encoder).set("protocol", unit_->id);
+    Json json =
+        Json::object().set("absenc_record", 1).set("encoder", settings_.encoder).set("protocol", encoder_.unit().id);
     json.set("model", model).set("options", fmt::format("{}", fmt::join(options, " ")));
-    json.set("started", started_).set("rate_hz", settings_.rate).set("every", settings_.every).set("part", part_);
+    json.set("started", started_).set("rate_hz", settings_.rate_hz).set("every", settings_.every).set("part", part_);
     Json units = Json::object();
     for (const Column& column : explained) units.set(column.name, column.meaning);
     return json.set("units", units).line() + '\n';
@@ -104,7 +143,8 @@ std::string Recording::header() const {
   std::string text = fmt::format(
       "# absenc record 1\n# encoder: {}\n# protocol: {}\n# model: {}\n# options: {}\n# started: {}\n# rate_hz: {}\n"
       "# every: {}\n# part: {}\n",
-      settings_.encoder, unit_->id, model, fmt::join(options, " "), started_, settings_.rate, settings_.every, part_);
+      settings_.encoder, encoder_.unit().id, model, fmt::join(options, " "), started_, settings_.rate_hz,
+      settings_.every, part_);
   for (const Column& column : explained) text += fmt::format("# {}: {}\n", column.name, column.meaning);
   return text + csv_header(rows_.columns()) + '\n';
 }
@@ -135,14 +175,9 @@ void Recording::write_gap() {
   missed_ += std::exchange(gap_, 0);
 }
 
-void Recording::finish() {
-  write_gap();
-  file_->sync();
-}
-
 void Recording::take(const Sample& sample) {
   if (!wanted(sample)) return file_->require_there();
-  const bool full = settings_.part_size && file_->size() >= *settings_.part_size;
+  const bool full = settings_.part_bytes && file_->size() >= *settings_.part_bytes;
   const bool over = settings_.part_time && os::now() - part_start_ >= *settings_.part_time;
   if (full || over) open_part();
   write_gap();
@@ -155,4 +190,4 @@ std::string Recording::names() const {
   return part_ == 1 ? part_path(1) : fmt::format("{} to {}", part_path(1), part_path(part_));
 }
 
-}  // namespace absenc::tool
+}  // namespace absenc::client

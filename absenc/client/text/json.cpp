@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/absenc/text/json.hpp"
+#include "absenc/client/text/json.hpp"
 
 #include <nlohmann/json.hpp>
 #include <utility>
 
-namespace absenc::tool {
+namespace absenc::client {
 
 struct Json::Value {
   nlohmann::ordered_json json;
@@ -52,4 +52,4 @@ std::string Json::line() const {
   return value_->json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-}  // namespace absenc::tool
+}  // namespace absenc::client

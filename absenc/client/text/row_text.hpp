@@ -8,11 +8,9 @@
 #include <vector>
 
 #include "absenc/client/row.hpp"
-#include "tools/absenc/text/json.hpp"
+#include "absenc/client/text/json.hpp"
 
-namespace absenc::tool {
-
-using namespace client;
+namespace absenc::client {
 
 /// The names of the columns, without details.
 [[nodiscard]] std::string csv_header(std::span<const Column> columns);
@@ -20,10 +18,10 @@ using namespace client;
 void append_csv(std::string& text, const Row& row);
 [[nodiscard]] std::string to_csv(const Row& row);
 
-/// For `table`: name, value, unit or meaning; a row for each flag that is set.
-[[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
-
+/// ["over_heat","battery_alarm"]
+[[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
+[[nodiscard]] Json to_json(const Value& value);
 /// What is not told is left out; what does not hold is null.
 [[nodiscard]] Json to_json(const Row& row);
 
-}  // namespace absenc::tool
+}  // namespace absenc::client
