@@ -123,6 +123,15 @@ if(ABSENC_COMMAND)
   endforeach()
 endif()
 
+# What the tests in the virtual machine run beside the command.
+if(TARGET absenc-client)
+  add_executable(vm_can_emulation tests/vm/can_emulation.cpp)
+  absenc_settings(vm_can_emulation)
+  set_target_properties(vm_can_emulation PROPERTIES OUTPUT_NAME can_emulation
+                        RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/vm")
+  target_link_libraries(vm_can_emulation PRIVATE absenc::client)
+endif()
+
 # Examples end by themselves and tell by their exit status whether they worked.
 file(GLOB examples CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/examples/*.cpp")
 if(NOT TARGET absenc-client)

@@ -64,6 +64,25 @@ class CrcFind(Case):
         best = self.best("--bits", frames)
         self.assertEqual((best["width"], best["poly"], best["xorout"], best["covered_from"]), (6, "0x03", "0x3F", [0]))
 
+    def test_says_by_which_options_a_word_is_read(self):
+        words = [self.random.randbytes(3 + i % 2) for i in range(8)]
+        for name, check, options in (
+            ("as it is", (6, 3, 0, 0x3F), []),
+            ("with --option crc_width=16 --option crc_poly=37081 --option crc_init=21 --option crc_inverted=false",
+             (16, 0x90D9, 21, 0), ["crc_width=16", "crc_poly=37081", "crc_init=21", "crc_inverted=false"]),
+            (None, (8, 0x97, 0, 0x55), None),  # no option turns some bits of it round
+        ):
+            with self.subTest(name):
+                frames = ["".join(f"{byte:08b}" for byte in word) + f"{crc(word, *check):0{check[0]}b}" for word in words]
+                found = self.best("--bits", frames)
+                self.assertEqual(found.get("options", {}).get("biss"), options, found)
+                shown = self.find("--bits", frames).stdout
+                if name is None:
+                    self.assertNotIn("biss", shown)
+                else:
+                    self.assertIn(f"biss has the first of these {name}", shown)
+        self.assertNotIn("options", self.best("--hex", self.encolink_frames(4)))
+
     def test_bytes_that_never_change_prove_nothing(self):
         frames = [bytes((0x40, 0x42, 0, 0)) + (0xA5A5 + 311 * i).to_bytes(2, "big") for i in range(8)]
         frames = [frame + bytes([functools.reduce(operator.xor, frame)]) for frame in frames]

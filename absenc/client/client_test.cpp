@@ -24,6 +24,7 @@ namespace absenc::client {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Kind = Sample::Kind;
 
 /// A path of this test alone.
@@ -282,6 +283,15 @@ TEST(ClientEmulation, EveryUnitOfALineIsServedAndRead) {
     EXPECT_EQ(reading.singleturn, 0u) << text;
     EXPECT_GT(emulation.answer_count(), 0u) << text;
   }
+}
+
+TEST(ClientEmulation, AnInterfaceThatIsNotThereSaysSo) {
+  EXPECT_THAT(thrown_by<os::Failure>([] { static_cast<void>(emulate("raa38-can", {.can = "nocan7"})); }),
+              Not(HasSubstr("nothing was thrown")));
+  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(emulate("tformat", {.can = "can0"})); }),
+              HasSubstr("does not go over a CAN"));
+  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(emulate("raa38-can", {.tcp = 0, .can = "can0"})); }),
+              HasSubstr("can0"));
 }
 
 TEST(ClientEmulation, WhatIsDoneToItIsSoAtOnce) {

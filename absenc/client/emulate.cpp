@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "absenc/client/emulation/attended.hpp"
+#include "absenc/client/emulation/serve.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
@@ -19,10 +20,13 @@
 #include "absenc/os/emulator_port.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/slcan_port.hpp"
+#include "absenc/os/socketcan.hpp"
 
 namespace absenc::client {
 
 namespace {
+
+constexpr Time between_tries_to_look = std::chrono::milliseconds(20);  // while the interface is away
 
 EncoderAddress virtual_address(std::string_view text) {
   EncoderAddress address = parse_address("sim:" + std::string(text));
@@ -30,6 +34,15 @@ EncoderAddress virtual_address(std::string_view text) {
   if (link != LinkKind::spi && link != LinkKind::clocked) return address;
   throw UsageError(fmt::format("{} ({}) does not go over a pseudo-terminal: open it as sim:{}", address.unit->id,
                                line_of(*address.unit), address.unit->id));
+}
+
+void require_can_alone(const Unit& unit, const EmulateChoices& choices) {
+  if (unit.link != LinkKind::can) {
+    throw UsageError(fmt::format("{} ({}) does not go over a CAN bus", unit.id, line_of(unit)));
+  }
+  if (!choices.link.empty() || choices.tcp) {
+    throw UsageError(fmt::format("the interface {} is a line of its own: not with a link or TCP", choices.can));
+  }
 }
 
 DeviceSettings with_faults_to_come(DeviceSettings settings) {
@@ -43,8 +56,14 @@ struct Emulation::Service {
   Service(std::string_view text, const EmulateChoices& choices)
       : address(virtual_address(text)),
         device(*address.unit, address.options, with_faults_to_come(address.device)),
-        port(std::make_shared<os::EmulatorPort>(choices.link, choices.tcp)) {
-    port->set_send_slack(send_slack);
+        interface(choices.can) {
+    if (interface.empty()) {
+      port = std::make_shared<os::EmulatorPort>(choices.link, choices.tcp);
+      port->set_send_slack(send_slack);
+    } else {
+      require_can_alone(*address.unit, choices);
+      can = open_can();
+    }
     device.power_on(os::now());
     thread = std::jthread([this] { serve(); });
   }
@@ -56,7 +75,9 @@ struct Emulation::Service {
 
   void serve() {
     try {
-      if (device.frames() != nullptr) {
+      if (!interface.empty()) {
+        serve_on_can();
+      } else if (device.frames() != nullptr) {
         os::SlcanAdapter adapter(port, address.line);
         serve_on(*device.frames(), adapter);
       } else {
@@ -75,6 +96,22 @@ struct Emulation::Service {
   void serve_on(Machine<Item>& machine, Port<Item>& on) {
     Attended<Item> attended(machine, [this](Time now) { return look(now); });
     host::drive(attended, on, [] { return true; });
+  }
+
+  [[nodiscard]] std::unique_ptr<os::SocketCan> open_can() const {
+    return std::make_unique<os::SocketCan>(interface, address.line);
+  }
+
+  [[noreturn]] void serve_on_can() {
+    Attended<CanFrame> attended(*device.frames(), [this](Time now) { return look(now); });
+    const auto open = [this] { return can != nullptr ? std::move(can) : open_can(); };
+    const auto wait = [this](Time time) {
+      for (Time now = os::now(); now < time; now = os::now()) {
+        look(now);
+        os::sleep_until(std::min(time, now + between_tries_to_look));
+      }
+    };
+    client::serve(attended, open, wait, [](Served, std::string_view) {});
   }
 
   // Between two steps of the encoder.
@@ -110,7 +147,9 @@ struct Emulation::Service {
 
   EncoderAddress address;
   VirtualDevice device;
+  std::string interface;  // or else
   std::shared_ptr<os::EmulatorPort> port;
+  std::unique_ptr<os::SocketCan> can;  // not served yet
 
   std::mutex wishes;  // one at a time
   std::mutex mutex;   // guards what follows
@@ -128,12 +167,15 @@ Emulation::Emulation(Emulation&&) noexcept = default;
 Emulation& Emulation::operator=(Emulation&&) noexcept = default;
 Emulation::~Emulation() = default;
 
-const std::string& Emulation::path() const { return service_->port->path(); }
-std::uint16_t Emulation::tcp_port() const { return service_->port->tcp_port(); }
+const std::string& Emulation::path() const {
+  return service_->port != nullptr ? service_->port->path() : service_->interface;
+}
+std::uint16_t Emulation::tcp_port() const { return service_->port != nullptr ? service_->port->tcp_port() : 0; }
 const Unit& Emulation::unit() const { return *service_->address.unit; }
 
 std::string Emulation::address() const {
-  return fmt::format("{}:{}{}", unit().id, unit().link == LinkKind::can ? "slcan:" : "", path());
+  return fmt::format("{}:{}{}", unit().id, unit().link == LinkKind::can && service_->interface.empty() ? "slcan:" : "",
+                     path());
 }
 
 void Emulation::power_off() {

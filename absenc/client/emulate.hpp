@@ -17,6 +17,7 @@ namespace absenc::client {
 struct EmulateChoices {
   std::string link{};                  // a path that leads to the pseudo-terminal; "": only that itself
   std::optional<std::uint16_t> tcp{};  // listens there on 127.0.0.1 as well; 0: on a free port
+  std::string can{};                   // CAN: instead of an adapter this interface, "can0"
 };
 
 /// Serves in a thread of its own until it is destroyed. What is done to it is so when the call returns; any thread may.
@@ -28,7 +29,8 @@ class Emulation {
   Emulation& operator=(Emulation&&) noexcept;
   ~Emulation();
 
-  /// The pseudo-terminal, or the link to it: of an encoder on a CAN bus that of an slcan adapter.
+  /// The pseudo-terminal, or the link to it: of an encoder on a CAN bus that of an slcan adapter, or the name
+  /// of its interface.
   [[nodiscard]] const std::string& path() const;
   /// 0 without.
   [[nodiscard]] std::uint16_t tcp_port() const;

@@ -4,10 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "absenc/capture/search/crc_search.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/core/bit_view.hpp"
+#include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
 
@@ -113,6 +118,33 @@ CheckFindings find_crc(std::span<const CheckedFrame> frames) {
   if (findings.checks.empty() && !findings.is_open) findings.odd = odd_one_out(all);
   findings.advice = advice(findings);
   return findings;
+}
+
+std::vector<CheckOptions> options_for(const FoundCheck& check, LinkKind link) {
+  const CrcParameters& crc = check.parameters;
+  const auto all_ones = static_cast<std::uint32_t>(low_mask(crc.width));
+  const bool is_plain = check.name == "crc" && !crc.refin && !crc.refout && check.trailing == 0 && !check.padded;
+  if (!is_plain || (crc.xorout != 0 && crc.xorout != all_ones)) return {};
+  const std::array<std::pair<Role, std::int64_t>, 4> wanted{{{Role::check_width, crc.width},
+                                                             {Role::check_polynomial, crc.poly},
+                                                             {Role::check_init, crc.init},
+                                                             {Role::check_inverted, crc.xorout != 0}}};
+  std::vector<CheckOptions> all;
+  for (const Unit* unit : all_units()) {
+    CheckOptions one{unit, {}};
+    const auto takes = [&](const auto& part) {
+      const Option* option = find_role(unit->options, part.first);
+      if (option == nullptr) return false;
+      const bool is_number = option->choices.empty();
+      if (is_number && (part.second < option->minimum || part.second > option->maximum)) return false;
+      if (part.second != option->default_value) {
+        one.options.push_back(fmt::format("{}={}", option->name, to_text(*option, part.second)));
+      }
+      return true;
+    };
+    if (unit->link == link && std::all_of(wanted.begin(), wanted.end(), takes)) all.push_back(one);
+  }
+  return all;
 }
 
 }  // namespace absenc::client

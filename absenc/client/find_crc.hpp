@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absenc/core/crc.hpp"
+#include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
 
@@ -45,5 +46,14 @@ struct CheckFindings {
 /// All checks of 3 to 16 bits that explain every frame. Throws UsageError when there are fewer than two frames, bytes
 /// and bits among them, or one is too short or too long (64 bytes, 128 bits).
 [[nodiscard]] CheckFindings find_crc(std::span<const CheckedFrame> frames);
+
+/// How a unit is told of a check.
+struct CheckOptions {
+  const Unit* unit;
+  std::vector<std::string> options;  // "crc_width=16"; none where it has this check anyhow
+};
+
+/// The units whose words can have such a check at their end. `link`: of the frames.
+[[nodiscard]] std::vector<CheckOptions> options_for(const FoundCheck& check, LinkKind link);
 
 }  // namespace absenc::client

@@ -21,6 +21,11 @@ enum class Role : std::uint8_t {
   clash,        // field of a scan: not 0: whatever answers there is damaged every time
   rate,         // option: bits a second
   maximum_rpm,  // option: how fast the shaft turns at most; 0: not known
+  // Of a check at the end of a word, as `crc find` finds one: options
+  check_width,       // bits
+  check_polynomial,  // without its highest power
+  check_init,        // start value
+  check_inverted,    // whether it is sent inverted
   // Of a memory, of registers, and of settings
   address,  // argument: of the byte or register
   page,     // argument, where there are pages

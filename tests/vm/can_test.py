@@ -217,6 +217,23 @@ class Verbs(OnABus):
                            "sudo ip link set can7 up type can bitrate 500000", "then bitrate=500000")
 
 
+class Library(OnABus):
+    def test_a_virtual_encoder_of_a_program(self):
+        self.add("can8")
+        process = subprocess.Popen(["can_emulation", "can8"], bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE)
+        self.addCleanup(end, process)
+        self.assertEqual(self.line(process), "raa38-can:can8 9799")
+        run("ip", "link", "del", "can8")
+        process.stdin.write(b"\n")
+        self.assertEqual(self.line(process), "switched")  # also without its interface
+        self.add("can8")
+        wait_until(lambda: receivers("can8") > 0, "the encoder to come back")
+        self.assertEqual(self.singleturn("raa38-can:can8?latency=2000"), 9799)
+        process.stdin.close()
+        self.assertEqual(process.wait(PATIENCE), 0)
+
+
 class BesideCanUtils(OnABus):
     def test_candump_shows_both_directions(self):
         self.emulator("--singleturn", "9799")

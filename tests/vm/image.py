@@ -210,6 +210,7 @@ def build(absenc, patterns, folder):
         image.put(path, "/modules/" + os.path.basename(path))
     image.put(program("busybox"), "/bin/busybox")
     image.put_with_libraries(absenc, "/bin/absenc")
+    image.put_with_libraries(os.path.join(os.path.dirname(absenc), "../vm/can_emulation"), "/bin/can_emulation")
     for name in PROGRAMS:
         image.put_with_libraries(program(name), f"/bin/{name}")
     scripts = glob.glob(os.path.join(TESTS, "vm/*_test.py")) + [os.path.join(TESTS, "vm/guest.py")]

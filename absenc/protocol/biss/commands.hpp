@@ -20,6 +20,7 @@ inline constexpr std::array<Argument, 4> write_arguments{
      {"value", "the byte", 0, 255, 0, true, Role::value},
      bank_argument,
      {"force", "1: also what only the maker knows", 0, 1, 0, false, Role::force}}};
+inline constexpr std::array<Argument, 1> select_arguments{{{"bank", "that addresses 0 to 63 mean", 0, 255}}};
 inline constexpr std::array<Argument, 2> command_arguments{
     {{"slaves", "bit n is slave n; 0: all, who do not answer", 0, 255}, {"command", "its number", 0, 3}}};
 
@@ -46,6 +47,12 @@ template <class Definition, class F>
       author::command<Definition, P, Found, write_memory<F>, request>({"memory-write", Verb::memory_write, 0,
                                                                        "write a register; the bank stays selected",
                                                                        write_arguments, true, false})
+          .only_if(is_readable),
+      author::command<Definition, P, Found, read_bank<F>, request>(
+          {"bank", Verb::config_get, 0, "which bank addresses 0 to 63 mean"})
+          .only_if(is_readable),
+      author::command<Definition, P, Found, write_bank<F>, request>(
+          {"set-bank", Verb::config_set, 0, "select a bank", select_arguments, true, false, "bank"})
           .only_if(is_readable),
       author::command<Definition, P, Found, send_command<F>, request>(
           {"control-command", Verb::run, 0, "a command of control communication", command_arguments, true, false})

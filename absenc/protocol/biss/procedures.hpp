@@ -176,6 +176,29 @@ Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments argumen
   co_return done;
 }
 
+template <class F>
+Procedure read_bank(ControlDialog<F>& dialog, Found& found) {
+  ControlMaster master;
+  ByteBuffer<control_most> selected;
+  const Error error = co_await read_registers(dialog, master, selected, registers::bank_select, 1);
+  if (error != Error::none) co_return failure_of(error);
+  found.slave_id = dialog.format().slave;
+  found.bank = selected[0];
+  co_return done;
+}
+
+template <class F>
+Procedure write_bank(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+  ControlMaster master;
+  const auto bank = static_cast<std::uint8_t>(arguments[0]);
+  const Error error = co_await write_register(dialog, master, registers::bank_select, bank);
+  if (error == Error::cross_check_failed) co_return only(error, "another bank is selected still");
+  if (error != Error::none) co_return failure_of(error);
+  found.slave_id = dialog.format().slave;
+  found.bank = bank;
+  co_return done;
+}
+
 // What of these an encoder refuses it does not have.
 template <class F>
 Procedure read_info(ControlDialog<F>& dialog, Found& found) {

@@ -40,11 +40,12 @@ struct Definition {
       OptionOf<&Settings::multiturn_first>{multiturn_first_option},
       OptionOf<&Settings::position_bits>{position_bits_option},
       OptionOf<&Settings::unit_pm>{unit_um_option},
-      probeable(option<&Settings::crc_width>("crc_width", "bits of the CRC; 0: there is none", 0, 16)),
-      probeable(
-          option<&Settings::crc_poly>("crc_poly", "its polynomial without the highest power: 0x3 is 0x43", 0, 0xFFFF)),
-      option<&Settings::crc_init>("crc_init", "its start value", 0, 0xFFFF),
-      option<&Settings::crc_inverted>("crc_inverted", "whether it is sent inverted"),
+      with_role<Role::check_width>(
+          probeable(option<&Settings::crc_width>("crc_width", "bits of the CRC; 0: there is none", 0, 16))),
+      with_role<Role::check_polynomial>(probeable(
+          option<&Settings::crc_poly>("crc_poly", "its polynomial without the highest power: 0x3 is 0x43", 0, 0xFFFF))),
+      with_role<Role::check_init>(option<&Settings::crc_init>("crc_init", "its start value", 0, 0xFFFF)),
+      with_role<Role::check_inverted>(option<&Settings::crc_inverted>("crc_inverted", "whether it is sent inverted")),
       option<&Settings::life_counter>("life_counter", "6 bits between status bits and CRC that count frames"),
       option<&Settings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
       decimal<3>(option<&Settings::latency>(

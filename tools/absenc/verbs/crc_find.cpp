@@ -93,7 +93,16 @@ void show_checks(const CheckFindings& findings, std::size_t most, std::string_vi
   if (left != 0) print_note(fmt::format("{} more, each likelier to be chance: --all shows them", left));
 }
 
-Json check_json(const FoundCheck& check, std::string_view unit) {
+// How what decodes words is told of the best of them.
+void show_options(const FoundCheck& check, LinkKind link) {
+  for (const CheckOptions& one : options_for(check, link)) {
+    const std::string options =
+        one.options.empty() ? "as it is" : fmt::format("with --option {}", fmt::join(one.options, " --option "));
+    print_line(fmt::format("{} has the first of these {}", one.unit->id, options));
+  }
+}
+
+Json check_json(const FoundCheck& check, LinkKind link, std::string_view unit) {
   const CrcParameters& crc = check.parameters;
   Json json = Json::object().set("check", check.name).set("width", crc.width);
   if (check.name == crc_name) {
@@ -109,6 +118,13 @@ Json check_json(const FoundCheck& check, std::string_view unit) {
   for (const std::size_t one : check.first) first.append(one);
   json.set("unit", unit).set("covered_from", first).set("check_size", check.check_size);
   json.set("behind_check", check.trailing).set("chance", check.chance);
+  Json options = Json::object();
+  for (const CheckOptions& one : options_for(check, link)) {
+    Json texts = Json::array();
+    for (const std::string& text : one.options) texts.append(text);
+    options.set(one.unit->id, texts);
+  }
+  if (!options.empty()) json.set("options", options);
   return json.set("frames_to_settle", check.frames_to_settle);
 }
 
@@ -116,13 +132,15 @@ int run_crc_find(const Invocation& invocation) {
   const std::vector<CheckedFrame> frames = frames_of(invocation);
   const CheckFindings findings = find_crc(frames);
   const bool found = !findings.checks.empty();
-  const std::string_view unit = frames.front().bits != 0 ? "bits" : "bytes";
+  const LinkKind link = frames.front().bits != 0 ? LinkKind::clocked : LinkKind::half_duplex;
+  const std::string_view unit = link == LinkKind::clocked ? "bits" : "bytes";
   if (invocation.has("--json")) {
     Json list = Json::array();
-    for (const FoundCheck& check : findings.checks) list.append(check_json(check, unit));
+    for (const FoundCheck& check : findings.checks) list.append(check_json(check, link, unit));
     print_line(Json::object().set("ok", found).set("frames", frames.size()).set("solutions", list).line());
   } else if (found) {
     show_checks(findings, invocation.has("--all") ? SIZE_MAX : most_shown, unit);
+    show_options(findings.checks.front(), link);
   }
   if (!found && !findings.is_open) {
     print_message(findings.advice);
@@ -154,7 +172,8 @@ const Subcommand crc_find_subcommand{
     "find the CRC or sum of an unknown encoder from a few of its frames",
     "Give whole frames with different data. For each solution: polynomial in normal and in Koopman's notation,\n"
     "what is covered (first byte or bit from 0 on), where the check stands, and how often chance would explain\n"
-    "the frames as well. Exit status 1 when nothing explains them.",
+    "the frames as well; and the options by which a protocol here has the first of them. Exit status 1 when\n"
+    "nothing explains them.",
     crc_find_parameters,
     crc_find_examples,
     run_crc_find};

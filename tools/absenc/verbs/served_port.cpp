@@ -8,8 +8,8 @@
 #include <string>
 
 #include "absenc/client/emulation/attended.hpp"
+#include "absenc/client/emulation/serve.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/host/drive.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/serial.hpp"
@@ -22,98 +22,35 @@ namespace absenc::tool {
 
 namespace {
 
-using namespace std::chrono_literals;
-
-constexpr Time time_between_tries = 250ms;
-
-/// Goes from one port to the next: the last one may have gone away between a transfer and its `sent`.
-template <class Item>
-class Movable final : public Machine<Item> {
- public:
-  explicit Movable(Machine<Item>& inner) : inner_(&inner) {}
-
-  void feed(const Event<Item>& event) override {
-    if (event.kind == Event<Item>::Kind::sent) sending_ = false;
-    inner_->feed(event);
+void tell(const std::string& name, Served what, std::string_view why) {
+  switch (what) {
+    case Served::opened:
+      return print_line(fmt::format("ready: {}", name));
+    case Served::away:
+      return print_message(fmt::format("{}\n  Waiting for it to come back.", why));
+    case Served::back:
+      return print_message(fmt::format("the port {} is back", name));
   }
+}
 
-  Step<Item> next(Time now) override {
-    const Step<Item> step = inner_->next(now);
-    if (step.kind == Step<Item>::Kind::transfer) sending_ = true;
-    if (step.kind == Step<Item>::Kind::configure) rate_ = step.settings.rate;
-    return step;
-  }
-
-  void left(Time now) {
-    if (sending_) feed({.kind = Event<Item>::Kind::sent, .at = now});
-  }
-
-  /// What it has set the last port to; 0: nothing.
-  [[nodiscard]] std::uint32_t rate() const { return rate_; }
-
- private:
-  Machine<Item>* inner_;
-  bool sending_ = false;
-  std::uint32_t rate_ = 0;
-};
-
-/// `Open` makes the port.
+// Until a signal or the end.
 template <class Item, class Open>
-class Server {
- public:
-  Server(Machine<Item>& machine, const std::string& name, Time end, const Open& open)
-      : machine_(machine), name_(name), end_(end), open_(open) {}
-
-  // Until a signal or the end of the time.
-  void run() {
-    try {
-      go_on();
-    } catch (const os::Interrupted&) {
-    } catch (const os::Ended&) {
-    }
+void serve_as(Machine<Item>& machine, const std::string& name, Time end, const Open& open) {
+  const auto with_end = [&] {
+    auto port = open();
+    port->set_end(end);
+    return port;
+  };
+  const auto wait = [end](Time time) {
+    if (os::now() >= end) throw os::Ended{};
+    os::sleep_until(std::min(time, end));
+  };
+  try {
+    serve(machine, with_end, wait, [&](Served what, std::string_view why) { tell(name, what, why); });
+  } catch (const os::Interrupted&) {
+  } catch (const os::Ended&) {
   }
-
- private:
-  enum class State : std::uint8_t { new_here, open, away };
-
-  [[noreturn]] void go_on() {
-    for (;;) {
-      try {
-        serve();
-      } catch (const os::Failure& failure) {
-        // What the port cannot do, it cannot do later either.
-        const bool unable = state_ == State::open && failure.kind() == os::Failure::Kind::unsupported;
-        if (state_ == State::new_here || unable) throw;
-        if (state_ == State::open) print_message(fmt::format("{}\n  Waiting for it to come back.", failure.what()));
-        state_ = State::away;
-      }
-      if (os::now() >= end_) throw os::Ended{};
-      os::sleep_until(std::min(os::now() + time_between_tries, end_));
-    }
-  }
-
-  void serve() {
-    const auto port = open_();
-    port->set_end(end_);
-    if (state_ == State::away) {
-      machine_.left(port->now());
-      if (machine_.rate() != 0) {
-        port->begin({.kind = Step<Item>::Kind::configure, .settings = {.rate = machine_.rate()}});
-      }
-      print_message(fmt::format("the port {} is back", name_));
-    } else {
-      print_line(fmt::format("ready: {}", name_));
-    }
-    state_ = State::open;
-    host::drive(machine_, *port, [] { return true; });
-  }
-
-  Movable<Item> machine_;
-  std::string name_;
-  Time end_;
-  Open open_;
-  State state_ = State::new_here;
-};
+}
 
 }  // namespace
 
@@ -139,16 +76,16 @@ void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time e
   // Only a host can find out by itself whether it hears itself: it speaks first.
   host::EchoFilter line(uri.echo == host::EchoMode::on ? host::EchoMode::on : host::EchoMode::off);
   line.attach(device);
-  Server(static_cast<Machine<std::uint8_t>&>(line), uri.path, end, [&] {
+  serve_as(static_cast<Machine<std::uint8_t>&>(line), uri.path, end, [&] {
     auto port = std::make_unique<os::SerialPort>(uri.path, uri.line, uri.rs485);
     if (uri.latency) port->set_latency(*uri.latency);
     port->set_send_slack(send_slack);
     return port;
-  }).run();
+  });
 }
 
 void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end) {
-  Server(device, interface, end, [&] { return std::make_unique<os::SocketCan>(interface, line); }).run();
+  serve_as(device, interface, end, [&] { return std::make_unique<os::SocketCan>(interface, line); });
 }
 
 }  // namespace absenc::tool
