@@ -127,5 +127,33 @@ class Registers(Case):
         self.assertEqual((control[-1]["operation"], control[-1]["address"], control[-1]["data"]), ("read", 3, "5a"))
 
 
+class Registers(Case):
+    def test_a_dump_is_loaded_and_verified(self):
+        with tempfile.TemporaryDirectory(prefix="absenc-test-") as folder:
+            dump = os.path.join(folder, "bank.dump")
+            self.assert_good(absenc("memory", "dump", "sim:biss", "--output", dump))
+            self.assert_good(absenc("memory", "load", "sim:biss", dump, "--yes"))
+            self.assert_good(absenc("memory", "verify", "sim:biss", dump))
+            with open(dump, encoding="ascii") as file:
+                lines = file.read().splitlines()
+            edited = [line.replace(": 00", ": 5a") if line.startswith("page 0 address 0x00") else line for line in lines]
+            with open(dump, "w", encoding="ascii") as file:
+                file.write("\n".join([*edited[:-1], "checksum: edited", ""]))
+            verified = absenc("memory", "verify", "sim:biss", dump)
+            self.assertEqual(verified.returncode, 1)
+            self.assertIn("1 of 64 bytes differ", verified.stdout)
+            loaded = absenc("memory", "load", "sim:biss", dump, "--yes")
+            self.assert_good(loaded)
+            self.assertIn("1 byte written and read back", loaded.stdout)
+
+    def test_the_bank_is_a_setting(self):
+        answer = json.loads(absenc("config", "set", "sim:biss", "bank", "2", "--yes", "--json").stdout)
+        self.assertEqual((answer["old"]["bank"], answer["new"]["bank"]), (0, 2))
+
+    def test_a_command_is_acknowledged(self):
+        answer = json.loads(absenc("run", "sim:biss", "control-command", "1", "0", "--yes", "--json").stdout)
+        self.assertEqual((answer["fields"]["acknowledged"], answer["fields"]["executed"]), ("0", True), answer)
+
+
 if __name__ == "__main__":
     unittest.main()

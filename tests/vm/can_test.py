@@ -231,6 +231,7 @@ class Library(OnABus):
         wait_until(lambda: receivers("can8") > 0, "the encoder to come back")
         self.assertEqual(self.singleturn("raa38-can:can8?latency=2000"), 9799)
         process.stdin.close()
+        process.stdin = None
         self.assertEqual(process.wait(PATIENCE), 0)
 
 

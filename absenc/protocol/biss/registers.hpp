@@ -23,7 +23,8 @@ inline constexpr unsigned end = 0x80;
 
 inline constexpr unsigned known_banks = 4;  // that are listed; an encoder may have up to 256, or none
 
-/// Pages are banks; what is behind the banks is on page 0.
+/// Pages are banks; what is behind the banks is on page 0. A copy of the memory is the bank that the user may write:
+/// the rest says which encoder it is, and is not for another.
 inline constexpr std::array<MemoryArea, known_banks + 4> areas = [] {
   const auto bank = [](unsigned page) {
     return MemoryArea{.page = page,
@@ -40,17 +41,20 @@ inline constexpr std::array<MemoryArea, known_banks + 4> areas = [] {
        .first = eds_bank,
        .count = device - eds_bank,
        .meaning = "EDS bank, profile, serial number",
-       .writable = false},
+       .writable = false,
+       .in_dump = false},
       {.page = 0,
        .first = device,
        .count = device_id - device,
        .meaning = "the maker's own",
+       .in_dump = false,
        .protection = "only its maker says what is written there"},
       {.page = 0,
        .first = device_id,
        .count = end - device_id,
        .meaning = "device id, manufacturer",
-       .writable = false},
+       .writable = false,
+       .in_dump = false},
       bank(1),
       bank(2),
       bank(3),
