@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The command line. The only file that includes CLI11: it is slow to compile.
+// The command line: verbs, and what stands behind them, from their tables.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -27,76 +26,88 @@ namespace absenc::tool {
 
 namespace {
 
-/// The options and arguments of one subcommand in CLI11. What is missing or too much is found here and not there,
-/// so that a wrong name is reported before what is missing because of it.
+bool asks_for_help(std::string_view word) { return word == "--help" || word == "-h"; }
+
+/// What is written behind a verb. A wrong name is reported before what is missing because of it.
 class Parser {
  public:
   explicit Parser(const Subcommand& subcommand) : subcommand_(&subcommand) {
-    app_.allow_extras();
-    for (const Parameter& parameter : subcommand.parameters) add(parameter);
+    for (const Parameter& parameter : subcommand.parameters) {
+      if (!parameter.is_option()) arguments_.push_back(&parameter);
+    }
   }
 
-  /// `arguments[0]` is the last word of the verb. Nothing when help was asked for. Throws UsageError.
-  [[nodiscard]] std::optional<Invocation> parse(std::span<char*> arguments) {
-    try {
-      app_.parse(static_cast<int>(arguments.size()), arguments.data());
-    } catch (const CLI::CallForHelp&) {
-      return std::nullopt;
-    } catch (const CLI::ArgumentMismatch& error) {
-      const std::string text = error.what();  // "--hex: 1 required  missing"
-      throw UsageError(text.substr(0, text.find(':')) + " needs a value");
-    } catch (const CLI::ParseError& error) {
-      throw UsageError(error.what());
+  /// Nothing when help was asked for. Throws UsageError.
+  [[nodiscard]] std::optional<Invocation> parse(std::span<char* const> words) {
+    while (!words.empty()) {
+      const std::string_view word = words.front();
+      words = words.subspan(1);
+      if (asks_for_help(word)) return std::nullopt;
+      if (word == "--") break;
+      if (is_name(word)) {
+        take_option(word, words);
+      } else {
+        take_argument(word);
+      }
     }
-    refuse_extras();
-    Invocation invocation;
-    for (const auto& [parameter, option] : options_) take(*parameter, *option, invocation);
-    return invocation;
+    for (const std::string_view word : words) take_argument(word);  // behind "--" nothing is an option
+    refuse_numbers();
+    return std::move(invocation_);
   }
 
  private:
-  void add(const Parameter& parameter) {
-    const std::string name(parameter.name);
-    CLI::Option* option = nullptr;
-    if (parameter.is_option() && parameter.value.empty()) {
-      option = app_.add_flag(name);
-    } else {
-      option = app_.add_option(name);
-      option->type_name("")->allow_extra_args(false);
-      option->expected(parameter.repeatable && !parameter.is_option() ? -1 : 1);
-    }
-    if (parameter.repeatable || parameter.is_option()) option->take_all();
-    options_.emplace_back(&parameter, option);
+  // "-5" is a value.
+  static bool is_name(std::string_view word) {
+    return word.size() > 1 && word[0] == '-' && word[1] != '.' && (word[1] < '0' || word[1] > '9');
   }
 
-  void take(const Parameter& parameter, const CLI::Option& option, Invocation& invocation) const {
-    if (parameter.required && option.count() == 0) throw UsageError(missing(parameter));
-    if (!parameter.repeatable && option.count() > 1) {
-      throw UsageError(fmt::format("{} is given {} times: which is meant?", parameter.name, option.count()));
+  void take_option(std::string_view word, std::span<char* const>& words) {
+    const std::size_t equals = word.find('=');
+    const std::string_view name = word.substr(0, equals);
+    const auto& all = subcommand_->parameters;
+    const auto parameter = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.name == name; });
+    if (parameter == all.end()) refuse_option(name);
+    const bool has_value = equals != std::string_view::npos;
+    const bool is_flag = parameter->value.empty();
+    if (has_value && is_flag) valued_flag_ = name;
+    if (has_value || is_flag) {
+      return invocation_.add(parameter->name, std::string(has_value ? word.substr(equals + 1) : ""));
     }
-    const bool is_flag = parameter.is_option() && parameter.value.empty();
-    if (is_flag && option.count() > 0 && option.results().front() != "true") {
-      throw UsageError(fmt::format("{} takes no value", parameter.name));
-    }
-    for (const std::string& value : option.results()) invocation.add(parameter.name, value);
+    if (words.empty() || is_name(words.front())) throw UsageError(fmt::format("{} needs a value", name));
+    invocation_.add(parameter->name, words.front());
+    words = words.subspan(1);
   }
 
-  // Behind the first "--" nothing is an option.
-  void refuse_extras() const {
-    const std::vector<std::string> extras = app_.remaining();
-    const auto mark = std::find(extras.begin(), extras.end(), "--");
-    for (auto extra = extras.begin(); extra != mark; ++extra) {
-      if (extra->size() < 2 || (*extra)[0] != '-') continue;
-      const std::string name = extra->substr(0, extra->find('='));
-      std::vector<std::string_view> names{"--help"};
-      for (const Parameter& parameter : subcommand_->parameters) {
-        if (parameter.is_option()) names.push_back(parameter.name);
+  void take_argument(std::string_view word) {
+    if (taken_ == arguments_.size()) {
+      if (!extra_) extra_ = word;
+      return;
+    }
+    invocation_.add(arguments_[taken_]->name, std::string(word));
+    if (!arguments_[taken_]->repeatable) ++taken_;
+  }
+
+  [[noreturn]] void refuse_option(std::string_view name) const {
+    std::vector<std::string_view> names{"--help"};
+    for (const Parameter& parameter : subcommand_->parameters) {
+      if (parameter.is_option()) names.push_back(parameter.name);
+    }
+    throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
+  }
+
+  // Too many, too few, a value too many.
+  void refuse_numbers() const {
+    if (extra_) {
+      throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *extra_, usage(*subcommand_)));
+    }
+    for (const Parameter& parameter : subcommand_->parameters) {
+      const std::size_t count = invocation_.texts(parameter.name).size();
+      if (parameter.required && count == 0) throw UsageError(missing(parameter));
+      if (!parameter.repeatable && count > 1) {
+        throw UsageError(fmt::format("{} is given {} times: which is meant?", parameter.name, count));
       }
-      throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
     }
-    const auto first = mark == extras.begin() && mark != extras.end() ? mark + 1 : extras.begin();
-    if (first == extras.end()) return;
-    throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *first, usage(*subcommand_)));
+    if (valued_flag_) throw UsageError(fmt::format("{} takes no value", *valued_flag_));
   }
 
   [[nodiscard]] std::string missing(const Parameter& parameter) const {
@@ -105,11 +116,11 @@ class Parser {
   }
 
   const Subcommand* subcommand_;
-  CLI::App app_;
-  std::vector<std::pair<const Parameter*, CLI::Option*>> options_;
+  std::vector<const Parameter*> arguments_;
+  std::size_t taken_ = 0;
+  std::optional<std::string_view> extra_, valued_flag_;
+  Invocation invocation_;
 };
-
-bool asks_for_help(std::string_view word) { return word == "--help" || word == "-h"; }
 
 // No verb begins with these words; `group` is the first of two, or "".
 [[noreturn]] void refuse_verb(std::string_view group, std::span<char*> words) {
@@ -207,7 +218,7 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
 int run_command_line(std::span<char*> words, std::string& understood) {
   const Subcommand* subcommand = find_verb(words, understood);
   if (subcommand == nullptr) return exit_good;
-  const std::optional<Invocation> invocation = Parser(*subcommand).parse(words);
+  const std::optional<Invocation> invocation = Parser(*subcommand).parse(words.subspan(1));
   if (invocation) return run(*subcommand, *invocation);
   print_line(help(*subcommand));
   return exit_good;
