@@ -121,6 +121,16 @@ TEST(ClientEncoder, ACommandTellsTypedValues) {
   EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(read["vlaue"]); }), HasSubstr("value"));
 }
 
+TEST(ClientEncoder, AnAnswerOutlivesItsEncoder) {
+  Answer answer;
+  {
+    Answer first = open("sim:ssi?word=a_long_name=value:4 position:13").run("position");
+    answer = first;  // and its original
+  }
+  EXPECT_EQ(answer["a_long_name"], Value(std::uint64_t{0}));
+  EXPECT_EQ(answer.columns[0].name, "a_long_name");
+}
+
 TEST(ClientEncoder, SettingsAreReadWrittenAndReadBack) {
   Encoder encoder = open("sim:tformat");
   Settings settings = encoder.settings();

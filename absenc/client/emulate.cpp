@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "absenc/client/emulation/attended.hpp"
-#include "absenc/client/emulation/serve.hpp"
+#include "absenc/client/emulation/serve_forever.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
@@ -111,7 +111,7 @@ struct Emulation::Service {
         os::sleep_until(std::min(time, now + between_tries_to_look));
       }
     };
-    client::serve(attended, open, wait, [](Served, std::string_view) {});
+    serve_forever(attended, open, wait, [](Served, std::string_view) {});
   }
 
   // Between two steps of the encoder.

@@ -85,8 +85,10 @@ void AnswerSink::put(const FieldValue& value) {
     answer.values[static_cast<std::size_t>(same - fields_.begin())] = value_of(value);
     return;
   }
+  answer.names.push_back(std::make_shared<const std::string>(value.info->name));
   fields_.push_back(*value.info);
-  answer.columns.push_back(column_of(*value.info));
+  fields_.back().name = *answer.names.back();
+  answer.columns.push_back(column_of(fields_.back()));
   answer.values.push_back(value_of(value));
 }
 

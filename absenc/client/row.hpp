@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -65,6 +66,8 @@ struct Row {
 struct Answer {
   std::vector<Column> columns;
   std::vector<Value> values;
+  /// The names of the columns: those of a word that the user described are no longer there than the encoder is.
+  std::vector<std::shared_ptr<const std::string>> names;
 
   [[nodiscard]] Row row() const { return {columns, values}; }
   [[nodiscard]] const Value& operator[](std::string_view name) const;

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "absenc/client/emulation/attended.hpp"
-#include "absenc/client/emulation/serve.hpp"
+#include "absenc/client/emulation/serve_forever.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/os/error.hpp"
@@ -46,7 +46,7 @@ void serve_as(Machine<Item>& machine, const std::string& name, Time end, const O
     os::sleep_until(std::min(time, end));
   };
   try {
-    serve(machine, with_end, wait, [&](Served what, std::string_view why) { tell(name, what, why); });
+    serve_forever(machine, with_end, wait, [&](Served what, std::string_view why) { tell(name, what, why); });
   } catch (const os::Interrupted&) {
   } catch (const os::Ended&) {
   }

@@ -49,7 +49,7 @@ class Movable final : public Machine<Item> {
 /// Without end: what `open`, the port or `wait` throws ends it. `open()` makes the port; one that is lost, which
 /// os::Failure tells, is tried again. Between tries `wait(time)` is called. `told(what, why)` hears of the port.
 template <class Item, class Open, class Wait, class Told>
-[[noreturn]] void serve(Machine<Item>& machine, const Open& open, const Wait& wait, const Told& told) {
+[[noreturn]] void serve_forever(Machine<Item>& machine, const Open& open, const Wait& wait, const Told& told) {
   constexpr Time time_between_tries = std::chrono::milliseconds(250);
   Movable<Item> movable(machine);
   bool is_open = false;
