@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/esl/reply.hpp"
-#include "bench/firmware/reader.hpp"
+#include "firmware/readers/reader.hpp"
 
 int main() {
   using namespace absenc;

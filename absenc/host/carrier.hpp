@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Carries a machine from interrupts: what host::drive is where a program can wait, in pieces where it cannot. It owns
+// no port and no clock; docs/firmware.md has it behind a UART, a DMA channel and a timer.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+
+#include "absenc/link/step.hpp"
+
+namespace absenc::host {
+
+/// All members are called in one context: from interrupts of one priority, or with these held off.
+///
+/// Line has `void begin(const Step<Item>&)`, which begins a transfer, a pulse or a change of the rate and does not wait
+/// for it, and `void result(bool over)`, called for every `emit`, and at `done` with `over`, when `is_busy()` is false
+/// again.
+template <class Item, class Line>
+class Carrier {
+ public:
+  /// `latency` is what the way to the encoder adds to its answer time: of a UART beside it one character at the most.
+  explicit Carrier(Line& line, Time latency = {}) : line_(&line), latency_(latency) {}
+
+  /// Begins a conversation, which must live until it is over. The one before is given up.
+  void start(Machine<Item>& machine, Time now) {
+    machine_ = &machine;
+    sending_ = held_ = heard_ = false;
+    quiet_told_ = true;  // until something was sent
+    go_on(now);
+  }
+  [[nodiscard]] bool is_busy() const { return machine_ != nullptr; }
+
+  /// The last bit of the transfer, or of the pulse, is out.
+  void sent(Time now) {
+    if (!is_busy() || !sending_) return;
+    sending_ = heard_ = quiet_told_ = false;
+    quiet_since_ = now;
+    tell({.kind = Event<Item>::Kind::sent, .at = now});
+  }
+  /// What comes while no conversation runs is nobody's.
+  void received(std::span<const Item> items, Time now) {
+    came({.kind = Event<Item>::Kind::received, .at = now, .items = items});
+  }
+  /// A character with a wrong stop or parity bit came.
+  void line_error(Time now) { came({.kind = Event<Item>::Kind::line_error, .at = now}); }
+
+  /// To be called when `due()` has come; oftener does no harm. A tick slower than the encoder's limits makes silences
+  /// longer, never wrong.
+  void tick(Time now) {
+    if (!is_busy() || now < due()) return;
+    if (held_) {
+      held_ = false;
+      sending_ = true;
+      return line_->begin(step_);
+    }
+    if (now >= quiet_end()) {
+      quiet_told_ = true;
+      ++silences_;
+      return tell({.kind = Event<Item>::Kind::silence, .at = now});
+    }
+    at_ = never;
+    tell({.kind = Event<Item>::Kind::timer, .at = now});
+  }
+  /// When `tick` has something to do; `never`: not before something is sent or comes.
+  [[nodiscard]] Time due() const {
+    if (!is_busy()) return never;
+    return held_ ? step_.at : std::min(at_, quiet_end());
+  }
+  /// How often a reply did not come, or not to its end, or was followed by silence because it was not good.
+  [[nodiscard]] std::uint32_t silences() const { return silences_; }
+
+ private:
+  using Kind = typename Step<Item>::Kind;
+
+  void came(const Event<Item>& event) {
+    if (!is_busy()) return;
+    heard_ = true;
+    quiet_told_ = sending_;
+    quiet_since_ = event.at;
+    tell(event);
+  }
+  void tell(const Event<Item>& event) {
+    machine_->feed(event);
+    go_on(event.at);
+  }
+  [[nodiscard]] Time quiet_end() const {
+    const Time limit = heard_ ? gap_ : answer_;
+    return quiet_told_ || limit == Time{} ? never : quiet_since_ + limit + latency_;
+  }
+
+  // A transfer is remembered until its time has come; what it waits for afterwards stands in the step behind it.
+  void go_on(Time now) {
+    for (;;) {
+      const Step<Item> step = machine_->next(now);
+      switch (step.kind) {
+        case Kind::done:
+          machine_ = nullptr;
+          return line_->result(true);
+        case Kind::emit:
+          line_->result(false);
+          break;
+        case Kind::configure:
+          line_->begin(step);
+          break;
+        case Kind::transfer:
+        case Kind::pulse:
+          held_ = step.at > now;
+          sending_ = !held_;
+          quiet_told_ = true;
+          if (held_) {
+            step_ = step;
+          } else {
+            line_->begin(step);
+          }
+          break;
+        case Kind::wait:
+          answer_ = step.answer;
+          gap_ = step.gap;
+          at_ = step.at > now ? step.at : never;
+          return;
+      }
+    }
+  }
+
+  Line* line_;
+  Machine<Item>* machine_ = nullptr;
+  Time latency_;
+  Time quiet_since_{};
+  Time answer_{};
+  Time gap_{};
+  Time at_ = never;
+  Step<Item> step_{};  // held until its time
+  std::uint32_t silences_ = 0;
+  bool held_ = false;
+  bool sending_ = false;
+  bool heard_ = false;  // since the last transfer
+  bool quiet_told_ = true;
+};
+
+}  // namespace absenc::host

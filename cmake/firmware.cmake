@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+# Programs for machines that QEMU emulates (firmware/). Code for a Cortex-M0+ runs on all of them: there is no machine
+# with one. ./dev firmware builds and runs them.
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+
+set(firmware_folder "${CMAKE_CURRENT_BINARY_DIR}/firmware")
+set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)  # behind those of the toolchain, which they replace
+
+# firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]): NAME.elf
+function(firmware_program name machine rom ram)
+  cmake_parse_arguments(one "" "LIBRARY" "SOURCES;FLAGS" ${ARGN})
+  add_executable(firmware_${name} EXCLUDE_FROM_ALL ${one_SOURCES} "${PROJECT_SOURCE_DIR}/firmware/machine/start.cpp"
+                 "${PROJECT_SOURCE_DIR}/firmware/machine/machine.cpp"
+                 "${PROJECT_SOURCE_DIR}/firmware/machine/${machine}.cpp")
+  absenc_settings(firmware_${name})
+  target_include_directories(firmware_${name} PRIVATE "${PROJECT_SOURCE_DIR}")
+  target_compile_options(firmware_${name} PRIVATE ${one_FLAGS})
+  set(script "${PROJECT_SOURCE_DIR}/firmware/machine/machine.ld")
+  target_link_options(firmware_${name} PRIVATE ${one_FLAGS} --specs=nano.specs -nostartfiles
+                      "-T${script}" -Wl,--gc-sections,--no-warn-rwx-segments
+                      -Wl,--defsym=rom_size=${rom},--defsym=ram_size=${ram})
+  target_link_libraries(firmware_${name} PRIVATE ${one_LIBRARY})
+  set_target_properties(firmware_${name} PROPERTIES OUTPUT_NAME "${name}.elf" LINK_DEPENDS "${script}"
+                        RUNTIME_OUTPUT_DIRECTORY "${firmware_folder}")
+endfunction()
+
+# All of the library for a Cortex-M4 with its FPU.
+absenc_sources(m4f_sources ${absenc_layers_sources})
+add_library(absenc-m4f STATIC EXCLUDE_FROM_ALL ${m4f_sources})
+absenc_settings(absenc-m4f)
+target_include_directories(absenc-m4f PUBLIC "${PROJECT_SOURCE_DIR}")
+target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
+
+# The vectors of the reference.
+file(GLOB vector_files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/vectors*.json")
+set(vector_tables "${firmware_folder}/reference_vectors.cpp")
+set(vector_script "${PROJECT_SOURCE_DIR}/firmware/vectors.py")
+add_custom_command(OUTPUT "${vector_tables}" DEPENDS "${vector_script}" ${vector_files}
+                   COMMAND ${CMAKE_COMMAND} -E make_directory "${firmware_folder}"
+                   COMMAND "${Python3_EXECUTABLE}" -B "${vector_script}" "${vector_tables}" ${vector_files} VERBATIM)
+set(vector_sources "${PROJECT_SOURCE_DIR}/firmware/vectors.cpp" "${vector_tables}")
+
+firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
+firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})
+
+firmware_program(drive-microbit microbit 256K 16K SOURCES "${PROJECT_SOURCE_DIR}/firmware/drive.cpp" LIBRARY absenc)
+firmware_program(drive-m0plus mps2 1M 64K SOURCES "${PROJECT_SOURCE_DIR}/firmware/drive.cpp" LIBRARY absenc)
+firmware_program(drive-m4f mps2 1M 64K SOURCES "${PROJECT_SOURCE_DIR}/firmware/drive.cpp" LIBRARY absenc-m4f
+                 FLAGS ${m4f_flags})
+
+add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microbit firmware_drive-m0plus)
+add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f)

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+// A drive with a T-format encoder: a timer asks for positions, the UART's interrupts carry the conversations, the main
+// program gets readings, and in between clears an alarm and writes the encoder's memory.
+//   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: where the shaft stands, which is what every position must say
+#include <array>
+#include <new>
+
+#include "absenc/host/carrier.hpp"
+#include "absenc/host/first_reading.hpp"
+#include "absenc/protocol/tformat/host.hpp"
+#include "absenc/protocol/tformat/unit.hpp"
+#include "firmware/machine/machine.hpp"
+
+namespace absenc::firmware {
+namespace {
+
+using machine::say;
+using namespace std::chrono_literals;
+
+constexpr Time tick_period = 500us;  // a position each, while the line is free
+constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
+// Of the axis, not of the encoder. The XOR of T-format lets two flipped bits of the same place in two bytes pass: these
+// move a position by 255 counts or by turns, which no axis this slow does between two readings.
+constexpr std::uint32_t axis_rpm = 1;
+
+struct Result {
+  Error error;
+  Reading reading;
+};
+
+// In the interrupts: one conversation at a time, positions or what the main program has ordered.
+class Axis {
+ public:
+  explicit Axis(Time latency) : carrier_(*this, latency) {}
+
+  // ---- Interrupts
+
+  void tick(Time now) {
+    carrier_.tick(now);
+    if (carrier_.is_busy()) return;
+    if (ordered_ != nullptr) {
+      running_ = ordered_;
+      ordered_ = nullptr;
+      carrier_.start(*running_, now);
+    } else if (positions_wanted_ && count_ < results_.size()) {
+      running_ = position_ = new (position_memory_) tformat::ReadPosition(format);
+      carrier_.start(*position_, now);
+    }
+  }
+  void received(std::uint8_t byte, Time now) {
+    if (!carrier_.is_busy()) ++unasked_;
+    carrier_.received({&byte, 1}, now);
+  }
+  void sent(Time now) { carrier_.sent(now); }
+
+  // ---- The line of the carrier
+
+  void begin(const ByteStep& step) {
+    ++requests_;
+    machine::send(step.out);
+  }
+  void result(bool over) {
+    if (!over) return;
+    if (running_ == position_) {
+      const Reading* const reading = position_->reading();
+      results_[(first_ + count_++) % results_.size()] = {position_->error(), reading != nullptr ? *reading : Reading{}};
+    }
+    running_ = nullptr;
+  }
+
+  // ---- The main program
+
+  void want_positions(bool wanted) {
+    const machine::Quiet quiet;
+    positions_wanted_ = wanted;
+  }
+  bool take(Result& result) {
+    const machine::Quiet quiet;
+    if (count_ == 0) return false;
+    result = results_[first_];
+    first_ = (first_ + 1) % results_.size();
+    --count_;
+    return true;
+  }
+  // To its end; the conversation then has its error and what it found.
+  void run(Conversation<std::uint8_t>& conversation) {
+    {
+      const machine::Quiet quiet;
+      ordered_ = &conversation;
+    }
+    for (bool over = false; !over;) {
+      asm volatile("wfi");
+      const machine::Quiet quiet;
+      over = ordered_ == nullptr && running_ != &conversation;
+    }
+  }
+  [[nodiscard]] std::uint32_t requests() const { return requests_; }
+  [[nodiscard]] std::uint32_t silences() const { return carrier_.silences(); }
+  [[nodiscard]] std::uint32_t unasked() const { return unasked_; }
+
+ private:
+  host::Carrier<std::uint8_t, Axis> carrier_;
+  alignas(tformat::ReadPosition) std::byte position_memory_[sizeof(tformat::ReadPosition)];
+  tformat::ReadPosition* position_ = nullptr;
+  Conversation<std::uint8_t>* running_ = nullptr;
+  Conversation<std::uint8_t>* ordered_ = nullptr;
+  std::array<Result, 8> results_{};
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+  std::uint32_t requests_ = 0;
+  std::uint32_t unasked_ = 0;
+  bool positions_wanted_ = false;
+};
+
+alignas(Axis) std::byte axis_memory[sizeof(Axis)];
+Axis* axis = nullptr;
+
+// What comes of readings.
+class Watch {
+ public:
+  Watch(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}
+
+  void alarms_are(std::uint32_t alarms) { alarms_ = alarms; }
+  void take(const Result& result) {
+    if (result.error != Error::none) {
+      ++failed_;
+      known_ = false;
+      return first_.start_again();
+    }
+    const bool near = first_.confirms(result.reading);
+    if (result.reading.alarms != alarms_ || (known_ && !near)) {
+      ++implausible_;
+      known_ = false;
+      return first_.start_again();
+    }
+    known_ = true;
+    if (!near) return;
+    ++good_;
+    if (result.reading.singleturn != singleturn_ || result.reading.multiturn != multiturn_ ||
+        !result.reading.multiturn_valid) {
+      ++wrong_;
+    }
+  }
+  [[nodiscard]] std::uint32_t good() const { return good_; }
+  [[nodiscard]] bool is_right() const { return wrong_ == 0; }
+  void tell() const {
+    tell("good", good_);
+    tell("failed", failed_);
+    tell("implausible", implausible_);
+    tell("wrong", wrong_);
+  }
+  static void tell(std::string_view name, std::uint64_t number) {
+    say(name);
+    say(" ");
+    say(number);
+    say("\n");
+  }
+
+ private:
+  host::FirstReading first_{axis_rpm};
+  std::uint32_t singleturn_;
+  std::uint32_t multiturn_;
+  std::uint32_t alarms_ = 0;
+  bool known_ = false;  // the last one was good
+  std::uint32_t good_ = 0;
+  std::uint32_t failed_ = 0;
+  std::uint32_t implausible_ = 0;
+  std::uint32_t wrong_ = 0;
+};
+
+void read(Watch& watch, std::uint32_t until) {
+  axis->want_positions(true);
+  Result result;
+  while (watch.good() < until) {
+    if (axis->take(result)) {
+      watch.take(result);
+    } else {
+      asm volatile("wfi");
+    }
+  }
+  axis->want_positions(false);
+  while (axis->take(result)) watch.take(result);
+}
+
+// A command of the unit. What changes an encoder is never repeated by itself: this program decides to, because to clear
+// alarms twice, or to write the same byte twice, does no harm.
+bool command(std::string_view name, Arguments arguments) {
+  alignas(std::max_align_t) static std::array<std::byte, 4096> storage;
+  const Unit& unit = tformat::unit;
+  Options options;
+  if (unit.host_storage > storage.size() ||
+      resolve_options(unit, "TS5700N8500", {}, options).kind != OptionError::Kind::none) {
+    return false;
+  }
+  for (unsigned attempt = 0; attempt < 10; ++attempt) {
+    auto* const conversation = unit.host(options, *find_command(unit, name), arguments, storage).bytes;
+    if (conversation == nullptr) return false;
+    axis->run(*conversation);
+    if (conversation->error() == Error::none) return true;
+    Watch::tell(text_of(conversation->error()).name, attempt);
+  }
+  return false;
+}
+
+bool run() {
+  const std::uint32_t positions = machine::argument(0, 1000);
+  Watch watch(machine::argument(1, 0), machine::argument(2, 0));
+  watch.alarms_are(tformat::alarms::over_heat);
+  read(watch, positions / 2);
+  const bool cleared = command("clear-alarms", {});
+  constexpr std::array<std::int64_t, 3> written{5, 0x42, 2};  // address, value, page
+  const bool stored = command("memory-write", written);
+  watch.alarms_are(0);
+  read(watch, positions);
+  watch.tell();
+  Watch::tell("requests", axis->requests());
+  Watch::tell("silences", axis->silences());
+  Watch::tell("unasked", axis->unasked());
+  Watch::tell("cleared", cleared ? 1 : 0);
+  Watch::tell("stored", stored ? 1 : 0);
+  Watch::tell("stack", machine::stack_used());
+  return watch.is_right() && cleared && stored;
+}
+
+}  // namespace
+}  // namespace absenc::firmware
+
+// Interrupts of one priority: what they call is one context.
+namespace absenc::machine {
+void on_tick() { firmware::axis->tick(now()); }
+void on_received(std::uint8_t byte) { firmware::axis->received(byte, now()); }
+void on_sent() { firmware::axis->sent(now()); }
+}  // namespace absenc::machine
+
+int main() {
+  using namespace absenc;
+  using namespace absenc::firmware;
+  axis = new (axis_memory) Axis(std::chrono::milliseconds(machine::argument(3, 20)));
+  machine::start_clock(tick_period);
+  machine::start_uart();
+  machine::end(firmware::run());
+}

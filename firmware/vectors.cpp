@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Decodes every vector of every unit on the machine, those that the units have and those of tests/*.json, and compares
+// fields and errors.
+#include <algorithm>
+#include <array>
+
+#include "absenc/protocol/all.hpp"
+#include "absenc/protocol/vector_check.hpp"
+#include "firmware/machine/machine.hpp"
+#include "firmware/vectors.hpp"
+
+namespace absenc::firmware {
+namespace {
+
+using machine::say;
+
+// What stands in front of `end` in `text`, which loses both. Not substr(), which may throw.
+std::string_view cut(std::string_view& text, char end) {
+  const std::size_t size = std::min(text.find(end), text.size());
+  const std::string_view front(text.data(), size);
+  text.remove_prefix(std::min(size + 1, text.size()));
+  return front;
+}
+
+// Of "name=value name=value".
+bool resolve(const Unit& unit, std::string_view text, Options& options) {
+  Buffer<OptionText, maximum_options> settings;
+  while (!text.empty()) {
+    std::string_view value = cut(text, ' ');
+    const std::string_view name = cut(value, '=');
+    if (!settings.push_back({name, value})) return false;
+  }
+  return resolve_options(unit, {}, settings, options).kind == OptionError::Kind::none;
+}
+
+// What a vector of tests/*.json calls: flags by their names, other lists by their numbers, the rest by its value.
+class Reference final : public FieldSink {
+ public:
+  explicit Reference(std::span<const Wanted> wanted) : wanted_(wanted) {}
+
+  void put(const FieldValue& value) override {
+    for (const Wanted& one : wanted_) {
+      if (one.field != value.info->name) continue;
+      ++matches_;
+      if (!holds(one, value)) wrong_ = true;
+    }
+  }
+  // A list of nothing may be left out.
+  [[nodiscard]] bool all() const {
+    const auto needed = std::count_if(wanted_.begin(), wanted_.end(), [](const Wanted& one) {
+      return one.kind != Wanted::Kind::text || !one.text.empty();
+    });
+    return !wrong_ && matches_ >= static_cast<std::size_t>(needed);
+  }
+
+ private:
+  static bool holds(const Wanted& one, const FieldValue& value) {
+    using Kind = FieldInfo::Kind;
+    switch (value.info->kind) {
+      case Kind::flags:
+        return one.kind == Wanted::Kind::names && one.text == names(value);
+      case Kind::real: {
+        const double difference = one.real - value.real;
+        return one.kind != Wanted::Kind::names && difference < 1e-6 && difference > -1e-6;
+      }
+      case Kind::text:
+        return VectorCheck::same(one.text, value.bytes);
+      case Kind::bytes:
+        return hexadecimal(value.bytes) == one.text;
+      default:
+        return one.kind == Wanted::Kind::number && one.number == value.number;
+    }
+  }
+  using Text = Buffer<char, 192>;
+  static void add(Text& text, std::string_view more) {
+    for (const char c : more) static_cast<void>(text.push_back(c));
+  }
+  static std::string_view view(const Text& text) { return {text.view().data(), text.view().size()}; }
+
+  static Text& scratch() {
+    static Text text;
+    text.clear();
+    return text;
+  }
+  static std::string_view names(const FieldValue& value) {
+    Text& text = scratch();
+    for (std::size_t bit = 0; bit < value.info->flags.size(); ++bit) {
+      if ((value.number >> bit & 1) == 0) continue;
+      if (!text.empty()) add(text, " ");
+      add(text, value.info->flags[bit].name);
+    }
+    return view(text);
+  }
+  static std::string_view hexadecimal(Bytes bytes) {
+    Text& text = scratch();
+    for (const std::uint8_t byte : bytes) {
+      static_cast<void>(text.push_back("0123456789abcdef"[byte >> 4]));
+      static_cast<void>(text.push_back("0123456789abcdef"[byte & 15]));
+    }
+    return view(text);
+  }
+
+  std::span<const Wanted> wanted_;
+  std::size_t matches_ = 0;
+  bool wrong_ = false;
+};
+
+// A frame as a vector has it: bytes, or the text of bits or of a CAN frame.
+class Made {
+ public:
+  Made(LinkKind link, Bytes text) : bytes_(text), is_bits_(link == LinkKind::clocked) {
+    if (is_bits_) bits_ = bits_of_text(text);
+    is_can_ = link == LinkKind::can && !text.empty();
+    if (is_can_) can_ = can_frame_of_text(text);
+  }
+  [[nodiscard]] Frame frame() const {
+    if (is_can_) return {.can = &can_};
+    if (is_bits_) return {.bytes = bits_.bytes(), .bits = bits_.size()};
+    return {.bytes = bytes_};
+  }
+
+ private:
+  Bytes bytes_;
+  BitBuffer<256> bits_;
+  CanFrame can_;
+  bool is_bits_;
+  bool is_can_;
+};
+
+struct Count {
+  unsigned decoded = 0;
+  unsigned wrong = 0;
+
+  template <class Fields>
+  void check(const Unit* unit, std::string_view id, std::string_view settings, Bytes request, Bytes reply, Error error,
+             Fields& fields) {
+    ++decoded;
+    Options options;
+    if (unit == nullptr || !resolve(*unit, settings, options)) return complain(id, "has no unit or other options");
+    const Made asked(unit->link, request);
+    const Made answered(unit->link, reply);
+    const Error found = unit->decode(options, asked.frame(), answered.frame(), fields);
+    if (found != error) return complain(id, text_of(found).name);
+    if (!fields.all()) complain(id, "decodes to other fields");
+  }
+  void complain(std::string_view id, std::string_view what) {
+    ++wrong;
+    say(id);
+    say(": ");
+    say(what);
+    say("\n");
+  }
+};
+
+}  // namespace
+}  // namespace absenc::firmware
+
+int main() {
+  using namespace absenc;
+  using namespace absenc::firmware;
+  Count count;
+  for (const Unit* const unit : all_units()) {
+    for (const Vector& one : unit->vectors) {
+      VectorCheck fields(one.fields);
+      count.check(unit, one.id, one.options, one.request, one.reply, one.error, fields);
+    }
+  }
+  for (const ReferenceVector& one : reference_vectors()) {
+    Reference fields(one.fields);
+    count.check(find_unit(one.unit), one.id, one.options, one.request, one.reply, one.error, fields);
+  }
+  say("decoded ");
+  say(count.decoded);
+  say(", wrong ");
+  say(count.wrong);
+  say(", stack ");
+  say(machine::stack_used());
+  say("\n");
+  machine::end(count.wrong == 0);
+}
