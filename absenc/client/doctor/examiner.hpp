@@ -127,11 +127,25 @@ class Examiner {
       one.exchange.request.bytes = port_.sent;
       one.exchange.reply.bytes = port_.received;
       one.exchange.reply.bits = std::min(port_.clocks, port_.received.size() * 8);
-      const bool echoes = port_.received.size() > port_.sent.size() && session_.echo().mode() != host::EchoMode::off &&
-                          std::equal(port_.sent.begin(), port_.sent.end(), port_.received.begin());
       auto& reply = one.exchange.reply.bytes;
-      if (echoes) reply.erase(reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(port_.sent.size()));
+      if (is_echoed()) reply.erase(reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(port_.sent.size()));
     }
+  }
+
+  // A reply may begin as its request does: what is a whole frame as it came has no echo before it.
+  [[nodiscard]] bool is_echoed() const {
+    const Bytes sent = port_.sent;
+    const Bytes came = port_.received;
+    const bool repeats =
+        !sent.empty() && came.size() > sent.size() && std::equal(sent.begin(), sent.end(), came.begin());
+    if (!repeats || session_.echo().mode() != host::EchoMode::automatic) {
+      return repeats && session_.echo().mode() == host::EchoMode::on;
+    }
+    const auto is_frame = [this](Bytes bytes) {
+      const FrameEnd end = address_.unit->frame_end(address_.options, Direction::reply, bytes);
+      return end.kind == FrameEnd::Kind::complete && end.size == bytes.size();
+    };
+    return !is_frame(came) && is_frame(came.subspan(sent.size()));
   }
 
   EncoderAddress address_;

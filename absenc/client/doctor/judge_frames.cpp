@@ -127,13 +127,15 @@ std::optional<Finding> refusal(const Case&, const All& all) {
 
 // The machinery of `identify`, held to this unit and to this encoder of it.
 std::optional<Finding> other_settings(const Case& one, const All& all) {
+  constexpr std::size_t enough = 4;  // frames: fewer prove little
+  if (all.size() < enough) return {};
   std::vector<capture::HeardExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
   const std::vector<capture::Hypothesis> found = capture::find_hypotheses(one.unit, {}, exchanges);
   if (found.empty()) return {};
   const capture::Hypothesis& best = found.front();
-  const bool enough = best.evidence.explained * 10 >= best.evidence.tried * 9;
-  if (!enough || best.evidence.frames > capture::frames_say_enough) return {};
+  const bool mostly = best.evidence.explained * 10 >= best.evidence.tried * 9;
+  if (!mostly || best.evidence.frames > capture::frames_say_enough) return {};
   const std::vector<std::string> settings = settings_for(one.unit, best.options);
   if (settings.empty()) return {};
   return finding(Ailment::wrong_settings, {fmt::format("{}", all.size()), fmt::format("{}", best.evidence.explained),
@@ -262,6 +264,18 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
   }
   findings.push_back(finding(Ailment::always_damaged,
                              {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
+}
+
+Finding finding_of(const Unit& unit, const Options& options, const Attempted& last, bool usually_good, bool late) {
+  if (late && last.error == Error::timeout) return finding(Ailment::reply_late, {"", "", "", ""});
+  if (usually_good) {
+    return last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
+                      : finding(Ailment::sometimes_silent, {"", ""});
+  }
+  Observations seen;
+  seen.readings.push_back(last);
+  const Examination one = judge(unit, options, seen);
+  return one.findings.empty() ? finding(Ailment::always_damaged, {"", "", ""}) : one.findings.front();
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {

@@ -65,4 +65,9 @@ struct Observations {
 /// What is wrong, in the order of `Ailment`.
 [[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);
 
+/// Of one reading that failed, at once: what is most likely behind it. `usually_good`: others mostly do not fail;
+/// `late`: replies came after their limit. Its evidence may be incomplete.
+[[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, const Attempted& last, bool usually_good,
+                                 bool late);
+
 }  // namespace absenc::client
