@@ -19,8 +19,9 @@ struct Trouble {
   std::string advice{};    // what to try
   std::string sent{};      // hexadecimal or as the link's wire text
   std::string received{};
+  std::string finding{};  // of a reading: which of those of client/doctor.hpp it looks like, "only_echo: ..."
 
-  /// Of several lines, without the last line end.
+  /// Without the finding. Of several lines, without the last line end.
   [[nodiscard]] std::string text() const;
 };
 

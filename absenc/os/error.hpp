@@ -22,11 +22,17 @@ class Failure : public std::runtime_error {
     system,         // anything else that the operating system refused
   };
 
-  Failure(Kind kind, const std::string& sentence) : std::runtime_error(sentence), kind_(kind) {}
+  /// What of a CAN bus is behind it, where that is known.
+  enum class Bus : std::uint8_t { unknown, off, not_acknowledged };
+
+  Failure(Kind kind, const std::string& sentence, Bus bus = Bus::unknown)
+      : std::runtime_error(sentence), kind_(kind), bus_(bus) {}
   [[nodiscard]] Kind kind() const { return kind_; }
+  [[nodiscard]] Bus bus() const { return bus_; }
 
  private:
   Kind kind_;
+  Bus bus_;
 };
 
 /// "<what> failed: <text of error>"; `error` is a value of errno.

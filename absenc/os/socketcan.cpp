@@ -215,12 +215,13 @@ void SocketCan::take(const can_frame& from, Time at) {
 
 void SocketCan::take_error(const can_frame& frame, Time at) {
   if ((frame.can_id & CAN_ERR_BUSOFF) != 0) {
-    throw Failure(Kind::lost, interface_ +
-                                  " is bus-off: too many of its frames were destroyed. Check the bit rate, CANH "
-                                  "and CANL, 120 ohms at both ends and that no two nodes have one number; then "
-                                  "`sudo ip link set " +
-                                  interface_ + " down` and " + up_command(settings_.rate) +
-                                  " (`restart-ms 100` does it by itself)");
+    throw Failure(Kind::lost,
+                  interface_ +
+                      " is bus-off: too many of its frames were destroyed. Check the bit rate, CANH "
+                      "and CANL, 120 ohms at both ends and that no two nodes have one number; then "
+                      "`sudo ip link set " +
+                      interface_ + " down` and " + up_command(settings_.rate) + " (`restart-ms 100` does it by itself)",
+                  Failure::Bus::off);
   }
   push_error(at);
 }
@@ -237,8 +238,10 @@ void SocketCan::send(const CanFrame& from) {
     const bool full = errno == ENOBUFS || errno == EAGAIN;
     if (!full && errno != EINTR) fail("sending on " + interface_, errno);
     if (os::now() >= limit) {
-      throw Failure(Kind::lost, interface_ + " sends nothing, its queue is full: no other node acknowledges. " +
-                                    std::string("Try: ") + std::string(check_bus));
+      throw Failure(Kind::lost,
+                    interface_ + " sends nothing, its queue is full: no other node acknowledges. " +
+                        std::string("Try: ") + std::string(check_bus),
+                    Failure::Bus::not_acknowledged);
     }
     sleep_until(std::min(os::now() + queue_pause, end()));
     if (os::now() >= end()) throw Ended{};

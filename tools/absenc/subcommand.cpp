@@ -23,8 +23,8 @@ std::span<const Subcommand* const> all_subcommands() {
       &config_get_subcommand,   &config_set_subcommand,  &run_subcommand,
       &scan_subcommand,         &emulate_subcommand,     &decode_subcommand,
       &encode_subcommand,       &wave_subcommand,        &probe_subcommand,
-      &identify_subcommand,     &crc_find_subcommand,    &vectors_subcommand,
-      &bench_subcommand,
+      &identify_subcommand,     &doctor_subcommand,      &crc_find_subcommand,
+      &vectors_subcommand,      &bench_subcommand,
   };
   return all;
 }

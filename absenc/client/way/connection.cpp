@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "absenc/client/doctor/observations.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
@@ -101,6 +102,7 @@ class ConnectionOn final : public Connection {
       return trouble;
     }
     if (port_.sent.empty() && port_.clocks == 0) return unasked_trouble(outcome);
+    trouble.finding = finding_text(outcome);
     const Diagnosis diagnosis = diagnose_last();
     trouble.message = describe(outcome.error, outcome.detail, diagnosis.finding);
     trouble.sent = wire_text(port_.sent);
@@ -140,6 +142,22 @@ class ConnectionOn final : public Connection {
         "allow the way so long with latency={} (milliseconds) behind the encoder, or find what "
         "holds replies up: a busy computer, a network, the latency timer of a USB adapter",
         std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count());
+  }
+
+  // As `absenc doctor` would call it.
+  [[nodiscard]] std::string finding_text(const Outcome& outcome) const {
+    Attempted last{.error = outcome.error, .detail = std::string(outcome.detail), .heard = !port_.received.empty()};
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      if (!port_.received.empty()) last.exchange.reply.can = port_.received.back();
+    } else {
+      last.raw = port_.received;
+      last.exchange.request.bytes = port_.sent;
+      last.exchange.reply = {port_.received, std::min(port_.clocks, port_.received.size() * 8)};
+    }
+    const host::Counters& counters = session_.counters();
+    const bool usually_good = counters.good > counters.bad();
+    const Finding found = finding_of(unit(), uri().options, last, usually_good, session_.lateness() != Time{});
+    return fmt::format("{}: {}", found.id, found.cause);
   }
 
   // Of a conversation that sent nothing.

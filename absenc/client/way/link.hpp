@@ -56,6 +56,7 @@ class WatchedPort final : public Port<Item> {
     if (over && over()) throw os::Ended{};
     const Event<Item> event = wait_or_abort(step);
     if (event.kind == Event<Item>::Kind::sent) sent_at = event.at;
+    if (event.kind == Event<Item>::Kind::line_error) ++line_errors;
     if (event.kind == Event<Item>::Kind::received) {
       if (received.empty()) first_received_at = event.at;
       received_at = event.at;
@@ -79,6 +80,7 @@ class WatchedPort final : public Port<Item> {
   Time received_at{};  // last of `received`
   std::uint64_t items_sent = 0;
   std::uint64_t items_received = 0;
+  std::uint64_t line_errors = 0;
 
  private:
   Event<Item> wait_or_abort(const Step<Item>& step) {

@@ -12,6 +12,7 @@
 #include "absenc/client/way/pace.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/text/encoder_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/reading_text.hpp"
 
@@ -167,6 +168,9 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
       known_.state = Snapshot::State::failing;
       known_.message = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);
       if (!sample.trouble.advice.empty()) known_.message += fmt::format(". Try: {}", sample.trouble.advice);
+      if (!sample.trouble.finding.empty()) {
+        known_.message += fmt::format(". {}", finding_line(sample.trouble, live.connection().uri()));
+      }
       break;
     case Sample::Kind::lost:
       known_.state = Snapshot::State::lost;

@@ -38,6 +38,10 @@ Json to_json(const Trouble& trouble) {
   return json.set("sent", trouble.sent).set("received", trouble.received);
 }
 
+std::string finding_line(const Trouble& trouble, const EncoderAddress& address) {
+  return fmt::format("Looks like {}; `absenc doctor {}` says more", trouble.finding, address_of(address));
+}
+
 Json errors_to_json(const host::Counters& counters) {
   Json json = Json::object();
   for (std::size_t i = 0; i < counters.errors.size(); ++i) {

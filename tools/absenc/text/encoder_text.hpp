@@ -22,6 +22,9 @@ void print_notes(const Connection& encoder);
 /// {"ok":false,"error":...}
 [[nodiscard]] Json to_json(const Trouble& trouble);
 
+/// What a failed reading looks like, on one line, and who says more: "Looks like only_echo: ...; `absenc doctor ...".
+[[nodiscard]] std::string finding_line(const Trouble& trouble, const EncoderAddress& address);
+
 /// "1234 readings, 2 failed attempts (2 bad_checksum), 2 repeated"
 [[nodiscard]] std::string summary(const host::Counters& counters);
 /// `summary`, and why there are more exchanges than readings.

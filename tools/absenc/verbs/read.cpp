@@ -80,9 +80,11 @@ class Display {
     Trouble trouble = sample.trouble;
     if (format_ == Format::json) return print_line(to_json(trouble).line());
     if (format_ == Format::csv) show_row(sample);
-    if (trouble.error == last_trouble_) trouble.advice.clear();
+    const bool again = trouble.error == last_trouble_;
+    if (again) trouble.advice.clear();
     last_trouble_ = trouble.error;
     print_message(trouble.text());
+    if (!again && !trouble.finding.empty()) print_note("  " + finding_line(trouble, live_->connection().uri()));
   }
 
   const Encoder* live_;

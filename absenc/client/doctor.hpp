@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is wrong with an encoder, or with the way to it: looked for from the port up, each finding as data.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/core/time.hpp"
+
+namespace absenc::client {
+
+/// What can be found, in the order in which it is looked for.
+enum class Ailment : std::uint8_t {
+  // The port
+  port_missing,
+  port_forbidden,
+  port_in_use,
+  port_unsuitable,
+  port_is_modem,
+  port_rate,
+  port_lost,
+  port_failed,
+  latency_timer,
+  direction_unswitched,
+  // The bus
+  can_bus_off,
+  can_not_acknowledged,
+  can_errors,
+  // The line
+  never_silent,
+  line_inverted,
+  wrong_baud,
+  wrong_spi_mode,
+  clock_too_fast,
+  miso_stuck,
+  wrong_echo,
+  only_echo,
+  modem_answers,
+  no_answer,
+  baud_pattern,
+  // The frames
+  two_answer,
+  same_address,
+  wrong_settings,
+  other_checksum,
+  always_damaged,
+  damaged_bits,
+  damaged_bursts,
+  sometimes_damaged,
+  sometimes_silent,
+  refused,
+  // The time
+  reply_late,
+  reply_slow,
+  // What the encoder says
+  starting,
+  alarm,
+  // The position
+  position_noise,
+  position_jumps,
+  stuck_bits,
+};
+
+enum class Severity : std::uint8_t {
+  note,     // good to know
+  warning,  // it works, but less well than it could, or not for long
+  fault,    // it does not work, or what it says is not to be trusted
+};
+
+/// Which of them, as data and in words.
+struct Finding {
+  Ailment ailment{};
+  std::string_view id{};  // "only_echo"
+  Severity severity{};
+  std::string evidence{};  // what was seen
+  std::string cause{};     // what is most likely behind it
+  std::string action{};    // what to do
+
+  /// "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION", on one line.
+  [[nodiscard]] std::string sentence() const;
+};
+
+struct Examination {
+  std::vector<Finding> findings{};  // in the order in which they are to be mended
+  std::size_t tried = 0;            // readings
+  std::size_t good = 0;             // of them
+  bool complete = true;             // false: it was interrupted
+
+  /// Whether nothing is to be mended.
+  [[nodiscard]] bool healthy() const;
+  /// The first thing to mend; null: nothing is.
+  [[nodiscard]] const Finding* first() const;
+  /// "good: ..." or "first: ...", one line.
+  [[nodiscard]] std::string verdict() const;
+};
+
+struct DoctorChoices {
+  std::size_t readings = 300;
+  Time limit = std::chrono::seconds(3);  // of all these readings
+  Time turning{};                        // how long the shaft is then read while somebody turns it by hand; 0: not
+  std::function<void(const std::string& what)> progress{};  // what is done now
+};
+
+/// "note", "warning", "fault"
+[[nodiscard]] std::string_view name_of(Severity severity);
+/// "only_echo"
+[[nodiscard]] std::string_view id_of(Ailment ailment);
+
+/// Looks from the port up and reads; nothing is ever written to the encoder. `text` and `settings` as those of `open`.
+/// A port that does not open is a finding. Throws UsageError, Cancelled.
+[[nodiscard]] Examination examine(std::string_view text, std::span<const std::string> settings = {},
+                                  const DoctorChoices& choices = {});
+
+}  // namespace absenc::client

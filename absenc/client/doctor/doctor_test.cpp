@@ -1,0 +1,516 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each fault is found and named; healthy encoders give no finding, however their timing falls.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <random>
+#include <set>
+
+#include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/doctor/words.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/core/crc.hpp"
+#include "absenc/os/fake_spi_test.hpp"
+#include "absenc/protocol/all.hpp"
+#include "absenc/sim/sim_port.hpp"
+
+namespace absenc::client {
+
+using namespace std::chrono_literals;
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+namespace {
+
+using ByteList = std::vector<std::uint8_t>;
+
+std::vector<std::string> ids(const Examination& examination) {
+  std::vector<std::string> all;
+  for (const Finding& one : examination.findings) all.emplace_back(one.id);
+  return all;
+}
+
+// ---- Links in virtual time
+
+/// Begins each request a random while later.
+template <class Item>
+class UnevenPort final : public Port<Item> {
+ public:
+  UnevenPort(Port<Item>& port, std::uint64_t seed) : port_(&port), random_(seed) {}
+  Time now() override { return port_->now(); }
+  void begin(const Step<Item>& step) override {
+    Step<Item> later = step;
+    // On SPI and clocked links pauses have a meaning; so they have within a procedure.
+    if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
+      later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
+    }
+    port_->begin(later);
+  }
+  Event<Item> wait(const Step<Item>& step) override { return port_->wait(step); }
+
+ private:
+  Port<Item>* port_;
+  std::mt19937_64 random_;
+};
+
+template <class Item>
+void put_on_line(Link& link, const EncoderAddress& address, Machine<Item>& device, Port<Item>*& port,
+                 std::optional<std::uint64_t> seed) {
+  struct Both {
+    sim::SimPort<Item> line;
+    UnevenPort<Item> uneven;
+    Both(const EncoderAddress& to, Machine<Item>& machine, std::uint64_t number)
+        : line(to.unit->link, to.line.with_some_rate(), machine), uneven(line, number) {}
+  };
+  const auto both = std::make_shared<Both>(address, device, seed.value_or(0));
+  if (seed) {
+    port = &both->uneven;
+  } else {
+    port = &both->line;
+  }
+  link.owner = both;
+}
+
+/// A virtual encoder in virtual time, as its address describes it; `seed`: with random pauses.
+Link virtual_link(const EncoderAddress& address, std::optional<std::uint64_t> seed = {}) {
+  Link link;
+  link.place = "here";
+  link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
+  link.device->power_on(Time{});
+  if (link.device->bytes() != nullptr) {
+    put_on_line(link, address, *link.device->bytes(), link.bytes, seed);
+  } else {
+    put_on_line(link, address, *link.device->frames(), link.frames, seed);
+  }
+  return link;
+}
+
+/// A line on which a request is answered by a function, and on which somebody may talk all the time.
+template <class Item>
+class ScriptedPort final : public Port<Item> {
+ public:
+  using List = std::vector<Item>;
+  std::function<List(const List& request)> answer = [](const List&) { return List{}; };
+  List babble{};  // every millisecond
+  Time after = 100us;
+  Time latency{};
+  bool destroys = false;  // every frame, as a CAN bus on which nobody acknowledges
+
+  Time now() override { return now_; }
+  void begin(const Step<Item>& step) override {
+    now_ = std::max(now_, step.at);
+    if (step.kind != Step<Item>::Kind::transfer) return;
+    quiet_since_ = now_;
+    heard_ = told_ = false;
+    due_.push_back({{.kind = Event<Item>::Kind::sent, .at = now_}, {}});
+    if (destroys) due_.push_back({{.kind = Event<Item>::Kind::line_error, .at = now_ + after}, {}});
+    List reply = answer({step.out.begin(), step.out.end()});
+    if (!reply.empty()) due_.push_back({{.kind = Event<Item>::Kind::received, .at = now_ + after}, std::move(reply)});
+  }
+  Event<Item> wait(const Step<Item>& step) override {
+    const Time timer = step.at > now_ ? step.at : never;
+    const Time limit = heard_ ? step.gap : step.answer;
+    const Time silence = limit > Time{} && !told_ ? std::max(now_, quiet_since_ + limit + latency) : never;
+    const Time event = due_.empty() ? never : due_.front().event.at;
+    const Time noise = babble.empty() ? never : std::max(now_, babble_at_);
+    const Time first = std::min({timer, silence, event, noise});
+    if (first == never) throw std::logic_error("a wait for what can never happen");
+    now_ = std::max(now_, first);
+    if (first == event) {
+      current_ = std::move(due_.front());
+      due_.pop_front();
+      return tell(current_.event, current_.items);
+    }
+    if (first == noise) {
+      babble_at_ = now_ + 1ms;
+      return tell({.kind = Event<Item>::Kind::received, .at = now_}, babble);
+    }
+    if (first == silence) {
+      told_ = true;
+      return {.kind = Event<Item>::Kind::silence, .at = now_};
+    }
+    return {.kind = Event<Item>::Kind::timer, .at = now_};
+  }
+
+ private:
+  struct Due {
+    Event<Item> event;
+    List items;
+  };
+  Event<Item> tell(Event<Item> event, const List& items) {
+    if (event.kind == Event<Item>::Kind::received) {
+      heard_ = true;
+      told_ = false;
+      quiet_since_ = now_;
+      event.items = items;
+    }
+    return event;
+  }
+
+  Time now_{};
+  Time quiet_since_{};
+  Time babble_at_{};
+  bool heard_ = false;
+  bool told_ = false;
+  std::deque<Due> due_;
+  Due current_{};
+};
+
+Link link_to(std::shared_ptr<ScriptedPort<std::uint8_t>> port) {
+  Link link;
+  link.place = "here";
+  link.bytes = port.get();
+  link.owner = std::move(port);
+  return link;
+}
+
+// ---- Examinations
+
+constexpr const char* serial = "tformat:/dev/ttyABSENC";
+
+/// Of a serial encoder; nothing is known of its port.
+Examination examine_with(std::string_view text, const std::function<Link(const EncoderAddress&)>& open,
+                         const os::PortFacts& facts = {}) {
+  const Surroundings surroundings{open, [&](const std::string&) { return facts; }};
+  return examine(parse_address(text), {.readings = 120, .limit = 20s}, surroundings);
+}
+
+/// Of what is answered so.
+Examination examine_line(std::function<ByteList(const ByteList&)> answer, ByteList babble = {},
+                         const os::PortFacts& facts = {}) {
+  return examine_with(
+      serial,
+      [&](const EncoderAddress&) {
+        auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+        port->answer = answer;
+        port->babble = babble;
+        return link_to(std::move(port));
+      },
+      facts);
+}
+
+/// Of a virtual encoder in virtual time.
+Examination examine_sim(std::string_view text) {
+  return examine_with(text, [](const EncoderAddress& address) { return virtual_link(address); });
+}
+
+Link refused(os::Failure::Kind kind, os::Failure::Bus bus = os::Failure::Bus::unknown) {
+  throw os::Failure(kind, "the port is not to be had", bus);
+}
+
+/// To 1A: 17 bits and 16 of turns, both 0, no alarm.
+const ByteList& good_reply() {
+  static const ByteList reply{0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B};
+  return reply;
+}
+
+/// Readings of positions, a millisecond apart.
+Observations positions(const std::function<std::uint64_t(std::size_t)>& place, unsigned bits = 17) {
+  Observations seen;
+  for (std::size_t i = 0; i < 200; ++i) {
+    Attempted one{.heard = true};
+    one.reading = Reading{.singleturn = place(i) & low_mask(bits),
+                          .singleturn_bits = bits,
+                          .singleturn_valid_bits = bits,
+                          .latched = static_cast<std::int64_t>(i) * 1ms};
+    seen.readings.push_back(one);
+  }
+  return seen;
+}
+
+Examination judged(const Observations& seen) {
+  static const EncoderAddress address = parse_address("sim:tformat");
+  return judge(*address.unit, address.options, seen);
+}
+
+// ---- Each fault, and how it comes about
+
+struct Fault {
+  std::string id;
+  std::function<Examination()> examine;
+};
+
+std::vector<Fault> port_faults() {
+  using Kind = os::Failure::Kind;
+  std::vector<Fault> faults;
+  const std::vector<std::pair<std::string, Kind>> kinds{
+      {"port_missing", Kind::not_found},      {"port_forbidden", Kind::no_permission}, {"port_in_use", Kind::in_use},
+      {"port_unsuitable", Kind::unsupported}, {"port_rate", Kind::bad_rate},           {"port_lost", Kind::lost},
+      {"port_failed", Kind::system}};
+  for (const auto& [id, kind] : kinds) {
+    faults.push_back(
+        {id, [kind = kind] { return examine_with(serial, [kind](const EncoderAddress&) { return refused(kind); }); }});
+  }
+  faults.push_back({"port_is_modem", [] {
+                      return examine_line([](const ByteList&) { return ByteList{}; }, {}, {.driver = "option1"});
+                    }});
+  faults.push_back({"latency_timer", [] {
+                      return examine_line([](const ByteList&) { return good_reply(); }, {}, {.latency_timer = 16});
+                    }});
+  faults.push_back({"direction_unswitched", [] {
+                      return examine_line([](const ByteList&) { return ByteList{}; }, {}, {.driver = "serial8250"});
+                    }});
+  using Bus = os::Failure::Bus;
+  faults.push_back({"can_bus_off", [] {
+                      return examine_with("raa38-can:can0",
+                                          [](const EncoderAddress&) { return refused(Kind::lost, Bus::off); });
+                    }});
+  faults.push_back({"can_not_acknowledged", [] {
+                      return examine_with("raa38-can:can0", [](const EncoderAddress&) {
+                        return refused(Kind::lost, Bus::not_acknowledged);
+                      });
+                    }});
+  faults.push_back({"can_errors", [] {
+                      return examine_with("raa38-can:can0", [](const EncoderAddress&) {
+                        const auto port = std::make_shared<ScriptedPort<CanFrame>>();
+                        port->destroys = true;
+                        Link link;
+                        link.frames = port.get();
+                        link.owner = port;
+                        return link;
+                      });
+                    }});
+  return faults;
+}
+
+/// Good at one rate, silent at all others.
+Examination examine_rate(std::string_view text, std::uint32_t rate) {
+  return examine_with(text, [rate](const EncoderAddress& address) {
+    auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+    if (address.line.rate == rate) port->answer = [](const ByteList&) { return good_reply(); };
+    return link_to(std::move(port));
+  });
+}
+
+/// An encoder on SPI that is understood with these settings alone.
+Examination examine_spi(const std::function<bool(const EncoderAddress&)>& understands) {
+  return examine_with("encolink-spi:spi:/dev/spidev0.0", [understands](const EncoderAddress& address) {
+    if (understands(address)) return virtual_link(address);
+    auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+    port->answer = [](const ByteList& out) { return ByteList(std::max<std::size_t>(out.size(), 16), 0xA5); };
+    return link_to(std::move(port));
+  });
+}
+
+std::vector<Fault> line_faults() {
+  std::vector<Fault> faults;
+  faults.push_back({"never_silent", [] {
+                      return examine_line([](const ByteList&) { return ByteList{}; }, {0x55, 0x12});
+                    }});
+  faults.push_back({"line_inverted", [] { return examine_line([](const ByteList&) { return ByteList(9, 0); }); }});
+  faults.push_back({"line_inverted", [] { return examine_line([](const ByteList&) { return ByteList{}; }, {0x00}); }});
+  faults.push_back({"wrong_baud", [] { return examine_rate("tformat:/dev/ttyABSENC?baud=2000000", 2'500'000); }});
+  faults.push_back({"wrong_baud", [] { return examine_rate(serial, 9'600); }});
+  faults.push_back({"wrong_spi_mode",
+                    [] { return examine_spi([](const EncoderAddress& address) { return address.spi.mode == 2; }); }});
+  faults.push_back({"clock_too_fast", [] {
+                      return examine_spi([](const EncoderAddress& address) {
+                        return address.spi.speed.value_or(address.line.rate) <= address.line.rate / 4;
+                      });
+                    }});
+  faults.push_back({"miso_stuck", [] {
+                      return examine_with("encolink-spi:spi:/dev/spidev0.0", [](const EncoderAddress&) {
+                        auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+                        port->answer = [](const ByteList& out) {
+                          return ByteList(std::max<std::size_t>(out.size(), 16), 0xFF);
+                        };
+                        return link_to(std::move(port));
+                      });
+                    }});
+  faults.push_back({"wrong_echo", [] { return examine_sim("sim:tformat?echo=off&fault=echo=1"); }});
+  faults.push_back({"only_echo", [] { return examine_line([](const ByteList& sent) { return sent; }); }});
+  faults.push_back({"modem_answers", [] {
+                      return examine_line([](const ByteList& sent) {
+                        ByteList text = sent;
+                        for (const char letter : std::string_view("\r\nERROR\r\n"))
+                          text.push_back(static_cast<std::uint8_t>(letter));
+                        return text;
+                      });
+                    }});
+  faults.push_back({"no_answer", [] { return examine_line([](const ByteList&) { return ByteList{}; }); }});
+  faults.push_back({"baud_pattern", [] {
+                      return examine_line(
+                          [](const ByteList&) { return ByteList{0xF0, 0xFF, 0x00, 0xC0, 0xFE, 0x80, 0xFF}; });
+                    }});
+  return faults;
+}
+
+/// A moving encoder whose checksum begins at another value.
+ByteList with_other_checksum(unsigned number) {
+  ByteList reply = good_reply();
+  for (std::size_t i = 2; i < 5; ++i) reply[i] = static_cast<std::uint8_t>(number * (37 + 11 * i) + number * number);
+  reply[4] &= 0x01;
+  reply.pop_back();
+  constexpr CrcParameters crc{.width = 8, .poly = 0x97, .init = 0x5A, .refin = false, .refout = false, .xorout = 0};
+  reply.push_back(static_cast<std::uint8_t>(crc_bitwise(crc, reply)));
+  return reply;
+}
+
+std::vector<Fault> frame_faults() {
+  std::vector<Fault> faults;
+  faults.push_back({"two_answer", [] { return examine_sim("sim:tformat?fault=repeat=1"); }});
+  faults.push_back({"same_address", [] {
+                      Observations seen;
+                      seen.clash = "address 3";
+                      seen.readings.push_back({.error = Error::bad_checksum, .raw = {1, 2}, .heard = true});
+                      return judged(seen);
+                    }});
+  faults.push_back({"wrong_settings", [] {
+                      return examine_with(serial, [](const EncoderAddress&) {
+                        return virtual_link(parse_address("sim:tformat?model=23-bit&motion=rpm=600"));
+                      });
+                    }});
+  faults.push_back(
+      {"other_checksum",
+       [] { return examine_line([number = 0u](const ByteList&) mutable { return with_other_checksum(++number); }); }});
+  faults.push_back({"always_damaged", [] {
+                      return examine_line([random = std::mt19937(7)](const ByteList&) mutable {
+                        ByteList reply = good_reply();
+                        for (std::uint8_t& byte : reply) byte = static_cast<std::uint8_t>(random());
+                        return reply;
+                      });
+                    }});
+  faults.push_back({"damaged_bits", [] { return examine_sim("sim:tformat?fault=corrupt=0.1"); }});
+  faults.push_back({"damaged_bursts", [] { return examine_sim("sim:tformat?fault=drop=0.1"); }});
+  faults.push_back({"sometimes_damaged", [] { return examine_sim("sim:tformat?fault=corrupt=0.1&motion=rpm=600"); }});
+  faults.push_back({"sometimes_silent", [] { return examine_sim("sim:tformat?fault=silence=0.2"); }});
+  faults.push_back({"refused", [] {
+                      Observations seen;
+                      for (int i = 0; i < 5; ++i)
+                        seen.readings.push_back({.error = Error::busy, .raw = {1}, .heard = true});
+                      return judged(seen);
+                    }});
+  return faults;
+}
+
+Observations starting() {
+  Observations seen = positions([](std::size_t) { return 5; });
+  for (std::size_t i = 0; i < 20; ++i) seen.readings[i].reading->ready = false;
+  return seen;
+}
+
+std::vector<Fault> other_faults() {
+  std::vector<Fault> faults;
+  faults.push_back({"reply_late", [] { return examine_sim("sim:tformat?fault=delay=1"); }});
+  faults.push_back({"reply_slow", [] {
+                      return examine_with(serial, [](const EncoderAddress&) {
+                        auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+                        port->answer = [](const ByteList&) { return good_reply(); };
+                        port->after = 16ms;
+                        port->latency = 30ms;
+                        return link_to(std::move(port));
+                      });
+                    }});
+  faults.push_back({"starting", [] { return judged(starting()); }});
+  faults.push_back({"alarm", [] { return examine_sim("sim:tformat?alarm=battery_alarm"); }});
+  faults.push_back(
+      {"position_noise",
+       [] { return judged(positions([random = std::mt19937(3)](std::size_t) mutable { return random() % 60; })); }});
+  faults.push_back(
+      {"position_jumps", [] { return judged(positions([](std::size_t i) { return i == 70 ? 60'000u : 100u; })); }});
+  faults.push_back(
+      {"stuck_bits",
+       [] { return judged(positions([](std::size_t i) { return (i * i * 3 + i * 7) & ~std::uint64_t{0x10}; })); }});
+  return faults;
+}
+
+std::vector<Fault> all_faults() {
+  std::vector<Fault> faults;
+  for (const auto& some : {port_faults(), line_faults(), frame_faults(), other_faults()}) {
+    faults.insert(faults.end(), some.begin(), some.end());
+  }
+  return faults;
+}
+
+}  // namespace
+
+TEST(Doctor, EachFaultIsNamedRightAndFirst) {
+  std::set<std::string> named;
+  for (const Fault& fault : all_faults()) {
+    const Examination examination = fault.examine();
+    EXPECT_EQ(ids(examination), std::vector{fault.id}) << examination.verdict();
+    if (!examination.findings.empty()) {
+      const Finding& found = examination.findings.front();
+      EXPECT_THAT(found.sentence(), AllOf(HasSubstr(fault.id + ": "), HasSubstr("Likely: "), HasSubstr("Try: ")));
+      EXPECT_EQ(examination.healthy(), found.severity == Severity::note);
+      if (found.severity != Severity::note)
+        EXPECT_EQ(examination.verdict(), "first: " + fault.id + ": " + found.action);
+    }
+    named.insert(fault.id);
+  }
+  for (std::size_t i = 0; i <= static_cast<std::size_t>(Ailment::stuck_bits); ++i) {
+    EXPECT_TRUE(named.contains(std::string(id_of(static_cast<Ailment>(i))))) << id_of(static_cast<Ailment>(i));
+  }
+}
+
+TEST(Doctor, FindingsSayWhatHelps) {
+  EXPECT_EQ(examine_rate(serial, 9'600).findings.at(0).action, "set baud=9600");
+  EXPECT_THAT(examine_rate(serial, 9'600).findings.at(0).evidence, HasSubstr("5 of 5 with baud=9600"));
+  const Examination other = examine_with(serial, [](const EncoderAddress&) {
+    return virtual_link(parse_address("sim:tformat?model=23-bit&motion=rpm=600"));
+  });
+  EXPECT_EQ(other.findings.at(0).action, "set model=23-bit");
+  const Examination alarm = examine_sim("sim:tformat?alarm=battery_alarm");
+  EXPECT_THAT(alarm.findings.at(0).evidence, HasSubstr("battery_alarm"));
+  EXPECT_THAT(alarm.findings.at(0).action, HasSubstr("replace the battery"));
+  EXPECT_THAT(judged(starting()).findings.at(0).evidence, HasSubstr("20 of 200"));
+  const Examination bits = examine_sim("sim:tformat?fault=corrupt=0.1");
+  EXPECT_THAT(bits.findings.at(0).evidence, HasSubstr("bad_checksum"));
+}
+
+// ---- Health
+
+/// As often as it is said over all units, each with random pauses; every second one turns.
+TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
+  std::mt19937_64 random(16);
+  std::size_t runs = 0;
+  while (runs < 1000) {
+    for (const Unit* unit : all_units()) {
+      if (find_command(*unit, Verb::read) == nullptr) continue;
+      const std::uint64_t seed = random();
+      const std::string motion = seed % 2 == 0 ? "" : "?motion=rpm=" + std::to_string(seed % 997);
+      const EncoderAddress address = parse_address("sim:" + std::string(unit->id) + motion);
+      const Surroundings surroundings{[seed](const EncoderAddress& to) { return virtual_link(to, seed); },
+                                      [](const std::string&) { return os::PortFacts{}; }};
+      const Examination examination = examine(address, {.readings = 60, .limit = 30s}, surroundings);
+      EXPECT_THAT(ids(examination), IsEmpty())
+          << unit->id << motion << " seed " << seed << ": " << examination.verdict();
+      EXPECT_TRUE(examination.healthy());
+      EXPECT_GT(examination.good, 20u) << unit->id;
+      if (++runs % 100 == 0 && testing::Test::HasFailure()) return;
+    }
+  }
+}
+
+/// That stands still has no noise, however it is disturbed by a count.
+TEST(Doctor, AFlickeringLastBitIsNoNoise) {
+  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
+  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());
+  EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
+}
+
+// ---- SPI as the kernel has it
+
+TEST(Doctor, TheModeOfAnSpiControllerIsFoundOnItsWires) {
+  os::testing::FakeSpi kernel;
+  EncoderAddress address = parse_address("encolink-spi:spi:/dev/spidev0.0?spi_mode=0");
+  VirtualDevice device(*address.unit, address.options, {});
+  device.power_on(os::now());
+  LineSettings right = address.line;
+  kernel.connect(address.unit->link, right, *device.bytes());
+  const Surroundings surroundings{[&](const EncoderAddress& to) {
+    const auto port = std::make_shared<os::SpiPort>(to.path, to.unit->link, to.line, to.spi, kernel);
+    Link link;
+    link.bytes = port.get();
+    link.owner = port;
+    return link;
+  }};
+  const Examination wrong = examine(address, {.readings = 20}, surroundings);
+  ASSERT_THAT(ids(wrong), Contains("wrong_spi_mode"));
+  EXPECT_EQ(wrong.findings.at(0).action, "set spi_mode=" + std::to_string(right.spi_mode));
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// An examination whose surroundings are given: a test has its own.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "absenc/client/doctor/observations.hpp"
+#include "absenc/client/way/link.hpp"
+
+namespace absenc::client {
+
+struct Surroundings {
+  std::function<Link(const EncoderAddress& address)> open = open_link;
+  std::function<os::PortFacts(const std::string& path)> facts = [](const std::string& path) {
+    return os::port_facts(path);
+  };
+};
+
+/// As the one of client/doctor.hpp.
+[[nodiscard]] Examination examine(const EncoderAddress& address, const DoctorChoices& choices,
+                                  const Surroundings& surroundings = {});
+
+}  // namespace absenc::client

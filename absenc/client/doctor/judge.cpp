@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "absenc/client/doctor/judges.hpp"
+#include "absenc/client/doctor/words.hpp"
+#include "absenc/client/reading.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+constexpr Time slow = std::chrono::milliseconds(8);  // half a USB adapter's latency timer as it comes
+
+Ailment ailment_of(const Refusal& refusal) {
+  using Kind = os::Failure::Kind;
+  if (refusal.bus == os::Failure::Bus::off) return Ailment::can_bus_off;
+  if (refusal.bus == os::Failure::Bus::not_acknowledged) return Ailment::can_not_acknowledged;
+  switch (refusal.kind) {
+    case Kind::not_found:
+      return Ailment::port_missing;
+    case Kind::no_permission:
+      return Ailment::port_forbidden;
+    case Kind::in_use:
+      return Ailment::port_in_use;
+    case Kind::unsupported:
+      return Ailment::port_unsuitable;
+    case Kind::bad_rate:
+      return Ailment::port_rate;
+    case Kind::lost:
+      return Ailment::port_lost;
+    case Kind::system:
+      break;
+  }
+  return Ailment::port_failed;
+}
+
+std::size_t count(const std::vector<Attempted>& readings, bool (*is)(const Attempted&)) {
+  return static_cast<std::size_t>(std::count_if(readings.begin(), readings.end(), is));
+}
+
+bool was_heard(const Attempted& one) { return one.heard; }
+
+bool all_are(const std::vector<std::uint8_t>& bytes, std::uint8_t value) {
+  return std::all_of(bytes.begin(), bytes.end(), [value](std::uint8_t byte) { return byte == value; });
+}
+
+std::string hex(const std::vector<std::uint8_t>& bytes, std::size_t most) {
+  return to_hex(Bytes(bytes).first(std::min(bytes.size(), most)));
+}
+
+// What an inverted line shows; "": nothing.
+std::string inversion(const Case& one) {
+  const Observations& seen = one.seen;
+  if (seen.damage && seen.damage->breaks > 0) {
+    return fmt::format("the UART counted {} breaks, in which it was low for more than a character",
+                       seen.damage->breaks);
+  }
+  if (!seen.unasked.empty() && all_are(seen.unasked, 0)) {
+    return fmt::format("{} bytes came that nobody asked for, all of them 00", seen.unasked.size());
+  }
+  std::size_t zeros = 0;
+  for (const Attempted& attempt : seen.readings) {
+    const auto& reply = attempt.exchange.reply.bytes;
+    if (!reply.empty() && all_are(reply, 0)) ++zeros;
+  }
+  const std::size_t heard = count(seen.readings, was_heard);
+  if (heard > 0 && zeros == heard) return fmt::format("{} replies came, all of them nothing but 00", zeros);
+  return {};
+}
+
+// The port's silence, of whatever kind of line.
+void judge_silence(const Case& one, std::vector<Finding>& findings) {
+  const Observations& seen = one.seen;
+  if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
+  if (seen.late > 0 || seen.line_errors > 0 || !seen.trials.empty()) return;
+  const bool unswitched = one.unit.link == LinkKind::half_duplex && os::is_bare_uart(seen.facts.driver) &&
+                          !seen.facts.kernel_direction.value_or(false);
+  if (unswitched) {
+    findings.push_back(finding(Ailment::direction_unswitched, {seen.port, seen.facts.driver}));
+  } else {
+    findings.push_back(finding(
+        Ailment::no_answer,
+        {fmt::format("{}", seen.readings.size()), seen.unasked.empty() ? "" : ", though something was heard before"}));
+  }
+}
+
+void judge_lateness(const Case& one, std::vector<Finding>& findings) {
+  const Observations& seen = one.seen;
+  const std::size_t tried = seen.readings.size();
+  // One now and then is a busy computer.
+  if (seen.late == 0 || (one.good > 0 && seen.late * 10 < tried)) return;
+  const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
+  findings.push_back(finding(Ailment::reply_late, {fmt::format("{}", seen.late), fmt::format("{}", tried),
+                                                   to_text(seen.lateness), fmt::format("{}", allowance)}));
+}
+
+void judge_slowness(const Case& one, std::vector<Finding>& findings) {
+  std::vector<Time> excess;
+  Time allowed{};
+  for (const Attempted& attempt : one.seen.readings) {
+    if (attempt.error != Error::none || attempt.allowed == Time{} || attempt.exchange.request.frame().empty()) continue;
+    excess.push_back(attempt.after - attempt.allowed);
+    allowed = attempt.allowed;
+  }
+  if (excess.size() < 10) return;
+  std::sort(excess.begin(), excess.end());
+  const Time fastest = excess[excess.size() / 10];
+  if (fastest > slow) findings.push_back(finding(Ailment::reply_slow, {to_text(fastest), to_text(allowed)}));
+}
+
+}  // namespace
+
+std::string shown(const Attempted& one) {
+  constexpr std::size_t most = 16;
+  if (one.exchange.reply.can) return to_wire_text(LinkKind::can, one.exchange.reply.frame());
+  return hex(one.exchange.reply.bytes, most);
+}
+
+void judge_port(const Case& one, std::vector<Finding>& findings) {
+  const Observations& seen = one.seen;
+  if (os::is_modem_driver(seen.facts.driver)) {
+    findings.push_back(finding(Ailment::port_is_modem, {seen.port, seen.facts.driver}));
+  }
+  if (seen.refusal) findings.push_back(finding(ailment_of(*seen.refusal), {seen.refusal->sentence}));
+  if (const auto timer = seen.facts.latency_timer; timer && *timer > 1) {
+    const std::string terminal = std::filesystem::path(seen.port).filename();
+    findings.push_back(finding(Ailment::latency_timer, {terminal, fmt::format("{}", *timer)}));
+  }
+}
+
+void judge_line(const Case& one, std::vector<Finding>& findings) {
+  const Observations& seen = one.seen;
+  if (seen.line_errors > 0) {
+    findings.push_back(finding(
+        Ailment::can_errors,
+        {fmt::format("{}", seen.line_errors), fmt::format("{}", seen.readings.size()), fmt::format("{}", one.good)}));
+  }
+  for (const Trial& trial : seen.trials) {
+    findings.push_back(finding(
+        trial.ailment, {trial.said, trial.setting, fmt::format("{}", trial.good), fmt::format("{}", trial.tried)}));
+  }
+  const bool characters = one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
+  const bool in_doubt = one.good == 0 && seen.trials.empty() && characters;
+  const std::string inverted = in_doubt ? inversion(one) : "";
+  if (!inverted.empty()) {
+    findings.push_back(finding(Ailment::line_inverted, {inverted}));
+  } else if (seen.never_silent && one.good * 10 < seen.readings.size() * 9 + 1) {
+    findings.push_back(finding(Ailment::never_silent,
+                               {fmt::format("{}", seen.unasked.size()), to_text(seen.listened), hex(seen.unasked, 8)}));
+  }
+  if (findings.empty() || findings.back().ailment != Ailment::line_inverted) judge_silence(one, findings);
+  judge_lateness(one, findings);
+  judge_slowness(one, findings);
+}
+
+void judge_state(const Case& one, std::vector<Finding>& findings) {
+  std::size_t starting = 0;
+  std::size_t read = 0;
+  const Reading* last = nullptr;
+  for (const Attempted& attempt : one.seen.readings) {
+    if (!attempt.reading) continue;
+    ++read;
+    last = &*attempt.reading;
+    starting += last->ready ? 0 : 1;
+  }
+  if (last == nullptr) return;
+  if (starting > 0) {
+    findings.push_back(finding(Ailment::starting, {fmt::format("{}", starting), fmt::format("{}", read),
+                                                   last->ready ? ", and at the end no more" : ""}));
+  }
+  for (const Flags& flags : one.unit.alarms != nullptr ? alarms_of(one.unit, *last) : status_of(one.unit, *last)) {
+    for (std::size_t i = 0; i < flags.field->flags.size(); ++i) {
+      const FlagInfo& flag = flags.field->flags[i];
+      if ((flags.bits >> i & 1) == 0 || flag.name.empty()) continue;
+      const std::string_view action = flag.action.empty() ? "what the encoder's document says of it" : flag.action;
+      findings.push_back(
+          finding(Ailment::alarm, {std::string(flag.name), std::string(flag.meaning), std::string(action)}));
+    }
+  }
+}
+
+Examination judge(const Unit& unit, const Options& options, const Observations& seen) {
+  Examination result{.tried = seen.readings.size(), .complete = seen.complete};
+  result.good = count(seen.readings, [](const Attempted& one) { return one.error == Error::none; });
+  const Case one{unit, options, seen, result.good};
+  judge_port(one, result.findings);
+  judge_line(one, result.findings);
+  // What the line explains is not said again of each frame.
+  const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
+    return found.severity == Severity::fault && found.ailment != Ailment::can_errors;
+  });
+  if (result.good == 0) {
+    if (!explained) judge_bad_frames(one, result.findings);
+  } else {
+    if (!explained) judge_mixed_frames(one, result.findings);
+    judge_state(one, result.findings);
+    judge_position(one, seen.readings, false, result.findings);
+    judge_position(one, seen.turned, true, result.findings);
+  }
+  std::stable_sort(result.findings.begin(), result.findings.end(),
+                   [](const Finding& before, const Finding& after) { return before.ailment < after.ailment; });
+  return result;
+}
+
+}  // namespace absenc::client

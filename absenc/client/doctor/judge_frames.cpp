@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+// What damaged replies look like.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <map>
+#include <optional>
+
+#include "absenc/capture/search/hypotheses.hpp"
+#include "absenc/client/doctor/judges.hpp"
+#include "absenc/client/doctor/words.hpp"
+#include "absenc/client/find_crc.hpp"
+#include "absenc/client/identify/candidate.hpp"
+#include "absenc/client/text/unit_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+using ByteList = std::vector<std::uint8_t>;
+
+bool is_damaged(const Attempted& one) { return one.error != Error::none && one.heard; }
+
+// "bad_checksum, wrong_length"
+std::string errors_of(const std::vector<Attempted>& readings) {
+  std::vector<std::string_view> names;
+  for (const Attempted& one : readings) {
+    const std::string_view name = text_of(one.error).name;
+    if (is_damaged(one) && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+bool is_good(const Case& one, const Frame& request, Bytes reply) {
+  NoFields nowhere;
+  return one.unit.decode(one.options, request, {.bytes = reply}, nowhere) == Error::none;
+}
+
+// ---- None is good
+
+std::vector<const Attempted*> damaged(const Case& one) {
+  std::vector<const Attempted*> all;
+  for (const Attempted& attempt : one.seen.readings) {
+    if (is_damaged(attempt)) all.push_back(&attempt);
+  }
+  return all;
+}
+
+using All = std::vector<const Attempted*>;
+
+// Whether nearly all are: one or two may be noise.
+template <class Is>
+bool most(const All& all, const Is& is) {
+  const auto those = std::count_if(all.begin(), all.end(), [&](const Attempted* one) { return is(*one); });
+  return !all.empty() && static_cast<std::size_t>(those) * 10 >= all.size() * 8;
+}
+
+std::optional<Finding> stuck_data(const Case& one, const All& all) {
+  if (one.unit.link != LinkKind::spi && one.unit.link != LinkKind::clocked) return {};
+  for (const std::uint8_t level : {std::uint8_t{0x00}, std::uint8_t{0xFF}}) {
+    const auto is_level = [level](std::uint8_t byte) { return byte == level; };
+    const bool stuck = most(all, [&](const Attempted& attempt) {
+      return !attempt.raw.empty() && std::all_of(attempt.raw.begin(), attempt.raw.end(), is_level);
+    });
+    if (stuck) return finding(Ailment::miso_stuck, {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
+  }
+  return {};
+}
+
+std::optional<Finding> own_echo(const Case& one, const All& all) {
+  if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
+  const auto echoes = [](const Attempted& attempt) {
+    return !attempt.raw.empty() && attempt.raw == attempt.exchange.request.bytes;
+  };
+  if (!most(all, echoes)) return {};
+  return finding(Ailment::only_echo, {fmt::format("{}", all.size()), to_hex(all.front()->exchange.request.bytes)});
+}
+
+std::optional<Finding> modem(const Case&, const All& all) {
+  std::string text;
+  for (const Attempted* one : all) text.append(one->raw.begin(), one->raw.end());
+  for (const std::string_view word : {"ERROR\r\n", "NO CARRIER", "OK\r\n", "login:"}) {
+    const std::size_t at = text.find(word);
+    if (at == std::string::npos) continue;
+    return finding(Ailment::modem_answers, {fmt::format("\"{}\"", word.substr(0, word.find('\r')))});
+  }
+  return {};
+}
+
+std::optional<Finding> two_frames(const Case& one, const All& all) {
+  if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
+  const auto holds_two = [&](const Attempted& attempt) {
+    const Frame request = attempt.exchange.request.frame();
+    const Bytes bytes = attempt.exchange.reply.bytes;
+    for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
+      if (is_good(one, request, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
+    }
+    return false;
+  };
+  const auto two = static_cast<std::size_t>(
+      std::count_if(all.begin(), all.end(), [&](const Attempted* attempt) { return holds_two(*attempt); }));
+  if (two * 2 < all.size() || two == 0) return {};
+  const auto first =
+      std::find_if(all.begin(), all.end(), [&](const Attempted* attempt) { return holds_two(*attempt); });
+  return finding(Ailment::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
+}
+
+std::optional<Finding> same_address(const Case& one, const All&) {
+  if (one.seen.clash.empty()) return {};
+  return finding(Ailment::same_address, {one.seen.clash});
+}
+
+std::optional<Finding> refusal(const Case&, const All& all) {
+  const auto refuses = [](const Attempted& attempt) {
+    return attempt.error == Error::busy || attempt.error == Error::request_rejected;
+  };
+  if (!most(all, refuses)) return {};
+  const Attempted& last = *all.back();
+  const ErrorText& text = text_of(last.error);
+  return finding(Ailment::refused, {last.detail.empty() ? std::string(text.description) : last.detail,
+                                    last.advice.empty() ? std::string(text.advice) : last.advice});
+}
+
+// The machinery of `identify`, held to this unit and to this encoder of it.
+std::optional<Finding> other_settings(const Case& one, const All& all) {
+  constexpr std::size_t enough = 4;  // frames: fewer prove little
+  if (all.size() < enough) return {};
+  std::vector<capture::HeardExchange> exchanges;
+  for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
+  const std::vector<capture::Hypothesis> found = capture::find_hypotheses(one.unit, {}, exchanges);
+  if (found.empty()) return {};
+  const capture::Hypothesis& best = found.front();
+  const bool mostly = best.evidence.explained * 10 >= best.evidence.tried * 9;
+  if (!mostly || best.evidence.frames > capture::frames_say_enough) return {};
+  const std::vector<std::string> settings = settings_for(one.unit, best.options);
+  if (settings.empty()) return {};
+  return finding(Ailment::wrong_settings, {fmt::format("{}", all.size()), fmt::format("{}", best.evidence.explained),
+                                           fmt::format("{}", fmt::join(settings, ", "))});
+}
+
+std::optional<Finding> other_checksum(const Case&, const All& all) {
+  if (!most(all, [](const Attempted& attempt) { return attempt.error == Error::bad_checksum; })) return {};
+  std::vector<CheckedFrame> frames;
+  for (const Attempted* attempt : all) {
+    const auto& reply = attempt->exchange.reply;
+    if (!reply.bytes.empty()) frames.push_back({reply.bytes, reply.bits});
+  }
+  CheckFindings checks;
+  try {
+    checks = find_crc(frames);
+  } catch (const UsageError&) {  // too few, or of kinds in which no check is looked for
+    return {};
+  }
+  if (checks.checks.empty() || checks.checks.front().chance > 1e-4) return {};
+  const FoundCheck& check = checks.checks.front();
+  const std::string name = check.name != "crc"
+                               ? std::string(check.name)
+                               : fmt::format("a CRC of {} bits with polynomial {:#x} and init {:#x}",
+                                             check.parameters.width, check.parameters.poly, check.parameters.init);
+  return finding(Ailment::other_checksum, {fmt::format("{}", frames.size()), name});
+}
+
+// Bits of a sender that is several times slower than the receiver come out as long runs: no byte changes its level
+// more than once, which those of a frame with a check do.
+std::optional<Finding> stretched(const Case& one, const All& all) {
+  if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
+  if (const auto& damage = one.seen.damage; damage && damage->framing > 0) {
+    return finding(Ailment::baud_pattern,
+                   {fmt::format("the UART counted {} characters without a stop bit", damage->framing)});
+  }
+  ByteList bytes;
+  for (const Attempted* attempt : all) {
+    const auto& reply = attempt->exchange.reply.bytes;
+    bytes.insert(bytes.end(), reply.begin(), reply.end());
+  }
+  const auto is_run = [](std::uint8_t byte) {
+    return std::popcount(static_cast<unsigned>((byte ^ (byte >> 1)) & 0x7F)) <= 1;
+  };
+  std::map<std::uint8_t, int> distinct;
+  for (const std::uint8_t byte : bytes) ++distinct[byte];
+  constexpr std::size_t enough = 16;
+  if (bytes.size() < enough || distinct.size() < 3 || !std::all_of(bytes.begin(), bytes.end(), is_run)) return {};
+  return finding(Ailment::baud_pattern, {fmt::format("long runs of equal bits, such as {}", shown(*all.front()))});
+}
+
+// ---- Some are good
+
+// Which bits differ from what a good reply has at standstill.
+struct Damage {
+  std::size_t first = 0;  // bytes that are touched
+  std::size_t last = 0;
+  std::size_t flips = 0;
+};
+
+std::optional<Damage> compare(const ByteList& reply, const ByteList& good) {
+  if (reply.size() != good.size()) return {};
+  Damage damage{.first = good.size()};
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    const auto flips = static_cast<std::size_t>(std::popcount(static_cast<unsigned>(reply[i] ^ good[i])));
+    if (flips == 0) continue;
+    damage.first = std::min(damage.first, i);
+    damage.last = i;
+    damage.flips += flips;
+  }
+  return damage;
+}
+
+// The reply that nearly all good ones are; empty: the shaft moves, or the frames count.
+ByteList usual_reply(const std::vector<Attempted>& readings) {
+  std::map<ByteList, std::size_t> counts;
+  std::size_t good = 0;
+  for (const Attempted& one : readings) {
+    if (one.error != Error::none || one.exchange.reply.bytes.empty()) continue;
+    ++good;
+    ++counts[one.exchange.reply.bytes];
+  }
+  const auto usual = std::max_element(counts.begin(), counts.end(),
+                                      [](const auto& one, const auto& other) { return one.second < other.second; });
+  const bool is_usual = usual != counts.end() && good >= 8 && usual->second * 10 >= good * 9;
+  return is_usual ? usual->first : ByteList{};
+}
+
+Finding some_damage(const Case& one, const All& all) {
+  std::vector<std::string> values{fmt::format("{}", all.size()), fmt::format("{}", one.seen.readings.size()),
+                                  errors_of(one.seen.readings)};
+  const ByteList usual = usual_reply(one.seen.readings);
+  if (usual.empty()) return finding(Ailment::sometimes_damaged, values);
+  constexpr std::size_t few = 3;  // bits that a disturbance of one bit's length changes, at most
+  std::size_t single = 0;
+  std::size_t compared = 0;
+  Damage sum{.first = usual.size()};
+  for (const Attempted* attempt : all) {
+    const auto damage = compare(attempt->exchange.reply.bytes, usual);
+    if (!damage || damage->flips == 0) continue;
+    ++compared;
+    single += damage->flips <= few ? 1 : 0;
+    sum.first = std::min(sum.first, damage->first);
+    sum.last = std::max(sum.last, damage->last);
+    sum.flips += damage->flips;
+  }
+  const bool bits = single * 2 > all.size();
+  values.push_back(compared == 0 ? "bytes are missing or too many"
+                                 : fmt::format("{} in all, in bytes {} to {} of {}", sum.flips, sum.first + 1,
+                                               sum.last + 1, usual.size()));
+  return finding(bits ? Ailment::damaged_bits : Ailment::damaged_bursts, values);
+}
+
+}  // namespace
+
+void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
+  const All all = damaged(one);
+  if (all.empty()) return;
+  constexpr std::array looks{stuck_data, own_echo,       modem,          two_frames, same_address,
+                             refusal,    other_settings, other_checksum, stretched};
+  for (const auto& look : looks) {
+    if (std::optional<Finding> found = look(one, all)) {
+      findings.push_back(std::move(*found));
+      return;
+    }
+  }
+  findings.push_back(finding(Ailment::always_damaged,
+                             {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
+}
+
+Finding finding_of(const Unit& unit, const Options& options, const Attempted& last, bool usually_good, bool late) {
+  if (late && last.error == Error::timeout) return finding(Ailment::reply_late, {"", "", "", ""});
+  if (usually_good) {
+    return last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
+                      : finding(Ailment::sometimes_silent, {"", ""});
+  }
+  Observations seen;
+  seen.readings.push_back(last);
+  const Examination one = judge(unit, options, seen);
+  return one.findings.empty() ? finding(Ailment::always_damaged, {"", "", ""}) : one.findings.front();
+}
+
+void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
+  const All all = damaged(one);
+  if (std::optional<Finding> two = two_frames(one, all); two && all.size() * 4 > one.seen.readings.size()) {
+    findings.push_back(std::move(*two));
+  } else if (!all.empty()) {
+    findings.push_back(some_damage(one, all));
+  }
+  const auto silent = static_cast<std::size_t>(
+      std::count_if(one.seen.readings.begin(), one.seen.readings.end(),
+                    [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
+  if (silent > one.seen.late + 1) {
+    findings.push_back(
+        finding(Ailment::sometimes_silent, {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
+  }
+}
+
+}  // namespace absenc::client

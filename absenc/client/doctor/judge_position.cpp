@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether positions behave as those of a shaft: quiet at standstill, no faster than it can turn, with every code.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <set>
+
+#include "absenc/client/doctor/judges.hpp"
+#include "absenc/client/doctor/words.hpp"
+#include "absenc/host/speed_limit.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+constexpr double quiet_share = 1e-4;  // of a turn, 0.04 degrees: what stands may go to and fro by so much
+constexpr std::int64_t quiet_counts = 4;
+constexpr std::uint32_t hand_rpm = 600;
+
+/// How the position went from reading to reading.
+struct Walk {
+  unsigned bits = 0;
+  double unit_um = 0;
+  std::vector<std::uint64_t> places{};
+  std::vector<std::int64_t> steps{};
+  std::vector<Time> pauses{};
+  std::int64_t lowest = 0;  // as it goes on past the end of a turn, from the first
+  std::int64_t highest = 0;
+  std::int64_t end = 0;
+
+  [[nodiscard]] std::int64_t span() const { return highest - lowest; }
+};
+
+Walk walk_of(const std::vector<Attempted>& readings) {
+  Walk walk;
+  const Reading* before = nullptr;
+  for (const Attempted& one : readings) {
+    if (!one.reading || !one.reading->singleturn_valid() || one.reading->singleturn_bits > 62) continue;
+    const Reading& now = *one.reading;
+    walk.bits = now.singleturn_bits;
+    walk.unit_um = now.unit_um;
+    walk.places.push_back(now.singleturn);
+    if (before != nullptr) {
+      const std::int64_t step = wrapped_difference(now.singleturn, before->singleturn, walk.bits);
+      walk.steps.push_back(step);
+      walk.pauses.push_back(now.latched - before->latched);
+      walk.end += step;
+      walk.lowest = std::min(walk.lowest, walk.end);
+      walk.highest = std::max(walk.highest, walk.end);
+    }
+    before = &now;
+  }
+  return walk;
+}
+
+std::int64_t quiet(const Walk& walk) {
+  if (walk.unit_um > 0) return quiet_counts * 4;
+  return std::max(quiet_counts, static_cast<std::int64_t>(std::ldexp(quiet_share, static_cast<int>(walk.bits))));
+}
+
+// What turns goes one way, or swings; what stands and is disturbed turns round all the time.
+void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
+  constexpr std::size_t enough = 40;
+  std::size_t turns = 0;
+  std::size_t moved = 0;
+  std::int64_t last = 0;
+  for (const std::int64_t step : walk.steps) {
+    if (step == 0) continue;
+    turns += last != 0 && (step > 0) != (last > 0) ? 1 : 0;
+    last = step;
+    ++moved;
+  }
+  if (walk.steps.size() < enough || walk.span() <= quiet(walk) || moved * 4 < walk.steps.size()) return;
+  // A swing that is slow enough to be seen does not turn round at every third step; one that is wide is no noise.
+  const bool wide = walk.unit_um > 0 ? walk.span() > 1000 : walk.span() > (std::int64_t{1} << walk.bits) / 32;
+  if (turns * 3 < moved || wide) return;
+  const std::string size = walk.unit_um > 0
+                               ? fmt::format("{:.3g} um", micrometres(walk.span(), walk.unit_um))
+                               : fmt::format("{:.3g} degrees", std::ldexp(360.0 * static_cast<double>(walk.span()),
+                                                                          -static_cast<int>(walk.bits)));
+  findings.push_back(finding(Ailment::position_noise, {fmt::format("{}", walk.span()), size}));
+}
+
+// Counts that can be passed in this time; as many as half of them cannot be told from the other way round.
+double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
+  const double seconds = std::chrono::duration<double>(pause).count();
+  const double counts =
+      walk.unit_um > 0 ? limit.mm_s * 1000.0 / walk.unit_um : std::ldexp(limit.rpm / 60.0, static_cast<int>(walk.bits));
+  return 1.25 * counts * seconds + static_cast<double>(quiet(walk));
+}
+
+void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, std::vector<Finding>& findings) {
+  std::size_t jumps = 0;
+  std::int64_t furthest = 0;
+  for (std::size_t i = 0; i < walk.steps.size(); ++i) {
+    const auto way = std::abs(walk.steps[i]);
+    if (walk.pauses[i] <= Time{} || static_cast<double>(way) <= reach(walk, walk.pauses[i], limit)) continue;
+    ++jumps;
+    furthest = std::max(furthest, way);
+  }
+  if (jumps == 0) return;
+  findings.push_back(finding(Ailment::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
+}
+
+// A bit that stays as it is though the position went past several of its changes, at uneven steps: even ones may always
+// come to the same.
+void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
+  constexpr std::size_t enough = 64;
+  constexpr std::size_t uneven = 8;
+  const std::set<std::uint64_t> places(walk.places.begin(), walk.places.end());
+  const std::set<std::int64_t> steps(walk.steps.begin(), walk.steps.end());
+  if (places.size() < enough || steps.size() < uneven) return;
+  std::uint64_t changed = 0;
+  for (const std::uint64_t place : walk.places) changed |= place ^ walk.places.front();
+  std::string names;
+  for (unsigned bit = 0; bit + 3 < walk.bits && walk.span() >> (bit + 3) != 0; ++bit) {
+    if ((changed >> bit & 1) == 0) names += fmt::format("{}{}", names.empty() ? "bit " : ", bit ", bit);
+  }
+  if (names.empty()) return;
+  findings.push_back(finding(Ailment::stuck_bits, {names, fmt::format("{}", walk.span())}));
+}
+
+}  // namespace
+
+void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
+                    std::vector<Finding>& findings) {
+  const Walk walk = walk_of(readings);
+  if (walk.steps.empty()) return;
+  host::SpeedLimit limit = host::speed_limit(one.unit, one.options);
+  if (by_hand) limit.rpm = std::min(limit.rpm, hand_rpm);
+  if (!by_hand) judge_noise(walk, findings);
+  judge_jumps(walk, limit, findings);
+  judge_bits(walk, findings);
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of the judgement: each adds what it finds.
+#pragma once
+
+#include <vector>
+
+#include "absenc/client/doctor/observations.hpp"
+
+namespace absenc::client {
+
+/// What was seen, and how many of its readings were good.
+struct Case {
+  const Unit& unit;
+  const Options& options;
+  const Observations& seen;
+  std::size_t good = 0;
+};
+
+void judge_port(const Case& one, std::vector<Finding>& findings);
+void judge_line(const Case& one, std::vector<Finding>& findings);
+/// Of replies of which none is good.
+void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
+/// Of replies of which some are.
+void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
+void judge_state(const Case& one, std::vector<Finding>& findings);
+void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
+                    std::vector<Finding>& findings);
+
+/// "1A 20 45", the begin of what is long.
+[[nodiscard]] std::string shown(const Attempted& one);
+
+}  // namespace absenc::client

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// What was seen of an encoder and its way, before anybody judges it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absenc/capture/search/evidence.hpp"
+#include "absenc/client/doctor.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/port_facts.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::client {
+
+/// One reading that was tried, once.
+struct Attempted {
+  Error error = Error::none;
+  std::string detail{};               // in the words of the unit
+  std::string advice{};               // of the unit; "": none
+  capture::HeardExchange exchange{};  // the last one, without echo
+  std::vector<std::uint8_t> raw{};    // all bytes that came, echo included
+  bool heard = false;                 // something came
+  Time after{};                       // from the end of the request to the end of the reply
+  Time allowed{};                     // that the protocol and the characters of the reply take at most
+  std::optional<Reading> reading{};
+};
+
+/// A setting that was tried in place of that of the user.
+struct Trial {
+  Ailment ailment{};      // what it is when this one helps
+  std::string said{};     // "baud=115200"
+  std::string setting{};  // "baud=9600"
+  std::size_t good = 0;
+  std::size_t tried = 0;
+};
+
+/// Why the port did not open, or went away.
+struct Refusal {
+  os::Failure::Kind kind{};
+  std::string sentence{};
+  os::Failure::Bus bus = os::Failure::Bus::unknown;
+};
+
+struct Observations {
+  std::string port{};  // its path, where it is a serial one
+  os::PortFacts facts{};
+  std::optional<os::LineCounts> damage{};  // that the UART counted meanwhile
+  std::optional<Refusal> refusal{};
+  std::vector<std::uint8_t> unasked{};  // before anything was sent
+  Time listened{};
+  bool never_silent = false;  // meanwhile
+  std::vector<Attempted> readings{};
+  std::vector<Attempted> turned{};  // while somebody turned the shaft by hand
+  std::uint64_t line_errors = 0;    // of a CAN bus
+  std::uint64_t late = 0;           // replies that came after their limit
+  Time lateness{};                  // of the latest
+  std::vector<Trial> trials{};
+  std::string clash{};  // "address 3": whatever answers there is damaged every time
+  bool complete = true;
+};
+
+/// What is wrong, in the order of `Ailment`.
+[[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);
+
+/// Of one reading that failed, at once: what is most likely behind it. `usually_good`: others mostly do not fail;
+/// `late`: replies came after their limit. Its evidence may be incomplete.
+[[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, const Attempted& last, bool usually_good,
+                                 bool late);
+
+}  // namespace absenc::client

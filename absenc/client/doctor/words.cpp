@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/doctor/words.hpp"
+
+#include <fmt/args.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+namespace absenc::client {
+
+namespace {
+
+struct Words {
+  Ailment ailment;
+  std::string_view id;
+  Severity severity;
+  std::string_view evidence;
+  std::string_view cause;
+  std::string_view action;
+};
+
+using enum Severity;
+
+// {0}, {1} ... are what was seen, as whoever finds it hands it out.
+constexpr auto table = std::to_array<Words>({
+    // {0}: what the system said, and what it proposes
+    {Ailment::port_missing, "port_missing", fault, "{0}", "the adapter is not plugged in, or the name is another one",
+     "plug it in, or correct the name; `ls /dev/serial/by-id` shows adapters by their own names"},
+    {Ailment::port_forbidden, "port_forbidden", fault, "{0}", "the user is not in the group that owns the port",
+     "join the group of the port, as in `sudo usermod -aG dialout $USER`, and log in again"},
+    {Ailment::port_in_use, "port_in_use", fault, "{0}",
+     "another program has it open, and both would take each other's bytes",
+     "end that program; ModemManager lets go of a port with `sudo systemctl stop ModemManager`"},
+    {Ailment::port_unsuitable, "port_unsuitable", fault, "{0}", "it is not what this encoder is connected to",
+     "name the port of the adapter; `ls /dev/serial/by-id` shows those that there are"},
+    {Ailment::port_is_modem, "port_is_modem", fault, "the driver of {0} is {1}, which is that of a mobile modem",
+     "the modem's port was taken for that of the adapter", "name the port of the adapter: `ls /dev/serial/by-id`"},
+    {Ailment::port_rate, "port_rate", fault, "{0}", "the adapter's clock has no divisor near this baud rate",
+     "use an adapter that reaches the rate"},
+    {Ailment::port_lost, "port_lost", fault, "{0}", "the cable or the supply of the adapter has a loose contact",
+     "plug it in again, at another port of the computer and without a hub between"},
+    {Ailment::port_failed, "port_failed", fault, "{0}", "the system refused", "follow what it says"},
+    {Ailment::latency_timer, "latency_timer", warning, "the latency timer of {0} is {1} ms",
+     "the USB adapter holds back what it has received for so long, which limits the readings a second",
+     "echo 1 | sudo tee /sys/class/tty/{0}/device/latency_timer"},
+    {Ailment::direction_unswitched, "direction_unswitched", fault,
+     "nothing came back, and {0} is a UART of the computer (driver {1}) whose kernel switches no direction",
+     "nobody switches the RS-485 transceiver to sending, or never back to receiving",
+     "use a driver or device tree that switches RTS (rs485=on), or an adapter that switches by itself"},
+
+    {Ailment::can_bus_off, "can_bus_off", fault, "{0}", "the controller's own frames were destroyed again and again",
+     "check the bit rate, CANH and CANL and 120 ohms at both ends, then bring the interface up again"},
+    {Ailment::can_not_acknowledged, "can_not_acknowledged", fault, "{0}",
+     "no other node is on the bus that hears with this bit rate",
+     "check the encoder's supply, CANH and CANL, 120 ohms at both ends, and the bit rate"},
+    {Ailment::can_errors, "can_errors", fault,
+     "{0} frames were destroyed or refused on the bus while {1} readings were tried, {2} with success",
+     "nobody acknowledges, or nodes have different bit rates",
+     "check the encoder's supply, CANH and CANL, 120 ohms at both ends, and the bit rate"},
+
+    {Ailment::never_silent, "never_silent", fault,
+     "{0} bytes came in {1} before anything was asked, without a pause, such as {2}",
+     "another host or an encoder that sends by itself has the line, or the line is open and picks up noise",
+     "disconnect what else sends; set the mode in which it sends by itself; bias the idle line"},
+    {Ailment::line_inverted, "line_inverted", fault, "the idle line is low: {0}",
+     "A and B (or the two wires of a pair) are exchanged, so that every level is inverted",
+     "exchange A and B at one end: makers disagree on the names"},
+    {Ailment::wrong_baud, "wrong_baud", fault, "no good reply with {0}, but {2} of {3} with {1}",
+     "the encoder has another rate than was said", "set {1}"},
+    {Ailment::wrong_spi_mode, "wrong_spi_mode", fault, "no good reply with {0}, but {2} of {3} with {1}",
+     "bits are taken at the wrong edge of the clock", "set {1}"},
+    {Ailment::clock_too_fast, "clock_too_fast", fault, "no good reply with {0}, but {2} of {3} with {1}",
+     "the cable or the encoder is too slow for this clock", "set {1}, or shorten the cable"},
+    {Ailment::miso_stuck, "miso_stuck", fault, "in {0} transfers every bit from the encoder was {1}",
+     "nobody drives the data line: no supply, not selected, a wire that is broken or shorted",
+     "check the supply, MISO (of clocked encoders DATA), the chip select and which wires are a pair"},
+    {Ailment::wrong_echo, "wrong_echo", fault, "no good reply with {0}, but {2} of {3} with {1}",
+     "the adapter sends back what is sent otherwise than was said", "set {1}"},
+    {Ailment::only_echo, "only_echo", fault, "{0} times only the request itself came back: {1}",
+     "the adapter hears itself, but no encoder answers",
+     "check the encoder's supply and ground, exchange A and B, and check address and baud rate"},
+    {Ailment::modem_answers, "modem_answers", fault, "what came back is text of a modem: {0}",
+     "a modem or a console is behind this port, no encoder", "name the port of the adapter: `ls /dev/serial/by-id`"},
+    {Ailment::no_answer, "no_answer", fault, "nothing came back to {0} requests{1}",
+     "no supply, exchanged wires, another address or rate, or an adapter that does not send",
+     "check the encoder's supply and ground, A and B (or TX and RX), the address and the rate; `absenc identify` asks "
+     "in "
+     "every protocol"},
+    {Ailment::baud_pattern, "baud_pattern", fault, "what came looks like bits at another rate: {0}",
+     "the sender is many times slower or faster than the port is set", "set the rate of the encoder with baud=RATE"},
+
+    {Ailment::two_answer, "two_answer", fault, "{0} of {1} replies held more than one frame, such as {2}",
+     "two encoders answer one after the other", "give each an address of its own, or disconnect one"},
+    {Ailment::same_address, "same_address", fault,
+     "every reply is damaged, and a scan finds that what answers at {0} is so each time",
+     "two encoders have one address and speak at the same time",
+     "disconnect one and give the other an address of its own"},
+    {Ailment::wrong_settings, "wrong_settings", fault, "none of {0} replies is good as it was said, but {1} with {2}",
+     "the encoder is another model, or set up otherwise", "set {2}"},
+    {Ailment::other_checksum, "other_checksum", fault, "the checksum of {0} replies is wrong, but {1} explains all",
+     "it speaks a variant of the protocol", "look for the document of this variant; `absenc crc find` tells more"},
+    {Ailment::always_damaged, "always_damaged", fault, "none of {0} replies is good: {1}, such as {2}",
+     "another protocol, a model or rate that is not the encoder's, or two that answer at once",
+     "check protocol, model and rate; `absenc identify` asks in every protocol"},
+    {Ailment::damaged_bits, "damaged_bits", warning, "{0} of {1} replies are damaged ({2}): single bits, {3}",
+     "reflections or noise on the edges of the signal",
+     "120 ohms at both ends of the line and nowhere else, twisted and shielded pairs, a common ground"},
+    {Ailment::damaged_bursts, "damaged_bursts", warning, "{0} of {1} replies are damaged ({2}): many bits at once, {3}",
+     "something nearby that switches, as a motor's bridge, a loose contact, or bytes that got lost",
+     "keep the cable away from the motor's, ground its shield, check the plugs"},
+    {Ailment::sometimes_damaged, "sometimes_damaged", warning, "{0} of {1} replies are damaged ({2})",
+     "noise, reflections or a loose contact",
+     "check termination, shielding and plugs; look again at standstill to hear which bits"},
+    {Ailment::sometimes_silent, "sometimes_silent", warning, "{0} of {1} requests were not answered",
+     "the request does not always arrive, or a contact is loose",
+     "check plugs, supply and termination; a busy computer needs latency=MS behind the encoder"},
+    {Ailment::refused, "refused", fault, "the encoder refuses to be read: {0}", "its state does not allow it", "{1}"},
+
+    {Ailment::reply_late, "reply_late", fault,
+     "{0} of {1} replies came later than their limit, up to {2} after the request",
+     "something on the way holds replies up: a network, a latency timer, a busy computer",
+     "allow the way so long with latency={3} behind the encoder, or find what holds them up"},
+    {Ailment::reply_slow, "reply_slow", note,
+     "even the fastest replies take {0} longer than the {1} that the protocol allows",
+     "the way to the line holds them up: a network, a hub, the latency timer of an adapter",
+     "for more readings a second connect the adapter without what is between"},
+
+    {Ailment::starting, "starting", warning, "the encoder said in {0} of {1} readings that it is still starting{2}",
+     "it was switched on just now, or its supply is too weak to come up", "wait, then look again; measure the supply"},
+    // The words of the encoder's document
+    {Ailment::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
+
+    {Ailment::position_noise, "position_noise", warning,
+     "at standstill the position goes to and fro by {0} counts ({1})",
+     "the magnet or scale is too far or off centre, or the supply is noisy",
+     "check air gap and centring, the supply at the encoder, and that nothing vibrates"},
+    {Ailment::position_jumps, "position_jumps", fault,
+     "{0} times the position went further than a shaft can turn, by up to {1} counts",
+     "a damaged track or magnet, or a fault of the encoder", "turn it slowly past the place; replace the encoder"},
+    {Ailment::stuck_bits, "stuck_bits", fault, "of the position {0} never changed while it went {1} counts",
+     "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
+});
+
+constexpr bool is_in_order() {
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    if (table[i].ailment != static_cast<Ailment>(i)) return false;
+  }
+  return true;
+}
+static_assert(is_in_order() && table.size() == static_cast<std::size_t>(Ailment::stuck_bits) + 1);
+
+const Words& words_of(Ailment ailment) { return table[static_cast<std::size_t>(ailment)]; }
+
+// As the start of a sentence whose end is added by whoever shows it.
+std::string filled(std::string_view text, const std::vector<std::string>& values) {
+  fmt::dynamic_format_arg_store<fmt::format_context> arguments;
+  for (const std::string& value : values) arguments.push_back(value);
+  return fmt::vformat(text, arguments);
+}
+
+}  // namespace
+
+std::string_view id_of(Ailment ailment) { return words_of(ailment).id; }
+
+std::string_view name_of(Severity severity) {
+  constexpr std::array<std::string_view, 3> names{"note", "warning", "fault"};
+  return names[static_cast<std::size_t>(severity)];
+}
+
+Finding finding(Ailment ailment, const std::vector<std::string>& values) {
+  const Words& words = words_of(ailment);
+  return {ailment,
+          words.id,
+          words.severity,
+          filled(words.evidence, values),
+          filled(words.cause, values),
+          filled(words.action, values)};
+}
+
+std::string Finding::sentence() const {
+  return fmt::format("{}: {}. Likely: {}. Try: {}", id, evidence, cause, action);
+}
+
+const Finding* Examination::first() const {
+  const auto worst = std::max_element(findings.begin(), findings.end(), [](const Finding& one, const Finding& other) {
+    return one.severity < other.severity;
+  });
+  return worst == findings.end() || worst->severity == note ? nullptr : &*worst;
+}
+
+bool Examination::healthy() const { return complete && first() == nullptr; }
+
+std::string Examination::verdict() const {
+  if (const Finding* one = first()) return fmt::format("first: {}: {}", one->id, one->action);
+  if (!complete) return "interrupted: nothing was found until then";
+  return fmt::format("good: {} of {} readings, nothing to mend", good, tried);
+}
+
+}  // namespace absenc::client

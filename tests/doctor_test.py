@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc doctor`: each fault on a pseudo-terminal or in the system is named, and what healthy encoders give."""
+import fcntl
+import json
+import os
+import random
+import select
+import subprocess
+import sys
+import unittest
+
+from command_support import ABSENC, BabblingLine, Emulator, EncoderCase, FakeEncoder, FakeLine, absenc, json_lines
+
+PATIENT = "latency=300"  # for a machine that is busy with other tests
+
+
+# To 1A: 17 bits and 16 of turns, both 0, no alarm.
+GOOD_REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
+
+
+def doctor(*arguments, **settings):
+    result = absenc("doctor", *arguments, "--json", **settings)
+    return result, json.loads(result.stdout) if result.stdout else None
+
+
+def ids(found):
+    return [finding["id"] for finding in found["findings"]]
+
+
+class TurnedRate(FakeLine):
+    """Answers well at one rate of the port, and at others with what garbles its frames."""
+
+    def __init__(self, rate, reply):
+        super().__init__()
+        self.rate = rate
+        self.reply = reply
+
+    def rate_of_port(self):
+        """From struct termios2, which alone has rates of any number."""
+        tcgets2 = 0x802C542A
+        state = fcntl.ioctl(self.slave, tcgets2, bytes(44))
+        return int.from_bytes(state[40:44], sys.byteorder)
+
+    def serve(self):
+        noise = random.Random(5)
+        while True:
+            ready, _, _ = select.select([self.master, self.wake], [], [])
+            if self.wake in ready:
+                return
+            os.read(self.master, 64)
+            at_rate = self.rate_of_port() == self.rate
+            os.write(self.master, self.reply if at_rate else bytes(noise.randrange(256) for _ in self.reply))
+
+
+class Named(EncoderCase):
+    def assert_found(self, address, *wanted, status=1):
+        result, found = doctor(address)
+        self.assertEqual(result.returncode, status, f"{result.stdout}{result.stderr}")
+        self.assertEqual(ids(found), list(wanted), result.stdout)
+        for finding in found["findings"]:
+            for part in ("evidence", "cause", "action", "severity"):
+                self.assertTrue(finding[part])
+        return found
+
+    def test_a_healthy_encoder_is_good(self):
+        emulator = self.emulator()
+        found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", status=0)
+        self.assertTrue(found["ok"])
+        self.assertRegex(found["verdict"], "^good: ")
+        text = absenc("doctor", f"tformat:{emulator.path}?{PATIENT}")
+        self.assert_good(text)
+        self.assertRegex(text.stdout.splitlines()[-1], r"^good: \d+ of \d+ readings")
+
+    def test_a_healthy_encoder_of_every_unit_gives_no_finding(self):
+        units = {unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout)}
+        for unit in sorted(units):
+            with self.subTest(unit):
+                self.assert_found(f"sim:{unit}", status=0)
+
+    def test_the_last_line_is_the_first_thing_to_mend(self):
+        result = absenc("doctor", "sim:tformat?fault=corrupt=0.3&alarm=battery_alarm")
+        self.assertEqual(result.returncode, 1)
+        lines = result.stdout.splitlines()
+        self.assertRegex(lines[0], "^warning: damaged_bits: ")
+        self.assertRegex(lines[-1], "^first: damaged_bits: ")
+        self.assertIn("warning: alarm: the encoder reports battery_alarm", result.stdout)
+
+    def test_a_port_that_is_not_there(self):
+        self.assert_found(f"tformat:{self.file('nothing')}", "port_missing")
+
+    def test_a_file_is_no_port(self):
+        self.assert_found(f"tformat:{self.file('text', 'hello')}", "port_unsuitable")
+
+    def test_a_port_that_another_program_has(self):
+        line = FakeEncoder()
+        with line:
+            holder = subprocess.Popen(
+                [sys.executable, "-c", "import fcntl,os,sys\nfd=os.open(sys.argv[1], os.O_RDWR|os.O_NOCTTY)\n"
+                 "fcntl.flock(fd, fcntl.LOCK_EX)\nprint('held', flush=True)\nsys.stdin.read()", line.path],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            try:
+                self.assertEqual(holder.stdout.readline(), b"held\n")
+                found = self.assert_found(f"tformat:{line.path}", "port_in_use")
+                self.assertIn(str(holder.pid), found["findings"][0]["evidence"])
+            finally:
+                holder.communicate()
+
+    def test_a_port_without_permission(self):
+        line = FakeEncoder()
+        with line:
+            os.chmod(line.path, 0o000)
+            if os.geteuid() != 0:
+                self.assert_found(f"tformat:{line.path}", "port_forbidden")
+                return
+            setpriv = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
+            command = [ABSENC, "doctor", f"tformat:{line.path}", "--json"]
+            # What others may not reach, they cannot run.
+            probe = subprocess.run([*setpriv, ABSENC, "list"], capture_output=True, check=False)
+            if probe.returncode != 0:
+                self.skipTest("another user cannot run the command here")
+            result = subprocess.run([*setpriv, *command], capture_output=True, text=True, check=False)
+            self.assertEqual(ids(json.loads(result.stdout)), ["port_forbidden"], result.stderr)
+
+    def test_only_the_own_echo(self):
+        class Echo(FakeEncoder):
+            def answer(self, request):
+                return request
+
+        with Echo() as line:
+            found = self.assert_found(f"tformat:{line.path}", "only_echo")
+            self.assertIn("1A", found["findings"][0]["evidence"])
+
+    def test_a_modem(self):
+        class Modem(FakeEncoder):
+            def answer(self, request):
+                return request + b"\r\nERROR\r\n"
+
+        with Modem() as line:
+            self.assert_found(f"tformat:{line.path}", "modem_answers")
+
+    def test_nobody(self):
+        with FakeEncoder() as line:
+            self.assert_found(f"tformat:{line.path}", "no_answer")
+
+    def test_an_inverted_line(self):
+        class Inverted(FakeEncoder):
+            def answer(self, request):
+                return bytes(9)
+
+        with Inverted() as line:
+            self.assert_found(f"tformat:{line.path}", "line_inverted")
+
+    def test_a_line_that_is_never_silent(self):
+        with BabblingLine(period=0.002, pieces=(b"\x55\x12",)) as line:
+            self.assert_found(f"tformat:{line.path}", "never_silent")
+
+    def test_another_rate(self):
+        for said, rate in ((2_000_000, 2_500_000), (2_500_000, 9_600)):
+            with self.subTest(rate=rate), TurnedRate(rate, GOOD_REPLY) as line:
+                found = self.assert_found(f"tformat:{line.path}?baud={said}&{PATIENT}", "wrong_baud")
+                self.assertEqual(found["findings"][0]["action"], f"set baud={rate}")
+
+    def test_another_model(self):
+        emulator = self.emulator("--model", "23-bit", "--motion", "rpm=60")
+        found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", "wrong_settings")
+        self.assertEqual(found["findings"][0]["action"], "set model=23-bit")
+
+    def test_two_encoders_with_one_address(self):
+        with Emulator(self.directory, "--option", "address=3", "--also", "address=3&singleturn=1234567",
+                      protocol="esl", name="both") as both:
+            found = self.assert_found(f"esl:{both.path}?address=3&latency=50", "same_address")
+            self.assertIn("3", found["findings"][0]["evidence"])
+
+    def test_a_flat_battery_in_the_words_of_the_document(self):
+        emulator = self.emulator("--alarm", "battery_alarm")
+        found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", "alarm")
+        self.assertIn("replace the battery", found["findings"][0]["action"])
+
+    def test_replies_that_come_late(self):
+        result, found = doctor("sim:tformat?fault=delay=1")
+        self.assertEqual(result.returncode, 1)
+        self.assertEqual(ids(found), ["reply_late"])
+
+    def test_nothing_is_written(self):
+        """Every byte sent is that of a command that reads."""
+        requests = set()
+
+        class Listening(FakeEncoder):
+            def answer(self, request):
+                requests.add(request)
+                return b""
+
+        with Listening() as line:
+            doctor(f"tformat:{line.path}")
+        self.assertTrue(requests)
+        self.assertEqual(set(b"".join(requests)), {0x1A})
+
+    def test_wrong_usage(self):
+        self.assert_wrong_usage(absenc("doctor", "tfromat:/dev/null"), "tformat")
+        self.assert_wrong_usage(absenc("doctor", "sim:tformat", "--readings", "no"), "--readings")
+
+
+class InOneLine(EncoderCase):
+    """`read` and `monitor` name the same finding, and who says more."""
+
+    def test_read_and_monitor(self):
+        class Echo(FakeEncoder):
+            def answer(self, request):
+                return request
+
+        with Echo() as line:
+            result = absenc("read", f"tformat:{line.path}")
+            self.assertEqual(result.returncode, 1)
+            lines = [text for text in result.stderr.splitlines() if "absenc doctor" in text]
+            self.assertEqual(len(lines), 1, result.stderr)
+            self.assertIn("only_echo: ", lines[0])
+            self.assertIn(f"`absenc doctor tformat:{line.path}`", lines[0])
+            seen = absenc("monitor", f"tformat:{line.path}", "--for", "0.5")
+            self.assertIn("only_echo: ", seen.stderr)
+            self.assertIn("absenc doctor", seen.stderr)
+
+    def test_what_is_no_reading_names_no_finding(self):
+        result = absenc("read", "sim:tformat")
+        self.assert_good(result)
+        self.assertNotIn("doctor", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+#include <string>
+
+#include "absenc/client/doctor/examine.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/json.hpp"
+#include "tools/absenc/text/output.hpp"
+#include "tools/absenc/text/progress.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+Json examination_json(const Examination& examination) {
+  Json findings = Json::array();
+  for (const Finding& one : examination.findings) {
+    findings.append(Json::object()
+                        .set("id", one.id)
+                        .set("severity", name_of(one.severity))
+                        .set("evidence", one.evidence)
+                        .set("cause", one.cause)
+                        .set("action", one.action));
+  }
+  Json json = Json::object().set("ok", examination.healthy()).set("findings", findings);
+  json.set("readings", examination.tried).set("good", examination.good).set("complete", examination.complete);
+  return json.set("verdict", examination.verdict());
+}
+
+std::string finding_text(const Finding& one) {
+  return fmt::format("{}: {}: {}\n  Likely: {}\n  Try: {}\n", name_of(one.severity), one.id, one.evidence, one.cause,
+                     one.action);
+}
+
+int run_doctor(const Invocation& invocation) {
+  os::catch_interrupts();
+  const EncoderAddress address = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const auto seconds = [&](std::string_view name, double fallback, double least) {
+    const std::chrono::duration<double> time(invocation.real(name, fallback, least, 3600));
+    return std::chrono::duration_cast<Time>(time);
+  };
+  Progress progress;
+  DoctorChoices choices;
+  choices.readings = static_cast<std::size_t>(invocation.number("--readings", 300, 10, 1'000'000));
+  choices.limit = seconds("--for", 3, 0.1);
+  choices.turning = seconds("--turn", 0, 0);
+  choices.progress = [&](const std::string& what) { progress.show(what); };
+  const Examination examination = examine(address, choices);
+  progress.clear();
+  if (invocation.has("--json")) {
+    print_line(examination_json(examination).line());
+  } else {
+    std::string text;
+    for (const Finding& one : examination.findings) text += finding_text(one);
+    print_line(text + examination.verdict());
+  }
+  return examination.healthy() ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 6> doctor_parameters{{
+    parameter::encoder,
+    {"--readings", "N", "how many readings are looked at", "300"},
+    {"--for", "SECONDS", "how long they may take", "3"},
+    {"--turn", "SECONDS", "then look on while you turn the shaft by hand: jumps, codes that are missing", "0"},
+    parameter::json,
+    parameter::option,
+}};
+
+constexpr std::array<Example, 3> doctor_examples{{
+    {"absenc doctor tformat:/dev/ttyUSB0", "what is wrong with it, or with the way to it"},
+    {"absenc doctor tformat:/dev/ttyUSB0 --turn 10", "also while the shaft is turned by hand"},
+    {"absenc doctor \"sim:tformat?fault=corrupt=0.1\" --json", "a virtual encoder on a bad line, for programs"},
+}};
+
+}  // namespace
+
+const Subcommand doctor_subcommand{
+    "doctor",
+    "say what is wrong with an encoder, or with the way to it, and what to do",
+    "Looks from the port up: whether it is there, may be opened and is nobody else's; whether the line is\n"
+    "silent until it is asked; whether anything answers, and if not, at another rate, SPI mode or clock;\n"
+    "what damaged replies look like; what the encoder reports; whether the position is quiet and goes no\n"
+    "faster than a shaft can. Each finding has what was seen, what is likely behind it and what to do.\n"
+    "The last line says good, or the first thing to mend. Nothing is ever written to the encoder.\n"
+    "Exit status 1 when something is to be mended.",
+    doctor_parameters,
+    doctor_examples,
+    run_doctor};
+
+}  // namespace absenc::tool
