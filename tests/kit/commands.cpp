@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "tests/kit/kit.hpp"
-#include "tests/kit/place.hpp"
+#include "absenc/sim/place.hpp"
 #include "tests/kit/world.hpp"
 
 namespace absenc::kit {
@@ -42,7 +42,7 @@ void run_commands(const Unit& unit, const Configuration& way, Findings& findings
       findings.require(command.verb != Verb::scan || !result.seen.numbers(Role::encoder).empty(),
                        [&] { return what() + "does not say who answered"; });
       if (result.seen.reading) {
-        findings.require(is_at(*result.seen.reading, world.place()),
+        findings.require(sim::is_at(*result.seen.reading, world.place()),
                          [&] { return what() + "another position than the shaft's"; });
       } else {
         findings.require(command.verb != Verb::read, [&] { return what() + "has no reading"; });

@@ -5,9 +5,9 @@
 #include <stdexcept>
 
 #include "absenc/sim/bench_test.hpp"
+#include "absenc/sim/place.hpp"
 #include "tests/kit/changes.hpp"
 #include "tests/kit/kit.hpp"
-#include "tests/kit/place.hpp"
 #include "tests/kit/weight.hpp"
 #include "tests/kit/world.hpp"
 
@@ -139,7 +139,7 @@ class Campaign {
       const Ended result = world_.run(*asked.command, asked.arguments);
       if (!result.good()) return false;
       if (result.seen.reading) {
-        findings_.require(is_at(*result.seen.reading, places_[place]),
+        findings_.require(sim::is_at(*result.seen.reading, places_[place]),
                           [&] { return where(asked) + "another position than the shaft's, on a good line"; });
       }
       asked.cost = std::max(asked.cost, result.asked);
@@ -255,7 +255,7 @@ class Campaign {
     const Seen& truth = *asked.truth[place_];
     const Seen& seen = result.seen;
     if (seen.reading.has_value() != truth.reading.has_value()) return {"has another reading"};
-    if (seen.reading && !is_at(*seen.reading, places_[place_])) return {"another position than the shaft's", true};
+    if (seen.reading && !sim::is_at(*seen.reading, places_[place_])) return {"another position than the shaft's", true};
     for (const auto& [name, value] : truth.fields) {
       if (std::find(asked.varying.begin(), asked.varying.end(), name) != asked.varying.end()) continue;
       const auto found = seen.fields.find(name);

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "tests/kit/kit.hpp"
-#include "tests/kit/place.hpp"
+#include "absenc/sim/place.hpp"
 #include "tests/kit/world.hpp"
 
 namespace absenc::kit {

@@ -7,7 +7,7 @@
 
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/make.hpp"
-#include "tests/kit/place.hpp"
+#include "absenc/sim/place.hpp"
 
 namespace absenc::kit::toy {
 
@@ -150,7 +150,7 @@ struct Toy {
     void feed(const Event<std::uint8_t>& event) override {
       using Kind = Event<std::uint8_t>::Kind;
       if (event.kind == Kind::received && event.items[0] == ask) {
-        const auto now = static_cast<unsigned>(counts_at(shaft_.at(event.at).position, bits));
+        const auto now = static_cast<unsigned>(sim::counts_at(shaft_.at(event.at).position, bits));
         said_ = mistake == Mistake::is_stale ? before_ : now + off_ + (mistake == Mistake::is_wrong ? 1 : 0);
         before_ = now;
         at_ = event.at + std::chrono::microseconds(3);

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "tests/kit/place.hpp"
+#include "absenc/sim/place.hpp"
 
 namespace absenc::kit {
 namespace {
@@ -50,7 +50,7 @@ struct Judge {
   void judge(const Held& frame, Wrong& wrong) const {
     Seen seen;
     if (unit.decode(options, request.frame(), frame.frame(), seen) != Error::none) return;
-    const bool elsewhere = !same_place(seen.reading, right.reading);
+    const bool elsewhere = !sim::same_place(seen.reading, right.reading);
     wrong.position = wrong.position || elsewhere;
     wrong.others = wrong.others || (!elsewhere && seen.fields != right.fields);
   }

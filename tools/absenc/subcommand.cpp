@@ -24,7 +24,7 @@ std::span<const Subcommand* const> all_subcommands() {
       &scan_subcommand,         &emulate_subcommand,     &decode_subcommand,
       &encode_subcommand,       &wave_subcommand,        &probe_subcommand,
       &identify_subcommand,     &doctor_subcommand,      &crc_find_subcommand,
-      &vectors_subcommand,      &bench_subcommand,
+      &vectors_subcommand,      &campaign_subcommand,    &bench_subcommand,
   };
   return all;
 }

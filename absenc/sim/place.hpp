@@ -7,7 +7,7 @@
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
 
-namespace absenc::kit {
+namespace absenc::sim {
 
 /// Counts of a turn; a linear encoder goes along its whole scale in one revolution.
 [[nodiscard]] constexpr std::uint64_t counts_at(std::int64_t position, unsigned bits) {
@@ -39,4 +39,4 @@ namespace absenc::kit {
   return !one->multiturn_valid || !other->multiturn_valid || one->multiturn == other->multiturn;
 }
 
-}  // namespace absenc::kit
+}  // namespace absenc::sim

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a protocol is worth on a bad line: its host and its virtual encoder over random faults in virtual time.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace absenc::client {
+
+/// A fault of the line, or of what the encoder sends.
+struct LineFault {
+  std::string_view name;
+  std::string_view meaning;
+  double usual;  // its rate when none is given
+};
+
+/// Those of `emulate --fault` by the same names, and those that only a line has: bit, burst, double, talker, late.
+[[nodiscard]] std::span<const LineFault> line_faults();
+
+struct CampaignChoices {
+  std::string model{};
+  std::vector<std::string> options{};  // "address=3"
+  std::vector<std::string> faults{};   // "bit=0.001": rates of 0 to 1, those not named 0; none: the usual rates of all
+  std::uint64_t exchanges = 100'000;
+  std::uint64_t seed = 1;
+};
+
+/// How many of how many, with the interval of 95 % confidence in which the true rate is (Wilson).
+struct Share {
+  std::uint64_t count = 0;
+  std::uint64_t of = 0;
+
+  [[nodiscard]] double rate() const { return of == 0 ? 0 : static_cast<double>(count) / static_cast<double>(of); }
+  [[nodiscard]] double low() const;
+  [[nodiscard]] double high() const;
+};
+
+/// What follows from the check's code for replies whose bits are damaged independently at the rate of the fault `bit`,
+/// of each reply.
+struct CheckWorth {
+  unsigned check_bits = 0;     // 0: there is no check
+  std::size_t frame_bits = 0;  // of a reply
+  unsigned distance = 0;       // errors of fewer bits than this are always seen; 0: more than 8 bits are
+  double words = 0;            // so many errors of so many bits are not
+  double unseen = 0;           // damaged, and the checksum is right
+  double taken = 0;            // damaged, and with all checks taken for good with another position
+  double taken_deviation = 0;  // standard deviation of `taken`, which is drawn by chance
+};
+
+struct CampaignResult {
+  std::string protocol{};
+  std::string model{};  // or ""
+  std::uint64_t readings = 0;
+  std::uint64_t exchanges = 0;        // requests, or where none are sent frames
+  std::uint64_t damaged = 0;          // replies damaged by any fault
+  Share failed{};                     // exchanges that ended with an error
+  Share given_up{};                   // readings that ended with one, after all attempts
+  Share recovered{};                  // readings that ended well after an attempt that did not
+  Share wrong{};                      // exchanges: a position was taken that is not the encoder's
+  Share older{};                      // exchanges: that was an earlier position, of a frame sent before the request
+  std::optional<CheckWorth> worth{};  // none where the check has more than 16 bits, is no linear one, or CAN's
+  double seconds = 0;                 // of processor time that the exchanges took
+};
+
+/// One core. Throws UsageError.
+[[nodiscard]] CampaignResult campaign(std::string_view protocol, const CampaignChoices& choices = {});
+
+}  // namespace absenc::client

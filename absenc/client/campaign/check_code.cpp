@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/campaign/check_code.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "absenc/sim/place.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+constexpr unsigned most_check_bits = 16;  // 2^16 words of the dual, and so many frames for each bit
+
+struct Position final : FieldSink {
+  void put(const FieldValue&) override {}
+  void put_reading(const Reading& one) override { reading = one; }
+  std::optional<Reading> reading;
+};
+
+bool is_of_others(Error error) { return error != Error::none && error != Error::bad_checksum; }
+
+}  // namespace
+
+bool has_position(const Unit& unit, const Options& options, const GoodReply& reply) {
+  if (reply.reply.empty()) return false;
+  Position seen;
+  const Frame frame{.bytes = reply.reply, .bits = reply.bits};
+  return unit.decode(options, {.bytes = reply.request}, frame, seen) == Error::none && seen.reading.has_value();
+}
+
+/// A reply with errors, and what the decoder says of it.
+class CheckCode::Asked {
+ public:
+  Asked(const Unit& unit, const Options& options, const GoodReply& good)
+      : unit_(unit), options_(options), good_(good), frame_(good.reply) {}
+
+  void flip(std::size_t bit) { frame_[bit / 8] = static_cast<std::uint8_t>(frame_[bit / 8] ^ (0x80u >> (bit % 8))); }
+  void restore() { frame_ = good_.reply; }
+  [[nodiscard]] Error decode(FieldSink& sink) const {
+    return unit_.decode(options_, {.bytes = good_.request}, {.bytes = frame_, .bits = good_.bits}, sink);
+  }
+  [[nodiscard]] Error error() const {
+    NoFields none;
+    return decode(none);
+  }
+  [[nodiscard]] bool passes() const { return error() != Error::bad_checksum; }
+
+ private:
+  const Unit& unit_;
+  const Options& options_;
+  const GoodReply& good_;
+  std::vector<std::uint8_t> frame_;
+};
+
+std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& options,
+                                          std::span<const GoodReply> replies) {
+  const std::size_t bits = replies.front().bit_count();
+  for (const GoodReply& reply : replies) {
+    if (reply.bit_count() != bits) return {};
+  }
+  CheckCode code;
+  code.syndromes_.resize(bits);
+  code.is_fixed_.resize(bits);
+  Asked asked(unit, options, replies.front());
+  for (std::size_t bit = 0; bit < bits; ++bit) {
+    asked.flip(bit);
+    code.is_fixed_[bit] = is_of_others(asked.error());
+    asked.flip(bit);
+    if (code.is_fixed_[bit]) ++code.fixed_;
+  }
+  if (!code.find_check(asked) || 2 * code.fixed_ >= bits) return {};
+  if (!code.is_linear(unit, options, replies)) return {};
+  return code;
+}
+
+// From the last bit on, because a check stands at the end; where it does not, any bits that are independent will do.
+// What stands before all that the check covers belongs to others, or shows where the frame begins.
+bool CheckCode::find_check(Asked& asked) {
+  bool complete = false;
+  bool before = false;
+  for (std::size_t bit = bits(); bit-- > 0;) {
+    if (is_fixed_[bit]) continue;
+    const std::optional<std::uint32_t> syndrome = before ? std::nullopt : syndrome_of(asked, bit);
+    if (syndrome) {
+      syndromes_[bit] = *syndrome;
+      complete = complete || *syndrome != 0;
+    } else if (complete) {
+      before = true;
+      is_fixed_[bit] = true;
+      ++fixed_;
+    } else if (check_.size() == most_check_bits) {
+      return false;
+    } else {
+      syndromes_[bit] = std::uint32_t{1} << check_.size();
+      check_.push_back(bit);
+    }
+  }
+  return true;
+}
+
+// With which of the check's bits an error of this one passes; nothing: with none.
+std::optional<std::uint32_t> CheckCode::syndrome_of(Asked& asked, std::size_t bit) const {
+  asked.restore();
+  asked.flip(bit);
+  std::uint32_t pattern = 0;
+  if (asked.passes()) return pattern;
+  // Gray code: one bit more or less at a time.
+  for (std::uint32_t i = 1; i < std::uint32_t{1} << check_.size(); ++i) {
+    const auto changed = static_cast<unsigned>(std::countr_zero(i));
+    asked.flip(check_[changed]);
+    pattern ^= std::uint32_t{1} << changed;
+    if (asked.passes()) return pattern;
+  }
+  return {};
+}
+
+// Words of the code pass the checksum in every reply, and no others are taken.
+bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
+  sim::Random random(1);
+  for (unsigned i = 0; i < 1000; ++i) {
+    Asked asked(unit, options, replies[random.below(replies.size())]);
+    std::uint32_t syndrome = 0;
+    for (std::size_t bit = 0; bit < bits(); ++bit) {
+      if (is_fixed_[bit] || random.below(2) == 0) continue;
+      asked.flip(bit);
+      syndrome ^= syndromes_[bit];
+    }
+    // Others may see it before.
+    const Error error = asked.error();
+    if (error == (syndrome == 0 ? Error::bad_checksum : Error::none)) return false;
+    for (unsigned one = 0; one < check_.size(); ++one) {
+      if ((syndrome >> one & 1) != 0) asked.flip(check_[one]);
+    }
+    if (!asked.passes()) return false;
+  }
+  return true;
+}
+
+// How many words of the dual have each weight.
+std::vector<std::uint32_t> CheckCode::dual_weights() const {
+  std::vector<std::uint32_t> count(free_bits() + 1);
+  for (std::uint32_t word = 0; word < std::uint32_t{1} << check_.size(); ++word) {
+    std::size_t weight = 0;
+    for (std::size_t bit = 0; bit < bits(); ++bit) {
+      weight += static_cast<std::size_t>(std::popcount(word & syndromes_[bit]) & 1);
+    }
+    ++count[weight];
+  }
+  return count;
+}
+
+std::vector<double> CheckCode::weights(unsigned most) const {
+  const std::vector<std::uint32_t> dual = dual_weights();
+  const auto n = static_cast<double>(free_bits());
+  std::vector<double> words(most + 1);
+  for (std::size_t weight = 0; weight < dual.size(); ++weight) {
+    if (dual[weight] == 0) continue;
+    // Krawtchouk's polynomials of this weight, each from the two before it.
+    double before = 0;
+    double now = 1;
+    for (unsigned k = 0; k <= most; ++k) {
+      words[k] += dual[weight] * now;
+      const double next = ((n - 2 * static_cast<double>(weight)) * now - (n - k + 1) * before) / (k + 1);
+      before = now;
+      now = next;
+    }
+  }
+  for (double& count : words) count = std::round(std::ldexp(count, -static_cast<int>(check_bits())));
+  return words;
+}
+
+double CheckCode::unseen(double bit_errors) const {
+  const std::vector<std::uint32_t> dual = dual_weights();
+  double pass = 0;
+  for (std::size_t weight = 0; weight < dual.size(); ++weight) {
+    pass += dual[weight] * std::pow(1 - 2 * bit_errors, static_cast<double>(weight));
+  }
+  pass = std::ldexp(pass, -static_cast<int>(check_bits()));
+  const double undamaged = std::pow(1 - bit_errors, static_cast<double>(free_bits()));
+  return std::max(0.0, pass - undamaged) * std::pow(1 - bit_errors, static_cast<double>(fixed_));
+}
+
+bool CheckCode::is_check(std::size_t bit) const {
+  const std::uint32_t syndrome = syndromes_[bit];
+  return std::has_single_bit(syndrome) && check_[static_cast<unsigned>(std::countr_zero(syndrome))] == bit;
+}
+
+// All bits but the check's are damaged by chance, the check's so that it is right. Such a word comes as often as its
+// check's bits are damaged just so, which is what it counts. With an error among the fixed bits there may be another
+// frame: then the check's bits are damaged by chance too.
+Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
+                           double bit_errors, unsigned samples) const {
+  sim::Random random(2);
+  double sum = 0;
+  double squares = 0;
+  for (unsigned i = 0; i < samples; ++i) {
+    const GoodReply& reply = replies[random.below(replies.size())];
+    Asked asked(unit, options, reply);
+    std::uint32_t syndrome = 0;
+    bool damaged = false;
+    bool by_chance = false;
+    for (std::size_t bit = 0; bit < bits(); ++bit) {
+      if (is_check(bit) || !random.chance(bit_errors)) continue;
+      asked.flip(bit);
+      syndrome ^= syndromes_[bit];
+      damaged = true;
+      by_chance = by_chance || is_fixed_[bit];
+    }
+    if (!damaged) continue;
+    for (unsigned one = 0; one < check_.size(); ++one) {
+      if (by_chance ? random.chance(bit_errors) : (syndrome >> one & 1) != 0) asked.flip(check_[one]);
+    }
+    Position right;
+    Position seen;
+    if (asked.decode(seen) != Error::none) continue;
+    asked.restore();
+    if (asked.decode(right) != Error::none || sim::same_place(seen.reading, right.reading)) continue;
+    const int flipped = std::popcount(syndrome);
+    const double chance =
+        by_chance ? 1
+                  : std::pow(bit_errors, flipped) * std::pow(1 - bit_errors, static_cast<int>(check_bits()) - flipped);
+    sum += chance;
+    squares += chance * chance;
+  }
+  const double mean = sum / samples;
+  return {mean, std::sqrt(std::max(0.0, squares / samples - mean * mean) / samples)};
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/sim/rough_line.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+#include "absenc/sim/can_bits.hpp"
+
+namespace absenc::sim {
+
+template <class Item>
+RoughLine<Item>::RoughLine(LinkKind kind, LineSettings settings, Machine<Item>& device, std::uint64_t seed)
+    : kind_(kind), settings_(settings), device_(device), random_(seed), character_(settings.character()) {
+  const Step<Item> step = device_.next(time_);
+  send(step);
+}
+
+template <class Item>
+void RoughLine<Item>::set_rates(const RoughRates& rates) {
+  rates_ = rates;
+  draw_skip();
+}
+
+template <class Item>
+Time RoughLine<Item>::now() {
+  told_ = time_;
+  return time_;
+}
+
+template <class Item>
+void RoughLine<Item>::begin(const Step<Item>& step) {
+  using Kind = typename Step<Item>::Kind;
+  if (step.kind != Kind::transfer && step.kind != Kind::pulse) return;
+  ++counts_.requests;
+  run_until(std::max(time_, step.at));
+  if (step.kind == Kind::pulse) {
+    feed({.kind = Event<Item>::Kind::triggered, .at = time_, .wire = step.wire, .width = step.width});
+    run_until(time_ + step.width);
+  } else if (driven()) {
+    transfer(step);
+  } else {
+    request_.assign(step.out.begin(), step.out.end());
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      for (const CanFrame& frame : request_) {
+        run_until(time_ + settings_.bits(can_bits(frame).size() + can_intermission_bits));
+        feed({.kind = Event<Item>::Kind::received, .at = time_, .items = {&frame, 1}});
+      }
+    } else if (!request_.empty()) {
+      run_until(time_ + character_ * static_cast<std::int64_t>(request_.size()));
+      feed({.kind = Event<Item>::Kind::received, .at = time_, .items = request_});
+    }
+  }
+  sent_due_ = true;
+  quiet_since_ = time_;
+  heard_ = silence_told_ = false;
+}
+
+// The host is the clock: what the device drives is there at the end.
+template <class Item>
+void RoughLine<Item>::transfer(const Step<Item>& step) {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    using Kind = typename Event<Item>::Kind;
+    const bool clocked = kind_ == LinkKind::clocked;
+    const std::size_t size = clocked ? (step.bits + 7) / 8 : std::max(step.out.size(), step.expect);
+    bits_ = clocked ? step.bits : size * 8;
+    request_.assign(step.out.begin(), step.out.end());
+    request_.resize(size, 0);
+    out_.clear();
+    const Time start = time_;
+    const Time period = settings_.bits(1);
+    const Time lead = clocked ? Time{} : settings_.select_lead;
+    feed({.kind = Kind::selected, .at = time_, .held_low = step.hold_low, .width = clocked ? period : Time{}});
+    run_until(time_ + lead + settings_.bits(bits_));
+    out_.resize(size, 0xFF);  // nobody drives: pulled up
+    const std::size_t unclocked = size * 8 - bits_;
+    if (unclocked != 0) out_.back() = static_cast<Item>(out_.back() >> unclocked << unclocked);
+    hold(start, time_, time_, out_);
+    if (!clocked) feed({.kind = Kind::received, .at = time_, .items = request_});
+    feed({.kind = Kind::sent, .at = time_, .bits = bits_, .width = clocked ? Time{} : period, .lead = lead});
+  }
+}
+
+template <class Item>
+Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
+  using Kind = typename Event<Item>::Kind;
+  if (std::exchange(sent_due_, false)) return tell({.kind = Kind::sent, .at = time_});
+  const Time timer = step.at > told_ ? step.at : never;
+  for (;;) {
+    const Time limit = heard_ ? step.gap : step.answer;
+    Time quiet = limit > Time{} && !silence_told_ ? quiet_since_ + limit : never;
+    const Time arrival = front_ != back_ ? held_[front_].at : never;
+    if (arrival != never && held_[front_].first <= quiet) quiet = never;  // it is being heard
+    const Time mine = std::min(timer, quiet);
+    const Time next = due();
+    if (next != never && next <= std::min(mine, arrival)) {
+      time_ = std::max(time_, next);
+      run_device();
+      continue;
+    }
+    if (arrival != never && arrival <= mine) {
+      time_ = std::max(time_, arrival);
+      return deliver();
+    }
+    if (mine == never) throw std::logic_error("a wait on a line for what can never happen");
+    time_ = std::max(time_, mine);
+    if (timer <= quiet) return tell({.kind = Kind::timer, .at = time_});
+    silence_told_ = true;
+    return tell({.kind = Kind::silence, .at = time_});
+  }
+}
+
+template <class Item>
+void RoughLine<Item>::rest(Time until) {
+  run_until(until);
+}
+
+template <class Item>
+void RoughLine<Item>::drop() {
+  while (front_ != back_ && held_[front_].at <= time_) ++front_;
+  if (front_ == back_) front_ = back_ = 0;
+}
+
+template <class Item>
+void RoughLine<Item>::mark() {
+  mark_ = time_;
+  old_.clear();
+}
+
+template <class Item>
+Event<Item> RoughLine<Item>::tell(const Event<Item>& event) {
+  told_ = event.at;
+  return event;
+}
+
+template <class Item>
+Event<Item> RoughLine<Item>::deliver() {
+  using Kind = typename Event<Item>::Kind;
+  Held& held = held_[front_++];
+  if (held.sent < mark_) old_.push_back(held.sent);
+  std::swap(told_items_, held.items);
+  if (front_ == back_) front_ = back_ = 0;
+  heard_ = true;
+  silence_told_ = false;
+  quiet_since_ = time_;
+  if (told_items_.empty()) return tell({.kind = Kind::line_error, .at = time_});
+  return tell({.kind = Kind::received, .at = time_, .items = told_items_});
+}
+
+// ---- The device's side
+
+template <class Item>
+Time RoughLine<Item>::due() const {
+  Time first = side_.timer;
+  if (side_.sending) return std::min(first, side_.end);
+  const Time limit = side_.heard ? side_.waiting.gap : side_.waiting.answer;
+  if (limit > Time{} && !side_.silence_told) first = std::min(first, side_.quiet_since + limit);
+  return first;
+}
+
+template <class Item>
+void RoughLine<Item>::run_until(Time limit) {
+  for (Time next = due(); next <= limit && next != never; next = due()) {
+    time_ = std::max(time_, next);
+    run_device();
+  }
+  time_ = std::max(time_, limit);
+}
+
+template <class Item>
+void RoughLine<Item>::run_device() {
+  using Kind = typename Event<Item>::Kind;
+  if (side_.sending && side_.end <= time_) {
+    side_.sending = false;
+    feed({.kind = Kind::sent, .at = time_});
+  } else if (side_.timer <= time_) {
+    side_.timer = never;
+    feed({.kind = Kind::timer, .at = time_});
+  } else {
+    side_.silence_told = true;
+    feed({.kind = Kind::silence, .at = time_});
+  }
+}
+
+template <class Item>
+void RoughLine<Item>::feed(const Event<Item>& event) {
+  using Kind = typename Event<Item>::Kind;
+  if (event.kind == Kind::received || event.kind == Kind::sent) {
+    side_.quiet_since = event.at;
+    side_.heard = event.kind == Kind::received;
+    side_.silence_told = false;
+  }
+  device_.feed(event);
+  send(device_.next(time_));
+}
+
+// What the device wants, until it waits.
+template <class Item>
+void RoughLine<Item>::send(const Step<Item>& first) {
+  using Kind = typename Step<Item>::Kind;
+  for (Step<Item> step = first;; step = device_.next(time_)) {
+    if (step.kind == Kind::done) return;
+    if (step.kind == Kind::wait) {
+      side_.waiting = step;
+      side_.timer = step.at > time_ ? step.at : never;
+      return;
+    }
+    if (step.kind != Kind::transfer) continue;
+    out_.assign(step.out.begin(), step.out.end());
+    if (driven()) continue;
+    const Time start = std::max(step.at, time_);
+    side_.sending = true;
+    side_.end = start;
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      for (const CanFrame& frame : out_) {
+        const Time begun = side_.end;
+        side_.end += settings_.bits(can_bits(frame).size() + can_intermission_bits);
+        hold(begun, side_.end, side_.end, {&frame, 1});
+      }
+    } else {
+      side_.end += character_ * static_cast<std::int64_t>(out_.size());
+      hold(start, start + character_, side_.end, out_);
+    }
+  }
+}
+
+template <class Item>
+void RoughLine<Item>::hold(Time start, Time first, Time end, std::span<const Item> items) {
+  ++counts_.replies;
+  if (back_ == held_.size()) held_.emplace_back();
+  Held& held = held_[back_];
+  held.items.assign(items.begin(), items.end());
+  damage(held.items);
+  const Time late = driven() ? Time{} : lateness();
+  // A line keeps the order.
+  const Time before = back_ != front_ ? held_[back_ - 1].at : Time{};
+  held.sent = start;
+  held.at = std::max(end + late, before);
+  held.first = std::max(first + late, std::min(before, held.at));
+  ++back_;
+}
+
+// ---- Faults
+
+template <class Item>
+Time RoughLine<Item>::lateness() {
+  if (rates_.late <= 0 || !random_.chance(rates_.late)) return {};
+  ++counts_.late;
+  const double decades = 6 * static_cast<double>(random_.next() >> 11) * 0x1p-53;
+  return Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades)));
+}
+
+template <class Item>
+void RoughLine<Item>::draw_skip() {
+  skip_ = ~std::uint64_t{0};
+  if (rates_.bit <= 0) return;
+  if (rates_.bit >= 1) {
+    skip_ = 0;
+    return;
+  }
+  const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;  // never 0
+  skip_ = static_cast<std::uint64_t>(std::log(chance) / std::log1p(-rates_.bit));
+}
+
+template <class Item>
+void RoughLine<Item>::flip(std::vector<Item>& items, std::size_t bit) {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    items[bit / 8] = static_cast<Item>(items[bit / 8] ^ (0x80u >> (bit % 8)));
+  }
+}
+
+template <class Item>
+bool RoughLine<Item>::flip_bits(std::vector<Item>& items, std::size_t count) {
+  std::size_t at = 0;
+  bool any = false;
+  while (skip_ < count - at) {
+    at += skip_;
+    flip(items, at++);
+    any = true;
+    draw_skip();
+  }
+  if (skip_ != ~std::uint64_t{0}) skip_ -= count - at;
+  if (rates_.burst <= 0 || !random_.chance(rates_.burst)) return any;
+  const std::size_t length = std::min<std::size_t>(count, 2 + random_.below(15));
+  const std::size_t first = random_.below(count - length + 1);
+  for (std::size_t i = 0; i < length; ++i) {
+    if (i == 0 || i + 1 == length || random_.below(2) != 0) flip(items, first + i);
+  }
+  return true;
+}
+
+template <class Item>
+void RoughLine<Item>::double_one(std::vector<Item>& items, std::size_t count) {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    if (!driven()) {
+      const auto which = items.begin() + static_cast<std::ptrdiff_t>(random_.below(items.size()));
+      items.insert(which, *which);
+      return;
+    }
+    const std::vector<Item> before = items;
+    for (std::size_t bit = 1 + random_.below(count); bit < count; ++bit) {
+      const bool now = (before[bit / 8] >> (7 - bit % 8) & 1) != 0;
+      const bool wanted = (before[(bit - 1) / 8] >> (7 - (bit - 1) % 8) & 1) != 0;
+      if (now != wanted) flip(items, bit);
+    }
+  }
+}
+
+template <class Item>
+void RoughLine<Item>::talk_over(std::vector<Item>& items) {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    const std::size_t size = items.size();
+    const std::size_t first = random_.below(size);
+    const std::size_t end = first + 1 + random_.below(size);
+    for (std::size_t i = first; i < end; ++i) {
+      const auto other = static_cast<Item>(random_.below(256));
+      if (i < items.size()) {
+        items[i] = static_cast<Item>(items[i] & other);
+      } else if (!driven()) {
+        items.push_back(other);
+      }
+    }
+  }
+}
+
+template <class Item>
+void RoughLine<Item>::damage(std::vector<Item>& items) {
+  if (items.empty()) return;
+  std::size_t count = items.size() * 8;
+  if constexpr (std::is_same_v<Item, CanFrame>) count = can_bits(items.front()).size();
+  if (kind_ == LinkKind::clocked) count = bits_;
+  if (count == 0) return;
+  bool struck = flip_bits(items, count);
+  const bool talked = rates_.talker > 0 && random_.chance(rates_.talker);
+  if (talked) talk_over(items);
+  struck = struck || talked;
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    if (struck) items.clear();  // the controllers see it, and nobody has the frame
+  }
+  if (rates_.doubled > 0 && random_.chance(rates_.doubled) && !items.empty()) {
+    double_one(items, count);
+    // On CAN the sender repeats a frame when it does not see that it was received.
+    if constexpr (std::is_same_v<Item, CanFrame>) items.push_back(items.front());
+    struck = true;
+  }
+  counts_.damaged += struck ? 1 : 0;
+}
+
+template class RoughLine<std::uint8_t>;
+template class RoughLine<CanFrame>;
+
+}  // namespace absenc::sim
