@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- tools; os needs
+"""Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- serve <- tools; os needs
 core, link. A public header, which is installed, needs public ones only."""
 
 import os
@@ -21,6 +21,7 @@ BELOW = {
     "capture": {"core", "link", "protocol"},
     "os": {"core", "link"},
     "client": {"core", "link", "protocol", "host", "sim", "capture", "os"},
+    "serve": {"core", "link", "protocol", "host", "sim", "os", "client"},
 }
 FREESTANDING = {"core", "link", "protocol", "host"}
 FREESTANDING_HEADERS = set(
@@ -30,7 +31,7 @@ FREESTANDING_HEADERS = set(
 # Layers whose headers are all public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
 # Each costs seconds for every file that includes it.
-HEAVY = ("CLI/", "toml++/", "nlohmann/")
+HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
     r"^(sys|linux|asm|asm-generic|net|netinet|arpa|fuse3)/|"
@@ -146,6 +147,8 @@ class TheCheckItself(unittest.TestCase):
         "absenc/client/row.hpp": '#include "absenc/os/error.hpp"\n',
         "absenc/client/row.cpp": '#include <fmt/core.h>\n#include "absenc/client/text/rows.hpp"\n',
         "absenc/client/text/rows.hpp": '#include "absenc/capture/open.hpp"\n#include "absenc/os/serial.hpp"\n',
+        "absenc/serve/http.hpp": '#include "absenc/client/text/rows.hpp"\n',
+        "absenc/serve/http.cpp": "#include <microhttpd.h>\n",
         "absenc/os/serial.cpp": '#include <sys/ioctl.h>\n#include "absenc/link/step.hpp"\n',
         "tools/absenc/main.cpp": '#include <CLI/CLI.hpp>\n#include "absenc/protocol/all.hpp"\n',
         "tools/absenc/text.hpp": "#include <string>\n",
@@ -190,6 +193,9 @@ class TheCheckItself(unittest.TestCase):
             ("absenc/client/encoder.hpp", "#include <fmt/core.h>"),
             ("absenc/client/encoder.hpp", "#include <poll.h>"),
             ("absenc/client/row.cpp", '#include "absenc/protocol/one/unit.hpp"'),
+            ("absenc/client/row.cpp", '#include "absenc/serve/http.hpp"'),
+            ("absenc/serve/http.hpp", '#include "absenc/capture/open.hpp"'),
+            ("absenc/serve/http.hpp", "#include <microhttpd.h>"),
             ("tools/absenc/main.cpp", '#include "absenc/protocol/one/unit.hpp"'),
             ("tools/absenc/main.cpp", "#include <linux/spi/spidev.h>"),
             ("tools/absenc/main.cpp", "#include <fuse3/cuse_lowlevel.h>"),

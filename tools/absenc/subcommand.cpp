@@ -15,16 +15,22 @@ namespace absenc::tool {
 
 std::span<const Subcommand* const> all_subcommands() {
   static constexpr std::array all{
-      &list_subcommand,         &read_subcommand,        &monitor_subcommand,
-      &record_subcommand,       &info_subcommand,        &alarms_subcommand,
-      &temperature_subcommand,  &zero_subcommand,        &reset_multiturn_subcommand,
-      &clear_alarms_subcommand, &memory_read_subcommand, &memory_write_subcommand,
-      &memory_dump_subcommand,  &memory_load_subcommand, &memory_verify_subcommand,
-      &config_get_subcommand,   &config_set_subcommand,  &run_subcommand,
-      &scan_subcommand,         &emulate_subcommand,     &decode_subcommand,
-      &encode_subcommand,       &wave_subcommand,        &probe_subcommand,
-      &identify_subcommand,     &doctor_subcommand,      &crc_find_subcommand,
-      &vectors_subcommand,      &campaign_subcommand,    &bench_subcommand,
+      &list_subcommand,         &read_subcommand,
+      &monitor_subcommand,      &serve_subcommand,
+      &record_subcommand,       &info_subcommand,
+      &alarms_subcommand,       &temperature_subcommand,
+      &zero_subcommand,         &reset_multiturn_subcommand,
+      &clear_alarms_subcommand, &memory_read_subcommand,
+      &memory_write_subcommand, &memory_dump_subcommand,
+      &memory_load_subcommand,  &memory_verify_subcommand,
+      &config_get_subcommand,   &config_set_subcommand,
+      &run_subcommand,          &scan_subcommand,
+      &emulate_subcommand,      &decode_subcommand,
+      &encode_subcommand,       &wave_subcommand,
+      &probe_subcommand,        &identify_subcommand,
+      &doctor_subcommand,       &crc_find_subcommand,
+      &vectors_subcommand,      &campaign_subcommand,
+      &bench_subcommand,
   };
   return all;
 }

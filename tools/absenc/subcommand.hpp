@@ -67,6 +67,7 @@ struct Subcommand {
 extern const Subcommand list_subcommand;
 extern const Subcommand read_subcommand;
 extern const Subcommand monitor_subcommand;
+extern const Subcommand serve_subcommand;
 extern const Subcommand record_subcommand;
 extern const Subcommand info_subcommand;
 extern const Subcommand alarms_subcommand;

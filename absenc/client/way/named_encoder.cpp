@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -16,6 +17,8 @@ namespace absenc::client {
 namespace {
 
 using Names = std::vector<std::string_view>;
+
+constexpr std::string_view rate_name = "rate_hz";  // of `serve`, beside the settings of the encoder
 
 void add_options(Names& names, const Unit& unit) {
   for (const Option& option : unit.options) names.push_back(option.name);
@@ -86,7 +89,7 @@ void check_line(const FileSection& encoder, const std::vector<FileSection>& buse
 
 void check_encoder(const FileSection& encoder, const std::vector<FileSection>& buses) {
   check_name(encoder);
-  Names known{"protocol", "model", "bus", "port"};
+  Names known{"protocol", "model", "bus", "port", rate_name};
   const FileSetting* protocol = encoder.find("protocol");
   if (protocol != nullptr && !protocol->is_list) {
     const Unit& unit = at(protocol->place, [&]() -> const Unit& { return require_unit(protocol->values[0]); });
@@ -106,6 +109,19 @@ std::vector<FileSetting> not_overridden(const FileSection& from, const std::vect
         return std::none_of(over.begin(), over.end(), [&](const auto& one) { return one.name == setting.name; });
       });
   return settings;
+}
+
+double rate_of(const FileSection& encoder) {
+  const FileSetting* rate = encoder.find(rate_name);
+  if (rate == nullptr) return 0;
+  const std::string& text = rate->values[0];
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  const bool whole = !text.empty() && end == text.c_str() + text.size();
+  if (!whole || !(value >= 0.001 && value <= 1e6)) {
+    refuse(rate->place, fmt::format("{} is \"{}\", but must be a number from 0.001 to 1000000", rate_name, text));
+  }
+  return value;
 }
 
 const FileSection& section_named(const std::vector<FileSection>& sections, std::string_view name) {
@@ -133,8 +149,12 @@ NamedEncoder require_encoder(const SettingsFile& config, std::string_view name) 
 
   const std::string& protocol = encoder.find("protocol")->values[0];
   const std::string& where = port.values[0];
-  NamedEncoder named{
-      where == "sim" ? "sim:" + protocol : protocol + ":" + where, port.place, encoder.settings, {}, false};
+  NamedEncoder named{where == "sim" ? "sim:" + protocol : protocol + ":" + where,
+                     port.place,
+                     encoder.settings,
+                     {},
+                     false,
+                     rate_of(encoder)};
   if (bus != nullptr) {
     for (FileSetting& setting : not_overridden(line, encoder.settings)) named.settings.push_back(std::move(setting));
   }
@@ -145,7 +165,7 @@ NamedEncoder require_encoder(const SettingsFile& config, std::string_view name) 
       });
   named.defaults = not_overridden(config.defaults, named.settings);
   std::erase_if(named.settings, [](const FileSetting& setting) {
-    return setting.name == "protocol" || setting.name == "bus" || setting.name == "port";
+    return setting.name == "protocol" || setting.name == "bus" || setting.name == "port" || setting.name == rate_name;
   });
   return named;
 }

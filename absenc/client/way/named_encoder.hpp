@@ -17,6 +17,7 @@ struct NamedEncoder {
   std::vector<FileSetting> settings;  // its own, and those of its bus that it does not override
   std::vector<FileSetting> defaults;  // that it may be given, where they fit
   bool has_company = false;           // other encoders are on its bus
+  double rate_hz = 0;                 // how often a service shall read it; 0: the file does not say
 };
 
 /// Throws UsageError, which names the place in the file: settings that do not exist, protocols and buses that do not

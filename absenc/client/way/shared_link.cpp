@@ -83,6 +83,21 @@ bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
 }
 
 // Opening is done under the lock, so that encoders which come back at the same time open one port.
+void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names) {
+  for (std::size_t i = 0; i < encoders.size(); ++i) {
+    for (std::size_t other = 0; other < i; ++other) {
+      const EncoderAddress& one = encoders[i];
+      const EncoderAddress& before = encoders[other];
+      if (one.place == Place::spi && before.place == Place::spi && one.path == before.path) {
+        throw UsageError(fmt::format("{} and {} are the same SPI device", names[other], names[i]));
+      }
+      if (!share_line(one, before)) continue;
+      const bool same = one.unit == before.unit && one.options.values == before.options.values;
+      if (same) throw UsageError(fmt::format("{} and {} are the same encoder", names[other], names[i]));
+    }
+  }
+}
+
 std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri) {
   Registry& all = registry();
   const std::lock_guard lock(all.mutex);

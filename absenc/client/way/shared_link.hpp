@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -95,6 +96,10 @@ class SharedLink {
 
 /// Whether both are on one line. Throws UsageError when they are, but need other settings of it.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
+
+/// For encoders that are read at the same time. Throws UsageError when two of them are one encoder, or cannot share
+/// their line.
+void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names);
 
 /// The link to this encoder: that of an encoder on the same line, if there is one and it is not lost. Throws
 /// os::Failure, UsageError.

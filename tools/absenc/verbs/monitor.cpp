@@ -167,17 +167,7 @@ Watches make_watches(const Invocation& invocation, double rate) {
   const std::span<const std::string> names = invocation.texts("encoder");
   std::vector<EncoderAddress> uris;
   for (const std::string& name : names) uris.push_back(parse_address(name, invocation.texts("--option")));
-  for (std::size_t i = 0; i < uris.size(); ++i) {
-    for (std::size_t other = 0; other < i; ++other) {
-      const bool one_chip = uris[i].place == Place::spi && uris[other].place == Place::spi;
-      if (one_chip && uris[i].path == uris[other].path) {
-        throw UsageError(fmt::format("{} and {} are the same SPI device", names[other], names[i]));
-      }
-      if (!share_line(uris[i], uris[other])) continue;
-      const bool same = uris[i].unit == uris[other].unit && uris[i].options.values == uris[other].options.values;
-      if (same) throw UsageError(fmt::format("{} and {} are the same encoder", names[other], names[i]));
-    }
-  }
+  require_different(uris, names);
   Watches watches;
   for (std::size_t i = 0; i < uris.size(); ++i) {
     // Side by side and not all at once.

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who may what. On loopback everybody of this computer may look; elsewhere, and to change an encoder, it takes a token.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/serve/http.hpp"
+
+namespace absenc::serve {
+
+class Access {
+ public:
+  enum class To : std::uint8_t {
+    anybody,  // the page itself, and whether the server lives
+    look,
+    change,
+  };
+
+  /// `token_file`: lines of a name and a token; "": there is none, which is for loopback only. Throws Failure: when it
+  /// cannot be read, others may read it, or a token is shorter than 16 characters; UsageError.
+  Access(const std::string& token_file, bool on_loopback);
+
+  /// Why this is refused; nothing: it is not.
+  [[nodiscard]] std::optional<Response> refusal(const Request& request, To what) const;
+  /// The name of the token that came with it, or "".
+  [[nodiscard]] std::string who(const Request& request) const;
+
+ private:
+  struct Token {
+    std::string name;
+    std::string secret;
+  };
+  std::vector<Token> tokens_;
+  bool on_loopback_;
+};
+
+/// {"error":"..."}
+[[nodiscard]] Response error_response(unsigned status, std::string_view sentence);
+
+}  // namespace absenc::serve

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/api.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/protocol/options.hpp"
+#include "absenc/serve/assets.hpp"
+#include "absenc/serve/view.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+constexpr std::int64_t most_rows = 5000;         // of one answer in JSON
+constexpr std::int64_t rows_of_a_page = 10'000;  // of CSV at a time
+
+/// Is refused with 400.
+struct BadRequest : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+Response json_response(const Json& json) { return {200, "application/json", json.line() + "\n"}; }
+
+const Asset* find_asset(std::string_view path) {
+  for (const Asset& asset : assets()) {
+    if (asset.path == path) return &asset;
+  }
+  return nullptr;
+}
+
+std::int64_t number_in(const Request& request, const std::string& name, std::int64_t fallback, std::int64_t least,
+                       std::int64_t most) {
+  const std::string text = request.value(name);
+  if (text.empty()) return fallback;
+  const Result<std::int64_t> number = parse_number(text);
+  if (number && *number >= least && *number <= most) return *number;
+  throw BadRequest(fmt::format("{} must be a whole number from {} to {}", name, least, most));
+}
+
+// Calendar seconds; the last hour when nothing else is asked for.
+Range range_in(const Request& request) {
+  constexpr std::int64_t latest = 1'000'000'000'000;
+  Range range;
+  range.to_s = number_in(request, "to", calendar_ms() / 1000, 0, latest);
+  range.from_s = number_in(request, "from", range.to_s - 3600, 0, latest);
+  if (range.from_s > range.to_s) throw BadRequest("from must not be later than to");
+  return range;
+}
+
+std::shared_ptr<Watch> encoder_in(const Fleet& fleet, const Request& request, const std::string& parameter) {
+  const std::string name = request.value(parameter);
+  if (std::shared_ptr<Watch> watch = fleet.find(name)) return watch;
+  throw BadRequest(fmt::format("there is no encoder \"{}\" here", name));
+}
+
+std::vector<std::int64_t> arguments_in(const Request& request, const Command& command) {
+  std::vector<std::string> written;
+  const auto [first, last] = request.query.equal_range("argument");
+  for (auto one = first; one != last; ++one) written.push_back(one->second);
+  return require_arguments(command, written);
+}
+
+}  // namespace
+
+Json state_json(const Fleet& fleet, const Chronicler* chronicler) {
+  Json encoders = Json::array();
+  for (const auto& watch : fleet.all()) encoders.append(overview(*watch, watch->snapshot(false)));
+  Json history;
+  if (chronicler != nullptr) {
+    const Chronicler::Health health = chronicler->health();
+    history = Json::object().set("trouble", health.trouble).set("lost", health.lost);
+  }
+  return Json::object().set("at_ms", calendar_ms()).set("encoders", encoders).set("history", history);
+}
+
+Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Chronicler* chronicler,
+         const std::string& history_path)
+    : fleet_(&fleet), access_(&access), streams_(&streams), worker_(&worker), chronicler_(chronicler) {
+  if (chronicler != nullptr) reader_ = std::make_shared<HistoryReader>(history_path);
+}
+
+void Api::answer(const Request& request, const Reply& reply) {
+  try {
+    if (request.method == "GET" || request.method == "HEAD") return get(request, reply);
+    if (request.method == "POST") return post(request, reply);
+    Response response = error_response(405, "only GET and POST are known here");
+    response.headers.emplace_back("Allow", "GET, HEAD, POST");
+    reply.send(response);
+  } catch (const BadRequest& error) {
+    reply.send(error_response(400, error.what()));
+  } catch (const UsageError& error) {
+    reply.send(error_response(400, error.what()));
+  }
+}
+
+void Api::get(const Request& request, const Reply& reply) {
+  const std::string& path = request.path;
+  const Asset* asset = find_asset(path);
+  const bool for_anybody = asset != nullptr || path == "/healthz";
+  if (const auto refused = access_->refusal(request, for_anybody ? Access::To::anybody : Access::To::look)) {
+    return reply.send(*refused);
+  }
+  if (asset != nullptr) return reply.send({200, std::string(asset->type), std::string(asset->content)});
+  if (path == "/healthz") return reply.send(health());
+  if (path == "/metrics") {
+    ServerFigures figures{streams_->count(), streams_->dropped(), 0};
+    if (chronicler_ != nullptr) figures.history_lost = chronicler_->health().lost;
+    return reply.send({200, "text/plain; version=0.0.4; charset=utf-8", metrics(fleet_->all(), figures)});
+  }
+  if (path == "/api/encoders") return reply.send(json_response(state_json(*fleet_, chronicler_)));
+  if (path == "/api/encoder") return reply.send(encoder(request));
+  if (path == "/api/stream" && request.method == "GET") return stream(request, reply);
+  if (path == "/api/history" || path == "/api/events") return past(request, reply);
+  if (path == "/api/history.csv") return past_as_csv(request, reply);
+  reply.send(error_response(404, "there is nothing of this name: /openapi.json tells what there is"));
+}
+
+void Api::post(const Request& request, const Reply& reply) {
+  if (const auto refused = access_->refusal(request, Access::To::change)) return reply.send(*refused);
+  if (request.path == "/api/command") return command(request, reply);
+  reply.send(error_response(404, "there is nothing of this name: /openapi.json tells what there is"));
+}
+
+// That it answers is its health; what is wrong with encoders is for /metrics.
+Response Api::health() const {
+  std::size_t live = 0;
+  const Fleet::Watches watches = fleet_->all();
+  for (const auto& watch : watches) live += watch->snapshot(false).state == State::live ? 1 : 0;
+  const Chronicler::Health history = chronicler_ != nullptr ? chronicler_->health() : Chronicler::Health{};
+  return json_response(Json::object()
+                           .set("ok", history.trouble.empty())
+                           .set("encoders", watches.size())
+                           .set("live", live)
+                           .set("history", chronicler_ == nullptr    ? "none"
+                                           : history.trouble.empty() ? "good"
+                                                                     : "failing")
+                           .set("history_lost", history.lost));
+}
+
+Response Api::encoder(const Request& request) const {
+  return json_response(details(*encoder_in(*fleet_, request, "name")));
+}
+
+void Api::stream(const Request& request, const Reply& reply) {
+  const std::string trace = request.value("trace");
+  if (!trace.empty()) static_cast<void>(encoder_in(*fleet_, request, "trace"));
+  const std::shared_ptr<Stream> stream = streams_->open(trace);
+  if (stream == nullptr) return reply.send(error_response(503, "too many streams are open"));
+  reply.send(stream);
+}
+
+void Api::command(const Request& request, const Reply& reply) {
+  const std::shared_ptr<Watch> watch = encoder_in(*fleet_, request, "encoder");
+  const Command& wanted = require_command(*watch->address().unit, request.value("command"));
+  if (wanted.verb == Verb::scan) throw BadRequest("a scan is for a line without encoders that are being read");
+  Order order{&wanted, arguments_in(request, wanted), {}, {}};
+  order.who = fmt::format("{} from {}", access_->who(request), request.peer);
+  order.done = [reply](const Done& done) {
+    Json json = Json::object().set("ok", done.good).set("text", done.text).set("fields", done.fields);
+    reply.send({done.good ? 200U : 502U, "application/json", json.line() + "\n"});
+  };
+  if (!watch->give(std::move(order))) reply.send(error_response(409, "another command is waiting for this encoder"));
+}
+
+void Api::past(const Request& request, const Reply& reply) {
+  if (reader_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
+  const Range range = range_in(request);
+  const std::int64_t rows = number_in(request, "rows", 1000, 1, most_rows);
+  const std::string encoder = request.value("encoder");
+  const bool events = request.path == "/api/events";
+  const auto job = [reader = reader_, range, rows, encoder, events, reply] {
+    try {
+      reply.send(
+          json_response(events ? reader->happenings(encoder, range, rows) : reader->seconds(encoder, range, rows)));
+    } catch (const std::exception& error) {
+      reply.send(error_response(500, error.what()));
+    }
+  };
+  if (!worker_->add(job)) reply.send(error_response(503, "too many others ask for history"));
+}
+
+void Api::past_as_csv(const Request& request, const Reply& reply) {
+  if (reader_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
+  struct Rest {
+    std::string encoder;
+    Range range;
+    std::weak_ptr<Stream> stream{};
+  };
+  const auto rest = std::make_shared<Rest>(Rest{request.value("encoder"), range_in(request)});
+  // A page each time that the client has taken the one before.
+  const auto next = [reader = reader_, rest] {
+    const std::shared_ptr<Stream> stream = rest->stream.lock();
+    if (stream == nullptr || stream->over()) return;
+    try {
+      auto [text, from_s] = reader->csv(rest->encoder, rest->range, rows_of_a_page);
+      rest->range.from_s = from_s;
+      if (!text.empty()) stream->push(std::make_shared<const std::string>(std::move(text)));
+    } catch (const std::exception& error) {
+      stream->push(std::make_shared<const std::string>(fmt::format("# broken off: {}\n", error.what())));
+      rest->range.from_s = rest->range.to_s + 1;
+    }
+    if (rest->range.from_s > rest->range.to_s) stream->end();
+  };
+  const auto stream = std::make_shared<Stream>("text/csv; charset=utf-8; header=present", 4,
+                                               [worker = worker_, next] { worker->add(next, true); });
+  rest->stream = stream;
+  stream->push(std::make_shared<const std::string>(HistoryReader::csv_header()));
+  reply.send(stream);
+}
+
+}  // namespace absenc::serve

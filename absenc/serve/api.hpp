@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is asked for at which path.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absenc/serve/access.hpp"
+#include "absenc/serve/chronicler.hpp"
+#include "absenc/serve/fleet.hpp"
+#include "absenc/serve/history.hpp"
+#include "absenc/serve/http.hpp"
+#include "absenc/serve/streams.hpp"
+#include "absenc/serve/worker.hpp"
+
+namespace absenc::serve {
+
+/// The state of everything, as in the event `state`: {"at_ms","encoders","history"}. `chronicler` null: no history.
+[[nodiscard]] client::Json state_json(const Fleet& fleet, const Chronicler* chronicler);
+
+class Api {
+ public:
+  /// All of them outlive it; `chronicler` null: there is no history.
+  Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Chronicler* chronicler,
+      const std::string& history_path);
+
+  void answer(const Request& request, const Reply& reply);
+
+ private:
+  void get(const Request& request, const Reply& reply);
+  void post(const Request& request, const Reply& reply);
+  [[nodiscard]] Response health() const;
+  [[nodiscard]] Response encoder(const Request& request) const;
+  void stream(const Request& request, const Reply& reply);
+  void command(const Request& request, const Reply& reply);
+  void past(const Request& request, const Reply& reply);
+  void past_as_csv(const Request& request, const Reply& reply);
+
+  Fleet* fleet_;
+  const Access* access_;
+  Streams* streams_;
+  Worker* worker_;
+  const Chronicler* chronicler_;
+  std::shared_ptr<HistoryReader> reader_;  // of the worker's thread; null: there is no history
+};
+
+}  // namespace absenc::serve

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/fleet.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/way/named_encoder.hpp"
+#include "absenc/client/way/shared_link.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
+
+// Whether two of these are equal tells whether anything about the encoder has changed.
+std::string description_of(const NamedEncoder& named) {
+  std::string text = fmt::format("{} {} {}", named.address, named.rate_hz, named.has_company);
+  for (const auto* settings : {&named.settings, &named.defaults}) {
+    text += " /";
+    for (const FileSetting& setting : *settings) text += fmt::format(" {}={}", setting.name, setting.values);
+  }
+  return text;
+}
+
+}  // namespace
+
+struct Fleet::Wanted {
+  std::string name;
+  std::string description;
+  EncoderAddress address;
+  double rate;
+};
+
+Fleet::Fleet(std::vector<std::string> names, double rate, Happenings& happenings)
+    : names_(std::move(names)), rate_(rate), happenings_(&happenings) {
+  reload();
+}
+
+Fleet::~Fleet() {
+  for (const Served& one : served_) one.watch->request_stop();  // all at once, and then wait for each
+}
+
+std::vector<Fleet::Wanted> Fleet::wanted() const {
+  std::vector<std::string> names = names_;
+  std::optional<SettingsFile> file;
+  if (names.empty() || std::any_of(names.begin(), names.end(), is_named)) {
+    file = require_settings_file("the names of encoders stand in absenc.toml");
+  }
+  if (names.empty()) {
+    for (const FileSection& encoder : file->encoders) names.push_back(encoder.name);
+    if (names.empty()) throw UsageError(fmt::format("there is no encoder in {}", file->path));
+  }
+  std::vector<Wanted> all;
+  for (const std::string& name : names) {
+    NamedEncoder named;
+    if (is_named(name)) named = require_encoder(*file, name);
+    const double rate = named.rate_hz > 0 ? named.rate_hz : rate_;
+    all.push_back({name, description_of(named), parse_address(name), rate});
+  }
+  std::vector<EncoderAddress> addresses;
+  for (const Wanted& one : all) addresses.push_back(one.address);
+  require_different(addresses, names);
+  for (auto one = names.begin(); one != names.end(); ++one) {
+    if (std::find(names.begin(), one, *one) != one) throw UsageError(fmt::format("{} is named twice", *one));
+  }
+  return all;
+}
+
+std::string Fleet::reload() {
+  std::vector<Wanted> all = wanted();
+  std::vector<Served> going;
+  Watches ending;
+  std::vector<std::string> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    for (Served& one : served_) {
+      const bool stays = std::any_of(all.begin(), all.end(), [&](const Wanted& now) {
+        return now.name == one.watch->name() && now.description == one.description;
+      });
+      if (!stays) gone.push_back(one.watch->name());
+      if (!stays) ending.push_back(one.watch);
+      if (stays) going.push_back(one);
+    }
+  }
+  // What comes in the place of one may need its port.
+  for (const auto& watch : ending) watch->request_stop();
+  for (const auto& watch : ending) watch->wait();
+  std::vector<std::string> added;
+  std::vector<Served> next;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Wanted& now = all[i];
+    const auto same =
+        std::find_if(going.begin(), going.end(), [&](const Served& one) { return one.watch->name() == now.name; });
+    if (same != going.end()) {
+      next.push_back(*same);
+      continue;
+    }
+    added.push_back(now.name);
+    // Side by side and not all at once.
+    const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
+    const Time offset(static_cast<std::int64_t>(1e9 * share));
+    next.push_back({now.description, std::make_shared<Watch>(now.name, now.address, now.rate, offset, *happenings_)});
+  }
+  const std::lock_guard lock(mutex_);
+  served_ = std::move(next);
+  return fmt::format("{} unchanged; ended: {}; begun: {}", going.size(),
+                     gone.empty() ? "none" : fmt::format("{}", fmt::join(gone, ", ")),
+                     added.empty() ? "none" : fmt::format("{}", fmt::join(added, ", ")));
+}
+
+Fleet::Watches Fleet::all() const {
+  const std::lock_guard lock(mutex_);
+  Watches watches;
+  for (const Served& one : served_) watches.push_back(one.watch);
+  return watches;
+}
+
+std::shared_ptr<Watch> Fleet::find(std::string_view name) const {
+  const std::lock_guard lock(mutex_);
+  for (const Served& one : served_) {
+    if (one.watch->name() == name) return one.watch;
+  }
+  return nullptr;
+}
+
+}  // namespace absenc::serve

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// What happens to encoders, for people: alarms, losses, changes, commands.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absenc/client/text/json.hpp"
+
+namespace absenc::serve {
+
+/// Milliseconds of the calendar's clock since 1970.
+[[nodiscard]] inline std::int64_t calendar_ms() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
+}
+
+struct Happening {
+  std::int64_t at_ms = 0;
+  std::string encoder{};  // "": of the server itself
+  std::string kind{};     // alarm, alarm_over, failing, silent, lost, back, restarted, ended, command, change, history
+  std::string text{};
+  std::string who{};  // of commands: who gave it
+
+  [[nodiscard]] client::Json json() const {
+    return client::Json::object()
+        .set("at_ms", at_ms)
+        .set("encoder", encoder)
+        .set("kind", kind)
+        .set("text", text)
+        .set("who", who);
+  }
+};
+
+/// From the threads that read to whoever tells: bounded, so that a flood of them costs the oldest and no memory.
+class Happenings {
+ public:
+  static constexpr std::size_t most = 10'000;
+
+  void add(Happening happening) {
+    const std::lock_guard lock(mutex_);
+    waiting_.push_back(std::move(happening));
+    if (waiting_.size() <= most) return;
+    waiting_.pop_front();
+    ++dropped_;
+  }
+
+  /// All that came since the last time, the oldest first.
+  [[nodiscard]] std::vector<Happening> take() {
+    const std::lock_guard lock(mutex_);
+    std::vector<Happening> taken(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
+    waiting_.clear();
+    if (dropped_ != 0) {
+      taken.push_back({calendar_ms(), "", "history", std::to_string(dropped_) + " older events were dropped"});
+      dropped_ = 0;
+    }
+    return taken;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::deque<Happening> waiting_;
+  std::size_t dropped_ = 0;
+};
+
+}  // namespace absenc::serve

@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whatever waits for an answer is a suspended connection of libmicrohttpd, which costs memory and no thread.
+#include "absenc/serve/http.hpp"
+
+#include <microhttpd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <optional>
+#include <unordered_map>
+
+#include "absenc/client/error.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::serve {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr unsigned most_connections = 512;
+constexpr std::size_t memory_for_each = 32 * 1024;  // headers and what waits to be written; more is refused with 431
+constexpr std::uint64_t most_body = 4096;           // nothing here takes one
+constexpr unsigned idle_seconds = 15;
+constexpr Time request_time = 10s;  // in which it must have come; a byte now and then is not enough
+constexpr std::size_t block = 16 * 1024;
+
+std::string header_of(MHD_Connection* connection, const char* name) {
+  const char* value = ::MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
+  return value == nullptr ? std::string() : value;
+}
+
+MHD_Result add_argument(void* query, MHD_ValueKind, const char* name, const char* value) {
+  static_cast<std::multimap<std::string, std::string>*>(query)->emplace(name, value == nullptr ? "" : value);
+  return MHD_YES;
+}
+
+Request request_of(MHD_Connection* connection, const char* path, const char* method) {
+  Request request{.method = method,
+                  .path = path,
+                  .query = {},
+                  .peer = {},
+                  .host = {},
+                  .origin = {},
+                  .fetch_site = {},
+                  .authorization = {}};
+  ::MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add_argument, &request.query);
+  request.host = header_of(connection, "Host");
+  request.origin = header_of(connection, "Origin");
+  request.fetch_site = header_of(connection, "Sec-Fetch-Site");
+  request.authorization = header_of(connection, "Authorization");
+  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+  if (info != nullptr && info->client_addr != nullptr) request.peer = os::host_text(*info->client_addr);
+  return request;
+}
+
+// For every answer: nothing is kept, framed, guessed or taken from elsewhere.
+void add_headers(MHD_Response* response, const std::string& type) {
+  ::MHD_add_response_header(response, "Content-Type", type.c_str());
+  ::MHD_add_response_header(response, "Cache-Control", "no-store");
+  ::MHD_add_response_header(response, "X-Content-Type-Options", "nosniff");
+  ::MHD_add_response_header(response, "Referrer-Policy", "no-referrer");
+  ::MHD_add_response_header(response, "Content-Security-Policy",
+                            "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+}
+
+}  // namespace
+
+std::string Request::value(const std::string& name) const {
+  const auto found = query.find(name);
+  return found == query.end() ? std::string() : found->second;
+}
+
+// ---- Streams
+
+struct Stream::Sending {
+  std::string type;
+  std::size_t most;
+  std::function<void()> wanted;
+
+  std::mutex mutex;  // guards what follows
+  std::deque<Text> queue;
+  std::size_t sent_of_first = 0;
+  MHD_Connection* suspended = nullptr;
+  bool ended = false;  // nothing more comes
+  bool over = false;   // nobody listens
+  std::uint64_t dropped = 0;
+
+  // With the mutex held, so that a connection is never resumed before it is suspended.
+  void resume() {
+    if (suspended != nullptr) ::MHD_resume_connection(std::exchange(suspended, nullptr));
+  }
+
+  ssize_t take(MHD_Connection* connection, char* buffer, std::size_t size) {
+    {
+      const std::lock_guard lock(mutex);
+      if (!queue.empty()) return take_some(buffer, size);
+      if (ended) return MHD_CONTENT_READER_END_OF_STREAM;
+      suspended = connection;
+      ::MHD_suspend_connection(connection);
+    }
+    if (wanted) wanted();
+    return 0;
+  }
+
+  ssize_t take_some(char* buffer, std::size_t size) {
+    std::size_t filled = 0;
+    while (!queue.empty() && filled < size) {
+      const std::string& first = *queue.front();
+      const std::size_t count = std::min(size - filled, first.size() - sent_of_first);
+      std::memcpy(buffer + filled, first.data() + sent_of_first, count);
+      filled += count;
+      sent_of_first += count;
+      if (sent_of_first < first.size()) break;
+      queue.pop_front();
+      sent_of_first = 0;
+    }
+    return static_cast<ssize_t>(filled);
+  }
+};
+
+Stream::Stream(std::string type, std::size_t most, std::function<void()> wanted)
+    : sending_(std::make_unique<Sending>()) {
+  sending_->type = std::move(type);
+  sending_->most = most;
+  sending_->wanted = std::move(wanted);
+}
+Stream::~Stream() = default;
+
+void Stream::push(Text text) {
+  const std::lock_guard lock(sending_->mutex);
+  if (sending_->over || sending_->ended || text->empty()) return;
+  std::deque<Text>& queue = sending_->queue;
+  queue.push_back(std::move(text));
+  // The first may be half sent: it stays.
+  if (queue.size() > std::max<std::size_t>(sending_->most, 2)) {
+    queue.erase(queue.begin() + 1);
+    ++sending_->dropped;
+  }
+  sending_->resume();
+}
+
+void Stream::end() {
+  const std::lock_guard lock(sending_->mutex);
+  sending_->ended = true;
+  sending_->resume();
+}
+
+bool Stream::over() const {
+  const std::lock_guard lock(sending_->mutex);
+  return sending_->over;
+}
+
+std::uint64_t Stream::dropped() const {
+  const std::lock_guard lock(sending_->mutex);
+  return sending_->dropped;
+}
+
+// ---- Replies
+
+struct Reply::Exchange {
+  bool called = false;
+  std::uint64_t body = 0;
+
+  std::mutex mutex;  // guards what follows
+  std::optional<Response> response;
+  std::shared_ptr<Stream> stream;
+  MHD_Connection* suspended = nullptr;
+  bool over = false;
+
+  void answer(std::optional<Response> given, std::shared_ptr<Stream> streamed) {
+    const std::lock_guard lock(mutex);
+    if (over || response || stream) return;
+    response = std::move(given);
+    stream = std::move(streamed);
+    if (suspended != nullptr) ::MHD_resume_connection(std::exchange(suspended, nullptr));
+  }
+};
+
+void Reply::send(Response response) const { exchange_->answer(std::move(response), nullptr); }
+void Reply::send(std::shared_ptr<Stream> stream) const { exchange_->answer({}, std::move(stream)); }
+
+// ---- The server
+
+struct HttpServer::Daemon {
+  using Exchange = Reply::Exchange;
+
+  Handler handler;
+  os::Listener listener;
+  MHD_Daemon* daemon = nullptr;
+
+  std::mutex mutex;  // guards what follows
+  bool ending = false;
+  struct Open {
+    int socket;
+    Time since;  // of the begin of the request that is awaited; `never`: it has come
+  };
+  std::unordered_map<MHD_Connection*, Open> connections;
+  std::unordered_map<Exchange*, std::weak_ptr<Exchange>> exchanges;
+  std::unordered_map<Stream*, std::weak_ptr<Stream>> streams;
+
+  static MHD_Result queue(MHD_Connection* connection, const Response& answer) {
+    MHD_Response* response = ::MHD_create_response_from_buffer(
+        answer.body.size(), const_cast<char*>(answer.body.data()), MHD_RESPMEM_MUST_COPY);
+    if (response == nullptr) return MHD_NO;
+    add_headers(response, answer.type);
+    for (const auto& [name, value] : answer.headers) ::MHD_add_response_header(response, name.c_str(), value.c_str());
+    const MHD_Result queued = ::MHD_queue_response(connection, answer.status, response);
+    ::MHD_destroy_response(response);
+    return queued;
+  }
+
+  struct Carried {
+    Daemon* daemon;
+    MHD_Connection* connection;
+    std::shared_ptr<Stream> stream;
+  };
+
+  static ssize_t read_stream(void* carried, std::uint64_t, char* buffer, std::size_t size) {
+    const auto* one = static_cast<Carried*>(carried);
+    return one->stream->sending_->take(one->connection, buffer, size);
+  }
+
+  static void free_stream(void* carried) {
+    const std::unique_ptr<Carried> one(static_cast<Carried*>(carried));
+    {
+      const std::lock_guard lock(one->daemon->mutex);
+      one->daemon->streams.erase(one->stream.get());
+    }
+    Stream::Sending& sending = *one->stream->sending_;
+    const std::lock_guard lock(sending.mutex);
+    sending.over = true;
+    sending.suspended = nullptr;
+    sending.queue.clear();
+  }
+
+  MHD_Result queue(MHD_Connection* connection, const std::shared_ptr<Stream>& stream) {
+    {
+      const std::lock_guard lock(mutex);
+      if (ending) stream->end();
+      streams.emplace(stream.get(), stream);
+    }
+    MHD_Response* response = ::MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, block, read_stream,
+                                                                 new Carried{this, connection, stream}, free_stream);
+    if (response == nullptr) return MHD_NO;
+    add_headers(response, stream->sending_->type);
+    const MHD_Result queued = ::MHD_queue_response(connection, MHD_HTTP_OK, response);
+    ::MHD_destroy_response(response);
+    return queued;
+  }
+
+  // Its answer, or suspended until there is one.
+  MHD_Result respond(MHD_Connection* connection, Exchange& exchange) {
+    const std::lock_guard lock(exchange.mutex);
+    if (exchange.response) return queue(connection, *exchange.response);
+    if (exchange.stream) return queue(connection, exchange.stream);
+    exchange.suspended = connection;
+    ::MHD_suspend_connection(connection);
+    return MHD_YES;
+  }
+
+  void call(MHD_Connection* connection, const char* path, const char* method,
+            const std::shared_ptr<Exchange>& exchange) {
+    {
+      const std::lock_guard lock(mutex);
+      if (const auto open = connections.find(connection); open != connections.end()) open->second.since = never;
+      exchanges.emplace(exchange.get(), exchange);
+      if (ending) return exchange->answer(Response{503, "text/plain", "the server ends\n"}, nullptr);
+    }
+    // Copies of it end with the last one: whoever has forgotten the answer has given this.
+    const Reply reply(std::shared_ptr<Exchange>(exchange.get(), [exchange](Exchange*) {
+      exchange->answer(Response{500, "text/plain", "nobody answered\n"}, nullptr);
+    }));
+    try {
+      handler(request_of(connection, path, method), reply);
+    } catch (const std::exception& error) {
+      reply.send(Response{500, "text/plain", std::string(error.what()) + "\n"});
+    }
+  }
+
+  static MHD_Result access(void* self, MHD_Connection* connection, const char* path, const char* method, const char*,
+                           const char*, std::size_t* size, void** context) {
+    auto& daemon = *static_cast<Daemon*>(self);
+    if (*context == nullptr) {
+      *context = new std::shared_ptr<Exchange>(std::make_shared<Exchange>());
+      const bool announced = std::strtoull(header_of(connection, "Content-Length").c_str(), nullptr, 10) > most_body;
+      return announced ? queue(connection, too_large()) : MHD_YES;
+    }
+    const auto& exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
+    if (*size != 0) {
+      exchange->body += std::exchange(*size, 0);
+      return exchange->body > most_body ? MHD_NO : MHD_YES;
+    }
+    if (!std::exchange(exchange->called, true)) daemon.call(connection, path, method, exchange);
+    return daemon.respond(connection, *exchange);
+  }
+
+  static Response too_large() { return {MHD_HTTP_CONTENT_TOO_LARGE, "text/plain", "nothing here takes a body\n"}; }
+
+  static void completed(void* self, MHD_Connection* connection, void** context, MHD_RequestTerminationCode) {
+    auto& daemon = *static_cast<Daemon*>(self);
+    {
+      const std::lock_guard lock(daemon.mutex);
+      if (const auto open = daemon.connections.find(connection); open != daemon.connections.end()) {
+        open->second.since = os::now();  // another request may come
+      }
+    }
+    if (*context == nullptr) return;
+    const std::unique_ptr<std::shared_ptr<Exchange>> exchange(static_cast<std::shared_ptr<Exchange>*>(*context));
+    *context = nullptr;
+    {
+      const std::lock_guard lock(daemon.mutex);
+      daemon.exchanges.erase(exchange->get());
+    }
+    const std::lock_guard lock((*exchange)->mutex);
+    (*exchange)->over = true;
+    (*exchange)->suspended = nullptr;
+  }
+
+  static void connected(void* self, MHD_Connection* connection, void**, MHD_ConnectionNotificationCode code) {
+    auto& daemon = *static_cast<Daemon*>(self);
+    const std::lock_guard lock(daemon.mutex);
+    if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
+      daemon.connections.erase(connection);
+      return;
+    }
+    const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+    if (info != nullptr) daemon.connections[connection] = {info->connect_fd, os::now()};
+  }
+
+  void start() {
+    daemon = ::MHD_start_daemon(
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, listener.port, nullptr, nullptr, &access, this,
+        MHD_OPTION_LISTEN_SOCKET, listener.socket.get(), MHD_OPTION_CONNECTION_LIMIT, most_connections,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, memory_for_each, MHD_OPTION_CONNECTION_TIMEOUT, idle_seconds,
+        MHD_OPTION_NOTIFY_COMPLETED, &completed, this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
+    if (daemon == nullptr)
+      throw client::Failure("the web server cannot be started: too many files are open, or no memory");
+    static_cast<void>(listener.socket.release());  // the daemon closes it
+  }
+
+  // Nothing may be suspended when the daemon is stopped.
+  void stop() {
+    ::MHD_quiesce_daemon(daemon);
+    std::vector<std::shared_ptr<Exchange>> waiting;
+    std::vector<std::shared_ptr<Stream>> streaming;
+    {
+      const std::lock_guard lock(mutex);
+      ending = true;
+      for (const auto& one : exchanges) waiting.push_back(one.second.lock());
+      for (const auto& one : streams) streaming.push_back(one.second.lock());
+    }
+    for (const auto& one : waiting) {
+      if (one) one->answer(Response{503, "text/plain", "the server ends\n"}, nullptr);
+    }
+    for (const auto& one : streaming) {
+      if (one) one->end();
+    }
+    ::MHD_stop_daemon(daemon);
+  }
+};
+
+HttpServer::HttpServer(os::Listener listener, Handler handler) : daemon_(std::make_unique<Daemon>()) {
+  daemon_->listener = std::move(listener);
+  daemon_->handler = std::move(handler);
+  daemon_->start();
+}
+
+HttpServer::~HttpServer() { daemon_->stop(); }
+
+void HttpServer::end_half_sent() {
+  const Time now = os::now();
+  const std::lock_guard lock(daemon_->mutex);
+  for (auto& [connection, open] : daemon_->connections) {
+    if (open.since != never && now - open.since > request_time) {
+      os::end_connection(open.socket);
+      open.since = never;
+    }
+  }
+}
+
+}  // namespace absenc::serve

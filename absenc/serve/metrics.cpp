@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <iterator>
+
+#include "absenc/client/reading.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/serve/view.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+/// As the format has them: backslash, quote and line end are written with a backslash.
+std::string label(std::string_view text) {
+  std::string written;
+  for (const char c : text) {
+    if (c == '\\' || c == '"') written += '\\';
+    if (c == '\n') {
+      written += "\\n";
+    } else {
+      written += c;
+    }
+  }
+  return written;
+}
+
+class Page {
+ public:
+  /// Lines of one metric stand together: every metric walks all encoders.
+  void metric(std::string_view name, std::string_view kind, std::string_view help) {
+    fmt::format_to(std::back_inserter(text), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, kind);
+  }
+  template <class Number>
+  void line(std::string_view name, const std::string& labels, Number value) {
+    fmt::format_to(std::back_inserter(text), "{}{{{}}} {}\n", name, labels, value);
+  }
+
+  std::string text;
+};
+
+struct Seen {
+  std::string label;
+  const Unit* unit;
+  Snapshot snapshot;
+};
+
+void add_alarms(Page& page, const Seen& seen) {
+  if (seen.snapshot.state != State::live) return;
+  for (const Flags& flags : alarms_of(*seen.unit, seen.snapshot.last.reading)) {
+    for (const std::string_view name : flag_names(*flags.field, flags.bits)) {
+      page.line("absenc_alarm", fmt::format("{},channel=\"{}\",alarm=\"{}\"", seen.label, flags.field->name, name), 1);
+    }
+  }
+}
+
+void add_latencies(Page& page, const Seen& seen) {
+  const auto seconds = [](Time time) { return std::chrono::duration<double>(time).count(); };
+  const Snapshot& snapshot = seen.snapshot;
+  page.line("absenc_latency_seconds", seen.label + ",quantile=\"0.5\"", seconds(snapshot.median));
+  page.line("absenc_latency_seconds", seen.label + ",quantile=\"0.99\"", seconds(snapshot.percentile_99));
+  page.line("absenc_latency_seconds", seen.label + ",quantile=\"1\"", seconds(snapshot.longest));
+}
+
+}  // namespace
+
+std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures) {
+  std::vector<Seen> all;
+  for (const auto& watch : watches) {
+    all.push_back({fmt::format("encoder=\"{}\",protocol=\"{}\"", label(watch->name()), watch->address().unit->id),
+                   watch->address().unit, watch->snapshot(false)});
+  }
+  Page page;
+  const auto each = [&](std::string_view name, std::string_view kind, std::string_view help, auto value) {
+    page.metric(name, kind, help);
+    for (const Seen& seen : all) page.line(name, seen.label, value(seen.snapshot));
+  };
+  each("absenc_up", "gauge", "1 while readings come", [](const Snapshot& s) { return s.state == State::live ? 1 : 0; });
+  each("absenc_readings_total", "counter", "good readings", [](const Snapshot& s) { return s.readings; });
+  each("absenc_losses_total", "counter", "how often the port went away", [](const Snapshot& s) { return s.losses; });
+  each("absenc_repeated_total", "counter", "requests that were sent again",
+       [](const Snapshot& s) { return s.counters.repeated; });
+  each("absenc_age_seconds", "gauge", "age of the last reading, or of what is known instead",
+       [](const Snapshot& s) { return std::chrono::duration<double>(s.age).count(); });
+  each("absenc_rate_hertz", "gauge", "good readings a second", [](const Snapshot& s) { return s.rate; });
+  page.metric("absenc_errors_total", "counter", "failed attempts by kind, repeated ones too");
+  for (const Seen& seen : all) {
+    for (std::size_t i = 1; i < error_texts.size(); ++i) {
+      const std::uint64_t count = seen.snapshot.counters.errors[i];
+      if (count == 0) continue;
+      page.line("absenc_errors_total", fmt::format("{},error=\"{}\"", seen.label, error_texts[i].name), count);
+    }
+  }
+  page.metric("absenc_latency_seconds", "gauge", "from the end of a request to the end of its reply, by quantile");
+  for (const Seen& seen : all) add_latencies(page, seen);
+  page.metric("absenc_alarm", "gauge", "1 while the encoder reports this alarm");
+  for (const Seen& seen : all) add_alarms(page, seen);
+  page.metric("absenc_streams", "gauge", "open event streams");
+  page.line("absenc_streams", "", figures.streams);
+  page.metric("absenc_stream_dropped_total", "counter", "messages that readers of streams were too slow for");
+  page.line("absenc_stream_dropped_total", "", figures.stream_drops);
+  page.metric("absenc_history_lost_total", "counter", "rows of history that could not be written");
+  page.line("absenc_history_lost_total", "", figures.history_lost);
+  return page.text;
+}
+
+}  // namespace absenc::serve

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Elements and texts. Everything that came from elsewhere is put in as text, never as markup.
+
+/** element("p", {class: "why"}, "text", child) */
+export function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+    else if (value !== false) made.setAttribute(key, value === true ? "" : value);
+  }
+  made.append(...children);
+  return made;
+}
+
+/** Only when it is another: so screen readers and selections are left in peace. */
+export function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** A dial whose needle `turn` sets, in degrees clockwise from the top; null: no needle. */
+export function dial() {
+  const svg = document.createElementNS(SVG, "svg");
+  svg.setAttribute("viewBox", "-50 -50 100 100");
+  svg.setAttribute("class", "dial off");
+  svg.setAttribute("aria-hidden", "true");  // the number stands beside it
+  const add = (name, attributes) => {
+    const part = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) part.setAttribute(key, value);
+    svg.append(part);
+    return part;
+  };
+  add("circle", {r: 46});
+  for (let angle = 0; angle < 360; angle += 30) {
+    add("line", {class: "tick", y1: -46, y2: -40, transform: `rotate(${angle})`});
+  }
+  const needle = add("line", {class: "needle", y1: 8, y2: -36});
+  return {
+    svg,
+    turn(angle) {
+      svg.classList.toggle("off", angle === null);
+      if (angle !== null) needle.setAttribute("transform", `rotate(${angle})`);
+    },
+  };
+}
+
+export const NOTHING = "–";
+
+export function duration(seconds) {
+  if (seconds < 1) return `${Math.round(seconds * 1000)} ms`;
+  if (seconds < 120) return `${seconds.toFixed(1)} s`;
+  if (seconds < 7200) return `${Math.round(seconds / 60)} min`;
+  return `${Math.round(seconds / 3600)} h`;
+}
+
+export function positionText(one) {
+  if (one.angle_deg !== null) return `${one.angle_deg.toFixed(3)}°`;
+  if (one.position_mm !== null) return `${one.position_mm.toFixed(4)} mm`;
+  return one.state === "live" ? "INVALID" : NOTHING;
+}
+
+export function speedText(one) {
+  return one.speed === null ? NOTHING : `${one.speed.toFixed(1)} ${one.speed_unit}`;
+}
+
+export function stateText(one) {
+  return one.state === "live" ? "live" : `${one.state}: no reading for ${duration(one.age_s)}`;
+}
+
+export function alarmText(alarm) {
+  const action = alarm.action ? ` What to do: ${alarm.action}.` : "";
+  return `${alarm.channel ? alarm.channel + " " : ""}${alarm.name}: ${alarm.meaning}.${action}`;
+}
+
+const dialog = document.getElementById("dialog");
+
+/** True when it was answered with yes; with `field`, what was written, or null. */
+export function ask(title, text, yes, field = null) {
+  document.getElementById("dialog-title").textContent = title;
+  document.getElementById("dialog-text").textContent = text;
+  document.getElementById("dialog-yes").textContent = yes;
+  const label = document.getElementById("dialog-field");
+  const input = label.querySelector("input");
+  label.hidden = field === null;
+  label.querySelector("span").textContent = field ?? "";
+  input.value = "";
+  dialog.returnValue = "no";
+  dialog.showModal();
+  return new Promise((resolve) => {
+    dialog.addEventListener("close", () => {
+      const agreed = dialog.returnValue === "yes";
+      if (field === null) resolve(agreed);
+      else resolve(agreed ? input.value.trim() : null);
+      input.value = "";
+    }, {once: true});
+  });
+}

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything about one encoder: live trace, history, errors, commands.
+/* global Dygraph */
+import {NOTHING, alarmText, ask, dial, duration, element, positionText, setText, speedText, stateText} from "./dom.js";
+import {download, hasToken, request, setToken} from "./server.js";
+
+const SHOWN_MS = 20000;
+const MOST_POINTS = 2000;
+const REFRESH_MS = 1000;
+
+const ink = () => getComputedStyle(document.body).color;
+
+function plot(node, title, labels, options) {
+  return new Dygraph(node, [], {
+    title, labels, axisLabelColor: ink(), axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
+    colors: ["#2f7fd0", "#d07a1f"], strokeWidth: 1.5, legend: "never", ...options,
+  });
+}
+
+function rows(list, cells) {
+  return element("tbody", {}, ...list.map((one) => element("tr", {}, ...cells(one).map((cell) => element("td", {}, cell)))));
+}
+
+function table(head, body, caption) {
+  return element("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": caption},
+                 element("table", {}, element("thead", {}, element("tr", {}, ...head.map((text) => element("th", {scope: "col"}, text)))), body));
+}
+
+export class One {
+  constructor(main, name) {
+    this.name = name;
+    this.trace = name;
+    this.points = [];
+    this.build(main);
+    this.refresh();
+    this.timer = setInterval(() => this.refresh(), REFRESH_MS);
+    this.loadHistory();
+    const frame = () => {
+      if (this.closed) return;
+      this.draw();
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  build(main) {
+    this.dial = dial();
+    this.state = element("p", {class: "state"});
+    this.facts = element("dl");
+    this.words = element("div");
+    this.placePlot = element("div", {class: "plot", role: "img", "aria-label": "position over the last 20 seconds"});
+    this.speedPlot = element("div", {class: "plot", role: "img", "aria-label": "speed over the last 20 seconds"});
+    this.fields = element("dl");
+    this.bad = element("div");
+    this.command = element("select", {"aria-label": "command", onchange: () => this.showArguments()});
+    this.arguments = element("div");
+    this.outcome = element("p", {role: "status"});
+    this.hours = element("select", {onchange: () => this.loadHistory()},
+                         ...[1, 6, 24, 168].map((hours) => element("option", {value: hours}, `${hours} h`)));
+    this.pastPlot = element("div", {class: "plot", role: "img", "aria-label": "least, mean and greatest position"});
+    this.past = element("p", {class: "why", role: "status"});
+    this.events = element("div");
+    const box = (title, ...children) => element("section", {class: "box"}, element("h2", {}, title), ...children);
+    main.replaceChildren(
+      element("p", {}, element("a", {href: "#"}, "all encoders")),
+      box(this.name, element("div", {class: "card"}, this.dial.svg, element("div", {}, this.state, this.facts)), this.words),
+      box("Live", this.placePlot, this.speedPlot),
+      box("Last reply", this.fields),
+      box("Last bad exchanges", this.bad),
+      box("Commands", element("p", {}, this.command, " ", element("button", {type: "button", onclick: () => this.run()}, "Run")),
+          this.arguments, this.outcome),
+      box("History", element("p", {}, element("label", {}, "the last ", this.hours), " ",
+                             element("button", {type: "button", onclick: () => this.save()}, "CSV")),
+          this.past, this.pastPlot, this.events));
+    const zoom = {interactionModel: {}};
+    this.placeGraph = plot(this.placePlot, "position", ["time", "position"], zoom);
+    this.speedGraph = plot(this.speedPlot, "speed", ["time", "speed"], zoom);
+  }
+
+  show(state) {
+    const one = state.encoders.find((other) => other.encoder === this.name);
+    if (one === undefined) return this.lose("it is no longer served");
+    this.dial.svg.toggleAttribute("hidden", one.linear);
+    this.dial.turn(one.angle_deg);
+    this.state.className = `state ${one.state}`;
+    setText(this.state, stateText(one));
+    this.live = one.state === "live";
+    for (const node of [this.placePlot, this.speedPlot]) node.classList.toggle("stale", !this.live);
+    this.facts.replaceChildren(...[
+      ["position", positionText(one)], ["turns", one.turns === null ? NOTHING : String(one.turns)],
+      ["speed", speedText(one)], ["readings a second", this.live ? one.rate_hz.toFixed(1) : NOTHING],
+      ["errors, last minute", String(one.errors_last_minute)], ["address", one.address],
+    ].flatMap(([label, value]) => [element("dt", {}, label), element("dd", {}, value)]));
+    const words = (one.alarms ?? []).map((alarm) => element("p", {class: "alarm"}, alarmText(alarm)));
+    if (one.message) words.push(element("p", {class: "why"}, one.message));
+    this.words.replaceChildren(...words);
+  }
+
+  lose(why = "no connection to the server") {
+    this.live = false;
+    this.dial.turn(null);
+    this.state.className = "state unknown";
+    setText(this.state, `not known: ${why}`);
+    this.facts.replaceChildren();
+    this.fields.replaceChildren();
+    this.words.replaceChildren();
+    for (const node of [this.placePlot, this.speedPlot]) node.classList.add("stale");
+  }
+
+  take(event, data) {
+    if (event === "happening" && data.encoder === this.name) this.loadHistory();
+    if (event !== "points" || data.encoder !== this.name) return;
+    const points = data.points.length > 8 ? data.points.filter((_, i) => i % Math.ceil(data.points.length / 8) === 0) : data.points;
+    const last = this.points.at(-1);
+    // A gap is drawn as one.
+    if (last !== undefined && points[0][0] - last[0] > 1000) this.points.push([last[0] + 1, null, null]);
+    this.points.push(...points);
+    this.changed = true;
+  }
+
+  draw() {
+    if (!this.changed) return;
+    this.changed = false;
+    const newest = this.points.at(-1)[0];
+    while (this.points.length > MOST_POINTS || this.points[0][0] < newest - SHOWN_MS) this.points.shift();
+    const window = [newest - SHOWN_MS, newest];
+    this.placeGraph.updateOptions({file: this.points.map(([at, place]) => [new Date(at), place]), dateWindow: window});
+    this.speedGraph.updateOptions({file: this.points.map(([at, , speed]) => [new Date(at), speed]), dateWindow: window});
+  }
+
+  async refresh() {
+    let answer;
+    try {
+      answer = await request("api/encoder", {name: this.name});
+    } catch {
+      return;  // the stream tells that the server is away
+    }
+    if (this.closed || answer.status !== 200) return;
+    const one = answer.body;
+    const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, value === null ? "INVALID" : Array.isArray(value) ? value.join(" ") || "none" : String(value)]);
+    const latency = one.latency_us;
+    fields.push(["latency", `50 % ${latency.p50.toFixed(0)} µs, 99 % ${latency.p99.toFixed(0)} µs, longest ${latency.max.toFixed(0)} µs`]);
+    fields.push(["readings", `${one.readings}; port lost ${one.losses} times; repeated ${one.repeated}`]);
+    fields.push(["errors", Object.entries(one.errors).map(([kind, count]) => `${count} ${kind}`).join(", ") || "none"]);
+    this.fields.replaceChildren(...fields.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+    this.bad.replaceChildren(one.bad_exchanges.length === 0 ? element("p", {}, "no exchange has failed") : table(
+      ["ago", "what", "sent", "received"],
+      rows(one.bad_exchanges, (bad) => [duration(bad.age_s), `${bad.error}: ${bad.meaning}`, element("code", {}, bad.sent), element("code", {}, bad.received || "nothing")]),
+      "last bad exchanges"));
+    if (this.commands === undefined) {
+      this.commands = one.commands;
+      this.command.replaceChildren(...one.commands.map((command) => element("option", {value: command.name}, `${command.name}: ${command.meaning}`)));
+      this.showArguments();
+    }
+  }
+
+  chosen() {
+    return this.commands?.find((command) => command.name === this.command.value);
+  }
+
+  showArguments() {
+    this.arguments.replaceChildren(...(this.chosen()?.arguments ?? []).map((argument) => element("p", {}, element("label", {},
+      `${argument.name} (${argument.meaning}; ${argument.minimum} to ${argument.maximum}) `,
+      element("input", {value: argument.default ?? "", inputmode: "numeric"})))));
+  }
+
+  async run() {
+    const command = this.chosen();
+    if (command === undefined) return;
+    if (command.changes_encoder) {
+      if (!await ask(command.name, `This changes the encoder ${this.name}: ${command.meaning}. Go on?`, "Go on")) return;
+      if (!await ask(command.name, `Once more: ${this.name} will be changed now and may not be as it was again. Is the machine safe?`, "Do it")) return;
+    }
+    if (!hasToken()) {
+      const token = await ask("Token", "Commands need a token of the server's token file.", "Use it", "token");
+      if (token === null) return;
+      setToken(token);
+    }
+    const values = {encoder: this.name, command: command.name, argument: [...this.arguments.querySelectorAll("input")].map((input) => input.value).filter((text) => text !== "")};
+    setText(this.outcome, `${command.name} is running`);
+    try {
+      const {status, body} = await request("api/command", values, "POST");
+      if (status === 401) setToken("");
+      const fields = Object.entries(body.fields ?? {}).map(([name, value]) => `${name} ${value}`).join(", ");
+      setText(this.outcome, body.error ?? (fields ? `${body.text}: ${fields}` : body.text));
+    } catch (error) {
+      setText(this.outcome, `no answer came, read whether it was done: ${error.message}`);
+    }
+  }
+
+  range() {
+    const to = Math.floor(Date.now() / 1000);
+    return {encoder: this.name, from: to - Number(this.hours.value) * 3600, to};
+  }
+
+  async loadHistory() {
+    if (this.loading) return;
+    this.loading = true;
+    try {
+      const past = await request("api/history", {...this.range(), rows: 1500});
+      if (this.closed) return;
+      setText(this.past, past.body.error ?? "");
+      if (past.status !== 200) return;
+      const list = past.body.rows.filter((row) => row[2] !== null).map((row) => [new Date(row[0] * 1000), [row[1], row[2], row[3]]]);
+      const options = {file: list, customBars: true, labels: ["time", "position"]};
+      if (this.pastGraph === undefined) this.pastGraph = plot(this.pastPlot, "least, mean, greatest", ["time", "position"], {customBars: true});
+      this.pastGraph.updateOptions(options);
+      const events = (await request("api/events", {...this.range(), rows: 100})).body.events;
+      this.events.replaceChildren(events.length === 0 ? element("p", {}, "nothing has happened") : table(
+        ["when", "what", "", "who"],
+        rows(events, (event) => [new Date(event.at_ms).toLocaleString(), event.kind, event.text, event.who]), "events"));
+    } catch {
+      // the stream tells that the server is away
+    } finally {
+      this.loading = false;
+    }
+  }
+
+  async save() {
+    try {
+      await download("api/history.csv", this.range(), `${this.name.replace(/[^\w-]/g, "_")}.csv`);
+    } catch (error) {
+      setText(this.past, error.message);
+    }
+  }
+
+  close() {
+    this.closed = true;
+    clearInterval(this.timer);
+    for (const graph of [this.placeGraph, this.speedGraph, this.pastGraph]) graph?.destroy();
+  }
+}

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// The way to the server: requests with the token, and the stream of events, which tells at once when it is lost.
+
+let token = sessionStorage.getItem("token") ?? "";
+
+export function setToken(text) {
+  token = text;
+  sessionStorage.setItem("token", text);
+}
+export const hasToken = () => token !== "";
+
+const headers = () => (token === "" ? {} : {Authorization: `Bearer ${token}`});
+
+/** JSON, also of an answer that is an error: {status, body}. */
+export async function request(path, values = {}, method = "GET") {
+  const query = new URLSearchParams();
+  for (const [name, value] of Object.entries(values)) {
+    for (const one of Array.isArray(value) ? value : [value]) query.append(name, one);
+  }
+  const answer = await fetch(`${path}?${query}`, {method, headers: headers(), cache: "no-store"});
+  return {status: answer.status, body: await answer.json()};
+}
+
+/** For a file: a link cannot carry the token. */
+export async function download(path, values, name) {
+  const answer = await fetch(`${path}?${new URLSearchParams(values)}`, {headers: headers(), cache: "no-store"});
+  if (!answer.ok) throw new Error((await answer.json()).error);
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(await answer.blob());
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+/**
+ * The events of the server, for ever: it is opened again when it ends, or says nothing for `PATIENCE`. Server-sent
+ * events are read here and not by EventSource, which has no way to give a token.
+ */
+const PATIENCE = 1500;
+const PAUSE = 500;
+
+export class Events {
+  constructor(trace, {onEvent, onLost}) {
+    this.trace = trace;
+    this.onEvent = onEvent;
+    this.onLost = onLost;
+    this.open();
+  }
+
+  close() {
+    this.closed = true;
+    this.abort?.abort();
+    clearTimeout(this.timer);
+  }
+
+  wait() {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => {
+      this.onLost("no word from the server");
+      this.abort.abort();
+    }, PATIENCE);
+  }
+
+  async open() {
+    while (!this.closed) {
+      this.abort = new AbortController();
+      this.wait();
+      try {
+        await this.read();
+        if (!this.closed) this.onLost("the server has ended the connection");
+      } catch (error) {
+        if (!this.closed && !this.abort.signal.aborted) this.onLost(error.message);
+      }
+      clearTimeout(this.timer);
+      await new Promise((resolve) => setTimeout(resolve, PAUSE));
+    }
+  }
+
+  async read() {
+    const path = this.trace === "" ? "api/stream" : `api/stream?trace=${encodeURIComponent(this.trace)}`;
+    const answer = await fetch(path, {headers: headers(), signal: this.abort.signal, cache: "no-store"});
+    if (!answer.ok) throw new Error((await answer.json()).error);
+    const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+    for (let text = ""; ;) {
+      const {value, done} = await reader.read();
+      if (done) return;
+      this.wait();
+      text += value;
+      for (let end; (end = text.indexOf("\n\n")) >= 0; text = text.slice(end + 2)) this.take(text.slice(0, end));
+    }
+  }
+
+  take(message) {
+    let name = "";
+    let data = "";
+    for (const line of message.split("\n")) {
+      if (line.startsWith("event: ")) name = line.slice(7);
+      if (line.startsWith("data: ")) data += line.slice(6);
+    }
+    if (name !== "" && !this.closed) this.onEvent(name, JSON.parse(data));
+  }
+}

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/server.hpp"
+
+#include <fmt/format.h>
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <thread>
+
+#include "absenc/client/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/serve/api.hpp"
+#include "absenc/serve/view.hpp"
+
+namespace absenc::serve {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Time between_points = 33ms;
+constexpr Time between_states = 200ms;
+constexpr Time between_large_states = 1s;  // of more encoders than a screen shows
+constexpr std::size_t large = 50;
+
+std::string url_of(const std::string& host, std::uint16_t port) {
+  const bool bare_v6 = host.find(':') != std::string::npos && host.front() != '[';
+  return fmt::format("http://{}:{}/", bare_v6 ? "[" + host + "]" : host, port);
+}
+
+}  // namespace
+
+// In the order in which each needs those above it.
+struct Server::Parts {
+  explicit Parts(const Choices& choices)
+      : listener(os::listen_at(choices.host, choices.port)),
+        url(url_of(choices.host, listener.port)),
+        access(choices.token_file, listener.on_loopback),
+        fleet(choices.encoders, choices.rate, happenings) {
+    if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet);
+    const Chronicler* history = chronicler ? &*chronicler : nullptr;
+    api.emplace(fleet, access, streams, worker, history, choices.history);
+    http.emplace(std::move(listener),
+                 [this](const Request& request, const Reply& reply) { api->answer(request, reply); });
+    teller = std::jthread([this](const std::stop_token& stop) { tell(stop); });
+  }
+
+  ~Parts() {
+    teller.request_stop();
+    teller.join();
+    http.reset();  // before what it asks
+    tell_happenings();
+  }
+
+  void tell(const std::stop_token& stop) {
+    Time next_state{};
+    Time next_second{};
+    while (!stop.stop_requested()) {
+      const Time now = os::now();
+      tell_happenings();
+      tell_points();
+      if (now >= next_state) {
+        next_state = now + (fleet.all().size() > large ? between_large_states : between_states);
+        streams.tidy();
+        if (streams.count() != 0) streams.tell("state", state_json(fleet, chronicler ? &*chronicler : nullptr));
+      }
+      if (now >= next_second) {
+        next_second = now + 1s;
+        http->end_half_sent();
+      }
+      std::unique_lock lock(mutex);
+      changed.wait_for(lock, stop, between_points - std::min(os::now() - now, between_points), [] { return false; });
+    }
+  }
+
+  void tell_happenings() {
+    const std::vector<Happening> taken = happenings.take();
+    if (taken.empty()) return;
+    if (chronicler) chronicler->add(taken);
+    for (const Happening& one : taken) streams.tell("happening", one.json());
+  }
+
+  void tell_points() {
+    const std::set<std::string> wanted = streams.traced();
+    for (const std::string& name : traced) {
+      const std::shared_ptr<Watch> watch = wanted.contains(name) ? nullptr : fleet.find(name);
+      if (watch != nullptr) watch->trace(false);
+    }
+    traced = wanted;
+    for (const std::string& name : wanted) {
+      const std::shared_ptr<Watch> watch = fleet.find(name);
+      if (watch == nullptr) continue;
+      watch->trace(true);
+      const std::vector<Point> taken = watch->take_points();
+      if (!taken.empty()) streams.tell_traced(name, "points", points(*watch, taken));
+    }
+  }
+
+  Happenings happenings;
+  os::Listener listener;
+  std::string url;
+  Access access;
+  Fleet fleet;
+  std::optional<Chronicler> chronicler;
+  Streams streams;
+  Worker worker;
+  std::optional<Api> api;
+  std::optional<HttpServer> http;
+  std::set<std::string> traced;  // of the teller's thread
+  std::mutex mutex;
+  std::condition_variable_any changed;
+  std::jthread teller;
+};
+
+Server::Server(const Choices& choices) : parts_(std::make_unique<Parts>(choices)) {}
+Server::~Server() = default;
+
+const std::string& Server::url() const { return parts_->url; }
+std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
+
+std::string Server::reload() {
+  std::string changed = parts_->fleet.reload();
+  parts_->happenings.add({calendar_ms(), "", "change", "absenc.toml was read again: " + changed});
+  return changed;
+}
+
+}  // namespace absenc::serve

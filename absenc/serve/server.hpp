@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// `absenc serve` without its command line: encoders that are read, a page, HTTP, history.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/serve/history.hpp"
+
+namespace absenc::serve {
+
+struct Choices {
+  std::vector<std::string> encoders{};  // as for `absenc read`; none: all of absenc.toml
+  double rate = 50;                     // readings a second, where absenc.toml has no rate_hz; 0: as fast as can be
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 8420;  // 0: any that is free
+  std::string token_file{};   // "": none
+  std::string history{};      // the file; "": none is kept
+  HistoryLimits limits{};
+};
+
+class Server {
+ public:
+  /// Everything runs when it returns. Throws UsageError, Failure, os::Failure.
+  explicit Server(const Choices& choices);
+  /// Within the time that one reading may take.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  /// "http://127.0.0.1:8420/"
+  [[nodiscard]] const std::string& url() const;
+  [[nodiscard]] std::size_t encoders() const;
+  /// Reads absenc.toml again; returns what changed, in words. Throws UsageError: then nothing did. From one thread.
+  std::string reload();
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace absenc::serve

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/view.hpp"
+
+#include "absenc/client/reading.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
+double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
+
+bool is_linear(const Watch& watch) { return watch.address().unit->resolution(watch.address().options).unit_um > 0; }
+
+Json alarms_json(const Unit& unit, const Reading& reading) {
+  Json all = Json::array();
+  const std::vector<Flags> channels = alarms_of(unit, reading);
+  for (const Flags& flags : channels) {
+    for (std::size_t bit = 0; bit < flags.field->flags.size(); ++bit) {
+      const FlagInfo& flag = flags.field->flags[bit];
+      if ((flags.bits >> bit & 1) == 0 || flag.name.empty()) continue;
+      Json one = Json::object().set("name", flag.name).set("meaning", flag.meaning).set("action", flag.action);
+      if (channels.size() > 1) one.set("channel", flags.field->name);
+      all.append(one);
+    }
+  }
+  return all;
+}
+
+// A status is no alarm, but of encoders without alarms it is what they tell.
+Json status_json(const Unit& unit, const Reading& reading) {
+  Json all = Json::array();
+  for (const Flags& flags : status_of(unit, reading)) {
+    for (const std::string_view name : flag_names(*flags.field, flags.bits)) all.append(name);
+  }
+  return all;
+}
+
+void set_place(Json& json, const Reading& reading, bool live) {
+  const bool holds = live && reading.ready && reading.singleturn_valid();
+  const bool linear = reading.unit_um > 0;
+  json.set("angle_deg", holds && !linear ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
+  json.set("position_mm", holds && linear ? Json(micrometres(reading.singleturn, reading.unit_um) / 1000) : Json());
+  json.set("counts", holds ? Json(reading.singleturn) : Json());
+  const bool has_turns = live && reading.multiturn_bits != 0 && reading.multiturn_valid;
+  json.set("turns", has_turns ? Json(reading.multiturn) : Json());
+}
+
+Json arguments_json(const Command& command) {
+  Json all = Json::array();
+  for (const Argument& argument : command.arguments) {
+    all.append(Json::object()
+                   .set("name", argument.name)
+                   .set("meaning", argument.meaning)
+                   .set("minimum", argument.minimum)
+                   .set("maximum", argument.maximum)
+                   .set("default", argument.required ? Json() : Json(argument.default_value)));
+  }
+  return all;
+}
+
+Json commands_json(const Unit& unit) {
+  Json all = Json::array();
+  for (const Command& command : unit.commands) {
+    if (command.verb == Verb::scan) continue;  // of a line, not of an encoder
+    all.append(Json::object()
+                   .set("name", command.name)
+                   .set("meaning", command.meaning)
+                   .set("changes_encoder", command.changes_encoder)
+                   .set("arguments", arguments_json(command)));
+  }
+  return all;
+}
+
+Json errors_json(const host::Counters& counters) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < counters.errors.size(); ++i) {
+    if (counters.errors[i] != 0) json.set(error_texts[i].name, counters.errors[i]);
+  }
+  return json;
+}
+
+Json bad_json(const Snapshot& snapshot) {
+  Json all = Json::array();
+  const Time now = os::now();
+  for (const BadExchangeText& bad : snapshot.bad) {
+    all.append(Json::object()
+                   .set("age_s", seconds_of(now - bad.at))
+                   .set("error", text_of(bad.error).name)
+                   .set("meaning", text_of(bad.error).description)
+                   .set("sent", bad.sent)
+                   .set("received", bad.received));
+  }
+  return all;
+}
+
+}  // namespace
+
+Json overview(const Watch& watch, const Snapshot& snapshot) {
+  const bool live = snapshot.state == State::live;
+  const Unit& unit = *watch.address().unit;
+  const Sample& last = snapshot.last;
+  Json json = Json::object().set("encoder", watch.name()).set("address", address_of(watch.address()));
+  json.set("protocol", unit.id).set("state", name_of(snapshot.state)).set("age_s", seconds_of(snapshot.age));
+  json.set("linear", is_linear(watch));
+  set_place(json, last.reading, live);
+  json.set("speed", live && last.speed_valid ? Json(last.speed) : Json());
+  json.set("speed_unit", is_linear(watch) ? "mm/s" : "rpm");
+  json.set("alarms", live ? alarms_json(unit, last.reading) : Json());
+  json.set("status", live ? status_json(unit, last.reading) : Json());
+  json.set("errors_last_minute", snapshot.errors_last_minute).set("rate_hz", snapshot.rate);
+  return json.set("message", live ? Json() : Json(snapshot.message));
+}
+
+Json details(const Watch& watch) {
+  const Snapshot snapshot = watch.snapshot(true);
+  Json json = overview(watch, snapshot);
+  json.set("protocol_name", watch.address().unit->name);
+  json.set("readings", snapshot.readings).set("losses", snapshot.losses).set("restarts", snapshot.restarts);
+  json.set("repeated", snapshot.counters.repeated).set("errors", errors_json(snapshot.counters));
+  json.set("latency_us", Json::object()
+                             .set("p50", microseconds_of(snapshot.median))
+                             .set("p99", microseconds_of(snapshot.percentile_99))
+                             .set("max", microseconds_of(snapshot.longest)));
+  json.set("fields", snapshot.state == State::live ? snapshot.fields : Json());
+  json.set("bad_exchanges", bad_json(snapshot));
+  return json.set("commands", commands_json(*watch.address().unit));
+}
+
+Json points(const Watch& watch, std::span<const Point> taken) {
+  Json list = Json::array();
+  for (const Point& point : taken) {
+    Json one = Json::array();
+    one.append(point.at_ms).append(point.place).append(point.speed ? Json(*point.speed) : Json());
+    list.append(one);
+  }
+  return Json::object().set("encoder", watch.name()).set("points", list);
+}
+
+}  // namespace absenc::serve

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is known of encoders, as JSON and for Prometheus. What is not live is never given as a present value.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absenc/client/text/json.hpp"
+#include "absenc/serve/fleet.hpp"
+#include "absenc/serve/watch.hpp"
+
+namespace absenc::serve {
+
+/// At a glance: state, age_s, position, turns, speed, alarms in words, errors of the last minute. Values are null
+/// unless the encoder is live and they hold.
+[[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
+
+/// All of it: also counters, latencies, the last bad exchanges, the fields of the last reply, and the commands that it
+/// has with their arguments.
+[[nodiscard]] client::Json details(const Watch& watch);
+
+/// {"encoder":name,"points":[[at_ms,position,speed],...]}; a speed that is not known is null.
+[[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
+
+/// Of the server, beside the encoders.
+struct ServerFigures {
+  std::size_t streams = 0;
+  std::uint64_t stream_drops = 0;  // messages that slow readers lost
+  std::uint64_t history_lost = 0;  // rows that could not be written
+};
+
+/// The text format of Prometheus.
+[[nodiscard]] std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures);
+
+}  // namespace absenc::serve

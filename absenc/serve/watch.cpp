@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absenc/client/settings.hpp"
+#include "absenc/client/text/row_text.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/pace.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t most_points = 4096;
+constexpr std::size_t most_seconds = 120;  // that wait for the history
+constexpr Time between_summaries = 1s;
+constexpr Time between_tellings = 1s;    // of failures, which may come with each reading
+constexpr Time before_another_try = 5s;  // of what cannot be read as it is
+
+// os::now is the steady clock.
+std::chrono::steady_clock::time_point to_time_point(Time time) {
+  return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
+}
+
+double place_of(const Sample& sample) {
+  const Reading& reading = sample.reading;
+  if (reading.unit_um > 0) return micrometres(sample.position, reading.unit_um) / 1000;
+  return std::ldexp(360.0 * static_cast<double>(sample.position), -static_cast<int>(reading.singleturn_bits));
+}
+
+std::string trouble_words(const Trouble& trouble) {
+  std::string words = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
+  if (!trouble.advice.empty()) words += fmt::format(". Try: {}", trouble.advice);
+  return words;
+}
+
+Done done_well(const Command& command, const Answer& answer, const std::string& note) {
+  return {true, fmt::format("{}: done{}{}", command.name, note.empty() ? "" : "; ", note), to_json(answer.row())};
+}
+
+// Settings are compared with what is read back.
+Done do_command(Encoder& live, const Order& order) {
+  const Command& command = *order.command;
+  if (command.verb != Verb::config_set) return done_well(command, live.run(command.name, order.arguments), "");
+  const std::string_view setting = command.reads_back.empty() ? command.name : command.reads_back;
+  const SettingChange change = live.settings().set(setting, order.arguments);
+  return done_well(command, change.now, change.was_so ? "it was so already" : change.note);
+}
+
+}  // namespace
+
+std::string_view name_of(State state) {
+  constexpr std::array<std::string_view, 6> names{"opening", "live", "silent", "failing", "lost", "ended"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+void Spread::add(double value) {
+  least = count == 0 ? value : std::min(least, value);
+  greatest = count == 0 ? value : std::max(greatest, value);
+  sum += value;
+  ++count;
+}
+
+Watch::Watch(std::string name, const EncoderAddress& address, double rate, Time offset, Happenings& happenings)
+    : name_(std::move(name)),
+      address_(address),
+      rate_(rate),
+      offset_(offset),
+      happenings_(&happenings),
+      known_at_(os::now()),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+Watch::~Watch() {
+  thread_.request_stop();
+  wait();
+}
+
+void Watch::wait() {
+  if (thread_.joinable()) thread_.join();
+  std::optional<Order> left;
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+    left = std::exchange(order_, std::nullopt);
+  }
+  if (left) left->done({false, "it was not done: the encoder is no longer watched", {}});
+}
+
+State Watch::state_now(Time age) const {
+  const Time period = rate_ > 0 ? Time(static_cast<std::int64_t>(1e9 / rate_)) : Time{};
+  const bool old = age > std::max<Time>(3 * period, 500ms);
+  return known_.state == State::live && old ? State::silent : known_.state;
+}
+
+Snapshot Watch::snapshot(bool details) const {
+  const std::int64_t now_s = calendar_ms() / 1000;
+  const std::lock_guard lock(mutex_);
+  Snapshot snapshot = known_;
+  snapshot.age = os::now() - known_at_;
+  snapshot.state = state_now(snapshot.age);
+  for (std::size_t i = 0; i < minute_.errors.size(); ++i) {
+    if (now_s - minute_.at_s[i] < 60) snapshot.errors_last_minute += minute_.errors[i];
+  }
+  if (!details) snapshot.bad.clear();
+  return snapshot;
+}
+
+void Watch::trace(bool on) {
+  const std::lock_guard lock(mutex_);
+  traced_ = on;
+  if (!on) points_.clear();
+}
+
+std::vector<Point> Watch::take_points() {
+  const std::lock_guard lock(mutex_);
+  std::vector<Point> taken(points_.begin(), points_.end());
+  points_.clear();
+  return taken;
+}
+
+std::vector<Second> Watch::take_seconds() {
+  const std::int64_t now_s = calendar_ms() / 1000;
+  const std::lock_guard lock(mutex_);
+  if (second_.at_s != 0 && second_.at_s < now_s) {
+    seconds_.push_back(std::exchange(second_, {}));
+  }
+  std::vector<Second> taken(seconds_.begin(), seconds_.end());
+  seconds_.clear();
+  return taken;
+}
+
+bool Watch::give(Order order) {
+  const std::lock_guard lock(mutex_);
+  if (order_ || over_) return false;
+  order_ = std::move(order);
+  changed_.notify_all();
+  return true;
+}
+
+void Watch::tell(std::string_view kind, std::string text, std::string who) {
+  happenings_->add({calendar_ms(), name_, std::string(kind), std::move(text), std::move(who)});
+}
+
+void Watch::work(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    try {
+      read_on(stop);
+    } catch (const os::Interrupted&) {  // everybody ends: os::interrupted() tells the others
+      return;
+    } catch (const os::Ended&) {  // asked to, while the line was never silent
+      return;
+    } catch (const std::exception& error) {
+      become(State::ended, error.what());
+    }
+    std::unique_lock lock(mutex_);
+    changed_.wait_until(lock, stop, to_time_point(os::now() + before_another_try), [] { return false; });
+  }
+}
+
+void Watch::read_on(const std::stop_token& stop) {
+  Pace pace(rate_, offset_);
+  Encoder live(address_, pace.period());
+  live.end_when([&] { return stop.stop_requested() && !command_runs_; });
+  Time next = os::now() + offset_;
+  while (!stop.stop_requested()) {
+    std::optional<Order> order;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait_until(lock, stop, to_time_point(next), [&] { return order_.has_value(); });
+      order = std::exchange(order_, std::nullopt);
+    }
+    if (order) {
+      carry_out(live, *order);
+    } else if (!stop.stop_requested()) {
+      publish(live, live.next());
+      next = pace.next();
+    }
+  }
+}
+
+void Watch::become(State state, const std::string& message) {
+  const bool is_new = [&] {
+    const std::lock_guard lock(mutex_);
+    const bool changed = known_.state != state || (state == State::ended && known_.message != message);
+    known_.state = state;
+    known_.message = message;
+    return changed;
+  }();
+  if (!is_new) return;
+  if (state == State::failing) {
+    if (os::now() < next_told_) return;
+    next_told_ = os::now() + between_tellings;
+  }
+  if (state != State::live) return tell(name_of(state), message);
+  tell("back", "readings come");
+}
+
+void Watch::publish(const Encoder& live, const Sample& sample) {
+  switch (sample.kind) {
+    case Sample::Kind::reading: {
+      {
+        const std::lock_guard lock(mutex_);
+        known_.has_reading = true;
+        known_.last = sample;
+        known_at_ = sample.at;
+        ++known_.readings;
+      }
+      become(State::live, "");
+      if (sample.restarted && !restarted_) tell("restarted", sample.message);
+      restarted_ = sample.restarted;
+      if (sample.reading.alarms != alarms_) tell_alarms(sample.reading);
+      break;
+    }
+    case Sample::Kind::failed:
+      become(State::failing, trouble_words(sample.trouble));
+      break;
+    case Sample::Kind::lost:
+      become(State::lost, sample.message);
+      break;
+    case Sample::Kind::absent: {
+      const std::lock_guard lock(mutex_);
+      known_.message = sample.message;
+      break;
+    }
+    case Sample::Kind::back:
+      break;
+  }
+  summarize(live, sample);
+}
+
+void Watch::summarize(const Encoder& live, const Sample& sample) {
+  const Connection& encoder = live.connection();
+  const std::uint64_t bad = encoder.counters().bad();
+  const Time now = os::now();
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t before = known_.counters.bad();
+  const std::uint64_t errors = bad < before ? bad : bad - before;  // anew after it had ended
+  count_second(sample, errors);
+  if (errors != 0) known_.bad = live.bad_exchanges();
+  known_.counters = encoder.counters();
+  known_.losses = live.losses();
+  known_.restarts = live.restarts();
+  if (now < next_summary_) return;
+  next_summary_ = now + between_summaries;
+  if (sample.kind == Sample::Kind::reading) {
+    AnswerSink sink;
+    encoder.report(sink);
+    known_.fields = to_json(sink.answer.row());
+  }
+  known_.rate = live.rate();
+  known_.median = encoder.latencies().percentile(0.5);
+  known_.percentile_99 = encoder.latencies().percentile(0.99);
+  known_.longest = encoder.latencies().longest();
+}
+
+void Watch::count_second(const Sample& sample, std::uint64_t errors) {
+  const std::int64_t at_ms = calendar_ms();
+  const std::int64_t at_s = at_ms / 1000;
+  if (at_s != second_.at_s) {
+    if (second_.at_s != 0) seconds_.push_back(second_);
+    if (seconds_.size() > most_seconds) seconds_.pop_front();
+    second_ = {};
+    second_.at_s = at_s;
+  }
+  second_.errors += errors;
+  const auto slot = static_cast<std::size_t>(at_s % 60);
+  if (minute_.at_s[slot] != at_s) minute_.errors[slot] = 0;
+  minute_.at_s[slot] = at_s;
+  minute_.errors[slot] += errors;
+  if (sample.kind != Sample::Kind::reading) return;
+  ++second_.readings;
+  if (!sample.position_valid) return;
+  Point point{at_ms, place_of(sample), {}};
+  second_.place.add(point.place);
+  if (sample.speed_valid) {
+    point.speed = sample.speed;
+    second_.speed.add(sample.speed);
+  }
+  if (!traced_) return;
+  points_.push_back(point);
+  if (points_.size() > most_points) points_.pop_front();
+}
+
+void Watch::tell_alarms(const Reading& reading) {
+  const Unit& unit = *address_.unit;
+  Reading before = reading;
+  before.alarms = std::exchange(alarms_, reading.alarms);
+  const std::vector<Flags> then = alarms_of(unit, before);
+  const std::vector<Flags> now = alarms_of(unit, reading);
+  for (std::size_t channel = 0; channel < now.size(); ++channel) {
+    const FieldInfo& field = *now[channel].field;
+    const std::uint32_t changed = then[channel].bits ^ now[channel].bits;
+    for (std::size_t bit = 0; bit < field.flags.size(); ++bit) {
+      const FlagInfo& flag = field.flags[bit];
+      if ((changed >> bit & 1) == 0 || flag.name.empty()) continue;
+      const bool raised = (now[channel].bits >> bit & 1) != 0;
+      std::string words =
+          fmt::format("{}{}: {}", now.size() > 1 ? fmt::format("{} ", field.name) : "", flag.name, flag.meaning);
+      if (raised && !flag.action.empty()) words += fmt::format(". What to do: {}", flag.action);
+      tell(raised ? "alarm" : "alarm_over", words);
+    }
+  }
+}
+
+void Watch::carry_out(Encoder& live, const Order& order) {
+  const std::string_view name = order.command->name;
+  Done done;
+  command_runs_ = true;
+  if (!live.connection().connected()) {
+    done.text = fmt::format("{} was not done: the port is away", name);
+  } else {
+    try {
+      done = do_command(live, order);
+    } catch (const os::Failure& failure) {  // the next reading will find the port lost
+      done.text = fmt::format("{} was broken off, read whether it was done: {}", name, failure.what());
+    } catch (const os::Interrupted&) {
+      order.done({false, fmt::format("{} was broken off: the server ends", name), {}});
+      throw;
+    } catch (const std::exception& error) {
+      done.text = fmt::format("{} failed: {}", name, error.what());
+    }
+    if (order.command->changes_encoder) live.forget_position();
+  }
+  command_runs_ = false;
+  tell("command", done.text, order.who);
+  order.done(done);
+}
+
+}  // namespace absenc::serve

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// One encoder read again and again by a thread of its own; others look at copies of what is known of it.
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/text/json.hpp"
+#include "absenc/client/way/address.hpp"
+#include "absenc/serve/happening.hpp"
+
+namespace absenc::serve {
+
+enum class State : std::uint8_t {
+  opening,  // its port was not there yet
+  live,     // the reading is new
+  silent,   // none has come for a while
+  failing,  // the last attempt failed
+  lost,     // the port has gone away
+  ended,    // it cannot be read as it is: `message` says why. It is tried again every few seconds
+};
+[[nodiscard]] std::string_view name_of(State state);
+
+/// What is known of an encoder at a moment.
+struct Snapshot {
+  State state = State::opening;
+  Time age{};  // of the reading, or of what is known instead
+  bool has_reading = false;
+  client::Sample last{};  // only to be shown as the present one while `live`
+  std::string message{};  // why it is not
+  host::Counters counters{};
+  std::uint64_t readings = 0;
+  std::uint64_t losses = 0;
+  std::uint64_t restarts = 0;  // of the position
+  std::uint64_t errors_last_minute = 0;
+  double rate = 0;  // readings a second
+  Time median{};    // of the latencies
+  Time percentile_99{};
+  Time longest{};
+  std::vector<client::BadExchangeText> bad{};  // the newest first
+  client::Json fields{};                       // of the last reply, at most a second old
+};
+
+/// Position, continued past the end of a turn, and speed: in degrees and rpm, of linear encoders mm and mm/s.
+struct Point {
+  std::int64_t at_ms = 0;
+  double place = 0;
+  std::optional<double> speed{};
+};
+
+/// Least, greatest and mean of what there was in a second.
+struct Spread {
+  std::uint64_t count = 0;
+  double least = 0;
+  double greatest = 0;
+  double sum = 0;
+
+  void add(double value);
+  [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
+};
+struct Second {
+  std::int64_t at_s = 0;  // calendar
+  std::uint64_t readings = 0;
+  std::uint64_t errors = 0;
+  Spread place{};
+  Spread speed{};
+};
+
+/// How a command ended.
+struct Done {
+  bool good = false;
+  std::string text{};
+  client::Json fields{};
+};
+
+struct Order {
+  const Command* command = nullptr;
+  std::vector<std::int64_t> arguments{};
+  std::string who{};
+  std::function<void(const Done&)> done{};  // called once, from the thread of the encoder
+};
+
+class Watch {
+ public:
+  /// The first reading comes `offset` after the start. `happenings` outlives it.
+  Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, Happenings& happenings);
+  ~Watch();
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+
+  /// It ends within the time that one reading may take.
+  void request_stop() { thread_.request_stop(); }
+  /// Until it has ended; the destructor does both.
+  void wait();
+
+  [[nodiscard]] Snapshot snapshot(bool details) const;
+  /// From now on points are kept until they are taken, the newest `most_points` of them.
+  void trace(bool on);
+  [[nodiscard]] std::vector<Point> take_points();
+  /// The seconds that are over.
+  [[nodiscard]] std::vector<Second> take_seconds();
+  /// False when another command is still waiting, or it has ended.
+  [[nodiscard]] bool give(Order order);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const client::EncoderAddress& address() const { return address_; }
+  [[nodiscard]] double rate() const { return rate_; }
+
+ private:
+  void work(const std::stop_token& stop);
+  void read_on(const std::stop_token& stop);
+  void publish(const client::Encoder& live, const client::Sample& sample);
+  void summarize(const client::Encoder& live, const client::Sample& sample);
+  void count_second(const client::Sample& sample, std::uint64_t errors);
+  void tell_alarms(const Reading& reading);
+  void become(State state, const std::string& message);
+  void carry_out(client::Encoder& live, const Order& order);
+  [[nodiscard]] State state_now(Time age) const;
+  void tell(std::string_view kind, std::string text, std::string who = {});
+
+  std::string name_;
+  client::EncoderAddress address_;
+  double rate_;
+  Time offset_;
+  Happenings* happenings_;
+
+  mutable std::mutex mutex_;  // guards what follows
+  std::condition_variable_any changed_;
+  Snapshot known_;
+  Time known_at_{};  // of the last reading, or of the last change of state
+  std::optional<Order> order_;
+  bool over_ = false;  // nobody takes orders any more
+  bool traced_ = false;
+  std::deque<Point> points_;
+  Second second_{};
+  std::deque<Second> seconds_;
+  struct Minute {
+    std::array<std::uint64_t, 60> errors{};  // by second
+    std::array<std::int64_t, 60> at_s{};
+  } minute_;
+
+  // Of the thread alone.
+  Time next_summary_{};
+  Time next_told_{};  // of failures
+  std::uint32_t alarms_ = 0;
+  bool restarted_ = false;
+  bool command_runs_ = false;  // it is not broken off
+
+  std::jthread thread_;  // last: it uses all of the others
+};
+
+}  // namespace absenc::serve

@@ -1,0 +1,537 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc serve`: what it tells, to whom, and that nobody can keep it from telling."""
+import contextlib
+import http.client
+import json
+import os
+import signal
+import socket
+import sqlite3
+import subprocess
+import time
+import unittest
+import urllib.parse
+
+from command_support import ABSENC, PATIENCE, Case, Emulator, end, read_line
+
+TOKEN = "a-secret-of-nobody-else"
+BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))  # what "at once" is
+
+
+def wait_until(true, what):
+    deadline = time.monotonic() + PATIENCE
+    while not (value := true()):
+        if time.monotonic() > deadline:
+            raise AssertionError(f"in vain waited until {what}")
+        time.sleep(0.02)
+    return value
+
+
+class Stream:
+    """An open stream of server-sent events."""
+
+    def __init__(self, server, trace=""):
+        self.connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
+        self.connection.request("GET", "/api/stream?" + urllib.parse.urlencode({"trace": trace}))
+        self.answer = self.connection.getresponse()
+
+    def next(self):
+        """(event, data)"""
+        name = data = ""
+        while True:
+            line = self.answer.readline().decode().rstrip("\n")
+            if line.startswith("event: "):
+                name = line[7:]
+            if line.startswith("data: "):
+                data += line[6:]
+            if line == "" and name:
+                return name, json.loads(data)
+
+    def until(self, wanted):
+        """The first event that is wanted, with its data."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            event, data = self.next()
+            if wanted(event, data):
+                return data
+        raise AssertionError("in vain waited for an event")
+
+    def state(self, wanted=lambda encoder: True):
+        """The one encoder of the first state in which it is as wanted."""
+        data = self.until(lambda event, data: event == "state" and wanted(data["encoders"][0]))
+        return data["encoders"][0]
+
+    def close(self):
+        self.answer.close()
+        self.connection.close()
+
+
+class Server:
+    def __init__(self, *arguments, cwd=None, **environment):
+        where = [] if "--listen" in arguments else ["--listen", "127.0.0.1:0"]
+        command = [ABSENC, "serve", *arguments, *where]
+        self.process = subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=cwd,
+                                        env={**os.environ, **environment})
+        line = read_line(self.process.stdout, time.monotonic() + PATIENCE)
+        if line is None:
+            raise AssertionError(f"the server did not become ready: {end(self.process)}")
+        self.url = line.strip()
+        self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
+
+    def ask(self, path, method="GET", headers=None, **values):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+        with contextlib.closing(connection):
+            query = "?" + urllib.parse.urlencode(values, doseq=True) if values else ""
+            connection.request(method, path + query, headers=headers or {})
+            answer = connection.getresponse()
+            return answer.status, answer.read().decode()
+
+    def json(self, path, **values):
+        status, body = self.ask(path, **values)
+        if status != 200:
+            raise AssertionError(f"{path}: {status} {body}")
+        return json.loads(body)
+
+    def encoder(self, index=0):
+        return self.json("/api/encoders")["encoders"][index]
+
+    def command(self, encoder, command, headers, **values):
+        status, body = self.ask("/api/command", "POST", headers, encoder=encoder, command=command, **values)
+        return status, json.loads(body)
+
+
+class ServeCase(Case):
+    def server(self, *arguments, **settings):
+        server = Server(*arguments, **settings)
+        self.addCleanup(end, server.process)
+        return server
+
+    def without_history(self, *arguments, **settings):
+        return self.server(*arguments, "--history", "none", **settings)
+
+    def tokens(self):
+        path = self.file("tokens", f"anna {TOKEN}\n")
+        os.chmod(path, 0o600)
+        return path
+
+    def stream(self, server, trace=""):
+        stream = Stream(server, trace)
+        self.addCleanup(stream.close)
+        return stream
+
+
+class Values(ServeCase):
+    def test_they_move(self):
+        server = self.without_history("sim:tformat?motion=rpm=60")
+        stream = self.stream(server)
+        first = stream.state(lambda one: one["state"] == "live" and one["speed"] is not None)
+        second = stream.state(lambda one: one["angle_deg"] not in (None, first["angle_deg"]))
+        self.assertEqual((second["protocol"], second["speed_unit"], second["alarms"]), ("tformat", "rpm", []))
+        self.assertAlmostEqual(stream.state(lambda one: one["speed"] is not None)["speed"], 60, delta=6)
+
+    def test_points_of_one_encoder(self):
+        name = "sim:tformat?motion=rpm=60"
+        server = self.without_history(name, "sim:esl?motion=rpm=6", "--rate", "100")
+        stream = self.stream(server, name)
+        points = []
+        while len(points) < 50:
+            data = stream.until(lambda event, _: event == "points")
+            self.assertEqual(data["encoder"], name)
+            points += data["points"]
+        times = [at for at, _, _ in points]
+        self.assertEqual(times, sorted(times))
+        self.assertEqual(len(set(place for _, place, _ in points)), len(points))
+
+    def test_alarms_in_words(self):
+        server = self.without_history("sim:tformat?alarm=over_heat")
+        encoder = wait_until(lambda: server.encoder()["alarms"] and server.encoder(), "it has an alarm")
+        alarm = encoder["alarms"][0]
+        self.assertEqual(alarm["name"], "over_heat")
+        self.assertTrue(alarm["meaning"] and alarm["action"], alarm)
+        self.assertIn('alarm="over_heat"} 1\n', server.ask("/metrics")[1])
+
+    def test_everything_about_one(self):
+        name = "sim:tformat?fault=corrupt=0.3&seed=1"
+        server = self.without_history(name)
+
+        def has_bad():
+            details = server.json("/api/encoder", name=name)
+            return details["bad_exchanges"] and details["fields"] and details
+        details = wait_until(has_bad, "an exchange has failed")
+        self.assertTrue(details["errors"])
+        self.assertGreater(details["errors_last_minute"], 0)
+        self.assertRegex(details["bad_exchanges"][0]["sent"], "^[0-9A-F]{2}")
+        changing = [command["name"] for command in details["commands"] if command["changes_encoder"]]
+        self.assertIn("zero", changing)
+        self.assertNotIn("position", changing)
+        self.assertEqual(server.ask("/api/encoder", name="none")[0], 400)
+
+    def test_what_describes_it(self):
+        server = self.without_history("sim:tformat")
+        self.assertIn("/api/command", server.json("/openapi.json")["paths"])
+        self.assertTrue(server.json("/healthz")["ok"])
+        page = server.ask("/")
+        self.assertEqual(page[0], 200)
+        for name in ("app.js", "style.css", "dygraph.min.js"):
+            self.assertIn(f'"{name}"', page[1])
+            self.assertEqual(server.ask(f"/{name}")[0], 200)
+        self.assertEqual(server.ask("/nothing")[0], 404)
+        self.assertEqual(server.ask("/api/encoders", "PUT")[0], 405)
+        for line in server.ask("/metrics")[1].splitlines():
+            self.assertRegex(line, r'^(# (HELP|TYPE) absenc_\w+ .+|absenc_\w+\{.*\} [-+.e\d]+)$')
+
+
+class Losses(ServeCase):
+    def test_an_encoder_goes_and_comes_back(self):
+        emulator = Emulator(self.directory)
+        self.addCleanup(emulator.end)
+        server = self.without_history(f"tformat:{emulator.path}")
+        wait_until(lambda: server.encoder()["state"] == "live", "it is read")
+        stream = self.stream(server)
+        stream.state()
+        emulator.process.kill()
+        killed = time.monotonic()
+        told = stream.until(lambda event, data: event == "happening")
+        gone = stream.state(lambda one: one["state"] != "live")
+        self.assertLess(time.monotonic() - killed, BUSY)
+        self.assertEqual((told["kind"], gone["state"]), ("lost", "lost"), told)
+        self.assertIsNone(gone["angle_deg"])
+        self.assertIsNone(gone["speed"])
+        emulator.end()
+        again = Emulator(self.directory)
+        self.addCleanup(again.end)
+        self.assertIsNotNone(stream.state(lambda one: one["state"] == "live")["angle_deg"])
+
+    def test_it_ends_cleanly(self):
+        for number in (signal.SIGTERM, signal.SIGINT):
+            server = self.without_history("sim:tformat", "tformat:/dev/nothing")
+            stream = self.stream(server)
+            stream.next()
+            status, _, err = end(server.process, number)
+            self.assertEqual(status, 0, err)
+
+    def test_what_cannot_be(self):
+        for arguments, words in ((("sim:tformatt",), "tformat"), (("sim:tformat", "sim:tformat"), "twice"),
+                                 (("sim:tformat", "--listen", "0.0.0.0:0"), "--token-file"),
+                                 (("sim:tformat", "--listen", "127.0.0.1:x"), "HOST:PORT")):
+            result = self.run_serve(*arguments)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(words, result.stderr)
+        first = self.without_history("sim:tformat")
+        result = self.run_serve("sim:tformat", "--listen", f"127.0.0.1:{first.port}")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("in use", result.stderr)
+
+    @staticmethod
+    def run_serve(*arguments):
+        return subprocess.run([ABSENC, "serve", *arguments, "--history", "none"], capture_output=True, text=True,
+                              timeout=PATIENCE, check=False)
+
+
+class Reload(ServeCase):
+    FILE = ('[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\nrate_hz = 20\n'
+            '[encoder.{}]\nprotocol = "esl"\nport = "sim"\nmultiturn = {}\n')
+
+    def test_those_that_did_not_change_go_on(self):
+        path = self.file("absenc.toml", self.FILE.format("wrist", 3))
+        server = self.without_history(ABSENC_CONFIG=path)
+
+        def readings(name):
+            return server.json("/api/encoder", name=name)["readings"]
+
+        def turns(index):
+            return server.encoder(index)["turns"]
+        wait_until(lambda: readings("elbow") > 20, "it was read")
+        wait_until(lambda: turns(1) == 3, "it has turns")
+        before = readings("elbow")
+        self.file("absenc.toml", self.FILE.format("wrist", 4))
+        server.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: turns(1) == 4, "the file was read again")
+        self.assertGreaterEqual(readings("elbow"), before)
+        self.file("absenc.toml", self.FILE.format("hand", "true true"))
+        server.process.send_signal(signal.SIGHUP)
+        self.assertIn("begun: wrist", self.error_line(server))
+        self.assertIn("goes on as it was", self.error_line(server))
+        self.assertEqual(turns(1), 4)
+
+    @staticmethod
+    def error_line(server):
+        while True:
+            line = read_line(server.process.stderr, time.monotonic() + PATIENCE)
+            if line is None or "absenc.toml" in line and "SIGHUP" not in line:
+                return line or ""
+
+    def test_its_rate(self):
+        path = self.file("absenc.toml", self.FILE.format("wrist", 0))
+        server = self.without_history("--rate", "200", ABSENC_CONFIG=path)
+        wait_until(lambda: server.encoder(1)["rate_hz"] > 60, "the others have the usual rate")
+        self.assertLess(server.encoder(0)["rate_hz"], 40)
+        self.file("absenc.toml", self.FILE.format("wrist", 0).replace("20", '"much"'))
+        result = subprocess.run(
+            [ABSENC, "serve", "--history", "none"], capture_output=True, text=True, timeout=PATIENCE, check=False,
+            env={**os.environ, "ABSENC_CONFIG": path})
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("rate_hz", result.stderr)
+
+
+class WhoMayWhat(ServeCase):
+    def setUp(self):
+        super().setUp()
+        self.emulator = Emulator(self.directory, "--singleturn", "1000")
+        self.addCleanup(self.emulator.end)
+        self.name = f"tformat:{self.emulator.path}"
+
+    def counts(self, server):
+        return wait_until(lambda: server.encoder()["counts"] is not None and server.encoder(), "it is live")["counts"]
+
+    def test_zero(self):
+        server = self.server(self.name, "--token-file", self.tokens(), "--history", self.file("history"))
+        self.assertEqual(self.counts(server), 1000)
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        for headers, expected in (({}, 401), ({"Authorization": "Bearer " + TOKEN[:-1] + "x"}, 401),
+                                  ({"Authorization": TOKEN}, 401),
+                                  ({**good, "Origin": "http://evil.example"}, 403),
+                                  ({**good, "Sec-Fetch-Site": "cross-site"}, 403),
+                                  ({**good, "Host": "evil.example"}, 403)):
+            with self.subTest(headers=headers):
+                status, body = self.command(server, headers)
+                self.assertEqual(status, expected, body)
+        self.assertEqual(server.ask("/api/command", headers=good, encoder=self.name, command="zero")[0], 404)
+        self.assertEqual(self.counts(server), 1000)
+        origin = {"Origin": f"http://127.0.0.1:{server.port}", "Sec-Fetch-Site": "same-origin"}
+        status, body = self.command(server, {**good, **origin})
+        self.assertEqual((status, body["ok"]), (200, True), body)
+        wait_until(lambda: self.counts(server) == 0, "it is at zero")
+
+        def commands():
+            return [event for event in server.json("/api/events", encoder=self.name)["events"]
+                    if event["kind"] == "command"]
+        events = wait_until(commands, "the history has it")
+        self.assertEqual(len(events), 1)
+        self.assertEqual(events[0]["who"], "anna from 127.0.0.1")
+
+    def command(self, server, headers):
+        return server.command(self.name, "zero", headers)
+
+    def test_bad_commands(self):
+        server = self.without_history(self.name, "--token-file", self.tokens())
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        status, body = server.command(self.name, "memory-read", good, argument=["5"])
+        self.assertEqual(status, 200, body)
+        for encoder, command, argument in (("nobody", "zero", []), (self.name, "zerro", []),
+                                           (self.name, "memory-read", ["x"]), (self.name, "memory-read", ["5", "6", "7", "8", "9"])):
+            status, body = server.command(encoder, command, good, argument=argument)
+            self.assertEqual(status, 400, body)
+            self.assertTrue(body["error"])
+
+    def test_without_tokens_nothing_changes(self):
+        server = self.without_history(self.name)
+        status, body = self.command(server, {"Authorization": "Bearer "})
+        self.assertEqual(status, 403)
+        self.assertIn("--token-file", body["error"])
+
+    def test_other_computers_need_a_token_to_look(self):
+        server = Server("sim:tformat", "--token-file", self.tokens(), "--history", "none", "--listen", "0.0.0.0:0")
+        self.addCleanup(end, server.process)
+        self.assertEqual(server.ask("/api/encoders")[0], 401)
+        self.assertEqual(server.ask("/metrics")[0], 401)
+        self.assertEqual(server.ask("/healthz")[0], 200)
+        self.assertEqual(server.ask("/")[0], 200)
+        self.assertEqual(server.ask("/api/encoders", headers={"Authorization": f"Bearer {TOKEN}"})[0], 200)
+
+    def test_other_names_of_this_computer(self):
+        server = self.without_history(self.name)
+        self.assertEqual(server.ask("/api/encoders", headers={"Host": "evil.example"})[0], 403)
+        self.assertEqual(server.ask("/api/encoders", headers={"Host": f"localhost:{server.port}"})[0], 200)
+
+    def test_tokens_that_others_may_read(self):
+        path = self.tokens()
+        os.chmod(path, 0o644)
+        result = Losses.run_serve("sim:tformat", "--token-file", path)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("chmod 600", result.stderr)
+        os.chmod(path, 0o600)
+        self.file("tokens", "anna short\n")
+        self.assertIn("16 characters", Losses.run_serve("sim:tformat", "--token-file", path).stderr)
+
+
+class History(ServeCase):
+    NAME = "sim:tformat?motion=rpm=60&alarm=over_heat"
+
+    def rows(self, server):
+        return server.json("/api/history", encoder=self.NAME)["rows"]
+
+    def test_it_is_kept_over_kill_9(self):
+        path = self.file("history")
+        server = self.server(self.NAME, "--history", path)
+        wait_until(lambda: len(self.rows(server)) >= 3, "it has three seconds")
+        before = self.rows(server)
+        server.process.kill()
+        server.process.wait()
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            self.assertEqual(database.execute("PRAGMA integrity_check").fetchall(), [("ok",)])
+        server = self.server(self.NAME, "--history", path)
+        after = {row[0]: row for row in self.rows(server)}
+        for row in before:
+            self.assertEqual(after.get(row[0]), row)
+        whole = [row for row in before if row[7] > 40]
+        self.assertTrue(whole)
+        for _, least, mean, greatest, speed_least, speed_mean, speed_greatest, _, _ in whole:
+            self.assertTrue(least < mean < greatest)
+            self.assertTrue(speed_least <= speed_mean <= speed_greatest)
+        kinds = [event["kind"] for event in server.json("/api/events")["events"]]
+        self.assertIn("alarm", kinds)
+
+    def test_csv(self):
+        server = self.server(self.NAME, "--history", self.file("history"))
+        wait_until(lambda: len(self.rows(server)) >= 2, "it has two seconds")
+        status, text = server.ask("/api/history.csv", encoder=self.NAME)
+        lines = text.splitlines()
+        self.assertEqual(status, 200)
+        self.assertEqual(lines[0].split(",")[:4], ["encoder", "at_s", "readings", "errors"])
+        self.assertGreaterEqual(len(lines), 3)
+        self.assertEqual(server.ask("/api/history.csv", encoder=self.NAME, **{"from": 1, "to": 2})[1], lines[0] + "\n")
+        self.assertEqual(server.ask("/api/history", encoder=self.NAME, **{"from": 2, "to": 1})[0], 400)
+
+    def test_many_rows_of_csv(self):
+        path = self.file("history")
+        server = self.server(self.NAME, "--history", path)
+        wait_until(lambda: self.rows(server), "it has a second")
+        with contextlib.closing(sqlite3.connect(path, timeout=PATIENCE)) as database:
+            now = int(time.time())
+            database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
+                                 [(now - 100_000 + i,) for i in range(35_000)])
+            database.commit()
+        _, text = server.ask("/api/history.csv", encoder=self.NAME, **{"from": now - 100_000, "to": now - 60_000})
+        self.assertEqual(len(text.splitlines()), 35_001)
+        rows = server.json("/api/history", encoder=self.NAME, rows=100, **{"from": now - 100_000, "to": now - 60_000})
+        self.assertLessEqual(len(rows["rows"]), 101)
+
+    def test_what_is_old_goes(self):
+        path = self.file("history")
+        server = self.server(self.NAME, "--history", path)
+        wait_until(lambda: self.rows(server), "it has a second")
+        end(server.process)
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            database.execute("INSERT INTO second SELECT id, 1, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder")
+            database.commit()
+        end(self.server(self.NAME, "--history", path, "--history-days", "2").process)
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            self.assertGreater(database.execute("SELECT min(at) FROM second").fetchone()[0], 1)
+
+    def test_a_full_disk_is_told(self):
+        path = self.file("history")
+        server = self.server(self.NAME, "--history", path)
+        wait_until(lambda: len(self.rows(server)) >= 2, "it has two seconds")
+        # Somebody who has it locked is to the writer what a full disk is: nothing can be written.
+        with contextlib.closing(sqlite3.connect(path, isolation_level=None, timeout=PATIENCE)) as database:
+            database.execute("BEGIN IMMEDIATE")
+            wait_until(lambda: not server.json("/healthz")["ok"], "it says so")
+            state = server.json("/api/encoders")
+            self.assertTrue(state["history"]["trouble"])
+            self.assertEqual(state["encoders"][0]["state"], "live")
+            database.execute("ROLLBACK")
+        wait_until(lambda: server.json("/healthz")["ok"], "it is well again")
+        lost = [event["text"] for event in server.json("/api/events")["events"] if event["kind"] == "history"]
+        self.assertRegex(lost[0], "could not be written")
+
+
+class Abuse(ServeCase):
+    def setUp(self):
+        super().setUp()
+        self.served = self.without_history("sim:tformat?motion=rpm=60")
+        self.addCleanup(self.assert_well)
+
+    def assert_well(self):
+        wait_until(lambda: self.served.encoder()["state"] == "live", "it answers")
+        self.assertIsNone(self.served.process.poll())
+
+    def connect(self):
+        connection = socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE)
+        self.addCleanup(connection.close)
+        return connection
+
+    def memory_kb(self):
+        with open(f"/proc/{self.served.process.pid}/status", encoding="ascii") as file:
+            return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
+
+    def test_half_sent_requests(self):
+        halves = [self.connect() for _ in range(100)]
+        for half in halves:
+            half.sendall(b"GET /api/encoders HTTP/1.1\r\nHost: local")
+        self.assert_well()
+        # Each is ended, also when it says a byte now and then.
+        talker = halves[0]
+        talker.settimeout(0.2)
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            try:
+                talker.sendall(b"h")
+                if talker.recv(1) == b"":
+                    return
+            except TimeoutError:
+                continue
+            except OSError:
+                return
+        self.fail("it is still waited for")
+
+    def test_large_headers(self):
+        connection = self.connect()
+        with contextlib.suppress(OSError):
+            connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * 1_000_000 + b"\r\n\r\n")
+        with contextlib.suppress(OSError):
+            self.assertNotIn(b" 200 ", connection.recv(100))
+
+    def test_large_bodies(self):
+        status, _ = self.served.ask("/api/command", "POST", {"Content-Length": "1000000000"})
+        self.assertEqual(status, 413)
+
+    def test_many_connections(self):
+        before = self.memory_kb()
+        for _ in range(10):
+            with contextlib.ExitStack() as stack:
+                for _ in range(100):
+                    stack.enter_context(socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE))
+        self.assert_well()
+        self.assertLess(self.memory_kb() - before, 64_000)
+
+    def test_more_streams_than_there_may_be(self):
+        statuses = []
+        for _ in range(320):
+            connection = self.connect()
+            connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            statuses.append(connection.recv(15)[9:12])
+        self.assertIn(b"503", statuses)
+        self.assertGreaterEqual(statuses.count(b"200"), 200)
+        self.assert_well()
+
+    def test_random_bytes(self):
+        for path in ("/", "/metrics", "/api/encoders", "/api/encoder", "/api/stream", "/api/history", "/api/events"):
+            for _ in range(5):
+                with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
+                    with contextlib.suppress(OSError):
+                        connection.sendall(os.urandom(2000))
+                with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
+                    noise = urllib.parse.quote_from_bytes(os.urandom(60)).encode()
+                    with contextlib.suppress(OSError):
+                        connection.sendall(b"GET " + path.encode() + b"?name=" + noise + b"&from=" + noise +
+                                           b" HTTP/1.1\r\nHost: localhost\r\n" + os.urandom(100) + b"\r\n\r\n")
+        self.assert_well()
+
+    def test_a_slow_reader_delays_nobody(self):
+        slow = self.connect()
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        slow.sendall(b"GET /api/stream?trace=" + urllib.parse.quote("sim:tformat?motion=rpm=60", safe="").encode() +
+                     b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        slow.recv(1)
+        stream = self.stream(self.served)
+        started = time.monotonic()
+        states = 0
+        while time.monotonic() - started < 5:
+            slow.recv(1)
+            states += stream.next()[0] == "state"
+        self.assertGreater(states, 10)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+
+#include "absenc/os/hangup.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/serve/server.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/rate.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/output.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+constexpr std::string_view usual_host = "127.0.0.1";
+constexpr std::uint16_t usual_port = 8420;
+constexpr std::string_view no_history = "none";
+constexpr Time between_looks = std::chrono::milliseconds(100);  // another thread may have taken the signal
+
+// "HOST:PORT", "HOST", ":PORT"
+void set_place(serve::Choices& choices, std::string_view written) {
+  const std::size_t bracket = written.rfind(']');
+  const std::size_t colon = written.find(':', bracket == std::string_view::npos ? 0 : bracket);
+  const std::string_view host = written.substr(0, colon);
+  choices.host = host.empty() ? usual_host : host;
+  choices.port = usual_port;
+  if (colon == std::string_view::npos) return;
+  const Result<std::int64_t> port = parse_number(written.substr(colon + 1));
+  if (!port || *port < 0 || *port > 65535) {
+    throw UsageError(fmt::format("--listen is \"{}\", but must be HOST:PORT; an IPv6 address in brackets", written));
+  }
+  choices.port = static_cast<std::uint16_t>(*port);
+}
+
+// The folder that systemd gives to a service, or the user's for what programs keep.
+std::string usual_history() {
+  namespace fs = std::filesystem;
+  const auto variable = [](const char* name) {
+    const char* value = std::getenv(name);
+    return value == nullptr ? std::string() : std::string(value);
+  };
+  fs::path folder = variable("STATE_DIRECTORY");
+  if (folder.empty() && !variable("XDG_STATE_HOME").empty()) folder = fs::path(variable("XDG_STATE_HOME")) / "absenc";
+  if (folder.empty() && !variable("HOME").empty()) folder = fs::path(variable("HOME")) / ".local/state/absenc";
+  if (folder.empty())
+    throw UsageError("where to keep the history is not known: give --history FILE, or --history none");
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    throw Failure(fmt::format("the folder {} for the history cannot be made: {}", folder.string(), error.message()));
+  return folder / "history.sqlite";
+}
+
+void reload(serve::Server& server) {
+  try {
+    print_message("absenc.toml was read again: " + server.reload());
+  } catch (const UsageError& error) {
+    print_message(fmt::format("everything goes on as it was, because absenc.toml is wrong: {}", error.what()));
+  }
+}
+
+int run_serve(const Invocation& invocation) {
+  os::catch_interrupts();
+  const os::Descriptor hangups = os::catch_hangups();
+  serve::Choices choices;
+  const auto names = invocation.texts("encoders");
+  choices.encoders.assign(names.begin(), names.end());
+  choices.rate = readings_a_second(invocation, 50);
+  set_place(choices, invocation.text("--listen", usual_host));
+  choices.token_file = invocation.text("--token-file");
+  choices.history = invocation.has("--history") ? std::string(invocation.text("--history")) : usual_history();
+  if (choices.history == no_history) choices.history.clear();
+  choices.limits.seconds = invocation.number("--history-days", 30, 1, 36'500) * 24 * 3600;
+  choices.limits.bytes = invocation.number("--history-mb", 1024, 1, 1'000'000) * 1'000'000;
+
+  serve::Server server(choices);
+  print_line(server.url());
+  print_message(fmt::format("{} encoders; Ctrl-C ends, SIGHUP reads absenc.toml again", server.encoders()));
+  try {
+    while (!os::interrupted()) {
+      pollfd watched{hangups.get(), POLLIN, 0};
+      if (os::wait_for({&watched, 1}, os::now() + between_looks) && os::take_hangup(hangups)) reload(server);
+    }
+  } catch (const os::Interrupted&) {
+  }
+  return exit_good;
+}
+
+constexpr std::array<Parameter, 7> serve_parameters{{
+    {"encoders", "", "as for `absenc read`", "all of absenc.toml", false, true},
+    {"--listen", "HOST:PORT", "where the page is; beyond this computer only with --token-file", "127.0.0.1:8420"},
+    {"--rate", "HZ", "readings a second of each for which absenc.toml has no rate_hz; 0: as many as the line allows",
+     "50"},
+    {"--token-file", "FILE", "lines of NAME TOKEN: who may change encoders, and look from other computers"},
+    {"--history", "FILE", "where the past is kept, in SQLite's format; none: nowhere",
+     "history.sqlite in $STATE_DIRECTORY or ~/.local/state/absenc"},
+    {"--history-days", "DAYS", "what is older is deleted", "30"},
+    {"--history-mb", "MB", "beyond it the oldest is deleted", "1024"},
+}};
+
+constexpr std::array<Example, 3> serve_examples{{
+    {"absenc serve", "all encoders of absenc.toml, at http://127.0.0.1:8420/"},
+    {"absenc serve \"sim:tformat?motion=rpm=60\" \"sim:esl?motion=sine=90,0.2\" --history none",
+     "try it without hardware"},
+    {"absenc serve --listen 0.0.0.0:8420 --token-file /etc/absenc/tokens", "for other computers too"},
+}};
+
+}  // namespace
+
+const Subcommand serve_subcommand{
+    "serve",
+    "show encoders to many: a live page, HTTP with JSON, history, Prometheus",
+    "Runs until it is ended. An encoder that is unplugged is waited for; a value that is not live is never shown as\n"
+    "one. Prints the address of the page. SIGHUP reads absenc.toml again: encoders that it describes as before are\n"
+    "not disturbed. What changes an encoder needs a token, always.",
+    serve_parameters,
+    serve_examples,
+    run_serve};
+
+}  // namespace absenc::tool
