@@ -10,7 +10,7 @@
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "tools/absenc/text/json.hpp"
+#include "absenc/client/text/json.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/progress.hpp"
 
