@@ -5,14 +5,17 @@ built in; ABSENC_FIRMWARE_POSITIONS how many the drive reads, ABSENC_FIRMWARE_AL
 import os
 import re
 import subprocess
+import sys
 import tempfile
 import unittest
 
 from command_support import Emulator
 
 FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE", "build/arm/firmware"))
+SOURCES = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 POSITIONS = int(os.environ.get("ABSENC_FIRMWARE_POSITIONS", "1000"))
 PATIENCE = 120 + POSITIONS / 20  # seconds
+CORES = ("m0plus", "m4f") if os.environ.get("ABSENC_FIRMWARE_ALL") else ("m0plus",)
 MACHINES = {"microbit": "microbit", "m0plus": "mps2-an385", "m4f": "mps2-an386"}
 SINGLETURN, MULTITURN = 74565, 4660
 LATENCY = 250  # ms: a reply that a busy machine delays longer would be a fault that nobody injected
@@ -31,19 +34,14 @@ def emulated(program, machine, *arguments, serial="null"):
 
 
 class Vectors(unittest.TestCase):
-    def check(self, cpu):
-        status, said = emulated(f"vectors-{cpu}", MACHINES[cpu])
-        self.assertEqual(status, 0, said)
-        decoded = re.search(r"^decoded (\d+), wrong 0, ", said, re.MULTILINE)
-        self.assertTrue(decoded, said)
-        self.assertGreaterEqual(int(decoded[1]), 600)
-
-    def test_m0plus(self):
-        self.check("m0plus")
-
-    @unittest.skipUnless(os.environ.get("ABSENC_FIRMWARE_ALL"), "./dev firmware builds it")
-    def test_m4f(self):
-        self.check("m4f")
+    def test_all_are_decoded(self):
+        for cpu in CORES:
+            with self.subTest(cpu):
+                status, said = emulated(f"vectors-{cpu}", MACHINES[cpu])
+                self.assertEqual(status, 0, said)
+                decoded = re.search(r"^decoded (\d+), wrong 0, ", said, re.MULTILINE)
+                self.assertTrue(decoded, said)
+                self.assertGreaterEqual(int(decoded[1]), 600)
 
 
 class Drive(unittest.TestCase):
@@ -74,21 +72,26 @@ class Drive(unittest.TestCase):
         self.assertEqual(counted["requests"], int(re.search(r"(\d+) requests answered", summary)[1]), everything)
         faults = {kind: int(number) for number, kind in re.findall(r"(\d+) (drop|corrupt)", summary)}
         self.assertEqual(set(faults), {"drop", "corrupt"}, everything)
-        self.assertEqual(counted["silences"] + counted["implausible"], sum(faults.values()), everything)
+        # A reply that is struck twice is noticed once: at these rates one in 10 000.
+        unnoticed = sum(faults.values()) - counted["silences"] - counted["implausible"]
+        self.assertIn(unnoticed, range(3 + POSITIONS // 4000), everything)
         self.assertNotIn("rules that the host broke", summary)
         page, address, value = 2, 5, "42"
         stored = re.findall(r"^[0-9A-F]{4}: (.*)$", memory, re.MULTILINE)
         self.assertEqual(" ".join(stored).split()[page * 127 + address], value)
 
-    def test_microbit(self):
-        self.check("microbit")
+    def test_positions_alarms_a_reset_and_a_write(self):
+        for cpu in ("microbit", *CORES):
+            with self.subTest(cpu):
+                self.check(cpu)
 
-    def test_m0plus(self):
-        self.check("m0plus")
 
-    @unittest.skipUnless(os.environ.get("ABSENC_FIRMWARE_ALL"), "./dev firmware builds it")
-    def test_m4f(self):
-        self.check("m4f")
+class Figures(unittest.TestCase):
+    def test_each_is_within_3_percent_of_the_table(self):
+        figures = [sys.executable, "-B", os.path.join(SOURCES, "firmware/figures.py"), FOLDER,
+                   os.path.join(SOURCES, "docs/firmware-figures.json"), "--check"]
+        result = subprocess.run(figures, capture_output=True, timeout=PATIENCE, text=True, check=False)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
 
 if __name__ == "__main__":

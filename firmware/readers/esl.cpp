@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+
 #include "absenc/protocol/esl/reply.hpp"
 #include "firmware/readers/reader.hpp"
 
 int main() {
   using namespace absenc;
-  firmware::run<std::uint8_t, author::ReadPosition<esl::Protocol>>(esl::Profile{}, esl::Request{});
+  static constexpr auto reply = std::to_array<std::uint8_t>(
+      {0x08, 0x40, 0x00, 0xEF, 0xCD, 0xAB, 0x34, 0x12, 0x56, 0x46, 0xB3, 0x08, 0x60, 0x00, 0xAB, 0xD6, 0xCD, 0x84});
+  firmware::run<std::uint8_t, author::ReadPosition<esl::Protocol>>(reply, true, esl::Profile{}, esl::Request{});
 }

@@ -1,75 +1,72 @@
 // SPDX-License-Identifier: Apache-2.0
-// Firmware that reads one position after the other and nothing else: what of the library it links is measured. Its
-// registers stand for a UART, an SPI or a CAN controller.
+// Firmware that reads a position and nothing else: what of the library it links is measured, and what it does between
+// two marks is counted (firmware/count.cpp). No wire is there: a good reply follows each request at once.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <new>
+#include <span>
 
 #include "absenc/link/can.hpp"
 #include "absenc/link/step.hpp"
+#include "firmware/machine/machine.hpp"
+
+// Instructions between them are counted; called, never inlined.
+extern "C" {
+[[gnu::noinline]] inline void count_begin() { asm volatile(""); }
+[[gnu::noinline]] inline void count_end() { asm volatile(""); }
+}
 
 namespace absenc::firmware {
 
-struct Registers {
-  std::uint32_t data;
-  std::uint32_t has_data;
-  std::uint32_t nanoseconds;
-  std::uint32_t singleturn;
-  std::uint32_t multiturn;
-  std::uint32_t error;
-};
-inline volatile Registers registers{};
+/// How a reply comes: in one event, as by DMA, or character by character, where the second is counted with what is
+/// asked after it.
+enum class Comes : std::uint8_t { whole, by_character };
 
-inline std::uint8_t receive(std::uint8_t) { return static_cast<std::uint8_t>(registers.data); }
-inline CanFrame receive(const CanFrame&) {
-  CanFrame frame{.id = registers.data, .size = 8};
-  for (std::uint8_t& byte : frame.data) byte = static_cast<std::uint8_t>(registers.data);
-  return frame;
-}
-inline void send(std::uint8_t byte) { registers.data = byte; }
-inline void send(const CanFrame& frame) {
-  registers.data = frame.id;
-  for (const std::uint8_t byte : frame.data) registers.data = byte;
-}
-
-/// One position: `machine` is driven to its end.
 template <class Item, class Reader>
-void read(Reader& machine) {
+bool converse(Reader& reader, std::span<const Item> reply, Comes comes) {
   using Kind = typename Event<Item>::Kind;
-  for (;;) {
-    const Time now{registers.nanoseconds};
-    const Step<Item> step = machine.next(now);
-    Event<Item> event{.kind = Kind::timer, .at = now};
-    Item item{};
-    if (step.kind == Step<Item>::Kind::done || step.kind == Step<Item>::Kind::emit) {
-      if (const auto* reading = machine.reading()) {
-        registers.singleturn = static_cast<std::uint32_t>(reading->singleturn);
-        registers.multiturn = static_cast<std::uint32_t>(reading->multiturn);
-      }
-      registers.error = static_cast<std::uint32_t>(machine.error());
-      return;
-    }
+  Time now{1'000'000};
+  std::span<const Item> coming{};
+  for (unsigned events = 0; events < 1000; ++events) {
+    const Step<Item> step = reader.next(now);
+    if (step.kind == Step<Item>::Kind::done || step.kind == Step<Item>::Kind::emit) return reader.reading() != nullptr;
+    now += Time{1000};
+    Event<Item> event{.kind = Kind::silence, .at = now};
     if (step.kind == Step<Item>::Kind::transfer) {
-      for (const Item& one : step.out) send(one);
       event.kind = Kind::sent;
-    } else if (registers.has_data != 0) {
-      item = receive(Item{});
+      coming = reply;
+    } else if (!coming.empty()) {
       event.kind = Kind::received;
-      event.items = {&item, 1};
-    } else if (step.answer != Time{} || step.gap != Time{}) {
-      event.kind = Kind::silence;
+      event.items = comes == Comes::whole ? coming : coming.first(1);
+      coming = coming.subspan(event.items.size());
+    } else if (step.at > now && step.at != never) {
+      event.kind = Kind::timer;
+      now = event.at = step.at;
     }
-    machine.feed(event);
+    const bool is_second = comes == Comes::by_character && coming.size() + 2 == reply.size();
+    if (is_second) count_begin();
+    reader.feed(event);
+    if (is_second) {
+      static_cast<void>(reader.next(now));
+      count_end();
+    }
   }
+  return false;
 }
 
-/// For ever, in memory that is counted.
+/// Counts, and ends the emulator; well when a position was read. `by_character`: where interrupts bring characters.
 template <class Item, class Reader, class... Parameters>
-[[noreturn]] void run(const Parameters&... parameters) {
+[[noreturn]] void run(std::span<const Item> reply, bool by_character, const Parameters&... parameters) {
   alignas(Reader) static std::byte memory[sizeof(Reader)];
-  for (;;) read<Item>(*new (memory) Reader(parameters...));
+  machine::paint_stack();
+  count_begin();
+  bool good = converse<Item>(*new (memory) Reader(parameters...), reply, Comes::whole);
+  count_end();
+  machine::say(machine::stack_used());
+  if (by_character) good = converse<Item>(*new (memory) Reader(parameters...), reply, Comes::by_character) && good;
+  machine::end(good);
 }
 
 }  // namespace absenc::firmware

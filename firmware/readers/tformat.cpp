@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+
 #include "absenc/protocol/tformat/host.hpp"
 #include "firmware/readers/reader.hpp"
 
 int main() {
   using namespace absenc;
-  firmware::run<std::uint8_t, tformat::ReadPosition>(tformat::Format{});
+  static constexpr auto reply =
+      std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00, 0x4A});
+  firmware::run<std::uint8_t, tformat::ReadPosition>(reply, true, tformat::Format{});
 }

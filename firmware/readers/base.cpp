@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every program has, and what figures are above: start-up, words, and the three functions of the C library that
+// every compiler calls.
+#include <cstring>
+
+#include "firmware/readers/reader.hpp"
+
+int main() {
+  using namespace absenc;
+  volatile std::size_t size = 4;
+  volatile char memory[8]{};
+  auto* const bytes = const_cast<char*>(memory);
+  std::memcpy(bytes, bytes + 4, size);
+  std::memmove(bytes, bytes + 1, size);
+  std::memset(bytes, 0, size);
+  machine::paint_stack();
+  count_begin();
+  count_end();
+  machine::say(machine::stack_used());
+  machine::end(true);
+}
