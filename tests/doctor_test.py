@@ -52,6 +52,22 @@ class TurnedRate(FakeLine):
             os.write(self.master, self.reply if at_rate else bytes(noise.randrange(256) for _ in self.reply))
 
 
+class RefusingAdapter(FakeLine):
+    """An slcan adapter whose frames nobody acknowledges."""
+
+    def serve(self):
+        line = b""
+        while True:
+            ready, _, _ = select.select([self.master, self.wake], [], [])
+            if self.wake in ready:
+                return
+            for byte in os.read(self.master, 256):
+                line += bytes([byte])
+                if byte == ord("\r"):
+                    os.write(self.master, b"\a" if line[:1] in b"tTrR" else b"\r")
+                    line = b""
+
+
 class Named(EncoderCase):
     def assert_found(self, address, *wanted, status=1):
         result, found = doctor(address)
@@ -170,6 +186,15 @@ class Named(EncoderCase):
                       protocol="esl", name="both") as both:
             found = self.assert_found(f"esl:{both.path}?address=3&latency=50", "same_address")
             self.assertIn("3", found["findings"][0]["evidence"])
+
+    def test_a_can_bus_on_which_nobody_acknowledges(self):
+        with RefusingAdapter() as line:
+            self.assert_found(f"raa38-can:slcan:{line.path}", "can_errors")
+
+    def test_another_bit_rate_of_a_can_bus(self):
+        with Emulator(self.directory, "--option", "bitrate=500000", protocol="raa38-can", name="bus") as bus:
+            found = self.assert_found(f"raa38-can:slcan:{bus.path}?{PATIENT}", "wrong_baud")
+            self.assertEqual(found["findings"][0]["action"], "set bitrate=500000")
 
     def test_a_flat_battery_in_the_words_of_the_document(self):
         emulator = self.emulator("--alarm", "battery_alarm")

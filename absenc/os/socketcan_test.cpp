@@ -145,6 +145,7 @@ TEST(SocketCan, AFullQueueIsWaitedOut) {
   kernel.keep_last_error = true;
   const Failure full = failure_of([&] { port.begin(sending(request)); });
   EXPECT_EQ(full.kind(), Failure::Kind::lost);
+  EXPECT_EQ(full.bus(), Failure::Bus::not_acknowledged);
   EXPECT_NE(std::string(full.what()).find("no other node acknowledges"), std::string::npos);
   EXPECT_NE(std::string(full.what()).find("120 ohms"), std::string::npos);
 }
@@ -157,6 +158,7 @@ TEST(SocketCan, ErrorFrames) {
   kernel.put(raw(CAN_ERR_FLAG | CAN_ERR_BUSOFF, {0, 0, 0, 0, 0, 0, 0, 0}));
   const Failure off = failure_of([&] { static_cast<void>(port.wait({.at = never})); });
   EXPECT_EQ(off.kind(), Failure::Kind::lost);
+  EXPECT_EQ(off.bus(), Failure::Bus::off);
   for (const char* words : {"bus-off", "ip link set can0 down", "restart-ms", "one number"}) {
     EXPECT_NE(std::string(off.what()).find(words), std::string::npos) << words;
   }

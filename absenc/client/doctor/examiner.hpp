@@ -41,6 +41,17 @@ class Examiner {
     }
   }
 
+  /// What comes when all was given up: one that answers later than anybody waited for.
+  void listen_for_late(Observations& seen) {
+    if constexpr (!std::is_same_v<Item, CanFrame>) {
+      std::vector<std::uint8_t> came;
+      hear(came, pieces * piece_time);
+      if (came.empty()) return;
+      ++seen.late;
+      seen.lateness = std::max(seen.lateness, port_.received_at - port_.sent_at);
+    }
+  }
+
   /// Up to `count` readings within `limit`; fewer when nobody answers at all. Throws as the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {
     const Time end = port_.now() + limit;

@@ -13,9 +13,11 @@
 #include "absenc/capture/search/hypotheses.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
+#include "absenc/client/error.hpp"
 #include "absenc/client/find_crc.hpp"
 #include "absenc/client/identify/candidate.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 
 namespace absenc::client {
 
