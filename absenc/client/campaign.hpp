@@ -55,13 +55,14 @@ struct CampaignResult {
   std::string protocol{};
   std::string model{};  // or ""
   std::uint64_t readings = 0;
-  std::uint64_t exchanges = 0;        // requests, or where none are sent frames
-  std::uint64_t damaged = 0;          // replies damaged by any fault
-  Share failed{};                     // exchanges that ended with an error
-  Share given_up{};                   // readings that ended with one, after all attempts
-  Share recovered{};                  // readings that ended well after an attempt that did not
-  Share wrong{};                      // exchanges: a position was taken that is not the encoder's
-  Share older{};                      // exchanges: that was an earlier position, of a frame sent before the request
+  std::uint64_t exchanges = 0;  // requests, or where none are sent frames
+  std::uint64_t damaged = 0;    // replies damaged by any fault
+  Share failed{};               // exchanges that ended with an error
+  Share given_up{};             // readings that ended with one, after all attempts
+  Share recovered{};            // readings that ended well after an attempt that did not
+  Share wrong{};                // exchanges: a position was taken that is not the encoder's
+  Share changed{};  // exchanges: a request that was misheard changed the encoder; after it another took its place
+  Share older{};    // exchanges: that was an earlier position, of a frame sent before the request
   std::optional<CheckWorth> worth{};  // none where the check has more than 16 bits, is no linear one, or CAN's
   double seconds = 0;                 // of processor time that the exchanges took
 };

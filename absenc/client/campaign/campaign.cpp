@@ -107,6 +107,7 @@ class Bench {
   Bench(const Unit& unit, const Options& options, const Rates& rates, std::uint64_t seed)
       : unit_(unit),
         options_(options),
+        rates_(rates),
         random_(seed),
         device_storage_(unit.device_storage),
         host_storage_(unit.host_storage),
@@ -127,7 +128,7 @@ class Bench {
     const std::uint64_t errors = session_.counters().bad();
     result.failed = {errors, result.exchanges};
     result.given_up.of = result.recovered.of = result.readings;
-    result.wrong.of = result.older.of = result.exchanges;
+    result.wrong.of = result.older.of = result.changed.of = result.exchanges;
   }
 
   /// Good replies that carry a position, of an undamaged line.
@@ -155,7 +156,7 @@ class Bench {
   };
   using Faulty = std::conditional_t<std::is_same_v<Item, CanFrame>, sim::FaultyNode, sim::FaultyDevice>;
 
-  Device<Item>& make_device() {
+  Device<Item>& make_device(Time now = {}) {
     const Any<Device> made = unit_.device(options_, shaft_, device_storage_);
     Device<Item>* device = nullptr;
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -164,7 +165,7 @@ class Bench {
       device = made.bytes;
     }
     if (device == nullptr) throw UsageError(fmt::format("{} has no virtual encoder with these options", unit_.id));
-    device->power_on(Time{}, Device<Item>::PowerOn::skip);
+    device->power_on(now, Device<Item>::PowerOn::skip);
     return *device;
   }
 
@@ -196,13 +197,36 @@ class Bench {
     if (ended->error() != Error::none) {
       ++result.given_up.count;
       pause();
+      if (was_changed(read)) ++result.changed.count;
       return;
     }
     if (session_.counters().repeated != repeated) ++result.recovered.count;
     const Reading* reading = ended->reading();
     if (reading == nullptr || sim::is_at(*reading, shaft_.position)) return;
+    const bool old = is_old(*reading);
+    if (was_changed(read)) {
+      ++result.changed.count;
+      return;
+    }
     ++result.wrong.count;
-    if (is_old(*reading)) ++result.older.count;
+    if (old) ++result.older.count;
+  }
+
+  // A request that was misheard may be one that changes the encoder, and what it says is so from then on: seen over a
+  // good line. Then another takes its place.
+  bool was_changed(const Command& read) {
+    if (rates_.device[sim::FaultKind::request_corrupt] <= 0) return false;
+    line_.set_rates({});
+    faulty_.set_rates({});
+    line_.rest(line_.now() + (unasked_ ? 11s : 20s));  // nothing is late any more
+    line_.drop();
+    const Conversation<Item>* now = session_.run(read);
+    const bool changed =
+        now->error() != Error::none || (now->reading() != nullptr && !sim::is_at(*now->reading(), shaft_.position));
+    if (changed) (void)make_device(line_.now());  // in the same place
+    line_.set_rates(rates_.line);
+    faulty_.set_rates(rates_.device);
+    return changed;
   }
 
   // Who has given up tries again after a while, of 10 us to 10 s, each decade as often: a line that holds up a reply
@@ -231,6 +255,7 @@ class Bench {
 
   const Unit& unit_;
   const Options& options_;
+  Rates rates_;
   sim::Random random_;
   Hand shaft_;
   std::vector<std::byte> device_storage_;
@@ -270,6 +295,7 @@ std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, dou
 // Wilson's score interval: holds also where nothing, or all, was counted.
 double wilson(const Share& share, double side) {
   if (share.of == 0) return side > 0 ? 1 : 0;
+  if (share.count == 0 && side < 0) return 0;  // not what rounding leaves
   constexpr double z = 1.96;
   const auto n = static_cast<double>(share.of);
   const double p = share.rate();

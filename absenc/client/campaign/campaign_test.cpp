@@ -108,6 +108,14 @@ TEST(CampaignTest, OldFramesAreCounted) {
   EXPECT_LE(result.older.count, result.wrong.count);
 }
 
+// A request that is misheard may set the zero: what is read then is right, and every reading after it would be wrong.
+TEST(CampaignTest, EncodersThatWereChangedAreReplaced) {
+  const CampaignResult result = run("raa38-can", {"request_corrupt=0.05"}, 100'000);
+  EXPECT_GT(result.changed.count, 0u);
+  EXPECT_LT(result.wrong.count, result.exchanges / 100);
+  EXPECT_LT(result.given_up.count, result.readings / 10);
+}
+
 TEST(CampaignTest, TheSameSeedGivesTheSame) {
   const CampaignResult one = run("biss", {"bit=0.01"}, 5000);
   const CampaignResult other = run("biss", {"bit=0.01"}, 5000);

@@ -29,7 +29,7 @@ Json campaign_json(const CampaignResult& result) {
   json.set("readings", result.readings).set("exchanges", result.exchanges).set("damaged", result.damaged);
   json.set("failed", share_json(result.failed)).set("given_up", share_json(result.given_up));
   json.set("recovered", share_json(result.recovered)).set("wrong", share_json(result.wrong));
-  json.set("older", share_json(result.older));
+  json.set("older", share_json(result.older)).set("changed", share_json(result.changed));
   if (!result.worth) return json.set("check", Json());
   const CheckWorth& worth = *result.worth;
   Json check = Json::object().set("bits", worth.check_bits).set("frame_bits", worth.frame_bits);
@@ -56,6 +56,7 @@ void print_campaign(const CampaignResult& result) {
       line("failed", result.failed, "exchanges"),
       line("wrong position taken", result.wrong, "exchanges"),
       line("of them older than the request", result.older, "exchanges"),
+      line("encoder changed by a misheard request", result.changed, "exchanges"),
       line("recovered by another attempt", result.recovered, "readings"),
       line("given up", result.given_up, "readings"),
   };
@@ -81,6 +82,7 @@ std::vector<std::string> campaign_row(const CampaignResult& result) {
           fmt::format("{}", result.given_up.count),
           fmt::format("{}", result.wrong.count),
           fmt::format("{}", result.older.count),
+          fmt::format("{}", result.changed.count),
           share_interval(result.wrong),
           worth ? fmt::format("{}/{}", worth->check_bits, worth->frame_bits) : "-",
           worth ? (worth->distance == 0 ? ">8" : fmt::format("{}", worth->distance)) : "-",
@@ -112,7 +114,8 @@ int run_campaign(const Invocation& invocation) {
   }
   if (!choices.model.empty() || !choices.options.empty()) throw UsageError("models and options belong to one protocol");
   std::vector<std::vector<std::string>> rows{{"PROTOCOL", "FAILED", "RECOVERED", "GIVEN UP", "WRONG", "OLDER",
-                                              "WRONG, 95 %", "CHECK", "DISTANCE", "PASS CHECKSUM", "PASS ALL"}};
+                                              "CHANGED", "WRONG, 95 %", "CHECK", "DISTANCE", "PASS CHECKSUM",
+                                              "PASS ALL"}};
   Progress progress;
   for (const Unit* unit : all_units()) {
     progress.show(unit->id);

@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc campaign`: what a bad line makes of a protocol, as a user sees it. Its numbers: client/campaign tests."""
+import json
+import unittest
+
+from command_support import Case, absenc
+
+
+class Campaign(Case):
+    def result(self, *arguments):
+        result = absenc("campaign", *arguments, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout)
+
+    def test_counts_have_their_intervals(self):
+        result = self.result("tformat", "--fault", "bit=0.01", "--exchanges", "20000")
+        self.assertGreaterEqual(result["exchanges"], 20000)
+        for name in ("failed", "given_up", "recovered", "wrong", "older", "changed"):
+            share = result[name]
+            self.assertLessEqual(share["low"], share["count"] / share["of"], name)
+            self.assertGreaterEqual(share["high"], share["count"] / share["of"], name)
+        self.assertGreater(result["failed"]["count"], 5000)
+        self.assertGreater(result["wrong"]["count"], 20)
+        self.assertEqual((result["check"]["bits"], result["check"]["distance"]), (8, 2))
+        self.assertEqual(result["check"]["words"], 440)
+
+    def test_the_same_seed_gives_the_same(self):
+        arguments = ("biss", "--exchanges", "3000", "--seed")
+        self.assertEqual(self.result(*arguments, "5"), self.result(*arguments, "5"))
+        self.assertNotEqual(self.result(*arguments, "5"), self.result(*arguments, "6"))
+
+    def test_every_protocol_has_a_line(self):
+        result = absenc("campaign", "--exchanges", "200", "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        names = [json.loads(line)["protocol"] for line in result.stdout.splitlines()]
+        listed = {line.split()[0] for line in absenc("list").stdout.splitlines()[1:] if line and "`" not in line}
+        self.assertEqual(set(names), listed)
+        table = absenc("campaign", "--exchanges", "200").stdout.splitlines()
+        self.assertEqual([line.split()[0] for line in table[1:] if line], names)
+
+    def test_text_says_what_was_computed(self):
+        text = absenc("campaign", "tformat", "--exchanges", "2000", "--fault", "bit=0.01")
+        self.assertIn("88 bits with a checksum of 8: of the errors of 2 bits 440 pass", text.stdout)
+        self.assertIn("exchanges a second", text.stderr)
+        self.assertIn("nothing is computed", absenc("campaign", "esl", "--exchanges", "2000").stdout)
+
+    def test_wrong_usage(self):
+        for arguments, word in ((("tformat", "--fault", "bits=0.1"), "did you mean bit?"), (("tformat", "--fault", "bit=2"), "0 to 1"),
+                                (("tformatt",), "tformat"), (("--model", "23-bit"), "one protocol")):
+            result = absenc("campaign", *arguments)
+            self.assertEqual(result.returncode, 2, arguments)
+            self.assertIn(word, result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
