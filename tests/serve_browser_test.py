@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of `absenc serve` in Debian's chromium: what somebody sees, does by keyboard and is told."""
 import os
+import sys
 import time
 import unittest
 
-from selenium import webdriver
+SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's python3-selenium is for
+
+try:
+    from selenium import webdriver
+except ImportError:
+    if os.path.realpath(sys.executable) == os.path.realpath(SYSTEM_PYTHON) or not os.path.exists(SYSTEM_PYTHON):
+        sys.exit("serve_browser_test.py: selenium is not installed: sudo apt install python3-selenium chromium-driver")
+    os.execv(SYSTEM_PYTHON, [SYSTEM_PYTHON, "-B", *sys.argv])
+
 from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By

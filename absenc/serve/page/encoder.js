@@ -14,7 +14,7 @@ const ink = () => getComputedStyle(document.body).color;
 function plot(node, title, options) {
   const nothing = options.customBars ? [NaN, NaN, NaN] : NaN;
   return new Dygraph(node, [[new Date(), nothing]], {
-    title, labels: ["time", title], axisLabelColor: ink(), axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
+    title, labels: ["time", title], axisLabelColor: ink(), axisLabelWidth: 72, axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
     colors: ["#2f7fd0", "#d07a1f"], strokeWidth: 1.5, legend: "never", ...options,
   });
 }
