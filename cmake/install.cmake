@@ -38,6 +38,8 @@ install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT 
 # The man page and the bash completion are written by a program that knows the tables of the command.
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
+  install(FILES cmake/absenc.service DESTINATION lib/systemd/system COMPONENT absenc)
+  install(FILES docs/serve.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
   if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
     add_library(absenc-manual-objects OBJECT tools/manual/completion.cpp tools/manual/man_page.cpp)
     absenc_settings(absenc-manual-objects)

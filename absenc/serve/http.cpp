@@ -61,8 +61,10 @@ void add_headers(MHD_Response* response, const std::string& type) {
   ::MHD_add_response_header(response, "Cache-Control", "no-store");
   ::MHD_add_response_header(response, "X-Content-Type-Options", "nosniff");
   ::MHD_add_response_header(response, "Referrer-Policy", "no-referrer");
+  // Dygraphs puts its styles into the document.
   ::MHD_add_response_header(response, "Content-Security-Policy",
-                            "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+                            "default-src 'self'; style-src 'self' 'unsafe-inline'; base-uri 'none'; "
+                            "form-action 'none'; frame-ancestors 'none'");
 }
 
 }  // namespace

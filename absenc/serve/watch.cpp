@@ -318,21 +318,22 @@ void Watch::carry_out(Encoder& live, const Order& order) {
   const std::string_view name = order.command->name;
   Done done;
   command_runs_ = true;
-  if (!live.connection().connected()) {
-    done.text = fmt::format("{} was not done: the port is away", name);
-  } else {
-    try {
-      done = do_command(live, order);
-    } catch (const os::Failure& failure) {  // the next reading will find the port lost
-      done.text = fmt::format("{} was broken off, read whether it was done: {}", name, failure.what());
-    } catch (const os::Interrupted&) {
-      order.done({false, fmt::format("{} was broken off: the server ends", name), {}});
-      throw;
-    } catch (const std::exception& error) {
-      done.text = fmt::format("{} failed: {}", name, error.what());
-    }
-    if (order.command->changes_encoder) live.forget_position();
+  try {
+    if (!live.connection().connected()) live.connect();
+    done = do_command(live, order);
+  } catch (const os::Failure& failure) {  // the next reading will find the port lost
+    const std::string_view how =
+        live.connection().connected() ? "was broken off, read whether it was done" : "was not done";
+    done.text = fmt::format("{} {}: {}", name, how, failure.what());
+  } catch (const os::Interrupted&) {
+    done.text = fmt::format("{} was broken off, because the server ends: read whether it was done", name);
+    tell("command", done.text, order.who);
+    order.done(done);
+    throw;
+  } catch (const std::exception& error) {
+    done.text = fmt::format("{} failed: {}", name, error.what());
   }
+  if (order.command->changes_encoder) live.forget_position();
   command_runs_ = false;
   tell("command", done.text, order.who);
   order.done(done);

@@ -73,6 +73,12 @@ export function alarmText(alarm) {
   return `${alarm.channel ? alarm.channel + " " : ""}${alarm.name}: ${alarm.meaning}.${action}`;
 }
 
+/** A value of a reply: flags are a list of names, and what does not hold is null. */
+export function fieldText(value) {
+  if (value === null) return "INVALID";
+  return Array.isArray(value) ? value.join(" ") || "none" : String(value);
+}
+
 const dialog = document.getElementById("dialog");
 
 /** True when it was answered with yes; with `field`, what was written, or null. */

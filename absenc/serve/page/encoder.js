@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Everything about one encoder: live trace, history, errors, commands.
 /* global Dygraph */
-import {NOTHING, alarmText, ask, dial, duration, element, positionText, setText, speedText, stateText} from "./dom.js";
+import {NOTHING, alarmText, ask, dial, duration, element, fieldText, positionText, setText, speedText, stateText} from "./dom.js";
 import {download, hasToken, request, setToken} from "./server.js";
 
 const SHOWN_MS = 20000;
@@ -10,9 +10,11 @@ const REFRESH_MS = 1000;
 
 const ink = () => getComputedStyle(document.body).color;
 
-function plot(node, title, labels, options) {
-  return new Dygraph(node, [], {
-    title, labels, axisLabelColor: ink(), axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
+// One point that is none, until there is something.
+function plot(node, title, options) {
+  const nothing = options.customBars ? [NaN, NaN, NaN] : NaN;
+  return new Dygraph(node, [[new Date(), nothing]], {
+    title, labels: ["time", title], axisLabelColor: ink(), axisLabelWidth: 72, axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
     colors: ["#2f7fd0", "#d07a1f"], strokeWidth: 1.5, legend: "never", ...options,
   });
 }
@@ -73,8 +75,8 @@ export class One {
                              element("button", {type: "button", onclick: () => this.save()}, "CSV")),
           this.past, this.pastPlot, this.events));
     const zoom = {interactionModel: {}};
-    this.placeGraph = plot(this.placePlot, "position", ["time", "position"], zoom);
-    this.speedGraph = plot(this.speedPlot, "speed", ["time", "speed"], zoom);
+    this.placeGraph = plot(this.placePlot, "position", zoom);
+    this.speedGraph = plot(this.speedPlot, "speed", zoom);
   }
 
   show(state) {
@@ -137,7 +139,7 @@ export class One {
     }
     if (this.closed || answer.status !== 200) return;
     const one = answer.body;
-    const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, value === null ? "INVALID" : Array.isArray(value) ? value.join(" ") || "none" : String(value)]);
+    const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, fieldText(value)]);
     const latency = one.latency_us;
     fields.push(["latency", `50 % ${latency.p50.toFixed(0)} µs, 99 % ${latency.p99.toFixed(0)} µs, longest ${latency.max.toFixed(0)} µs`]);
     fields.push(["readings", `${one.readings}; port lost ${one.losses} times; repeated ${one.repeated}`]);
@@ -181,7 +183,7 @@ export class One {
     try {
       const {status, body} = await request("api/command", values, "POST");
       if (status === 401) setToken("");
-      const fields = Object.entries(body.fields ?? {}).map(([name, value]) => `${name} ${value}`).join(", ");
+      const fields = Object.entries(body.fields ?? {}).map(([name, value]) => `${name} ${fieldText(value)}`).join(", ");
       setText(this.outcome, body.error ?? (fields ? `${body.text}: ${fields}` : body.text));
     } catch (error) {
       setText(this.outcome, `no answer came, read whether it was done: ${error.message}`);
@@ -202,9 +204,8 @@ export class One {
       setText(this.past, past.body.error ?? "");
       if (past.status !== 200) return;
       const list = past.body.rows.filter((row) => row[2] !== null).map((row) => [new Date(row[0] * 1000), [row[1], row[2], row[3]]]);
-      const options = {file: list, customBars: true, labels: ["time", "position"]};
-      if (this.pastGraph === undefined) this.pastGraph = plot(this.pastPlot, "least, mean, greatest", ["time", "position"], {customBars: true});
-      this.pastGraph.updateOptions(options);
+      this.pastGraph ??= plot(this.pastPlot, "position: least, mean, greatest", {customBars: true});
+      if (list.length !== 0) this.pastGraph.updateOptions({file: list});
       const events = (await request("api/events", {...this.range(), rows: 100})).body.events;
       this.events.replaceChildren(events.length === 0 ? element("p", {}, "nothing has happened") : table(
         ["when", "what", "", "who"],

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of `absenc serve` in Debian's chromium: what somebody sees, does by keyboard and is told."""
+import os
+import sys
+import time
+import unittest
+
+SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's python3-selenium is for
+
+try:
+    from selenium import webdriver
+except ImportError:
+    if os.path.realpath(sys.executable) == os.path.realpath(SYSTEM_PYTHON) or not os.path.exists(SYSTEM_PYTHON):
+        sys.exit("serve_browser_test.py: selenium is not installed: sudo apt install python3-selenium chromium-driver")
+    os.execv(SYSTEM_PYTHON, [SYSTEM_PYTHON, "-B", *sys.argv])
+
+from selenium.common.exceptions import StaleElementReferenceException
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
+
+from command_support import PATIENCE, Emulator, end
+from serve_test import BUSY, TOKEN, ServeCase, wait_until
+
+SCREENSHOTS = os.environ.get("ABSENC_SCREENSHOTS")  # a folder to look at them
+
+
+class Page(ServeCase):
+    @classmethod
+    def setUpClass(cls):
+        options = webdriver.ChromeOptions()
+        for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"):
+            options.add_argument(argument)
+        options.binary_location = "/usr/bin/chromium"
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        cls.browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+        cls.addClassCleanup(cls.browser.quit)
+        cls.browser.set_page_load_timeout(PATIENCE)
+
+    def setUp(self):
+        super().setUp()
+        self.emulator = Emulator(self.directory, "--singleturn", "1000")
+        self.addCleanup(lambda: self.emulator.end())
+        self.name = f"tformat:{self.emulator.path}"
+        self.served = self.server(self.name, "sim:esl?motion=rpm=60", "sim:tformat?alarm=over_heat&fault=corrupt=0.2",
+                                  "--token-file", self.tokens(), "--history", self.file("history"))
+        self.browser.set_window_size(1200, 900)
+        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+        self.browser.get("about:blank")
+
+    def open(self, hash_text=""):
+        self.browser.get(self.served.url + hash_text)
+
+    def text(self, selector="body"):
+        try:
+            return "\n".join(one.text for one in self.browser.find_elements(By.CSS_SELECTOR, selector))
+        except StaleElementReferenceException:
+            return ""
+
+    def wait_for(self, words, selector="body"):
+        return wait_until(lambda: words in self.text(selector) and self.text(selector), f"{selector} says {words!r}")
+
+    def shot(self, name):
+        if SCREENSHOTS:
+            self.browser.save_screenshot(os.path.join(SCREENSHOTS, name + ".png"))
+
+    def assert_no_errors(self):
+        wrong = [entry for entry in self.browser.get_log("browser")
+                 if entry["level"] == "SEVERE" and "net::ERR" not in entry["message"]
+                 and "status of 40" not in entry["message"]]
+        self.assertEqual([entry["message"] for entry in wrong], [])
+
+    def test_at_a_glance(self):
+        self.open()
+        self.wait_for("connected: 3 of 3 live", "#connection")
+        words = self.wait_for("over_heat", ".alarm")
+        self.assertIn("What to do:", words)
+        moving = self.browser.find_elements(By.CSS_SELECTOR, ".card")[1]
+        needle = moving.find_element(By.CSS_SELECTOR, ".needle")
+        first, turned = moving.text, needle.get_attribute("transform")
+        wait_until(lambda: moving.text != first and needle.get_attribute("transform") != turned, "it moves")
+        self.shot("light")
+        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia",
+                                     {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
+        paper = self.browser.execute_script("return getComputedStyle(document.body).backgroundColor")
+        self.assertEqual(paper, "rgb(16, 19, 22)")
+        self.shot("dark")
+        self.browser.set_window_size(500, 800)
+        wide = self.browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
+        self.assertLessEqual(wide, 0)
+        self.shot("phone")
+        self.assert_no_errors()
+
+    def test_an_encoder_is_lost_and_comes_back(self):
+        self.open()
+        self.wait_for("connected: 3 of 3 live", "#connection")
+        self.emulator.process.kill()
+        killed = time.monotonic()
+        self.wait_for("no reading for", ".card:first-child .state")
+        self.assertLess(time.monotonic() - killed, BUSY)
+        values = self.text(".card:first-child dd").splitlines()
+        self.assertEqual(values[:3], ["–", "–", "–"])
+        self.shot("lost")
+        self.emulator.end()
+        self.emulator = Emulator(self.directory, "--singleturn", "1000")
+        wait_until(lambda: self.text(".card:first-child .state") == "live", "it is back")
+
+    def test_the_server_is_lost(self):
+        self.open()
+        self.wait_for("connected", "#connection")
+        wait_until(lambda: "°" in self.text(".card dd"), "there are values")
+        self.served.process.kill()
+        killed = time.monotonic()
+        self.wait_for("is lost", "#connection")
+        self.assertLess(time.monotonic() - killed, BUSY + 1.5)
+        self.assertNotIn("°", self.text(".card dd"))
+        self.shot("server-lost")
+
+    def test_by_keyboard_to_one(self):
+        self.open()
+        self.wait_for("connected", "#connection")
+        for _ in range(20):
+            self.browser.switch_to.active_element.send_keys(Keys.TAB)
+            if "esl" in self.browser.switch_to.active_element.text:
+                break
+        self.browser.switch_to.active_element.send_keys(Keys.ENTER)
+        self.wait_for("Last bad exchanges")
+        self.wait_for("live", ".state")
+        points = "return document.querySelectorAll('.plot canvas').length"
+        wait_until(lambda: self.browser.execute_script(points) >= 4, "there are traces")
+
+        def drawn():
+            return self.browser.execute_script("""
+                const canvas = document.querySelector('.plot canvas');
+                return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some(byte => byte !== 0);
+            """)
+        wait_until(drawn, "the trace is drawn")
+        wait_until(lambda: "readings come" in self.text() or "back" in self.text("table"), "there are events")
+        self.shot("one")
+        self.assert_no_errors()
+
+    def test_zero_is_asked_twice_and_needs_a_token(self):
+        self.open("#encoder=" + self.name)
+        self.wait_for("live", ".state")
+        select = wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, "select[aria-label=command] option") and
+                            Select(self.browser.find_element(By.CSS_SELECTOR, "select[aria-label=command]")), "commands")
+        select.select_by_value("zero")
+
+        def run(token):
+            self.browser.find_element(By.XPATH, "//button[text()='Run']").click()
+            self.answer("Go on")
+            self.assertEqual(self.served.encoder()["counts"], 1000)
+            self.answer("Do it")
+            if token:
+                field = self.browser.find_element(By.CSS_SELECTOR, "#dialog input")
+                wait_until(field.is_displayed, "it asks for the token")
+                field.send_keys(token)
+                self.answer("Use it")
+        run("wrong")
+        self.wait_for("needs a token", "[role=status]")
+        self.assertEqual(self.served.encoder()["counts"], 1000)
+        run(TOKEN)
+        self.wait_for("zero: done", "[role=status]")
+        wait_until(lambda: self.served.encoder()["counts"] == 0, "it is at zero")
+        wait_until(lambda: "anna from 127.0.0.1" in self.text("table"), "the history on the page has it")
+        self.shot("zero")
+
+    def answer(self, words):
+        button = self.browser.find_element(By.ID, "dialog-yes")
+        wait_until(lambda: button.is_displayed() and button.text == words, f"it asks: {words}")
+        button.click()
+
+
+if __name__ == "__main__":
+    unittest.main()
