@@ -43,7 +43,7 @@ class Protocol:
         self.id: str = told["id"]
         self.name: str = told["name"]  #: maker and protocol, for people
         self.document: str = told["document"]  #: the source
-        self.link: str = told["link"]  #: "half_duplex", "full_duplex", "spi", "clocked" or "can"
+        self.link: str = told["link"]  #: "half_duplex", "full_duplex", "exchange" (SPI), "clocked" or "can"
         self.line: str = told["line"]  #: "RS-485 half duplex, 2.5 Mbit/s"
         self.options: list[str] = told["options"]
         self.models: list[str] = told["models"]
