@@ -11,6 +11,7 @@
 #include "absenc/client/captures/run.hpp"
 #include "absenc/client/captures/sequence_watch.hpp"
 #include "absenc/client/captures/words.hpp"
+#include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/core/angle.hpp"
@@ -55,7 +56,9 @@ struct Decoded::Work {
         clock(run.ticks_per_second()),
         columns(columns_of(unit, run.options(), clock.has_time())) {}
 
-  ~Work() {
+  ~Work() { stop(); }
+
+  void stop() {
     {
       const std::lock_guard lock(mutex);
       stopped = true;
@@ -80,7 +83,10 @@ struct Decoded::Work {
       const Options& options = run.settle_options();
       Sink sink(*this, options);
       SequenceWatch watched(sink);
-      const CaptureOutcome outcome = run.run(watched, [](capture::Tick) {});
+      const CaptureOutcome outcome = run.run(watched, [this](capture::Tick) {
+        const std::lock_guard lock(mutex);
+        if (stopped) throw Stopped{};
+      });
       notes = outcome.notes;
       for (const capture::Damage& damage : outcome.damages) notes.push_back(to_text(damage, clock));
       hand_over();
@@ -171,7 +177,8 @@ struct Decoded::Work {
     std::unique_lock lock(mutex);
     if (!taken.empty()) used.push_back(std::move(taken));
     taken.clear();
-    changed.wait(lock, [&] { return ended || !ready.empty(); });
+    changed.wait(lock, [&] { return ended || stopped || !ready.empty(); });
+    if (stopped) throw Cancelled{};
     if (ready.empty()) {
       if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
       return nullptr;
@@ -222,6 +229,7 @@ Decoded::Iterator Decoded::begin() {
   return Iterator(*this);
 }
 
+void Decoded::cancel() { work_->stop(); }
 void Decoded::advance() { row_ = work_->take(); }
 
 std::span<const Column> Decoded::columns() const { return work_->columns; }

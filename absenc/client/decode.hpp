@@ -52,6 +52,8 @@ class Decoded {
   [[nodiscard]] static Iterator::End end() { return {}; }
   [[nodiscard]] const Row* current() const { return row_; }
   void advance();
+  /// From any thread: who waits for a row, now or later, gets Cancelled.
+  void cancel();
 
   [[nodiscard]] std::span<const Column> columns() const;
   /// When the range has ended: sentences about what is damaged or missing in the file, and what was found out.

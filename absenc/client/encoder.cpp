@@ -87,13 +87,13 @@ Answer Encoder::run(std::string_view name, std::span<const std::int64_t> argumen
 }
 
 void Encoder::end_when(std::function<bool()> over) {
-  connection_->end_when(
-      [cancelled = cancelled_.get(), over = std::move(over)] { return cancelled->load() || (over && over()); });
+  over_ = std::move(over);
+  connection_->end_when([cancelled = cancelled_.get(), over = over_] { return cancelled->load() || (over && over()); });
 }
 
 void Encoder::wait_until(Time time) const {
   while (os::now() < time) {
-    if (*cancelled_) throw Cancelled{};
+    if (*cancelled_ || (over_ && over_())) throw Cancelled{};
     os::sleep_until(std::min(time, os::now() + between_looks));
   }
 }

@@ -103,7 +103,8 @@ class Encoder {
   /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
   void cancel();
 
-  /// Waiting ends with Cancelled also from the moment on in which `over` is true. Empty: never.
+  /// Waiting, also for the time of the next sample, ends with Cancelled also from the moment on in which `over` is
+  /// true. Empty: never.
   void end_when(std::function<bool()> over);
 
   /// The position starts again from the next reading: after a command that moves the zero.
@@ -145,6 +146,7 @@ class Encoder {
   void note_restart(Sample& sample, const Reading& reading);
 
   std::unique_ptr<std::atomic<bool>> cancelled_;
+  std::function<bool()> over_{};
   std::unique_ptr<Connection> connection_;
   Time period_;
   host::Unwrapper unwrapper_;

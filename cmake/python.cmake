@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+# The Python package, whole in build/release/python: its module, and beside it the sources in Python.
+find_package(Python3 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
+set(Python_EXECUTABLE "${Python3_EXECUTABLE}")
+find_package(pybind11 REQUIRED)
+
+file(GLOB python_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/python/src/*.cpp")
+pybind11_add_module(absenc-python MODULE NO_EXTRAS ${python_sources})
+absenc_settings(absenc-python)
+set(absenc_python_dir "${CMAKE_CURRENT_BINARY_DIR}/python/absenc")
+set_target_properties(absenc-python PROPERTIES OUTPUT_NAME _absenc LIBRARY_OUTPUT_DIRECTORY "${absenc_python_dir}")
+target_include_directories(absenc-python PRIVATE "${PROJECT_SOURCE_DIR}")
+target_compile_definitions(absenc-python PRIVATE ABSENC_VERSION="${PROJECT_VERSION}")
+target_link_libraries(absenc-python PRIVATE absenc::client)
+
+file(GLOB python_files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/python/absenc/*")
+list(FILTER python_files EXCLUDE REGEX "/__pycache__$")
+foreach(file IN LISTS python_files)
+  cmake_path(GET file FILENAME name)
+  configure_file("${file}" "${absenc_python_dir}/${name}" COPYONLY)
+endforeach()

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Absolute encoders of servo motors: read them, emulate them, decode what was captured on their wires.
+
+    import absenc
+
+    with absenc.open("tformat:/dev/ttyUSB0") as encoder:
+        print(encoder.read().angle_deg)
+        for sample in encoder.samples(rate=100, count=1000):
+            print(sample.time_s, sample.position, sample.speed)
+
+    with absenc.emulate("tformat", motion="rpm=60") as virtual:
+        virtual.raise_alarm("over_heat")       # the drive under test opens virtual.path
+        virtual.set_fault("corrupt", 0.01)
+
+    capture = absenc.decode("drive.sr", "tformat", channel="D0")
+    capture["angle_deg"].mean()                # NumPy, masked where nothing was told or it does not hold
+
+Encoders are written as for the command: "tformat:/dev/ttyUSB0?model=23-bit", "raa38-can:can0", "sim:esl", or a name of
+absenc.toml. Options may be given as keywords. A position that does not hold is None, or masked: never a number.
+Every wait releases the GIL and ends at Ctrl-C. What goes wrong is an exception of `absenc.errors`.
+"""
+from __future__ import annotations
+
+from . import errors
+from ._absenc import Reading, Sample, __version__
+from .captures import Capture, Column, decode, decode_batches
+from .emulation import Emulation, emulate
+from .encoder import Alarm, Config, Encoder, Info, Memory, Samples, open, scan
+from .errors import AbsencError, EncoderError, Failure, PortError, UsageError
+from .identification import Found, Identified, identify
+from .protocols import Command, Flag, Protocol, crc, protocol
+
+__all__ = [
+    "AbsencError",
+    "Alarm",
+    "Capture",
+    "Column",
+    "Command",
+    "Config",
+    "Emulation",
+    "Encoder",
+    "EncoderError",
+    "Failure",
+    "Flag",
+    "Found",
+    "Identified",
+    "Info",
+    "Memory",
+    "PortError",
+    "Protocol",
+    "Reading",
+    "Sample",
+    "Samples",
+    "UsageError",
+    "__version__",
+    "crc",
+    "decode",
+    "decode_batches",
+    "emulate",
+    "errors",
+    "identify",
+    "open",
+    "protocol",
+    "scan",
+]

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is given to the library, and what it tells."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Union
+
+#: Of an option; several of one name where it may be given more than once.
+Value = Union[str, int, float, bool, Iterable[str]]
+
+#: A number, a text, bytes, the names of flags; None: not told, or it does not hold.
+Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
+
+
+def texts(options: Mapping[str, Value]) -> list[str]:
+    """`singleturn=5, alarm=["a", "b"]` as "singleturn=5", "alarm=a", "alarm=b"."""
+    settings = []
+    for name, value in options.items():
+        if isinstance(value, bool):
+            settings.append(f"{name}={str(value).lower()}")
+        elif isinstance(value, (str, int, float)):
+            settings.append(f"{name}={value}")
+        else:
+            settings.extend(f"{name}={one}" for one in value)
+    return settings

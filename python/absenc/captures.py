@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Captures as columns of NumPy."""
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _absenc
+from ._values import Value, texts
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import]
+
+Masked = np.ma.MaskedArray[Any, np.dtype[Any]]
+
+
+class Column(NamedTuple):
+    """What stands in a column."""
+
+    name: str
+    unit: str  #: "s", "deg", "us" ...; "": a plain number or text
+    dtype: str
+    meaning: str
+
+
+class Capture:
+    """What was said on a line, exchange by exchange: `capture["angle_deg"]` is a column, `rows` all of them as one
+    structured masked array. Where nothing was told, or a position does not hold, it is masked (and NaN in floats).
+
+    Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; of CAN
+    and clocked links text), `turnaround_us`, `angle_deg` (of linear encoders `position_mm`), each field of the unit,
+    and `error` with `message`, "" in good rows. Flags are numbers: `Protocol.flag_names` names them."""
+
+    def __init__(self, rows: Masked, columns: dict[str, Column], notes: list[str]) -> None:
+        self.rows = rows
+        self.columns = columns  #: by name, with units and meanings
+        self.notes = notes  #: what is damaged or missing in the file, and what was found out
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, column: str) -> Masked:
+        if column not in self.columns:
+            raise KeyError(f"{column}: there are {', '.join(self.columns)}")
+        return self.rows[column]  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        return f"<absenc.Capture of {len(self)} rows: {', '.join(self.columns)}>"
+
+    def good(self) -> npt.NDArray[np.bool_]:
+        """Which rows have no error."""
+        return np.asarray(self.rows.data["error"] == "", np.bool_)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A DataFrame of the columns; what is masked is NaN or <NA>. Needs pandas."""
+        import pandas
+
+        nullable = {"i": "Int64", "u": "UInt64", "b": "boolean"}
+        frame = {}
+        for name in self.columns:
+            values, missing = self.rows.data[name], np.asarray(self.rows.mask[name])
+            series = pandas.Series(values, copy=False)
+            if values.dtype.kind in nullable:
+                series = series.astype(nullable[values.dtype.kind])
+                series[missing] = pandas.NA
+            frame[name] = series
+        return pandas.DataFrame(frame)
+
+
+def _masked(chunks: list[list[tuple[Any, npt.NDArray[np.bool_]]]], columns: list[Column]) -> Masked:
+    count = sum(len(chunk[0][1]) for chunk in chunks)
+    rows = np.empty(count, [(column.name, column.dtype) for column in columns])
+    missing = np.zeros(count, [(column.name, "?") for column in columns])
+    at = 0
+    for i, chunk in enumerate(chunks):
+        end = at + len(chunk[0][1])
+        for column, (values, absent) in zip(columns, chunk):
+            rows[column.name][at:end] = values
+            if column.dtype != "O":
+                missing[column.name][at:end] = absent
+        chunks[i] = []  # its memory is not needed twice
+        at = end
+    return np.ma.MaskedArray(rows, mask=missing)  # type: ignore[no-untyped-call]
+
+
+def _open(
+    file: Union[str, os.PathLike[str]],
+    unit: str,
+    channel: Union[str, Iterable[str]],
+    raw_channels: int,
+    rate: int,
+    baud: float,
+    parity: str,
+    model: str,
+    options: dict[str, Value],
+) -> _absenc.Rows:
+    channels = [channel] if isinstance(channel, str) else list(channel)
+    return _absenc.Rows(
+        os.fspath(file), unit, [one for one in channels if one], raw_channels, rate, baud, parity, model, texts(options)
+    )
+
+
+def decode(
+    file: Union[str, os.PathLike[str]],
+    unit: str,
+    *,
+    channel: Union[str, Iterable[str]] = "",
+    raw_channels: int = 0,
+    rate: int = 0,
+    baud: float = 0,
+    parity: str = "",
+    model: str = "",
+    **options: Value,
+) -> Capture:
+    """All of a capture: a session of sigrok, VCD, CSV or binary export of a logic analyser, a log of candump, or bytes
+    as text. What is left out is found in the capture, or is as the protocol has it.
+
+    `channel` is "D0", "clock=D0", or several of them; `raw_channels` says that the file is raw samples of so many
+    channels at `rate` samples a second; `baud` and `parity` ("none", "odd", "even") of the line. Other keywords are
+    options of the unit. Raises UsageError, Failure."""
+    source = _open(file, unit, channel, raw_channels, rate, baud, parity, model, options)
+    columns = [Column(*column) for column in source.columns()]
+    chunks = list(iter(lambda: source.take(65536), None))
+    by_name = {column.name: column for column in columns}
+    return Capture(_masked([one for one in chunks if one is not None], columns), by_name, source.notes())
+
+
+def decode_batches(
+    file: Union[str, os.PathLike[str]],
+    unit: str,
+    *,
+    rows: int = 65536,
+    channel: Union[str, Iterable[str]] = "",
+    raw_channels: int = 0,
+    rate: int = 0,
+    baud: float = 0,
+    parity: str = "",
+    model: str = "",
+    **options: Value,
+) -> Iterator[Capture]:
+    """As `decode`, in captures of at most so many rows each, for files larger than memory. The last has the notes."""
+    source = _open(file, unit, channel, raw_channels, rate, baud, parity, model, options)
+    columns = [Column(*column) for column in source.columns()]
+    by_name = {column.name: column for column in columns}
+    chunk = source.take(rows)
+    while chunk is not None:
+        following: Optional[list[tuple[Any, npt.NDArray[np.bool_]]]] = source.take(rows)
+        notes = source.notes() if following is None else []
+        yield Capture(_masked([chunk], columns), by_name, notes)
+        chunk = following

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An encoder that turns, read at 100 Hz; and what a program sees when its supply fails."""
+import absenc
+
+with absenc.emulate("tformat", motion="rpm=60") as virtual, absenc.open(virtual.address) as encoder:
+    for sample in encoder.samples(rate=100, count=10):
+        if sample.reading is None or sample.reading.angle_deg is None:
+            print(sample.text)
+            continue
+        print(f"{sample.time_s:.3f} s: {sample.reading.angle_deg:.3f} degrees, {sample.speed or 0:.1f} rpm")
+    virtual.power_off()
+    try:
+        encoder.read()
+    except absenc.errors.Timeout as error:
+        print(error.advice)

@@ -1,0 +1,419 @@
+// SPDX-License-Identifier: Apache-2.0
+// An open encoder and its samples.
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <mutex>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/address.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "python/src/bind.hpp"
+
+namespace absenc::python {
+
+namespace {
+
+double seconds(Time time) { return std::chrono::duration<double>(time).count(); }
+
+/// Who was found by a scan: each record begins with whom it is of.
+struct Records final : FieldSink {
+  void put(const FieldValue& value) override {
+    if (value.info->role == Role::encoder || all.empty()) all.emplace_back();
+    all.back().put(value);
+  }
+  void put_reading(const Reading& reading) override {
+    if (!all.empty()) all.back().put_reading(reading);
+  }
+  std::vector<client::AnswerSink> all;
+};
+
+struct PyReading {
+  const Unit* unit;
+  Reading reading;
+
+  [[nodiscard]] bool holds() const { return reading.ready && reading.singleturn_valid(); }
+  [[nodiscard]] std::optional<double> angle_deg() const {
+    if (!holds() || reading.unit_um > 0) return {};
+    return degrees(reading.singleturn, reading.singleturn_bits);
+  }
+  [[nodiscard]] std::optional<double> position_mm() const {
+    if (!holds() || reading.unit_um <= 0) return {};
+    return micrometres(reading.singleturn, reading.unit_um) / 1000;
+  }
+  [[nodiscard]] std::optional<std::uint64_t> singleturn() const {
+    if (!holds()) return {};
+    return reading.singleturn;
+  }
+  [[nodiscard]] std::optional<std::uint64_t> multiturn() const {
+    if (!reading.ready || reading.multiturn_bits == 0 || !reading.multiturn_valid) return {};
+    return reading.multiturn;
+  }
+  [[nodiscard]] py::tuple alarms() const { return names_of(client::alarms_of(*unit, reading)); }
+  [[nodiscard]] py::tuple status() const { return names_of(client::status_of(*unit, reading)); }
+  [[nodiscard]] py::str text() const {
+    const auto position =
+        holds() ? py::object(py::cast(reading.unit_um > 0 ? position_mm() : angle_deg())) : py::none();
+    return py::str("Reading({}={}, multiturn={}, alarms={})")
+        .format(reading.unit_um > 0 ? "position_mm" : "angle_deg", position, py::cast(multiturn()), alarms());
+  }
+};
+
+struct PySample {
+  const Unit* unit;
+  client::Sample sample;
+
+  [[nodiscard]] std::string_view kind() const {
+    using Kind = client::Sample::Kind;
+    switch (sample.kind) {
+      case Kind::reading:
+        return "reading";
+      case Kind::failed:
+        return "failed";
+      case Kind::lost:
+        return "lost";
+      case Kind::back:
+        return "back";
+      case Kind::absent:
+        break;
+    }
+    return "absent";
+  }
+  [[nodiscard]] std::optional<PyReading> reading() const {
+    if (sample.kind != client::Sample::Kind::reading) return {};
+    return PyReading{unit, sample.reading};
+  }
+  template <class T>
+  [[nodiscard]] std::optional<T> when(bool valid, T value) const {
+    return valid ? std::optional<T>(value) : std::nullopt;
+  }
+  [[nodiscard]] py::object error() const {
+    return sample.kind == client::Sample::Kind::failed ? error_object(sample.trouble) : py::none();
+  }
+};
+
+struct Closed : client::UsageError {
+  Closed() : UsageError("this encoder is closed: open it again") {}
+};
+
+/// Used by one Python thread at a time, whichever; others wait for it without the GIL.
+class PyEncoder {
+ public:
+  /// `work` on the encoder without the GIL; what it returns holds no Python objects.
+  template <class Work>
+  auto use(const Work& work) {
+    try {
+      const py::gil_scoped_release released;
+      const std::lock_guard lock(mutex_);
+      if (closed_) throw Closed();
+      return work(encoder_);
+    } catch (const client::Cancelled&) {
+      watch_.rethrow();
+      throw;
+    }
+  }
+
+  PyEncoder(const std::string& text, const std::vector<std::string>& settings)
+      : encoder_(client::parse_address(text, settings), Time{}) {
+    encoder_.end_when([this] { return stopping_ || watch_.wants_end(); });
+    use([](client::Encoder& encoder) { encoder.connect(); });
+  }
+  PyEncoder(const PyEncoder&) = delete;
+  PyEncoder& operator=(const PyEncoder&) = delete;
+
+  /// Throws what a handler of Python's has raised while samples were waited for.
+  void check() { watch_.rethrow(); }
+
+  void close() {
+    encoder_.cancel();  // from any thread: what waits ends
+    const py::gil_scoped_release released;
+    const std::lock_guard lock(mutex_);
+    if (!std::exchange(closed_, true)) encoder_.connection().disconnect();
+  }
+
+  /// So that one loop over samples ends and others may begin.
+  void stop(bool stopping) { stopping_ = stopping; }
+
+  [[nodiscard]] const client::Encoder& encoder() const { return encoder_; }
+  [[nodiscard]] const Unit& unit() const { return encoder_.unit(); }
+
+ private:
+  std::mutex mutex_;
+  SignalWatch watch_;
+  std::atomic<bool> stopping_ = false;
+  bool closed_ = false;
+  client::Encoder encoder_;
+};
+
+class PySamples {
+ public:
+  PySamples(PyEncoder& encoder, double rate_hz, std::uint64_t count)
+      : encoder_(&encoder),
+        samples_(encoder.use([&](client::Encoder& one) { return one.samples({.rate_hz = rate_hz, .count = count}); })) {
+  }
+
+  PySample next() try {
+    const client::Sample* sample = encoder_->use([this](client::Encoder&) {
+      if (!std::exchange(begun_, true)) {
+        static_cast<void>(samples_.begin());
+      } else {
+        samples_.advance();
+      }
+      return samples_.current();
+    });
+    encoder_->check();
+    if (sample == nullptr) throw py::stop_iteration();
+    return {&encoder_->unit(), *sample};
+  } catch (const Closed&) {
+    if (!begun_) throw;
+    throw py::stop_iteration();
+  }
+
+ private:
+  PyEncoder* encoder_;
+  client::Samples samples_;
+  bool begun_ = false;
+};
+
+/// Named arguments in the order of the command, those that are left out with their defaults.
+std::vector<std::int64_t> arguments_of(const Command& command, const py::args& args, const py::kwargs& named) {
+  std::vector<std::int64_t> values;
+  for (const py::handle value : args) values.push_back(py::cast<std::int64_t>(value));
+  std::size_t used = 0;
+  for (std::size_t i = values.size(); i < command.arguments.size() && used < named.size(); ++i) {
+    const Argument& argument = command.arguments[i];
+    std::string name(argument.name);
+    std::replace(name.begin(), name.end(), '-', '_');
+    if (named.contains(name.c_str())) {
+      values.push_back(py::cast<std::int64_t>(named[name.c_str()]));
+      ++used;
+    } else if (argument.required) {
+      throw client::UsageError(std::string(command.name) + " needs the argument " + name);
+    } else {
+      values.push_back(argument.default_value);
+    }
+  }
+  if (used == named.size()) return values;
+  std::string names;
+  for (const Argument& argument : command.arguments) names += (names.empty() ? "" : ", ") + std::string(argument.name);
+  throw client::UsageError(std::string(command.name) + " takes " + (names.empty() ? "no arguments" : "only " + names));
+}
+
+py::dict run(PyEncoder& encoder, const std::string& name, const py::args& args, const py::kwargs& named) {
+  const std::vector<std::int64_t> arguments = arguments_of(client::require_command(encoder.unit(), name), args, named);
+  return to_python(encoder.use([&](client::Encoder& one) { return one.run(name, arguments); }));
+}
+
+py::list scan(PyEncoder& encoder) {
+  const Command* command = find_command(encoder.unit(), Verb::scan);
+  if (command == nullptr) {
+    throw client::UsageError(std::string(encoder.unit().id) +
+                             " has no addresses to scan: there is one encoder on its line");
+  }
+  const std::vector<std::int64_t> arguments = client::complete_arguments(*command, {});
+  const Records records = encoder.use([&](client::Encoder& one) {
+    Records found;
+    client::run_into(one.connection(), *command, arguments, found);
+    return found;
+  });
+  py::list list;
+  for (const client::AnswerSink& sink : records.all) list.append(to_python(sink.answer));
+  return list;
+}
+
+// What needs no argument and exists with the encoder's options.
+bool can_be_asked(const client::Encoder& encoder, const Command& command) {
+  const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
+                                          [](const Argument& argument) { return argument.required; });
+  if (needs_argument) return false;
+  const Unit& unit = encoder.unit();
+  const std::vector<std::int64_t> arguments = client::complete_arguments(command, {});
+  const auto storage = std::make_unique<std::byte[]>(unit.host_storage);
+  const Any<Conversation> made = unit.host(encoder.options(), command, arguments, {storage.get(), unit.host_storage});
+  return made.bytes != nullptr || made.frames != nullptr;
+}
+
+std::vector<std::string> questions(const PyEncoder& encoder) {
+  std::vector<std::string> names;
+  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
+    for (const Command& command : encoder.unit().commands) {
+      if (command.verb == verb && can_be_asked(encoder.encoder(), command)) names.emplace_back(command.name);
+    }
+  }
+  return names;
+}
+
+py::dict settings_set(PyEncoder& encoder, const std::string& name, const py::args& args, const py::kwargs& named) {
+  const client::Setting setting = client::require_setting(encoder.unit(), name);
+  const std::vector<std::int64_t> arguments = arguments_of(*setting.setter, args, named);
+  return to_python(encoder.use([&](client::Encoder& one) { return one.settings().set(name, arguments).now; }));
+}
+
+std::vector<std::string> settings_names(const PyEncoder& encoder) {
+  std::vector<std::string> names;
+  for (const Command& command : encoder.unit().commands) {
+    if (command.verb == Verb::config_get) names.emplace_back(command.name);
+  }
+  return names;
+}
+
+using MemoryBytes = std::vector<std::tuple<std::uint32_t, std::uint32_t, std::uint8_t>>;
+
+MemoryBytes to_list(const client::MemoryImage& image) {
+  MemoryBytes list;
+  for (const auto& [at, value] : image) list.emplace_back(at.page, at.address, value);
+  return list;
+}
+
+client::MemoryImage image_of(std::uint32_t page, std::uint32_t address, std::string_view bytes) {
+  client::MemoryImage image;
+  for (const std::uint8_t byte : bytes_of(bytes)) image[{page, address++}] = byte;
+  return image;
+}
+
+py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t count, std::uint32_t page) {
+  const client::MemoryImage image = encoder.use([&](client::Encoder& one) {
+    client::require_memory(one.unit(), client::Access::read);
+    return one.memory().read(image_of(page, address, std::string(count, '\0')));
+  });
+  std::vector<std::uint8_t> bytes;
+  for (const auto& [at, value] : image) bytes.push_back(value);
+  return to_bytes(bytes);
+}
+
+MemoryBytes memory_dump(PyEncoder& encoder) {
+  return to_list(encoder.use([](client::Encoder& one) {
+    client::require_memory(one.unit(), client::Access::read);
+    client::Memory memory = one.memory();
+    memory.check_model();
+    return memory.read(client::dump_addresses(one.unit()));
+  }));
+}
+
+std::size_t memory_write(PyEncoder& encoder, std::uint32_t address, const py::bytes& data, std::uint32_t page,
+                         bool force) {
+  const client::MemoryImage wanted = image_of(page, address, std::string_view(data));
+  return encoder.use([&](client::Encoder& one) {
+    const client::Access access = force ? client::Access::force : client::Access::write;
+    client::require_memory(one.unit(), access);
+    one.memory().check_model();
+    client::MemoryChange change(one.memory(), wanted, access);
+    change.look();
+    change.write();
+    change.verify();
+    return change.written().size();
+  });
+}
+
+py::dict counters_of(const PyEncoder& encoder) {
+  py::dict counts;
+  const host::Counters& counters = encoder.encoder().counters();
+  counts["good"] = counters.good;
+  for (std::size_t i = 1; i < error_texts.size(); ++i) {
+    const auto count = counters.errors[i];
+    if (count != 0) counts[py::str(std::string(error_texts[i].name))] = count;
+  }
+  return counts;
+}
+
+void bind_values(py::module_& module) {
+  py::class_<PyReading>(module, "Reading", "One position as an encoder reported it.")
+      .def_property_readonly("angle_deg", &PyReading::angle_deg,
+                             "Degrees, 0 to below 360; None: it does not hold, or the encoder is linear.")
+      .def_property_readonly("position_mm", &PyReading::position_mm,
+                             "Of linear encoders, millimetres; None: it does not hold.")
+      .def_property_readonly("singleturn", &PyReading::singleturn, "Counts; None: it does not hold.")
+      .def_property_readonly("multiturn", &PyReading::multiturn, "Revolutions; None: not told, or they do not hold.")
+      .def_property_readonly(
+          "singleturn_bits", [](const PyReading& one) { return one.reading.singleturn_bits; },
+          "0: the reply carries no position")
+      .def_property_readonly(
+          "multiturn_bits", [](const PyReading& one) { return one.reading.multiturn_bits; },
+          "0: the reply carries no revolutions")
+      .def_property_readonly(
+          "ready", [](const PyReading& one) { return one.reading.ready; },
+          "False while the encoder says that it is starting.")
+      .def_property_readonly("valid", &PyReading::holds, "Whether the position holds.")
+      .def_property_readonly("alarms", &PyReading::alarms, "The names of those that are raised.")
+      .def_property_readonly("status", &PyReading::status, "The names of the status flags that are set.")
+      .def_property_readonly(
+          "time_s", [](const PyReading& one) { return seconds(one.reading.latched); },
+          "When it was latched, seconds of time.monotonic().")
+      .def("__repr__", &PyReading::text);
+  py::class_<PySample>(module, "Sample", "What one attempt to read has brought.")
+      .def_property_readonly(
+          "kind", &PySample::kind,
+          "\"reading\"; \"failed\": see `error`; \"lost\": the port has just gone away, \"absent\", \"back\".")
+      .def_property_readonly(
+          "time_s", [](const PySample& one) { return seconds(one.sample.at); },
+          "Seconds of time.monotonic(); of a reading when it was latched.")
+      .def_property_readonly("reading", &PySample::reading, "None when there is none: see `kind`.")
+      .def_property_readonly(
+          "position", [](const PySample& one) { return one.when(one.sample.position_valid, one.sample.position); },
+          "Counts, continued past the end of the counter.")
+      .def_property_readonly(
+          "speed", [](const PySample& one) { return one.when(one.sample.speed_valid, one.sample.speed); },
+          "rpm, of linear encoders mm/s, as it was `speed_delay_s` before `time_s`.")
+      .def_property_readonly(
+          "speed_delay_s",
+          [](const PySample& one) { return one.when(one.sample.speed_valid, seconds(one.sample.speed_delay)); },
+          "Seconds.")
+      .def_property_readonly(
+          "confirmed", [](const PySample& one) { return one.sample.confirmed; }, "Two readings in a row agreed.")
+      .def_property_readonly(
+          "restarted", [](const PySample& one) { return one.sample.restarted; },
+          "How far it went since the reading before is not known: `position` starts again.")
+      .def_property_readonly(
+          "text", [](const PySample& one) { return one.sample.text(); },
+          "Why there is no reading, or what happened; \"\" of a reading that goes on.")
+      .def_property_readonly("error", &PySample::error, "The absenc.errors.EncoderError of a failed attempt, or None.");
+}
+
+}  // namespace
+
+void bind_encoder(py::module_& module) {
+  bind_values(module);
+  py::class_<PySamples>(module, "Samples").def("next", &PySamples::next);
+  py::class_<PyEncoder>(module, "Encoder")
+      .def(py::init<const std::string&, const std::vector<std::string>&>())
+      .def("close", &PyEncoder::close)
+      .def("stop", &PyEncoder::stop)
+      .def("read",
+           [](PyEncoder& one) {
+             return PyReading{&one.unit(), one.use([](client::Encoder& encoder) { return encoder.read(); })};
+           })
+      .def(
+          "samples",
+          [](PyEncoder& one, double rate, std::uint64_t count) {
+            return std::make_unique<PySamples>(one, rate, count);
+          },
+          py::keep_alive<0, 1>())
+      .def("run", &run)
+      .def("scan", &scan)
+      .def("questions", &questions)
+      .def("settings_names", &settings_names)
+      .def("settings_get",
+           [](PyEncoder& one, const std::string& name) {
+             return to_python(one.use([&](client::Encoder& encoder) { return encoder.settings().get(name); }));
+           })
+      .def("settings_set", &settings_set)
+      .def("memory_read", &memory_read)
+      .def("memory_dump", &memory_dump)
+      .def("memory_write", &memory_write)
+      .def("counters", &counters_of)
+      .def_property_readonly("unit", [](const PyEncoder& one) { return std::string(one.unit().id); })
+      .def_property_readonly("model",
+                             [](const PyEncoder& one) -> std::optional<std::string> {
+                               const Model* model = one.encoder().options().model;
+                               return model == nullptr ? std::nullopt : std::optional<std::string>(model->name);
+                             })
+      .def_property_readonly("address",
+                             [](const PyEncoder& one) { return client::address_of(one.encoder().connection().uri()); })
+      .def_property_readonly(
+          "options", [](const PyEncoder& one) { return client::option_texts(one.unit(), one.encoder().options()); })
+      .def_property_readonly("notes", [](const PyEncoder& one) { return one.encoder().notes(); });
+}
+
+}  // namespace absenc::python

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// absenc._absenc: what absenc/*.py is written over.
+#include "python/src/bind.hpp"
+
+PYBIND11_MODULE(_absenc, module) {
+  using namespace absenc::python;
+  register_exceptions();
+  bind_encoder(module);
+  bind_emulation(module);
+  bind_identify(module);
+  bind_protocol(module);
+  bind_decode(module);
+  module.attr("__version__") = ABSENC_VERSION;
+}

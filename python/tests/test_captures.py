@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+import csv
+import io
+import os
+import subprocess
+from pathlib import Path
+
+import absenc
+import numpy as np
+import pytest
+
+SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
+TEXT = SOURCE / "examples" / "tformat.txt"
+
+
+@pytest.fixture
+def wave(tmp_path):
+    path = tmp_path / "wave.vcd"
+    subprocess.run(
+        [os.environ["ABSENC"], "wave", "tformat?motion=rpm=60", str(path), "--count", "300"],
+        check=True, capture_output=True,
+    )
+    return path
+
+
+def test_rows_with_errors_have_no_position():
+    capture = absenc.decode(TEXT, "tformat")
+    assert list(capture["error"]) == ["", "bad_checksum", ""]
+    assert list(capture.good()) == [True, False, True]
+    assert list(np.ma.getmaskarray(capture["singleturn"])) == [False, True, False]
+    assert np.isnan(capture.rows.data["angle_deg"][1])
+    assert capture["request"][0] == b"\x1a" and capture["reply"][0][:1] == b"\x1a"
+    assert capture.columns["angle_deg"].unit == "deg"
+
+
+def test_same_as_the_command(wave):
+    told = subprocess.run([os.environ["ABSENC"], "decode", "tformat", str(wave), "--csv"], capture_output=True, text=True)
+    rows = list(csv.DictReader(io.StringIO(told.stdout)))
+    capture = absenc.decode(wave, "tformat")
+    assert len(rows) == len(capture) >= 300
+    assert not np.ma.getmaskarray(capture["angle_deg"]).any()
+    for name in ("singleturn", "multiturn"):
+        assert [int(row[name]) for row in rows] == list(capture[name])
+    assert [bytes.fromhex(row["reply"]) for row in rows] == list(capture["reply"])
+
+
+def test_batches_make_the_whole(wave):
+    whole = absenc.decode(wave, "tformat")
+    batches = list(absenc.decode_batches(wave, "tformat", rows=7))
+    assert {len(batch) for batch in batches[:-1]} == {7}
+    for name in ("time_s", "singleturn", "reply"):
+        assert list(np.concatenate([batch.rows.data[name] for batch in batches])) == list(whole.rows.data[name])
+
+
+def test_pandas(wave):
+    pytest.importorskip("pandas")
+    frame = absenc.decode(TEXT, "tformat").to_pandas()
+    assert list(frame["singleturn"].isna()) == [False, True, False]
+    assert frame["angle_deg"].isna()[1]
+
+
+def test_files_that_are_wrong(tmp_path):
+    with pytest.raises(absenc.AbsencError):
+        absenc.decode(tmp_path / "none.sr", "tformat")
+    with pytest.raises(KeyError, match="angle_deg"):
+        absenc.decode(TEXT, "tformat")["angel"]
+
+
+def test_frames():
+    tformat = absenc.protocol["tformat"]
+    reply = bytes.fromhex("1A0045230111341200004A")
+    assert tformat.encode("position") == b"\x1a"
+    assert tformat.decode(reply, request=b"\x1a")["singleturn"] == 74565
+    with pytest.raises(absenc.errors.BadChecksum) as raised:
+        tformat.decode(reply[:-1] + b"\x4b", request=b"\x1a")
+    assert raised.value.sent == "1A"
+    assert tformat.flag_names("alarms", 1 << 4) == ["over_heat"]
+
+
+def test_crc_of_arrays():
+    assert absenc.crc(b"123456789", width=16, poly=0x1021, init=0xFFFF) == 0x29B1
+    rows = np.frombuffer(b"123456789" * 3, np.uint8).reshape(3, 9)
+    assert list(absenc.crc(rows, width=8, poly=0x07)) == [0xF4] * 3

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import absenc
+import pytest
+
+
+def test_errors_say_what_was_sent_what_came_and_what_to_try(absenc_emulate):
+    virtual = absenc_emulate("tformat")
+    with absenc.open(virtual.address) as encoder:
+        virtual.power_off()
+        with pytest.raises(absenc.errors.Timeout) as raised:
+            encoder.read()
+    assert (raised.value.name, raised.value.sent, raised.value.received) == ("timeout", "1A", "")
+    assert raised.value.message and raised.value.advice and raised.value.exchange
+
+
+def test_each_error_has_a_class():
+    assert set(absenc.errors.by_name) == set(absenc._absenc.error_names())
+
+
+def test_damaged_replies_are_never_a_position(absenc_emulate):
+    virtual = absenc_emulate("tformat", singleturn=65536, faults={"corrupt": 1})
+    with absenc.open(virtual.address) as encoder:
+        for sample in encoder.samples(count=5):
+            assert sample.kind == "failed" and sample.reading is None and sample.position is None
+            assert isinstance(sample.error, absenc.EncoderError)
+        virtual.clear_faults()
+        assert encoder.read().angle_deg == 180
+
+
+def test_conditions_while_it_runs(absenc_emulate):
+    virtual = absenc_emulate("tformat", conditions={"temperature": 40})
+    with absenc.open(virtual.address) as encoder:
+        assert encoder.run("temperature")["temperature_c"] == 40
+        virtual.set_condition("temperature", 71)
+        assert encoder.run("temperature")["temperature_c"] == 71
+
+
+def test_names_that_are_wrong_name_the_nearest(absenc_emulate):
+    virtual = absenc_emulate("tformat")
+    with pytest.raises(absenc.UsageError, match="over_heat"):
+        virtual.raise_alarm("over_heet")
+    with pytest.raises(absenc.UsageError, match="tformat"):
+        absenc.open("tformta:/dev/null")
+    with absenc.open(virtual.address) as encoder:
+        with pytest.raises(absenc.UsageError, match="address"):
+            encoder.run("memory-read", adress=5)
+    with pytest.raises(absenc.PortError) as raised:
+        absenc.open("tformat:/dev/no-such-port")
+    assert raised.value.kind == "not_found"
+
+
+def test_memory_is_written_and_read_back(absenc_emulate):
+    virtual = absenc_emulate("tformat")
+    with absenc.open(virtual.address) as encoder:
+        assert encoder.memory.write(5, b"\x42\x43") == 2
+        assert encoder.memory.read(5, 2) == b"\x42\x43"
+        assert encoder.memory.write(5, b"\x42\x43") == 0
+        assert encoder.memory.dump()[(0, 5)] == 0x42
+        assert encoder.run("memory-read", address=6)["value"] == 0x43
+
+
+def test_scan():
+    assert [one["clash"] for one in absenc.scan("sim:esl")] == [False]
+    with absenc.open("sim:tformat") as encoder, pytest.raises(absenc.UsageError, match="no addresses"):
+        encoder.scan()
+
+
+def test_tcp(absenc_emulate):
+    virtual = absenc_emulate("tformat", tcp=0)
+    with absenc.open(f"tformat:tcp:127.0.0.1:{virtual.tcp_port}") as encoder:
+        assert encoder.read().valid
+
+
+def test_samples_of_asyncio_leave_the_loop_free(absenc_emulate):
+    virtual = absenc_emulate("tformat", motion="rpm=60")
+    turns = 0
+
+    async def count_turns():
+        nonlocal turns
+        while True:
+            turns += 1
+            await asyncio.sleep(0)
+
+    async def read():
+        other = asyncio.create_task(count_turns())
+        with absenc.open(virtual.address) as encoder:
+            positions = [sample.position async for sample in encoder.samples(rate=100, count=10)]
+        other.cancel()
+        return positions
+
+    positions = asyncio.run(read())
+    assert len(positions) == 10 and positions == sorted(positions)
+    assert turns > 10
+
+
+def test_asyncio_cancels_a_long_wait(absenc_emulate):
+    virtual = absenc_emulate("tformat")
+
+    async def read():
+        with absenc.open(virtual.address) as encoder:
+            with pytest.raises(asyncio.TimeoutError):
+                async with asyncio.timeout(0.2):
+                    async for _ in encoder.samples(rate=0.001):
+                        pass
+            return encoder.read().valid  # it is not closed
+
+    assert asyncio.run(read())
+
+
+def test_close_ends_what_waits_in_another_thread(absenc_emulate):
+    virtual = absenc_emulate("tformat")
+    encoder = absenc.open(virtual.address)
+    samples = iter(encoder.samples(rate=0.001))
+    next(samples)
+    ended = []
+    thread = threading.Thread(target=lambda: ended.extend(samples))
+    thread.start()
+    encoder.close()
+    thread.join(60)
+    assert not thread.is_alive()
+    with pytest.raises(absenc.UsageError, match="closed"):
+        encoder.read()
+
+
+@pytest.mark.parametrize("wait", ["list(encoder.samples(rate=0.001))", "list(encoder.samples(rate=1000))"])
+def test_ctrl_c_ends_a_wait(wait):
+    program = f"""
+import absenc
+with absenc.open("sim:tformat") as encoder:
+    try:
+        encoder.read()
+        print("ready", flush=True)
+        {wait}
+    except KeyboardInterrupt:
+        encoder.read()
+        print("interrupted", flush=True)
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "ready\n"
+            os.kill(process.pid, signal.SIGINT)
+            assert process.communicate(timeout=60)[0] == "interrupted\n"
+            assert process.returncode == 0
+        finally:
+            process.kill()

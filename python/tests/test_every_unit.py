@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each unit's virtual encoder, over a pseudo-terminal where its link goes over one."""
+import absenc
+import pytest
+
+UNITS = sorted(absenc.protocol)
+
+
+@pytest.fixture(params=UNITS)
+def unit(request):
+    return absenc.protocol[request.param]
+
+
+@pytest.fixture
+def address(unit, absenc_emulate):
+    if unit.link in ("exchange", "clocked"):
+        return f"sim:{unit.id}"
+    return absenc_emulate(unit.id).address
+
+
+def test_reads(unit, address):
+    with absenc.open(address) as encoder:
+        reading = encoder.read()
+        assert reading.ready
+        if reading.singleturn_bits:
+            assert reading.valid
+            assert (reading.angle_deg is None) != (reading.position_mm is None)
+            assert 0 <= reading.singleturn < 2**reading.singleturn_bits
+        assert encoder.counters["good"] >= 1
+        assert encoder.protocol is unit
+
+
+def test_samples_in_order(address):
+    with absenc.open(address) as encoder:
+        samples = list(encoder.samples(count=3))
+    assert [sample.kind for sample in samples] == ["reading"] * 3
+    assert samples[0].time_s <= samples[1].time_s <= samples[2].time_s
+
+
+def test_info_answers(address):
+    with absenc.open(address) as encoder:
+        info = encoder.info()
+    assert info.unit in absenc.protocol
+    assert not info.failures
+
+
+def test_requests_are_encoded_and_decoded(unit):
+    for command in unit.commands.values():
+        if command.verb == "read" and not command.arguments and unit.link not in ("clocked",):
+            try:
+                request = unit.encode(command.name)
+            except absenc.UsageError:
+                continue
+            if request:
+                assert isinstance(request, str if unit.link == "can" else bytes)
+
+
+def test_alarms_of_the_virtual_encoder(unit, absenc_emulate):
+    if unit.link in ("exchange", "clocked") or not unit.alarms:
+        pytest.skip("no pseudo-terminal or no alarms")
+    virtual = absenc_emulate(unit.id)
+    with absenc.open(virtual.address) as encoder:
+        before = set(encoder.read().alarms)
+        virtual.raise_alarm(unit.alarms[0].name)
+        for _ in range(3):
+            reading = encoder.read()
+        assert unit.alarms[0].name in reading.alarms
+        assert unit.alarms[0].name not in before
+        assert [alarm for alarm in encoder.alarms() if alarm.name == unit.alarms[0].name][0].meaning
+    assert virtual.violations == 0
