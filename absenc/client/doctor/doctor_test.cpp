@@ -3,17 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <deque>
 #include <random>
 #include <set>
 
 #include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/doctor/lines_test.hpp"
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/os/fake_spi_test.hpp"
 #include "absenc/protocol/all.hpp"
-#include "absenc/sim/sim_port.hpp"
 
 namespace absenc::client {
 
@@ -31,140 +30,6 @@ std::vector<std::string> ids(const Examination& examination) {
   std::vector<std::string> all;
   for (const Finding& one : examination.findings) all.emplace_back(one.id);
   return all;
-}
-
-// ---- Links in virtual time
-
-/// Begins each request a random while later.
-template <class Item>
-class UnevenPort final : public Port<Item> {
- public:
-  UnevenPort(Port<Item>& port, std::uint64_t seed) : port_(&port), random_(seed) {}
-  Time now() override { return port_->now(); }
-  void begin(const Step<Item>& step) override {
-    Step<Item> later = step;
-    // On SPI and clocked links pauses have a meaning; so they have within a procedure.
-    if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
-      later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
-    }
-    port_->begin(later);
-  }
-  Event<Item> wait(const Step<Item>& step) override { return port_->wait(step); }
-
- private:
-  Port<Item>* port_;
-  std::mt19937_64 random_;
-};
-
-template <class Item>
-void put_on_line(Link& link, const EncoderAddress& address, Machine<Item>& device, Port<Item>*& port,
-                 std::optional<std::uint64_t> seed) {
-  struct Both {
-    sim::SimPort<Item> line;
-    UnevenPort<Item> uneven;
-    Both(const EncoderAddress& to, Machine<Item>& machine, std::uint64_t number)
-        : line(to.unit->link, to.line.with_some_rate(), machine), uneven(line, number) {}
-  };
-  const auto both = std::make_shared<Both>(address, device, seed.value_or(0));
-  if (seed) {
-    port = &both->uneven;
-  } else {
-    port = &both->line;
-  }
-  link.owner = both;
-}
-
-/// A virtual encoder in virtual time, as its address describes it; `seed`: with random pauses.
-Link virtual_link(const EncoderAddress& address, std::optional<std::uint64_t> seed = {}) {
-  Link link;
-  link.place = "here";
-  link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
-  link.device->power_on(Time{});
-  if (link.device->bytes() != nullptr) {
-    put_on_line(link, address, *link.device->bytes(), link.bytes, seed);
-  } else {
-    put_on_line(link, address, *link.device->frames(), link.frames, seed);
-  }
-  return link;
-}
-
-/// A line on which a request is answered by a function, and on which somebody may talk all the time.
-template <class Item>
-class ScriptedPort final : public Port<Item> {
- public:
-  using List = std::vector<Item>;
-  std::function<List(const List& request)> answer = [](const List&) { return List{}; };
-  List babble{};  // every millisecond
-  Time after = 100us;
-  Time latency{};
-  bool destroys = false;  // every frame, as a CAN bus on which nobody acknowledges
-
-  Time now() override { return now_; }
-  void begin(const Step<Item>& step) override {
-    now_ = std::max(now_, step.at);
-    if (step.kind != Step<Item>::Kind::transfer) return;
-    quiet_since_ = now_;
-    heard_ = told_ = false;
-    due_.push_back({{.kind = Event<Item>::Kind::sent, .at = now_}, {}});
-    if (destroys) due_.push_back({{.kind = Event<Item>::Kind::line_error, .at = now_ + after}, {}});
-    List reply = answer({step.out.begin(), step.out.end()});
-    if (!reply.empty()) due_.push_back({{.kind = Event<Item>::Kind::received, .at = now_ + after}, std::move(reply)});
-  }
-  Event<Item> wait(const Step<Item>& step) override {
-    const Time timer = step.at > now_ ? step.at : never;
-    const Time limit = heard_ ? step.gap : step.answer;
-    const Time silence = limit > Time{} && !told_ ? std::max(now_, quiet_since_ + limit + latency) : never;
-    const Time event = due_.empty() ? never : due_.front().event.at;
-    const Time noise = babble.empty() ? never : std::max(now_, babble_at_);
-    const Time first = std::min({timer, silence, event, noise});
-    if (first == never) throw std::logic_error("a wait for what can never happen");
-    now_ = std::max(now_, first);
-    if (first == event) {
-      current_ = std::move(due_.front());
-      due_.pop_front();
-      return tell(current_.event, current_.items);
-    }
-    if (first == noise) {
-      babble_at_ = now_ + 1ms;
-      return tell({.kind = Event<Item>::Kind::received, .at = now_}, babble);
-    }
-    if (first == silence) {
-      told_ = true;
-      return {.kind = Event<Item>::Kind::silence, .at = now_};
-    }
-    return {.kind = Event<Item>::Kind::timer, .at = now_};
-  }
-
- private:
-  struct Due {
-    Event<Item> event;
-    List items;
-  };
-  Event<Item> tell(Event<Item> event, const List& items) {
-    if (event.kind == Event<Item>::Kind::received) {
-      heard_ = true;
-      told_ = false;
-      quiet_since_ = now_;
-      event.items = items;
-    }
-    return event;
-  }
-
-  Time now_{};
-  Time quiet_since_{};
-  Time babble_at_{};
-  bool heard_ = false;
-  bool told_ = false;
-  std::deque<Due> due_;
-  Due current_{};
-};
-
-Link link_to(std::shared_ptr<ScriptedPort<std::uint8_t>> port) {
-  Link link;
-  link.place = "here";
-  link.bytes = port.get();
-  link.owner = std::move(port);
-  return link;
 }
 
 // ---- Examinations
