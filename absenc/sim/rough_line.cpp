@@ -11,6 +11,17 @@
 
 namespace absenc::sim {
 
+namespace {
+
+// Mostly as long as what was there: nothing to allocate or to fill.
+template <class Item>
+void copy(std::span<const Item> items, std::vector<Item>& to) {
+  to.resize(items.size());
+  std::copy(items.begin(), items.end(), to.begin());
+}
+
+}  // namespace
+
 template <class Item>
 RoughLine<Item>::RoughLine(LinkKind kind, LineSettings settings, Machine<Item>& device, std::uint64_t seed)
     : kind_(kind), settings_(settings), device_(device), random_(seed), character_(settings.character()) {
@@ -42,7 +53,7 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
   } else if (driven()) {
     transfer(step);
   } else {
-    request_.assign(step.out.begin(), step.out.end());
+    copy(step.out, request_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
       for (const CanFrame& frame : request_) {
         run_until(time_ + settings_.bits(can_bits(frame).size() + can_intermission_bits));
@@ -208,7 +219,7 @@ void RoughLine<Item>::send(const Step<Item>& first) {
       return;
     }
     if (step.kind != Kind::transfer) continue;
-    out_.assign(step.out.begin(), step.out.end());
+    copy(step.out, out_);
     if (driven()) continue;
     const Time start = std::max(step.at, time_);
     side_.sending = true;
@@ -231,7 +242,7 @@ void RoughLine<Item>::hold(Time start, Time first, Time end, std::span<const Ite
   ++counts_.replies;
   if (back_ == held_.size()) held_.emplace_back();
   Held& held = held_[back_];
-  held.items.assign(items.begin(), items.end());
+  copy(items, held.items);
   damage(held.items);
   const Time late = driven() ? Time{} : lateness();
   // A line keeps the order.

@@ -2,8 +2,8 @@
 // What needs no faults: commands, settings, memory and storage over the virtual encoder.
 #include <algorithm>
 
-#include "tests/kit/kit.hpp"
 #include "absenc/sim/place.hpp"
+#include "tests/kit/kit.hpp"
 #include "tests/kit/world.hpp"
 
 namespace absenc::kit {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <set>
 
-#include "tests/kit/kit.hpp"
 #include "absenc/sim/place.hpp"
+#include "tests/kit/kit.hpp"
 #include "tests/kit/world.hpp"
 
 namespace absenc::kit {
