@@ -137,7 +137,7 @@ class Installed(Case):
             "lib/absenc.pc", "lib/absenc-client.pc",
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
-            "share/doc/absenc/LICENSE"})
+            "share/doc/absenc/LICENSE", "share/doc/absenc/serve.md", "lib/absenc.service"})
         self.assertEqual(headers, public_headers())
 
     def test_headers_need_only_installed_ones(self):
@@ -336,7 +336,8 @@ class Packages(unittest.TestCase):
         self.assertEqual(command | development, installed | added)
         self.assertEqual(command, {
             "bin/absenc", "share/man/man1/absenc.1.gz", "share/bash-completion/completions/absenc",
-            "share/doc/absenc/README.md", "share/doc/absenc/copyright"})
+            "share/doc/absenc/README.md", "share/doc/absenc/serve.md", "share/doc/absenc/copyright",
+            "lib/systemd/system/absenc.service"})
         for name, held in (("absenc", command), ("libabsenc-dev", development)):
             self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})
 

@@ -4,6 +4,7 @@ import contextlib
 import http.client
 import json
 import os
+import resource
 import signal
 import socket
 import sqlite3
@@ -67,11 +68,11 @@ class Stream:
 
 
 class Server:
-    def __init__(self, *arguments, cwd=None, **environment):
+    def __init__(self, *arguments, preexec_fn=None, **environment):
         where = [] if "--listen" in arguments else ["--listen", "127.0.0.1:0"]
         command = [ABSENC, "serve", *arguments, *where]
-        self.process = subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=cwd,
-                                        env={**os.environ, **environment})
+        self.process = subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                        preexec_fn=preexec_fn, env={**os.environ, **environment})
         line = read_line(self.process.stdout, time.monotonic() + PATIENCE)
         if line is None:
             raise AssertionError(f"the server did not become ready: {end(self.process)}")
@@ -420,17 +421,18 @@ class History(ServeCase):
             self.assertGreater(database.execute("SELECT min(at) FROM second").fetchone()[0], 1)
 
     def test_a_full_disk_is_told(self):
-        path = self.file("history")
-        server = self.server(self.NAME, "--history", path)
+        server = self.server(self.NAME, "--history", self.file("history"),
+                             preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN))
         wait_until(lambda: len(self.rows(server)) >= 2, "it has two seconds")
-        # Somebody who has it locked is to the writer what a full disk is: nothing can be written.
-        with contextlib.closing(sqlite3.connect(path, isolation_level=None, timeout=PATIENCE)) as database:
-            database.execute("BEGIN IMMEDIATE")
-            wait_until(lambda: not server.json("/healthz")["ok"], "it says so")
-            state = server.json("/api/encoders")
-            self.assertTrue(state["history"]["trouble"])
-            self.assertEqual(state["encoders"][0]["state"], "live")
-            database.execute("ROLLBACK")
+        before = self.rows(server)
+        # A limit of the kernel for the size of files is to the writer what a full disk is.
+        resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+        wait_until(lambda: not server.json("/healthz")["ok"], "it says so")
+        state = server.json("/api/encoders")
+        self.assertTrue(state["history"]["trouble"])
+        self.assertEqual(state["encoders"][0]["state"], "live")
+        self.assertEqual(self.rows(server)[:len(before)], before)
+        resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         wait_until(lambda: server.json("/healthz")["ok"], "it is well again")
         lost = [event["text"] for event in server.json("/api/events")["events"] if event["kind"] == "history"]
         self.assertRegex(lost[0], "could not be written")

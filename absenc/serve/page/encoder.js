@@ -7,6 +7,8 @@ import {download, hasToken, request, setToken} from "./server.js";
 const SHOWN_MS = 20000;
 const MOST_POINTS = 2000;
 const REFRESH_MS = 1000;
+const WRITTEN_MS = 1500;  // then what has happened stands in the history
+const PAST_MS = 10000;
 
 const ink = () => getComputedStyle(document.body).color;
 
@@ -37,6 +39,7 @@ export class One {
     this.refresh();
     this.timer = setInterval(() => this.refresh(), REFRESH_MS);
     this.loadHistory();
+    this.pastTimer = setInterval(() => this.loadHistory(), PAST_MS);
     const frame = () => {
       if (this.closed) return;
       this.draw();
@@ -110,7 +113,10 @@ export class One {
   }
 
   take(event, data) {
-    if (event === "happening" && data.encoder === this.name) this.loadHistory();
+    if (event === "happening" && data.encoder === this.name) {
+      clearTimeout(this.soon);
+      this.soon = setTimeout(() => this.loadHistory(), WRITTEN_MS);
+    }
     if (event !== "points" || data.encoder !== this.name) return;
     const points = data.points.length > 8 ? data.points.filter((_, i) => i % Math.ceil(data.points.length / 8) === 0) : data.points;
     const last = this.points.at(-1);
@@ -228,6 +234,8 @@ export class One {
   close() {
     this.closed = true;
     clearInterval(this.timer);
+    clearInterval(this.pastTimer);
+    clearTimeout(this.soon);
     for (const graph of [this.placeGraph, this.speedGraph, this.pastGraph]) graph?.destroy();
   }
 }
