@@ -51,20 +51,23 @@ firmware_program(drive-m4f mps2 1M 64K SOURCES "${PROJECT_SOURCE_DIR}/firmware/d
 add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microbit firmware_drive-m0plus)
 add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f)
 
-# Readers of one position each, which firmware/figures.py measures. Of the library for the Cortex-M4F they need little.
-set(m4f_reader_sources ${m4f_sources})
-list(FILTER m4f_reader_sources INCLUDE REGEX "(engine|/host)\\.cpp$")
-add_library(absenc-m4f-readers STATIC EXCLUDE_FROM_ALL ${m4f_reader_sources})
-absenc_settings(absenc-m4f-readers)
-target_include_directories(absenc-m4f-readers PUBLIC "${PROJECT_SOURCE_DIR}")
-target_compile_options(absenc-m4f-readers PRIVATE ${m4f_flags})
+# Readers of one position each, which firmware/figures.py measures. Of the library they need little.
+set(reading_sources ${m4f_sources})
+list(FILTER reading_sources INCLUDE REGEX "(engine|/host)\\.cpp$")
+foreach(cpu IN ITEMS m0plus m4f)
+  add_library(absenc-reading-${cpu} STATIC EXCLUDE_FROM_ALL ${reading_sources})
+  absenc_settings(absenc-reading-${cpu})
+  target_include_directories(absenc-reading-${cpu} PUBLIC "${PROJECT_SOURCE_DIR}")
+endforeach()
+target_compile_options(absenc-reading-m4f PRIVATE ${m4f_flags})
 
 add_custom_target(firmware-readers)
 file(GLOB reader_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/firmware/readers/*.cpp")
 foreach(source IN LISTS reader_sources)
   cmake_path(GET source STEM reader)
-  firmware_program(reader-${reader}-m0plus mps2 256K 16K SOURCES "${source}" LIBRARY absenc)
-  firmware_program(reader-${reader}-m4f mps2 256K 16K SOURCES "${source}" LIBRARY absenc-m4f-readers FLAGS ${m4f_flags})
+  firmware_program(reader-${reader}-m0plus mps2 256K 16K SOURCES "${source}" LIBRARY absenc-reading-m0plus)
+  firmware_program(reader-${reader}-m4f mps2 256K 16K SOURCES "${source}" LIBRARY absenc-reading-m4f
+                   FLAGS ${m4f_flags})
   add_dependencies(firmware-readers firmware_reader-${reader}-m0plus firmware_reader-${reader}-m4f)
 endforeach()
 add_dependencies(firmware firmware-readers)
