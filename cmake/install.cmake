@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` and `cpack` make of a build tree, in two components: absenc, the command, and libabsenc-dev.
+# What `cmake --install` and `cpack` make of a build tree, in components: absenc, the command, libabsenc-dev, and
+# python3-absenc.
 include(CMakePackageConfigHelpers)
 
 set(absenc_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/absenc")

@@ -35,4 +35,18 @@ string(JOIN "\n" CPACK_DEBIAN_LIBABSENC-DEV_DESCRIPTION
   "up, emulate them, decode what was captured on their wires."
   "This package holds the static libraries with their headers, and the files for"
   "CMake and pkg-config.")
+
+if(TARGET absenc-python)
+  math(EXPR python3_next_minor "${Python3_VERSION_MINOR} + 1")
+  list(APPEND CPACK_COMPONENTS_ALL python3-absenc)
+  set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_NAME python3-absenc)
+  set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PYTHON3-ABSENC_PACKAGE_DEPENDS
+      "python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3 (<< ${Python3_VERSION_MAJOR}.${python3_next_minor}), python3-numpy")
+  string(JOIN "\n" CPACK_DEBIAN_PYTHON3-ABSENC_DESCRIPTION
+    "${PROJECT_DESCRIPTION} (Python)"
+    "Absolute encoders of servo motors where tests are written and data is looked at:"
+    "read them, emulate them in tests, decode captures into NumPy arrays.")
+endif()
 include(CPack)

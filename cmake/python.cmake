@@ -19,3 +19,9 @@ foreach(file IN LISTS python_files)
   cmake_path(GET file FILENAME name)
   configure_file("${file}" "${absenc_python_dir}/${name}" COPYONLY)
 endforeach()
+
+# Where Debian's Python looks; wheels are made of the same folder (python/backend).
+if(ABSENC_INSTALL AND NOT ABSENC_SANITIZE)
+  install(DIRECTORY "${absenc_python_dir}" DESTINATION lib/python3/dist-packages COMPONENT python3-absenc
+          PATTERN __pycache__ EXCLUDE)
+endif()

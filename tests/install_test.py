@@ -295,6 +295,7 @@ class Packages(unittest.TestCase):
             run("dpkg-deb", "-x", package, cls.folder / name)
         cls.command = cls.folder / "absenc/usr"
         cls.development = cls.folder / "libabsenc-dev/usr"
+        cls.python = cls.folder / "python3-absenc/usr"
 
     def field(self, package, name):
         return run("dpkg-deb", "-f", self.packages[package], name).strip()
@@ -302,9 +303,10 @@ class Packages(unittest.TestCase):
     def depends(self, package):
         return set(re.findall(r"[a-z0-9.+-]+(?= \(|,|$)", self.field(package, "Depends")))
 
-    def test_are_two_and_say_what_they_are(self):
-        self.assertEqual(set(self.packages), {"absenc", "libabsenc-dev"})
-        for name, section in (("absenc", "electronics"), ("libabsenc-dev", "libdevel")):
+    def test_are_three_and_say_what_they_are(self):
+        sections = {"absenc": "electronics", "libabsenc-dev": "libdevel", "python3-absenc": "python"}
+        self.assertEqual(set(self.packages), set(sections))
+        for name, section in sections.items():
             with self.subTest(name):
                 self.assertEqual(self.field(name, "Package"), name)
                 self.assertEqual(self.field(name, "Version"), VERSION)
@@ -312,7 +314,7 @@ class Packages(unittest.TestCase):
                 self.assertEqual(self.field(name, "Architecture"), run("dpkg", "--print-architecture").strip())
                 self.assertRegex(self.field(name, "Maintainer"), r"^absenc developers <\S+@\S+>$")
                 self.assertRegex(self.field(name, "Description"), r"\A[A-Z].+[^.]\n .+")
-        self.assertEqual(len({self.field(name, "Description").splitlines()[0] for name in self.packages}), 2)
+        self.assertEqual(len({self.field(name, "Description").splitlines()[0] for name in self.packages}), 3)
 
     def test_the_command_needs_nothing_to_develop_with(self):
         for library in ("libc6", "libstdc++6", "libfmt"):
@@ -330,15 +332,17 @@ class Packages(unittest.TestCase):
     def test_hold_what_is_installed_once(self):
         run("cmake", "--install", BUILD, "--prefix", self.folder / "installed")
         installed = files_below(self.folder / "installed") - {"share/doc/absenc/LICENSE", "share/man/man1/absenc.1"}
-        added = {"share/doc/absenc/copyright", "share/man/man1/absenc.1.gz", "share/doc/libabsenc-dev/copyright"}
-        command, development = files_below(self.command), files_below(self.development)
-        self.assertEqual(command & development, set())
-        self.assertEqual(command | development, installed | added)
+        added = {"share/doc/absenc/copyright", "share/man/man1/absenc.1.gz", "share/doc/libabsenc-dev/copyright",
+                 "share/doc/python3-absenc/copyright"}
+        command, development, python = map(files_below, (self.command, self.development, self.python))
+        self.assertEqual(len(command | development | python), len(command) + len(development) + len(python))
+        self.assertEqual(command | development | python, installed | added)
+        self.assertIn("lib/python3/dist-packages/absenc/py.typed", python)
         self.assertEqual(command, {
             "bin/absenc", "share/man/man1/absenc.1.gz", "share/bash-completion/completions/absenc",
             "share/doc/absenc/README.md", "share/doc/absenc/serve.md", "share/doc/absenc/copyright",
             "lib/systemd/system/absenc.service"})
-        for name, held in (("absenc", command), ("libabsenc-dev", development)):
+        for name, held in (("absenc", command), ("libabsenc-dev", development), ("python3-absenc", python)):
             self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})
 
     def test_belong_to_root_and_may_be_read_by_all(self):
@@ -350,6 +354,13 @@ class Packages(unittest.TestCase):
 
     def test_the_unpacked_command(self):
         self.assertIn("turns", run(self.command / "bin/absenc", "read", "sim:tformat"))
+
+    def test_the_unpacked_module(self):
+        for package in ("libc6", "libfmt", "python3", "python3-numpy"):
+            self.assertIn(package, self.field("python3-absenc", "Depends"))
+        modules = self.python / "lib/python3/dist-packages"
+        run("env", f"PYTHONPATH={modules}", "/usr/bin/python3", "-B", "-c",
+            "import absenc; assert absenc.open('sim:tformat').read().valid")
 
     def test_the_unpacked_documents(self):
         made = self.command / "share"
