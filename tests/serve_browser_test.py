@@ -20,8 +20,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
-from command_support import PATIENCE, Emulator, end
-from serve_test import BUSY, TOKEN, ServeCase, wait_until
+from command_support import PATIENCE, Emulator
+from serve_support import BUSY, TOKEN, ServeCase, wait_until
 
 SCREENSHOTS = os.environ.get("ABSENC_SCREENSHOTS")  # a folder to look at them
 

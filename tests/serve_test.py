@@ -1,124 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc serve`: what it tells, to whom, and that nobody can keep it from telling."""
+"""`absenc serve`: what it tells, to whom, and what it keeps."""
 import contextlib
-import http.client
-import json
 import os
 import resource
 import signal
-import socket
 import sqlite3
 import subprocess
 import time
 import unittest
-import urllib.parse
 
-from command_support import ABSENC, PATIENCE, Case, Emulator, end, read_line
-
-TOKEN = "a-secret-of-nobody-else"
-BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))  # what "at once" is
-
-
-def wait_until(true, what):
-    deadline = time.monotonic() + PATIENCE
-    while not (value := true()):
-        if time.monotonic() > deadline:
-            raise AssertionError(f"in vain waited until {what}")
-        time.sleep(0.02)
-    return value
-
-
-class Stream:
-    """An open stream of server-sent events."""
-
-    def __init__(self, server, trace=""):
-        self.connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
-        self.connection.request("GET", "/api/stream?" + urllib.parse.urlencode({"trace": trace}))
-        self.answer = self.connection.getresponse()
-
-    def next(self):
-        """(event, data)"""
-        name = data = ""
-        while True:
-            line = self.answer.readline().decode().rstrip("\n")
-            if line.startswith("event: "):
-                name = line[7:]
-            if line.startswith("data: "):
-                data += line[6:]
-            if line == "" and name:
-                return name, json.loads(data)
-
-    def until(self, wanted):
-        """The first event that is wanted, with its data."""
-        deadline = time.monotonic() + PATIENCE
-        while time.monotonic() < deadline:
-            event, data = self.next()
-            if wanted(event, data):
-                return data
-        raise AssertionError("in vain waited for an event")
-
-    def state(self, wanted=lambda encoder: True):
-        """The one encoder of the first state in which it is as wanted."""
-        data = self.until(lambda event, data: event == "state" and wanted(data["encoders"][0]))
-        return data["encoders"][0]
-
-    def close(self):
-        self.answer.close()
-        self.connection.close()
-
-
-class Server:
-    def __init__(self, *arguments, preexec_fn=None, **environment):
-        where = [] if "--listen" in arguments else ["--listen", "127.0.0.1:0"]
-        command = [ABSENC, "serve", *arguments, *where]
-        self.process = subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                        preexec_fn=preexec_fn, env={**os.environ, **environment})
-        line = read_line(self.process.stdout, time.monotonic() + PATIENCE)
-        if line is None:
-            raise AssertionError(f"the server did not become ready: {end(self.process)}")
-        self.url = line.strip()
-        self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
-
-    def ask(self, path, method="GET", headers=None, **values):
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
-        with contextlib.closing(connection):
-            query = "?" + urllib.parse.urlencode(values, doseq=True) if values else ""
-            connection.request(method, path + query, headers=headers or {})
-            answer = connection.getresponse()
-            return answer.status, answer.read().decode()
-
-    def json(self, path, **values):
-        status, body = self.ask(path, **values)
-        if status != 200:
-            raise AssertionError(f"{path}: {status} {body}")
-        return json.loads(body)
-
-    def encoder(self, index=0):
-        return self.json("/api/encoders")["encoders"][index]
-
-    def command(self, encoder, command, headers, **values):
-        status, body = self.ask("/api/command", "POST", headers, encoder=encoder, command=command, **values)
-        return status, json.loads(body)
-
-
-class ServeCase(Case):
-    def server(self, *arguments, **settings):
-        server = Server(*arguments, **settings)
-        self.addCleanup(end, server.process)
-        return server
-
-    def without_history(self, *arguments, **settings):
-        return self.server(*arguments, "--history", "none", **settings)
-
-    def tokens(self):
-        path = self.file("tokens", f"anna {TOKEN}\n")
-        os.chmod(path, 0o600)
-        return path
-
-    def stream(self, server, trace=""):
-        stream = Stream(server, trace)
-        self.addCleanup(stream.close)
-        return stream
+from command_support import ABSENC, PATIENCE, Emulator, end, read_line
+from serve_support import BUSY, TOKEN, ServeCase, Server, wait_until
 
 
 class Values(ServeCase):
@@ -436,103 +328,6 @@ class History(ServeCase):
         wait_until(lambda: server.json("/healthz")["ok"], "it is well again")
         lost = [event["text"] for event in server.json("/api/events")["events"] if event["kind"] == "history"]
         self.assertRegex(lost[0], "could not be written")
-
-
-class Abuse(ServeCase):
-    def setUp(self):
-        super().setUp()
-        self.served = self.without_history("sim:tformat?motion=rpm=60")
-        self.addCleanup(self.assert_well)
-
-    def assert_well(self):
-        wait_until(lambda: self.served.encoder()["state"] == "live", "it answers")
-        self.assertIsNone(self.served.process.poll())
-
-    def connect(self):
-        connection = socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE)
-        self.addCleanup(connection.close)
-        return connection
-
-    def memory_kb(self):
-        with open(f"/proc/{self.served.process.pid}/status", encoding="ascii") as file:
-            return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
-
-    def test_half_sent_requests(self):
-        halves = [self.connect() for _ in range(100)]
-        for half in halves:
-            half.sendall(b"GET /api/encoders HTTP/1.1\r\nHost: local")
-        self.assert_well()
-        # Each is ended, also when it says a byte now and then.
-        talker = halves[0]
-        talker.settimeout(0.2)
-        deadline = time.monotonic() + PATIENCE
-        while time.monotonic() < deadline:
-            try:
-                talker.sendall(b"h")
-                if talker.recv(1) == b"":
-                    return
-            except TimeoutError:
-                continue
-            except OSError:
-                return
-        self.fail("it is still waited for")
-
-    def test_large_headers(self):
-        connection = self.connect()
-        with contextlib.suppress(OSError):
-            connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * 1_000_000 + b"\r\n\r\n")
-        with contextlib.suppress(OSError):
-            self.assertNotIn(b" 200 ", connection.recv(100))
-
-    def test_large_bodies(self):
-        status, _ = self.served.ask("/api/command", "POST", {"Content-Length": "1000000000"})
-        self.assertEqual(status, 413)
-
-    def test_many_connections(self):
-        before = self.memory_kb()
-        for _ in range(10):
-            with contextlib.ExitStack() as stack:
-                for _ in range(100):
-                    stack.enter_context(socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE))
-        self.assert_well()
-        self.assertLess(self.memory_kb() - before, 64_000)
-
-    def test_more_streams_than_there_may_be(self):
-        statuses = []
-        for _ in range(320):
-            connection = self.connect()
-            connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            statuses.append(connection.recv(15)[9:12])
-        self.assertIn(b"503", statuses)
-        self.assertGreaterEqual(statuses.count(b"200"), 200)
-        self.assert_well()
-
-    def test_random_bytes(self):
-        for path in ("/", "/metrics", "/api/encoders", "/api/encoder", "/api/stream", "/api/history", "/api/events"):
-            for _ in range(5):
-                with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
-                    with contextlib.suppress(OSError):
-                        connection.sendall(os.urandom(2000))
-                with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
-                    noise = urllib.parse.quote_from_bytes(os.urandom(60)).encode()
-                    with contextlib.suppress(OSError):
-                        connection.sendall(b"GET " + path.encode() + b"?name=" + noise + b"&from=" + noise +
-                                           b" HTTP/1.1\r\nHost: localhost\r\n" + os.urandom(100) + b"\r\n\r\n")
-        self.assert_well()
-
-    def test_a_slow_reader_delays_nobody(self):
-        slow = self.connect()
-        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-        slow.sendall(b"GET /api/stream?trace=" + urllib.parse.quote("sim:tformat?motion=rpm=60", safe="").encode() +
-                     b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        slow.recv(1)
-        stream = self.stream(self.served)
-        started = time.monotonic()
-        states = 0
-        while time.monotonic() - started < 5:
-            slow.recv(1)
-            states += stream.next()[0] == "state"
-        self.assertGreater(states, 10)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Clients of `absenc serve` that ask for too much, too slowly or for nothing at all: others are answered all the same."""
+import contextlib
+import os
+import socket
+import time
+import unittest
+import urllib.parse
+
+from command_support import PATIENCE
+from serve_support import ServeCase, wait_until
+
+
+class Abuse(ServeCase):
+    def setUp(self):
+        super().setUp()
+        self.served = self.without_history("sim:tformat?motion=rpm=60")
+        self.addCleanup(self.assert_well)
+
+    def assert_well(self):
+        wait_until(lambda: self.served.encoder()["state"] == "live", "it answers")
+        self.assertIsNone(self.served.process.poll())
+
+    def connect(self):
+        connection = socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE)
+        self.addCleanup(connection.close)
+        return connection
+
+    def memory_kb(self):
+        with open(f"/proc/{self.served.process.pid}/status", encoding="ascii") as file:
+            return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
+
+    def test_half_sent_requests(self):
+        halves = [self.connect() for _ in range(100)]
+        for half in halves:
+            half.sendall(b"GET /api/encoders HTTP/1.1\r\nHost: local")
+        self.assert_well()
+        # Each is ended, also when it says a byte now and then.
+        talker = halves[0]
+        talker.settimeout(0.2)
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            try:
+                talker.sendall(b"h")
+                if talker.recv(1) == b"":
+                    return
+            except TimeoutError:
+                continue
+            except OSError:
+                return
+        self.fail("it is still waited for")
+
+    def test_large_headers(self):
+        connection = self.connect()
+        with contextlib.suppress(OSError):
+            connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * 1_000_000 + b"\r\n\r\n")
+        with contextlib.suppress(OSError):
+            self.assertNotIn(b" 200 ", connection.recv(100))
+
+    def test_large_bodies(self):
+        status, _ = self.served.ask("/api/command", "POST", {"Content-Length": "1000000000"})
+        self.assertEqual(status, 413)
+
+    def test_many_connections(self):
+        before = self.memory_kb()
+        for _ in range(10):
+            with contextlib.ExitStack() as stack:
+                for _ in range(100):
+                    stack.enter_context(socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE))
+        self.assert_well()
+        self.assertLess(self.memory_kb() - before, 64_000)
+
+    def test_more_streams_than_there_may_be(self):
+        statuses = []
+        for _ in range(320):
+            connection = self.connect()
+            connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            statuses.append(connection.recv(15)[9:12])
+        self.assertIn(b"503", statuses)
+        self.assertGreaterEqual(statuses.count(b"200"), 200)
+        self.assert_well()
+
+    def test_random_bytes(self):
+        for path in ("/", "/metrics", "/api/encoders", "/api/encoder", "/api/stream", "/api/history", "/api/events"):
+            for _ in range(5):
+                with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
+                    with contextlib.suppress(OSError):
+                        connection.sendall(os.urandom(2000))
+                with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
+                    noise = urllib.parse.quote_from_bytes(os.urandom(60)).encode()
+                    with contextlib.suppress(OSError):
+                        connection.sendall(b"GET " + path.encode() + b"?name=" + noise + b"&from=" + noise +
+                                           b" HTTP/1.1\r\nHost: localhost\r\n" + os.urandom(100) + b"\r\n\r\n")
+        self.assert_well()
+
+    def test_a_slow_reader_delays_nobody(self):
+        slow = self.connect()
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        slow.sendall(b"GET /api/stream?trace=" + urllib.parse.quote("sim:tformat?motion=rpm=60", safe="").encode() +
+                     b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        slow.recv(1)
+        stream = self.stream(self.served)
+        started = time.monotonic()
+        states = 0
+        while time.monotonic() - started < 5:
+            slow.recv(1)
+            states += stream.next()[0] == "state"
+        self.assertGreater(states, 10)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc serve` for its tests: the server, its event streams, waiting for what it will say."""
+import contextlib
+import http.client
+import json
+import os
+import subprocess
+import time
+import urllib.parse
+
+from command_support import ABSENC, PATIENCE, Case, end, read_line
+
+TOKEN = "a-secret-of-nobody-else"
+BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))  # what "at once" is
+
+
+def wait_until(true, what):
+    deadline = time.monotonic() + PATIENCE
+    while not (value := true()):
+        if time.monotonic() > deadline:
+            raise AssertionError(f"in vain waited until {what}")
+        time.sleep(0.02)
+    return value
+
+
+class Stream:
+    """An open stream of server-sent events."""
+
+    def __init__(self, server, trace=""):
+        self.connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
+        self.connection.request("GET", "/api/stream?" + urllib.parse.urlencode({"trace": trace}))
+        self.answer = self.connection.getresponse()
+
+    def next(self):
+        """(event, data)"""
+        name = data = ""
+        while True:
+            line = self.answer.readline().decode().rstrip("\n")
+            if line.startswith("event: "):
+                name = line[7:]
+            if line.startswith("data: "):
+                data += line[6:]
+            if line == "" and name:
+                return name, json.loads(data)
+
+    def until(self, wanted):
+        """The first event that is wanted, with its data."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            event, data = self.next()
+            if wanted(event, data):
+                return data
+        raise AssertionError("in vain waited for an event")
+
+    def state(self, wanted=lambda encoder: True):
+        """The one encoder of the first state in which it is as wanted."""
+        data = self.until(lambda event, data: event == "state" and wanted(data["encoders"][0]))
+        return data["encoders"][0]
+
+    def close(self):
+        self.answer.close()
+        self.connection.close()
+
+
+class Server:
+    def __init__(self, *arguments, preexec_fn=None, **environment):
+        where = [] if "--listen" in arguments else ["--listen", "127.0.0.1:0"]
+        command = [ABSENC, "serve", *arguments, *where]
+        self.process = subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                        preexec_fn=preexec_fn, env={**os.environ, **environment})
+        line = read_line(self.process.stdout, time.monotonic() + PATIENCE)
+        if line is None:
+            raise AssertionError(f"the server did not become ready: {end(self.process)}")
+        self.url = line.strip()
+        self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
+
+    def ask(self, path, method="GET", headers=None, **values):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+        with contextlib.closing(connection):
+            query = "?" + urllib.parse.urlencode(values, doseq=True) if values else ""
+            connection.request(method, path + query, headers=headers or {})
+            answer = connection.getresponse()
+            return answer.status, answer.read().decode()
+
+    def json(self, path, **values):
+        status, body = self.ask(path, **values)
+        if status != 200:
+            raise AssertionError(f"{path}: {status} {body}")
+        return json.loads(body)
+
+    def encoder(self, index=0):
+        return self.json("/api/encoders")["encoders"][index]
+
+    def command(self, encoder, command, headers, **values):
+        status, body = self.ask("/api/command", "POST", headers, encoder=encoder, command=command, **values)
+        return status, json.loads(body)
+
+
+class ServeCase(Case):
+    def server(self, *arguments, **settings):
+        server = Server(*arguments, **settings)
+        self.addCleanup(end, server.process)
+        return server
+
+    def without_history(self, *arguments, **settings):
+        return self.server(*arguments, "--history", "none", **settings)
+
+    def tokens(self):
+        path = self.file("tokens", f"anna {TOKEN}\n")
+        os.chmod(path, 0o600)
+        return path
+
+    def stream(self, server, trace=""):
+        stream = Stream(server, trace)
+        self.addCleanup(stream.close)
+        return stream
