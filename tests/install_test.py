@@ -132,7 +132,13 @@ class Installed(Case):
     def test_all_and_nothing_else(self):
         files = files_below(self.root)
         headers = {path for path in files if path.startswith("include/")}
-        self.assertEqual({re.sub(r"^lib/.*/", "lib/", path) for path in files - headers}, {
+        package = "lib/python3/dist-packages/absenc/"
+        python = {path for path in files if path.startswith(package)}
+        [module] = {path for path in python if path.endswith(".so")}
+        self.assertRegex(module, package + r"_absenc\.cpython-\d+-.*\.so")
+        self.assertEqual(python - {module}, {package + path for path in files_below(SOURCE / "python/absenc")
+                                             if "__pycache__" not in path})
+        self.assertEqual({re.sub(r"^lib/.*/", "lib/", path) for path in files - headers - python}, {
             "bin/absenc", "lib/libabsenc.a", "lib/libabsenc-os.a", "lib/libabsenc-capture.a", "lib/libabsenc-client.a",
             "lib/absenc.pc", "lib/absenc-client.pc",
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",

@@ -22,7 +22,7 @@ namespace absenc::tool {
 
 namespace {
 
-void tell(const std::string& name, Served what, std::string_view why) {
+void tell_of_port(const std::string& name, Served what, std::string_view why) {
   switch (what) {
     case Served::opened:
       return print_line(fmt::format("ready: {}", name));
@@ -46,7 +46,7 @@ void serve_as(Machine<Item>& machine, const std::string& name, Time end, const O
     os::sleep_until(std::min(time, end));
   };
   try {
-    serve_forever(machine, with_end, wait, [&](Served what, std::string_view why) { tell(name, what, why); });
+    serve_forever(machine, with_end, wait, [&](Served what, std::string_view why) { tell_of_port(name, what, why); });
   } catch (const os::Interrupted&) {
   } catch (const os::Ended&) {
   }
