@@ -3,6 +3,7 @@
 import absenc
 import pytest
 
+PATIENCE_MS = 500  # the machine may be busy; whoever first waits for silence takes as long
 UNITS = sorted(absenc.protocol)
 
 
@@ -15,7 +16,7 @@ def unit(request):
 def address(unit, absenc_emulate):
     if unit.link in ("exchange", "clocked"):
         return f"sim:{unit.id}"
-    return absenc_emulate(unit.id).address + "?latency=2000"  # the machine may be busy
+    return absenc_emulate(unit.id).address + f"?latency={PATIENCE_MS}"
 
 
 def test_reads(unit, address):
@@ -59,7 +60,7 @@ def test_alarms_of_the_virtual_encoder(unit, absenc_emulate):
     if unit.link in ("exchange", "clocked") or not unit.alarms:
         pytest.skip("no pseudo-terminal or no alarms")
     virtual = absenc_emulate(unit.id)
-    with absenc.open(virtual.address, latency=2000) as encoder:
+    with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
         before = set(encoder.read().alarms)
         virtual.raise_alarm(unit.alarms[0].name)
         for _ in range(3):

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python package: its own tests, over every unit's virtual encoder."""
+import tempfile
+import unittest
+
+from python_support import SOURCE, PackageCase
+
+
+class Units(PackageCase):
+    def test_its_own_tests(self):
+        with tempfile.TemporaryDirectory() as scratch:
+            self.run_python("-m", "pytest", "-q", "-p", "no:cacheprovider", f"--basetemp={scratch}/tests",
+                            str(SOURCE / "python" / "tests"))
+
+
+if __name__ == "__main__":
+    unittest.main()
