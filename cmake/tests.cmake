@@ -104,6 +104,7 @@ if(NOT ABSENC_FUZZ)
     endif()
     target_link_libraries(${target} PRIVATE fuzz_seeds_main absenc::absenc absenc::capture)
     add_test(NAME fuzz_seeds.${stem} COMMAND ${target})
+    set_tests_properties(fuzz_seeds.${stem} PROPERTIES TIMEOUT 400)  # a minute of computing, on a machine of its own
   endforeach()
 endif()
 
