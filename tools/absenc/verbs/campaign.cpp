@@ -6,11 +6,11 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/text/json.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "absenc/client/text/json.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/progress.hpp"
 

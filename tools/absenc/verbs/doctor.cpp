@@ -5,11 +5,11 @@
 #include <string>
 
 #include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "absenc/client/text/json.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/progress.hpp"
 
