@@ -72,9 +72,10 @@ class Drive(unittest.TestCase):
         self.assertEqual(counted["requests"], int(re.search(r"(\d+) requests answered", summary)[1]), everything)
         faults = {kind: int(number) for number, kind in re.findall(r"(\d+) (drop|corrupt)", summary)}
         self.assertEqual(set(faults), {"drop", "corrupt"}, everything)
-        # A reply that is struck twice is noticed once: at these rates one in 10 000.
+        # A reply that is struck twice is noticed once: at these rates one in 10 000. One that a busy machine delivers
+        # late is a silence without a fault.
         unnoticed = sum(faults.values()) - counted["silences"] - counted["implausible"]
-        self.assertIn(unnoticed, range(3 + POSITIONS // 4000), everything)
+        self.assertLess(unnoticed, 3 + POSITIONS // 4000, everything)
         self.assertNotIn("rules that the host broke", summary)
         page, address, value = 2, 5, "42"
         stored = re.findall(r"^[0-9A-F]{4}: (.*)$", memory, re.MULTILINE)
