@@ -128,8 +128,10 @@ void expect_all_of_the_bank(const Work& work) {
   }
 }
 
+constexpr Format bits_24{.word = "position:24 error:1! warning:1!"_word};
+
 TEST(BissRegisters, PositionsGoByWhileEveryRegisterIsReadAndWritten) {
-  const Format format{.word = "position:24 error:1! warning:1!"_word};
+  const Format format = bits_24;
   Host<Format> host(format, frames_wanted());
   const Outcome seen = run(host, format, {});
   const Work& work = host.machine.found();
@@ -145,7 +147,7 @@ TEST(BissRegisters, PositionsGoByWhileEveryRegisterIsReadAndWritten) {
 }
 
 TEST(BissRegisters, FaultsMakeNoWrongByte) {
-  const Format format{.word = "position:24 error:1! warning:1!"_word};
+  const Format format = bits_24;
   sim::FaultRates rates;
   rates[sim::FaultKind::corrupt] = 0.004;
   rates[sim::FaultKind::truncate] = 0.001;
@@ -165,7 +167,8 @@ TEST(BissRegisters, FaultsMakeNoWrongByte) {
 }
 
 TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
-  const Format format{.word = "position:24 error:1! warning:1!"_word, .check = crc16};
+  Format format = bits_24;
+  format.check = crc16;
   sim::FaultRates rates;
   rates[sim::FaultKind::corrupt] = 0.01;
   Host<Format> host(format, frames_wanted() / 4);
@@ -176,7 +179,8 @@ TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
 }
 
 TEST(BissRegisters, AnEncoderThatIsSlowIsWaitedFor) {
-  const Format format{.word = "position:24 error:1! warning:1!"_word, .register_delay = 15ms};
+  Format format = bits_24;
+  format.register_delay = 15ms;
   Host<Format> host(format, 1'000);
   const Outcome seen = run(host, format, {});
   EXPECT_EQ(host.machine.found().failures, 0u);
