@@ -122,10 +122,12 @@ class WordFormat {
     return false;
   }
 
+  // No padding stands between them: clang 14 leaves a constant with some half unset.
   std::array<WordField, maximum_fields> fields_{};
-  std::size_t size_ = 0;
+  std::uint32_t size_ = 0;
   unsigned bits_ = 0;
   bool gray_ = false;
+  static_assert(sizeof(fields_) % alignof(decltype(size_)) == 0);
 };
 
 namespace detail {
