@@ -48,8 +48,8 @@ struct ConformChoices {
 /// "kept", "broken", "untested"
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
-/// Reads only: nothing is ever written to the encoder. `text` and `settings` as those of `open`. Throws UsageError, what
-/// the port throws.
+/// Reads only: nothing is ever written to the encoder. `text` and `settings` as those of `open`. Throws UsageError,
+/// what the port throws.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

@@ -13,13 +13,14 @@
 #include "absenc/protocol/all.hpp"
 #include "absenc/protocol/clause.hpp"
 #include "absenc/sim/rough_line.hpp"
+#include "absenc/sim/sim_port.hpp"
 
 namespace absenc::client {
 namespace {
 
 using namespace std::chrono_literals;
 
-/// Between device and line: changes what the device hears, and what it says for the second request.
+/// Between device and line: changes what the device hears, and what it says for the third request.
 template <class Item>
 class Mutant final : public Machine<Item> {
  public:
@@ -44,7 +45,7 @@ class Mutant final : public Machine<Item> {
       if (step.kind != Step<Item>::Kind::transfer) return step;
       said.assign(step.out.begin(), step.out.end());
       if (streams) ++requests;
-      if (say && requests == 2) {
+      if (say && requests == mutated) {
         say(said, step);
         if (said.empty() && driven) continue;
         // A reply that is swallowed has left for the device.
@@ -64,6 +65,7 @@ class Mutant final : public Machine<Item> {
   bool driven = false;
   bool streams = false;
   unsigned requests = 0;
+  static constexpr unsigned mutated = 3;  // the first may be the one that finds the echo
 
  private:
   Machine<Item>& device_;
@@ -212,6 +214,29 @@ INSTANTIATE_TEST_SUITE_P(Units, Clauses, ::testing::ValuesIn(all_units().begin()
                            for (char& letter : name) letter = letter == '-' ? '_' : letter;
                            return name;
                          });
+
+// The echo is neither a reply nor the time of one.
+TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
+  for (const char* const text : {"sim:tformat?echo=auto", "sim:tformat?echo=on", "sim:amt21?echo=auto"}) {
+    const EncoderAddress address = parse_address(text);
+    for (const bool silent : {false, true}) {
+      Link link;
+      link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
+      link.device->power_on(Time{});
+      Mutant<std::uint8_t> mutant(*link.device->bytes());
+      if (silent) mutant.say = [](std::vector<std::uint8_t>& said, ByteStep&) { said.clear(); };
+      sim::SimPort<std::uint8_t> line(address.unit->link, address.line.with_some_rate(), mutant);
+      line.set_echo(true);
+      link.bytes = &line;
+      const Conformance found = conform(address, std::move(link), {.readings = 8});
+      EXPECT_EQ(found.good(), !silent) << text << "\n" << found.report();
+      if (silent) {
+        EXPECT_EQ(found.clauses.front().verdict, Verdict::broken) << found.report();
+        EXPECT_EQ(found.clauses.front().id, "answer");
+      }
+    }
+  }
+}
 
 TEST(Conformance, TellsProgramsAndPeople) {
   const Conformance one{.protocol = "toy",

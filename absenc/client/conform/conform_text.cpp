@@ -34,8 +34,8 @@ std::string_view name_of(Verdict verdict) {
 }
 
 std::size_t Conformance::count(Verdict verdict) const {
-  return static_cast<std::size_t>(std::count_if(clauses.begin(), clauses.end(),
-                                                [&](const ClauseResult& one) { return one.verdict == verdict; }));
+  return static_cast<std::size_t>(
+      std::count_if(clauses.begin(), clauses.end(), [&](const ClauseResult& one) { return one.verdict == verdict; }));
 }
 
 std::string Conformance::tap() const {

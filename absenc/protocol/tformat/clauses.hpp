@@ -15,8 +15,10 @@ inline constexpr std::array<Clause, 8> clauses{{
     {"crc", "6.3.4", "the CRC field is that of all fields before it", Demand::checked},
     {"fields", "6.3", "the control field is that of the request, fixed bits are as drawn", Demand::as_drawn},
     {"bad-sync", "8.4 Table 5 (1)", "a request with a wrong sync code is not answered", Demand::unknown_silent, 0x1F},
-    {"unknown-id", "8.4 Table 5 (2)", "an unknown data ID gets the data of data ID 3", Demand::unknown_reported, 0xA2, 11},
-    {"bad-parity", "8.4 Table 5 (3)", "a wrong parity bit gets the data of data ID 3", Demand::unknown_reported, 0x9A, 11},
+    {"unknown-id", "8.4 Table 5 (2)", "an unknown data ID gets the data of data ID 3", Demand::unknown_reported, 0xA2,
+     11},
+    {"bad-parity", "8.4 Table 5 (3)", "a wrong parity bit gets the data of data ID 3", Demand::unknown_reported, 0x9A,
+     11},
 }};
 
 }  // namespace absenc::tformat

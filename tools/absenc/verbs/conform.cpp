@@ -6,11 +6,11 @@
 #include <array>
 #include <fstream>
 
+#include "absenc/client/text/json.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
-#include "absenc/client/text/json.hpp"
 #include "tools/absenc/text/output.hpp"
 
 namespace absenc::tool {
@@ -38,8 +38,8 @@ std::string without_end(std::string text) {
 
 int run_conform(const Invocation& invocation) {
   os::catch_interrupts();
-  const ConformChoices choices{
-      .readings = static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000))};
+  const ConformChoices choices{.readings =
+                                   static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000))};
   const Conformance conformance = conform(invocation.text("encoder"), invocation.texts("--option"), choices);
   if (invocation.has("--junit")) {
     const std::string path(invocation.text("--junit"));
