@@ -28,6 +28,8 @@ struct Clause {
   Demand demand;
   std::uint8_t request = 0;     // a whole request of one byte
   std::uint8_t reply_size = 0;  // to it
+  std::string_view option{};    // with which it is read for this; "": as the user has it
+  std::int64_t value = 0;       // of this option
 };
 
 struct Unit;

@@ -34,8 +34,11 @@ class EditedPort final : public Port<Item> {
       if (edit) edit(request_);
       edited.out = request_;
       answer = step.answer;
-      forget();
-      if (echoes) echo_due_ = request_.size();
+      if (asked && received.empty()) ++unanswered;
+      asked = true;
+      received.clear();
+      after = Time{};
+      echo_due_ = echoes ? request_.size() : 0;
     }
     port_.begin(edited);
   }
@@ -56,14 +59,18 @@ class EditedPort final : public Port<Item> {
     received.clear();
     after = Time{};
     echo_due_ = 0;
+    asked = false;
+    unanswered = 0;
   }
 
   std::function<void(std::vector<Item>&)> edit{};
   std::vector<Item> received{};
   Time answer{};
-  Time after{};         // from the end of the request to the beginning of the reply
-  Time character{};     // of the line; 0: frames are not made of characters
-  bool echoes = false;  // what is sent comes back before the reply
+  Time after{};      // from the end of the request to the beginning of the reply
+  Time character{};  // of the line; 0: frames are not made of characters
+  bool asked = false;
+  unsigned unanswered = 0;  // requests behind which another came at once
+  bool echoes = false;      // what is sent comes back before the reply
 
  private:
   // By count, as a reply may begin as its request does.
@@ -141,7 +148,7 @@ class Tester {
       case Demand::whole:
       case Demand::checked:
       case Demand::as_drawn:
-        return test_frames(clause.demand, result);
+        return test_frames(clause, result);
       case Demand::foreign_silent:
         return test_foreign(result);
       case Demand::damaged_silent:
@@ -172,7 +179,7 @@ class Tester {
     if (ended == nullptr) throw UsageError(fmt::format("{} cannot be read with these options", unit_.id));
     Exchange one{.error = ended->error(), .detail = std::string(ended->detail())};
     if (one.error != Error::none && is_asked()) port_.listen(listening);
-    one.came = !port_.received.empty() && one.error != Error::line_stuck;
+    one.came = !port_.received.empty() && port_.unanswered == 0 && one.error != Error::line_stuck;
     one.after = port_.after;
     one.limit = port_.answer + latency_;
     return one;
@@ -196,13 +203,24 @@ class Tester {
              fmt::format("at most {:.1f} us, of {:.1f} us", us(worst->after), us(worst->limit)));
   }
 
-  void test_frames(Demand demand, ClauseResult& result) const {
+  [[nodiscard]] std::vector<Exchange> read_with(std::string_view option, std::int64_t value) {
+    Options other = options_;
+    for (std::size_t i = 0; i < unit_.options.size(); ++i) {
+      if (unit_.options[i].name == option) other.values[i] = value;
+    }
+    std::vector<Exchange> exchanges;
+    for (std::size_t i = 0; i < exchanges_.size(); ++i) exchanges.push_back(once(other));
+    return exchanges;
+  }
+
+  void test_frames(const Clause& clause, ClauseResult& result) {
+    const std::vector<Exchange> exchanges = clause.option.empty() ? exchanges_ : read_with(clause.option, clause.value);
     std::size_t came = 0;
     std::size_t bad = 0;
     std::string first;
-    for (const Exchange& one : exchanges_) {
+    for (const Exchange& one : exchanges) {
       came += one.came ? 1 : 0;
-      if (!breaks(demand, one.error)) continue;
+      if (!breaks(clause.demand, one.error)) continue;
       if (++bad == 1) first = fmt::format(": {} {}", name_of_error(one.error), one.detail);
     }
     if (came == 0 && bad == 0) return;

@@ -45,7 +45,7 @@ class Mutant final : public Machine<Item> {
       if (step.kind != Step<Item>::Kind::transfer) return step;
       said.assign(step.out.begin(), step.out.end());
       if (streams) ++requests;
-      if (say && requests == mutated) {
+      if (say && (requests == mutated || (always && requests > mutated))) {
         say(said, step);
         if (said.empty() && driven) continue;
         // A reply that is swallowed has left for the device.
@@ -59,13 +59,16 @@ class Mutant final : public Machine<Item> {
     }
   }
 
+  [[nodiscard]] std::span<const Item> heard() const { return heard_; }
+
   std::function<void(std::vector<Item>&)> hear{};
   std::function<void(std::vector<Item>&, Step<Item>&)> say{};
   std::vector<Item> said;
   bool driven = false;
   bool streams = false;
   unsigned requests = 0;
-  static constexpr unsigned mutated = 3;  // the first may be the one that finds the echo
+  bool always = false;   // from then on
+  unsigned mutated = 3;  // the first may be the one that finds the echo
 
  private:
   Machine<Item>& device_;
@@ -119,7 +122,10 @@ void hear_good(Mutant<std::uint8_t>& mutant, const Clause& clause) {
   mutant.hear = [good, clause](std::vector<std::uint8_t>& heard) {
     if (good->empty()) *good = heard;
     const bool unknown = clause.demand == Demand::unknown_silent || clause.demand == Demand::unknown_reported;
-    if (unknown ? heard != std::vector<std::uint8_t>{clause.request} : heard == *good) return;
+    const bool foreign = clause.demand == Demand::foreign_silent;
+    if (unknown ? heard != std::vector<std::uint8_t>{clause.request} : (heard.front() != good->front()) != foreign) {
+      return;
+    }
     if (clause.demand == Demand::unknown_reported) {
       heard.clear();
     } else {
@@ -137,7 +143,26 @@ void flip(Mutant<std::uint8_t>& mutant, std::size_t first, std::size_t second) {
   };
 }
 
-std::vector<Change<std::uint8_t>> mutants_of(const Clause& clause) {
+/// Flips a bit and makes the check at the end right again, as far as its last two bytes can.
+void flip_and_repair(Mutant<std::uint8_t>& mutant, const EncoderAddress& address, std::size_t bit) {
+  mutant.say = [&mutant, &address, bit](std::vector<std::uint8_t>& said, Step<std::uint8_t>&) {
+    if (said.size() < 4 || bit >= (said.size() - 2) * 8) return;
+    const std::vector<std::uint8_t> before = said;
+    said[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
+    struct Nothing final : FieldSink {
+      void put(const FieldValue&) override {}
+    } nothing;
+    for (unsigned check = 0; check < 0x10000; ++check) {
+      said[said.size() - 2] = static_cast<std::uint8_t>(check);
+      said[said.size() - 1] = static_cast<std::uint8_t>(check >> 8);
+      const Error error = address.unit->decode(address.options, {.bytes = mutant.heard()}, {.bytes = said}, nothing);
+      if (error != Error::bad_checksum) return;
+    }
+    said = before;
+  };
+}
+
+std::vector<Change<std::uint8_t>> once_mutants_of(const Clause& clause) {
   using M = Mutant<std::uint8_t>;
   using List = std::vector<std::uint8_t>;
   switch (clause.demand) {
@@ -166,13 +191,51 @@ std::vector<Change<std::uint8_t>> mutants_of(const Clause& clause) {
   }
 }
 
-std::vector<Change<CanFrame>> can_mutants_of(const Clause& clause) {
+/// Each of them once, then from the third reply on, as a host may ask again by itself.
+std::vector<Change<std::uint8_t>> mutants_of(const EncoderAddress& address, const Clause& clause) {
+  std::vector<Change<std::uint8_t>> all = once_mutants_of(clause);
+  const std::size_t count = all.size();
+  if (clause.demand == Demand::as_drawn) {
+    for (std::size_t bit = 160; bit-- > 0;) {
+      all.push_back([=, &address](Mutant<std::uint8_t>& m) { flip_and_repair(m, address, bit); });
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    all.push_back([change = all[i]](Mutant<std::uint8_t>& m) {
+      change(m);
+      m.always = true;
+    });
+  }
+  return all;
+}
+
+std::vector<Change<CanFrame>> can_mutants_of(const EncoderAddress&, const Clause& clause) {
   using M = Mutant<CanFrame>;
   using List = std::vector<CanFrame>;
-  if (clause.demand == Demand::in_time) {
-    return {[](M& m) { m.say = [](List&, Step<CanFrame>& step) { step.at += 1s; }; }};
+  if (clause.demand == Demand::foreign_silent) {
+    return {[](M& m) {
+      // Who was asked for, and a node that takes it for itself and answers in that name.
+      const auto other = std::make_shared<std::uint32_t>(0);
+      const auto own = std::make_shared<std::uint32_t>(0);
+      m.hear = [=](List& heard) {
+        const std::uint32_t node = heard.front().id & 0xFFU;
+        if (*own == 0) *own = node;
+        *other = node != *own ? node : 0;
+        if (*other == 0) return;
+        heard.front().id = (heard.front().id & ~0xFFU) | *own;
+        heard.front().data[1] = static_cast<std::uint8_t>(*own);
+      };
+      m.mutated = 0;
+      m.always = true;
+      m.say = [=](List& said, Step<CanFrame>&) {
+        if (*other != 0) said.front().id = (said.front().id & ~0xFFU) | *other;
+      };
+    }};
   }
-  return {[](M& m) { m.say = [](List& said, Step<CanFrame>&) { said.clear(); }; }};
+  return {[](M& m) {
+    m.say = [](List& said, Step<CanFrame>&) { said.clear(); };
+    m.always = true;
+  }};
 }
 
 template <class Item, class Make>
@@ -184,7 +247,7 @@ void check(const Unit& unit, const Make& make) {
   for (const Clause& clause : clauses_of(unit)) {
     bool found = false;
     std::string last;
-    for (const Change<Item>& change : make(clause)) {
+    for (const Change<Item>& change : make(address, clause)) {
       ++tried;
       const Conformance mutant = conform_mutant<Item>(address, change);
       last = mutant.report();
@@ -224,6 +287,7 @@ TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
       link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
       link.device->power_on(Time{});
       Mutant<std::uint8_t> mutant(*link.device->bytes());
+      mutant.mutated = 7;
       if (silent) mutant.say = [](std::vector<std::uint8_t>& said, ByteStep&) { said.clear(); };
       sim::SimPort<std::uint8_t> line(address.unit->link, address.line.with_some_rate(), mutant);
       line.set_echo(true);

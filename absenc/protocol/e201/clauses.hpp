@@ -8,10 +8,8 @@
 
 namespace absenc::e201 {
 
-inline constexpr std::array<Clause, 5> clauses{{
+inline constexpr std::array<Clause, 4> clauses{{
     {"answer", "BiSS C timing diagram, command 4", "4 is answered", Demand::answered},
-    {"answer-time", "BiSS C timing diagram, command 4", "the answer begins within the time of the interface",
-     Demand::in_time},
     {"length", "BiSS C timing diagram, command 4", "the answer is 16 hexadecimal digits and CR", Demand::whole},
     {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
     {"header", "BiSS C timing diagram, command 4", "ACK, start bit and CDS bit come before the position",

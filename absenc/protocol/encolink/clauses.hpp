@@ -8,10 +8,8 @@
 
 namespace absenc::encolink {
 
-inline constexpr std::array<Clause, 4> clauses{{
+inline constexpr std::array<Clause, 3> clauses{{
     {"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
-    {"answer-time", "UART, Communication parameters", "the answer begins within the time of the encoder",
-     Demand::in_time},
     {"length", "UART, Channel 1", "a frame has position, status and CRC", Demand::whole},
     {"crc", "UART, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
 }};

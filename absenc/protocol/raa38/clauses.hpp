@@ -13,9 +13,8 @@ inline constexpr std::array<Clause, 2> serial_clauses{{
     {"sum", "3.1.1", "a frame ends with the sum of its bytes", Demand::checked},
 }};
 
-inline constexpr std::array<Clause, 7> modbus_clauses{{
+inline constexpr std::array<Clause, 6> modbus_clauses{{
     {"answer", "3.1.7", "function 03 is answered", Demand::answered},
-    {"answer-time", "3.1.7", "the answer begins within the time of the encoder", Demand::in_time},
     {"length", "3.1.7 (5)", "an answer has as many bytes as its registers need", Demand::whole},
     {"crc", "3.1.7", "an answer ends with its CRC", Demand::checked},
     {"header", "3.1.7 (5)", "address and function are those of the request", Demand::as_drawn},
@@ -23,9 +22,8 @@ inline constexpr std::array<Clause, 7> modbus_clauses{{
     {"bad-crc", "3.1.7", "a request with a wrong CRC is not answered", Demand::damaged_silent},
 }};
 
-inline constexpr std::array<Clause, 3> can_clauses{{
+inline constexpr std::array<Clause, 2> can_clauses{{
     {"answer", "3.4.1", "command 80 is answered", Demand::answered},
-    {"answer-time", "3.4.1", "the answer comes within the time of the node", Demand::in_time},
     {"node", "3.4.1", "a request to another node is not answered", Demand::foreign_silent},
 }};
 

@@ -9,7 +9,12 @@
 namespace absenc::ssi {
 
 inline constexpr std::array<Clause, 1> clauses{{
-    {"word", "3.5", "the word comes while the clock runs, as drawn", Demand::as_drawn},
+    {.id = "repeat",
+     .paragraph = "3.5",
+     .words = "when the clock goes on, the word comes again from its MSB",
+     .demand = Demand::as_drawn,
+     .option = "extra_clocks",
+     .value = 1},
 }};
 
 }  // namespace absenc::ssi
