@@ -178,8 +178,12 @@ class Tester {
     const Conversation<Item>* ended = session.run(read_);
     if (ended == nullptr) throw UsageError(fmt::format("{} cannot be read with these options", unit_.id));
     Exchange one{.error = ended->error(), .detail = std::string(ended->detail())};
+    // What a host makes of silence is no matter of what came.
+    if (one.error != Error::none && is_asked() && port_.received.empty()) one.error = Error::timeout;
     if (one.error != Error::none && is_asked()) port_.listen(listening);
-    one.came = !port_.received.empty() && port_.unanswered == 0 && one.error != Error::line_stuck;
+    // One that comes when the host has asked again is late, not missing.
+    const bool late = port_.after > port_.answer + latency_;
+    one.came = !port_.received.empty() && (port_.unanswered == 0 || late) && one.error != Error::line_stuck;
     one.after = port_.after;
     one.limit = port_.answer + latency_;
     return one;

@@ -44,7 +44,7 @@ class Mutant final : public Machine<Item> {
       Step<Item> step = device_.next(now);
       if (step.kind != Step<Item>::Kind::transfer) return step;
       said.assign(step.out.begin(), step.out.end());
-      if (streams) ++requests;
+      if (!driven && heard_.empty()) ++requests;  // it sends by itself
       if (say && (requests == mutated || (always && requests > mutated))) {
         say(said, step);
         if (said.empty() && driven) continue;
@@ -65,7 +65,6 @@ class Mutant final : public Machine<Item> {
   std::function<void(std::vector<Item>&, Step<Item>&)> say{};
   std::vector<Item> said;
   bool driven = false;
-  bool streams = false;
   unsigned requests = 0;
   bool always = false;   // from then on
   unsigned mutated = 3;  // the first may be the one that finds the echo
@@ -97,7 +96,6 @@ Conformance conform_mutant(const EncoderAddress& address, const Change<Item>& ch
   Mutant<Item> mutant(machine_of<Item>(*link.device));
   const LinkKind kind = address.unit->link;
   mutant.driven = kind == LinkKind::clocked || kind == LinkKind::spi;
-  mutant.streams = address.unit->streams != nullptr && address.unit->streams(address.options);
   if (change) change(mutant);
   sim::RoughLine<Item> line(kind, address.line.with_some_rate(), mutant, 1);
   if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -191,7 +189,8 @@ std::vector<Change<std::uint8_t>> once_mutants_of(const Clause& clause) {
   }
 }
 
-/// Each of them once, then from the third reply on, as a host may ask again by itself.
+/// Each of them once; from the third reply on, as a host may ask again by itself; from the eighth on, as some are spent
+/// to find the echo where nothing is asked.
 std::vector<Change<std::uint8_t>> mutants_of(const EncoderAddress& address, const Clause& clause) {
   std::vector<Change<std::uint8_t>> all = once_mutants_of(clause);
   const std::size_t count = all.size();
@@ -200,11 +199,14 @@ std::vector<Change<std::uint8_t>> mutants_of(const EncoderAddress& address, cons
       all.push_back([=, &address](Mutant<std::uint8_t>& m) { flip_and_repair(m, address, bit); });
     }
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    all.push_back([change = all[i]](Mutant<std::uint8_t>& m) {
-      change(m);
-      m.always = true;
-    });
+  for (const unsigned from : {3U, 8U}) {
+    for (std::size_t i = 0; i < count; ++i) {
+      all.push_back([change = all[i], from](Mutant<std::uint8_t>& m) {
+        change(m);
+        m.always = true;
+        m.mutated = from;
+      });
+    }
   }
   return all;
 }
