@@ -77,7 +77,13 @@ class Mutant final : public Machine<Item> {
 template <class Item>
 using Change = std::function<void(Mutant<Item>&)>;
 
-EncoderAddress address_of_unit(const Unit& unit) { return parse_address("sim:" + std::string(unit.id)); }
+// One that sends by itself is read where it can be asked: a host that listens goes on to the next good frame.
+EncoderAddress address_of_unit(const Unit& unit) {
+  const std::string text = "sim:" + std::string(unit.id);
+  const EncoderAddress usual = parse_address(text);
+  const bool streams = unit.streams != nullptr && unit.streams(usual.options);
+  return streams ? parse_address(text + "?mode=bus") : usual;
+}
 
 template <class Item>
 Machine<Item>& machine_of(const VirtualDevice& device) {
