@@ -28,7 +28,8 @@ std::span<const Subcommand* const> all_subcommands() {
       &emulate_subcommand,      &decode_subcommand,
       &encode_subcommand,       &wave_subcommand,
       &probe_subcommand,        &identify_subcommand,
-      &doctor_subcommand,       &crc_find_subcommand,
+      &doctor_subcommand,       &conform_subcommand,
+      &crc_find_subcommand,
       &vectors_subcommand,      &campaign_subcommand,
       &bench_subcommand,
   };

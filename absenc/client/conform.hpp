@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether an encoder keeps to its document: each clause tested, each verdict with what was seen.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace absenc::client {
+
+enum class Verdict : std::uint8_t {
+  kept,
+  broken,
+  untested,  // nothing came that would tell
+};
+
+struct ClauseResult {
+  std::string_view id{};  // "crc"
+  std::string_view document{};
+  std::string_view paragraph{};
+  std::string_view words{};
+  Verdict verdict{};
+  std::string evidence{};  // what was seen
+};
+
+struct Conformance {
+  std::string protocol{};
+  std::vector<ClauseResult> clauses{};
+
+  [[nodiscard]] std::size_t count(Verdict verdict) const;
+  /// Whether every clause is kept.
+  [[nodiscard]] bool good() const { return count(Verdict::kept) == clauses.size(); }
+  /// As the Test Anything Protocol, version 13.
+  [[nodiscard]] std::string tap() const;
+  /// As JUnit's XML.
+  [[nodiscard]] std::string junit() const;
+  /// For people.
+  [[nodiscard]] std::string report() const;
+};
+
+struct ConformChoices {
+  std::size_t readings = 100;  // at least 1
+};
+
+/// "kept", "broken", "untested"
+[[nodiscard]] std::string_view name_of(Verdict verdict);
+
+/// Reads only: nothing is ever written to the encoder. `text` and `settings` as those of `open`. Throws UsageError,
+/// what the port throws.
+[[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
+                                  const ConformChoices& choices = {});
+
+}  // namespace absenc::client

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/conform/conform_link.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/host/session.hpp"
+#include "absenc/protocol/clause.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+constexpr Time listening = std::chrono::milliseconds(20);  // for what comes though nobody waits for it any more
+
+/// Keeps the last exchange as it was on the wire, and may send another request than the host's.
+template <class Item>
+class EditedPort final : public Port<Item> {
+ public:
+  explicit EditedPort(Port<Item>& port) : port_(port) {}
+  Time now() override { return port_.now(); }
+  void begin(const Step<Item>& step) override {
+    Step<Item> edited = step;
+    if (step.kind == Step<Item>::Kind::transfer) {
+      request_.assign(step.out.begin(), step.out.end());
+      if (edit) edit(request_);
+      edited.out = request_;
+      answer = step.answer;
+      if (asked && received.empty()) ++unanswered;
+      asked = true;
+      received.clear();
+      after = Time{};
+      echo_due_ = echoes ? request_.size() : 0;
+    }
+    port_.begin(edited);
+  }
+  Event<Item> wait(const Step<Item>& step) override {
+    const Event<Item> event = port_.wait(step);
+    if (event.kind == Event<Item>::Kind::sent) sent_at_ = event.at;
+    if (event.kind == Event<Item>::Kind::received) hear(event);
+    return event;
+  }
+  /// Until the time is over.
+  void listen(Time time) {
+    const Step<Item> step{.at = port_.now() + time};
+    while (port_.now() < step.at) {
+      if (wait(step).kind == Event<Item>::Kind::timer) return;
+    }
+  }
+  void forget() {
+    received.clear();
+    after = Time{};
+    echo_due_ = 0;
+    asked = false;
+    unanswered = 0;
+  }
+
+  std::function<void(std::vector<Item>&)> edit{};
+  std::vector<Item> received{};
+  Time answer{};
+  Time after{};      // from the end of the request to the beginning of the reply
+  Time character{};  // of the line; 0: frames are not made of characters
+  bool asked = false;
+  unsigned unanswered = 0;  // requests behind which another came at once
+  bool echoes = false;      // what is sent comes back before the reply
+
+ private:
+  // By count, as a reply may begin as its request does.
+  void hear(const Event<Item>& event) {
+    const std::size_t echo = std::min(echo_due_, event.items.size());
+    echo_due_ -= echo;
+    const auto items = event.items.subspan(echo);
+    if (received.empty() && !items.empty()) after = event.at - sent_at_ - late_by(items.size());
+    received.insert(received.end(), items.begin(), items.end());
+  }
+  // Items are told at their end.
+  [[nodiscard]] Time late_by(std::size_t items) const { return character * static_cast<std::int64_t>(items); }
+
+  Port<Item>& port_;
+  std::vector<Item> request_;
+  Time sent_at_{};
+  std::size_t echo_due_ = 0;
+};
+
+struct Exchange {
+  Error error = Error::none;
+  std::string detail;
+  bool came = false;
+  Time after{};
+  Time limit{};
+};
+
+bool breaks(Demand demand, Error error) {
+  switch (demand) {
+    case Demand::whole:
+      return error == Error::wrong_length || error == Error::truncated;
+    case Demand::checked:
+      return error == Error::bad_checksum;
+    case Demand::as_drawn:
+      return error == Error::bad_framing || error == Error::unexpected_reply || error == Error::out_of_range ||
+             error == Error::cross_check_failed || error == Error::line_stuck;
+    default:
+      return false;
+  }
+}
+
+ClauseResult& conclude(ClauseResult& result, bool kept, std::string evidence) {
+  result.verdict = kept ? Verdict::kept : Verdict::broken;
+  result.evidence = std::move(evidence);
+  return result;
+}
+
+template <class Item>
+class Tester {
+ public:
+  Tester(const EncoderAddress& address, Port<Item>& port, Time latency)
+      : unit_(*address.unit),
+        options_(address.options),
+        latency_(latency),
+        echo_(address.echo),
+        port_(port),
+        storage_(unit_.host_storage),
+        read_(*find_command(unit_, Verb::read)) {
+    if (unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex) {
+      port_.character = address.line.with_some_rate().character();
+    }
+  }
+
+  void read(std::size_t count) {
+    find_echo();
+    for (std::size_t i = 0; i < count; ++i) exchanges_.push_back(once(options_));
+  }
+
+  void test(const Clause& clause, ClauseResult& result) {
+    switch (clause.demand) {
+      case Demand::answered:
+        return test_answered(result);
+      case Demand::in_time:
+        return test_time(result);
+      case Demand::whole:
+      case Demand::checked:
+      case Demand::as_drawn:
+        return test_frames(clause, result);
+      case Demand::foreign_silent:
+        return test_foreign(result);
+      case Demand::damaged_silent:
+      case Demand::unknown_silent:
+      case Demand::unknown_reported:
+        return test_request(clause, result);
+    }
+  }
+
+ private:
+  // Whether the adapter echoes, from a good exchange; where none is, it does not.
+  void find_echo() {
+    constexpr unsigned attempts = 5;
+    for (unsigned i = 0; i < attempts && echo_ == host::EchoMode::automatic; ++i) {
+      host::Session<Item> session(unit_, options_, port_, storage_, echo_, 1);
+      (void)session.run(read_);
+      echo_ = session.echo().mode();
+    }
+    if (echo_ == host::EchoMode::automatic) echo_ = host::EchoMode::off;
+    port_.echoes = echo_ == host::EchoMode::on;
+  }
+
+  // With a session of its own: what one owes is nothing to the next.
+  Exchange once(const Options& options) {
+    host::Session<Item> session(unit_, options, port_, storage_, echo_, 1);
+    port_.forget();
+    const Conversation<Item>* ended = session.run(read_);
+    if (ended == nullptr) throw UsageError(fmt::format("{} cannot be read with these options", unit_.id));
+    Exchange one{.error = ended->error(), .detail = std::string(ended->detail())};
+    // What a host makes of silence is no matter of what came.
+    if (one.error != Error::none && is_asked() && port_.received.empty()) one.error = Error::timeout;
+    if (one.error != Error::none && is_asked()) port_.listen(listening);
+    // One that comes when the host has asked again is late, not missing.
+    const bool late = port_.after > port_.answer + latency_;
+    one.came = !port_.received.empty() && (port_.unanswered == 0 || late) && one.error != Error::line_stuck;
+    one.after = port_.after;
+    one.limit = port_.answer + latency_;
+    return one;
+  }
+  // Else the host is the clock.
+  [[nodiscard]] bool is_asked() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
+
+  void test_answered(ClauseResult& result) const {
+    const auto came = std::count_if(exchanges_.begin(), exchanges_.end(), [](const Exchange& one) { return one.came; });
+    conclude(result, came == std::ssize(exchanges_), fmt::format("{} of {} answered", came, exchanges_.size()));
+  }
+
+  void test_time(ClauseResult& result) const {
+    std::optional<Exchange> worst;
+    for (const Exchange& one : exchanges_) {
+      if (one.came && one.limit > Time{} && (!worst || one.after > worst->after)) worst = one;
+    }
+    if (!worst) return;
+    const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
+    conclude(result, worst->after <= worst->limit,
+             fmt::format("at most {:.1f} us, of {:.1f} us", us(worst->after), us(worst->limit)));
+  }
+
+  [[nodiscard]] std::vector<Exchange> read_with(std::string_view option, std::int64_t value) {
+    Options other = options_;
+    for (std::size_t i = 0; i < unit_.options.size(); ++i) {
+      if (unit_.options[i].name == option) other.values[i] = value;
+    }
+    std::vector<Exchange> exchanges;
+    for (std::size_t i = 0; i < exchanges_.size(); ++i) exchanges.push_back(once(other));
+    return exchanges;
+  }
+
+  void test_frames(const Clause& clause, ClauseResult& result) {
+    const std::vector<Exchange> exchanges = clause.option.empty() ? exchanges_ : read_with(clause.option, clause.value);
+    std::size_t came = 0;
+    std::size_t bad = 0;
+    std::string first;
+    for (const Exchange& one : exchanges) {
+      came += one.came ? 1 : 0;
+      if (!breaks(clause.demand, one.error)) continue;
+      if (++bad == 1) first = fmt::format(": {} {}", name_of_error(one.error), one.detail);
+    }
+    if (came == 0 && bad == 0) return;
+    conclude(result, bad == 0, fmt::format("{} of {} replies break it{}", bad, came, first));
+  }
+  static std::string_view name_of_error(Error error) { return error_texts[static_cast<std::size_t>(error)].name; }
+
+  // Silence tells only of an encoder that answers else.
+  [[nodiscard]] bool answers() const {
+    return std::any_of(exchanges_.begin(), exchanges_.end(),
+                       [](const Exchange& one) { return one.error == Error::none; });
+  }
+
+  void test_foreign(ClauseResult& result) {
+    if (!answers()) return;
+    Options other = options_;
+    for (std::size_t i = 0; i < unit_.options.size(); ++i) {
+      const Option& option = unit_.options[i];
+      if (option.role != Role::encoder) continue;
+      other.values[i] = option.maximum == options_.values[i] ? option.minimum : option.maximum;
+      std::vector<Item> sent;
+      port_.edit = [&](std::vector<Item>& request) { sent = request; };
+      const Exchange one = once(other);
+      port_.edit = {};
+      // On CAN not what comes counts, but what would be an answer: a node may say something else at any time.
+      if constexpr (std::is_same_v<Item, CanFrame>) {
+        conclude(result, one.error == Error::timeout,
+                 fmt::format("address {}: {}", other.values[i], name_of_error(one.error)));
+      } else {
+        conclude(result, port_.received.empty(), what_came(sent, port_.received));
+      }
+      return;
+    }
+  }
+
+  static std::string what_came(Bytes sent, Bytes came) {
+    return fmt::format("to {:02x} came {}", fmt::join(sent, " "),
+                       came.empty() ? "nothing" : fmt::format("{:02x}", fmt::join(came, " ")));
+  }
+
+  void test_request(const Clause& clause, ClauseResult& result) {
+    if constexpr (std::is_same_v<Item, std::uint8_t>) {
+      if (!answers()) return;
+      std::vector<std::uint8_t> sent;
+      port_.edit = [&](std::vector<std::uint8_t>& request) {
+        if (clause.demand != Demand::damaged_silent) request.assign(1, clause.request);
+        if (clause.demand == Demand::damaged_silent && !request.empty()) request.back() ^= 1;
+        sent = request;
+      };
+      once(options_);
+      port_.edit = {};
+      const std::vector<std::uint8_t>& came = port_.received;
+      if (clause.demand == Demand::unknown_reported) {
+        conclude(result, came.size() == clause.reply_size, what_came(sent, came));
+      } else {
+        conclude(result, came.empty(), what_came(sent, came));
+      }
+    }
+  }
+
+  const Unit& unit_;
+  Options options_;
+  Time latency_;
+  host::EchoMode echo_;
+  EditedPort<Item> port_;
+  std::vector<std::byte> storage_;
+  const Command& read_;
+  std::vector<Exchange> exchanges_;
+};
+
+template <class Item>
+void test_all(const EncoderAddress& address, Port<Item>& port, Time latency, const ConformChoices& choices,
+              Conformance& conformance) {
+  Tester<Item> tester(address, port, latency);
+  tester.read(std::max<std::size_t>(1, choices.readings));
+  for (const Clause& clause : clauses_of(*address.unit)) {
+    ClauseResult result{.id = clause.id,
+                        .document = address.unit->document,
+                        .paragraph = clause.paragraph,
+                        .words = clause.words,
+                        .verdict = Verdict::untested,
+                        .evidence = "nothing came that would tell"};
+    tester.test(clause, result);
+    conformance.clauses.push_back(std::move(result));
+  }
+}
+
+}  // namespace
+
+Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices) {
+  if (clauses_of(*address.unit).empty()) throw UsageError(fmt::format("no clauses are known of {}", address.unit->id));
+  Conformance conformance{.protocol = std::string(address.unit->id)};
+  if (link.bytes != nullptr) {
+    test_all(address, *link.bytes, link.latency, choices, conformance);
+  } else {
+    test_all(address, *link.frames, link.latency, choices, conformance);
+  }
+  return conformance;
+}
+
+Conformance conform(std::string_view text, std::span<const std::string> settings, const ConformChoices& choices) {
+  const EncoderAddress address = parse_address(text, settings);
+  return conform(address, open_link(address), choices);
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests the clauses of a unit over an open port.
+#pragma once
+
+#include "absenc/client/conform.hpp"
+#include "absenc/client/way/link.hpp"
+
+namespace absenc::client {
+
+[[nodiscard]] Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices);
+
+}  // namespace absenc::client

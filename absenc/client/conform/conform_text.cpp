@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// What was found, as text: for people and for the programs that count tests.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "absenc/client/conform.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+std::string xml(std::string_view text) {
+  std::string escaped;
+  for (const char letter : text) {
+    if (letter == '&') {
+      escaped += "&amp;";
+    } else if (letter == '<') {
+      escaped += "&lt;";
+    } else if (letter == '"') {
+      escaped += "&quot;";
+    } else {
+      escaped += letter;
+    }
+  }
+  return escaped;
+}
+
+}  // namespace
+
+std::string_view name_of(Verdict verdict) {
+  if (verdict == Verdict::kept) return "kept";
+  return verdict == Verdict::broken ? "broken" : "untested";
+}
+
+std::size_t Conformance::count(Verdict verdict) const {
+  return static_cast<std::size_t>(
+      std::count_if(clauses.begin(), clauses.end(), [&](const ClauseResult& one) { return one.verdict == verdict; }));
+}
+
+std::string Conformance::tap() const {
+  std::string text = fmt::format("TAP version 13\n1..{}\n", clauses.size());
+  std::size_t number = 0;
+  for (const ClauseResult& one : clauses) {
+    text += fmt::format("{} {} - {}: {} ({}){}\n", one.verdict == Verdict::broken ? "not ok" : "ok", ++number, one.id,
+                        one.words, one.paragraph,
+                        one.verdict == Verdict::untested ? " # SKIP " + one.evidence : std::string());
+    if (one.verdict == Verdict::broken) text += fmt::format("# {}\n", one.evidence);
+  }
+  return text;
+}
+
+std::string Conformance::junit() const {
+  std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
+  text += fmt::format("<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\">\n", xml(protocol),
+                      clauses.size(), count(Verdict::broken), count(Verdict::untested));
+  for (const ClauseResult& one : clauses) {
+    text += fmt::format("  <testcase classname=\"{}\" name=\"{}: {} ({}, {})\">", xml(protocol), xml(one.id),
+                        xml(one.words), xml(one.document), xml(one.paragraph));
+    if (one.verdict == Verdict::broken) text += fmt::format("<failure message=\"{}\"/>", xml(one.evidence));
+    if (one.verdict == Verdict::untested) text += fmt::format("<skipped message=\"{}\"/>", xml(one.evidence));
+    text += "</testcase>\n";
+  }
+  return text + "</testsuite>\n";
+}
+
+std::string Conformance::report() const {
+  std::string text;
+  for (const ClauseResult& one : clauses) {
+    text += fmt::format("{}: {}: {}\n  {}, {}\n  {}\n", name_of(one.verdict), one.id, one.words, one.document,
+                        one.paragraph, one.evidence);
+  }
+  return text + fmt::format("{} kept, {} broken, {} untested\n", count(Verdict::kept), count(Verdict::broken),
+                            count(Verdict::untested));
+}
+
+}  // namespace absenc::client

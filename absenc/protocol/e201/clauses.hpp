@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the document demands of the encoder, with the place that says so.
+#pragma once
+
+#include <array>
+
+#include "absenc/protocol/clause.hpp"
+
+namespace absenc::e201 {
+
+inline constexpr std::array<Clause, 4> clauses{{
+    {"answer", "BiSS C timing diagram, command 4", "4 is answered", Demand::answered},
+    {"length", "BiSS C timing diagram, command 4", "the answer is 16 hexadecimal digits and CR", Demand::whole},
+    {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
+    {"header", "BiSS C timing diagram, command 4", "ACK, start bit and CDS bit come before the position",
+     Demand::as_drawn},
+}};
+
+}  // namespace absenc::e201

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the document demands of the encoder, with the place that says so.
+#pragma once
+
+#include <array>
+
+#include "absenc/protocol/clause.hpp"
+
+namespace absenc::encolink {
+
+inline constexpr std::array<Clause, 3> clauses{{
+    {"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
+    {"length", "UART, Channel 1", "a frame has position, status and CRC", Demand::whole},
+    {"crc", "UART, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
+}};
+
+inline constexpr std::array<Clause, 2> spi_clauses{{
+    {"answer", "SPI timing diagram", "the encoder drives its output while it is selected", Demand::answered},
+    {"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
+}};
+
+}  // namespace absenc::encolink

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the document demands of the encoder, with the place that says so.
+#pragma once
+
+#include <array>
+
+#include "absenc/protocol/clause.hpp"
+
+namespace absenc::tformat {
+
+inline constexpr std::array<Clause, 8> clauses{{
+    {"answer", "6.2.1", "a readout request is answered", Demand::answered},
+    {"answer-time", "8.1", "the answer begins 3 us after the request", Demand::in_time},
+    {"length", "6.3.1 Table 2", "a reply has the fields of its data ID", Demand::whole},
+    {"crc", "6.3.4", "the CRC field is that of all fields before it", Demand::checked},
+    {"fields", "6.3", "the control field is that of the request, fixed bits are as drawn", Demand::as_drawn},
+    {"bad-sync", "8.4 Table 5 (1)", "a request with a wrong sync code is not answered", Demand::unknown_silent, 0x1F},
+    {"unknown-id", "8.4 Table 5 (2)", "an unknown data ID gets the data of data ID 3", Demand::unknown_reported, 0xA2,
+     11},
+    {"bad-parity", "8.4 Table 5 (3)", "a wrong parity bit gets the data of data ID 3", Demand::unknown_reported, 0x9A,
+     11},
+}};
+
+}  // namespace absenc::tformat

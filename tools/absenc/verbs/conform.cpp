@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/conform.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <fstream>
+
+#include "absenc/client/text/json.hpp"
+#include "absenc/os/signals.hpp"
+#include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
+#include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/output.hpp"
+
+namespace absenc::tool {
+
+namespace {
+
+Json conformance_json(const Conformance& conformance) {
+  Json clauses = Json::array();
+  for (const ClauseResult& one : conformance.clauses) {
+    clauses.append(Json::object()
+                       .set("id", one.id)
+                       .set("document", one.document)
+                       .set("paragraph", one.paragraph)
+                       .set("words", one.words)
+                       .set("verdict", name_of(one.verdict))
+                       .set("evidence", one.evidence));
+  }
+  return Json::object().set("ok", conformance.good()).set("protocol", conformance.protocol).set("clauses", clauses);
+}
+
+std::string without_end(std::string text) {
+  if (!text.empty() && text.back() == '\n') text.pop_back();
+  return text;
+}
+
+int run_conform(const Invocation& invocation) {
+  os::catch_interrupts();
+  const ConformChoices choices{.readings =
+                                   static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000))};
+  const Conformance conformance = conform(invocation.text("encoder"), invocation.texts("--option"), choices);
+  if (invocation.has("--junit")) {
+    const std::string path(invocation.text("--junit"));
+    std::ofstream file(path);
+    file << conformance.junit() << std::flush;
+    if (!file) throw UsageError(fmt::format("{} cannot be written", path));
+  }
+  if (invocation.has("--json")) {
+    print_line(conformance_json(conformance).line());
+  } else {
+    print_line(without_end(invocation.has("--tap") ? conformance.tap() : conformance.report()));
+  }
+  return conformance.good() ? exit_good : exit_failed;
+}
+
+constexpr std::array<Parameter, 6> conform_parameters{{
+    parameter::encoder,
+    {"--readings", "N", "how many readings are looked at", "100"},
+    {"--tap", "", "print the Test Anything Protocol"},
+    {"--junit", "FILE", "write JUnit's XML to it as well"},
+    parameter::json,
+    parameter::option,
+}};
+
+constexpr std::array<Example, 2> conform_examples{{
+    {"absenc conform sim:tformat", "what its document demands, and whether it does so"},
+    {"absenc conform amt21:/dev/ttyUSB0 --tap --junit amt21.xml", "for programs that count tests"},
+}};
+
+}  // namespace
+
+const Subcommand conform_subcommand{
+    "conform",
+    "test an encoder against the clauses of its document",
+    "Each clause has its paragraph, a verdict (kept, broken, untested) and what was seen: replies that come, in\n"
+    "time, whole, with a right checksum and as drawn; requests that must not be answered. Nothing is written to\n"
+    "the encoder. Exit status 1 when a clause is broken or could not be tested.",
+    conform_parameters,
+    conform_examples,
+    run_conform};
+
+}  // namespace absenc::tool
