@@ -58,13 +58,20 @@ ByteStep Engine::next(Time now) {
     return next(now);
   }
   if (state_ == State::ending && now < earliest_) return {.at = earliest_};
+  if (state_ == State::ready && times_.silence != Time{}) {
+    const Time quiet = std::max(received_at_ + times_.silence, earliest_);
+    if (now < quiet) return {.at = quiet};
+  }
+  return exchange_step(now);
+}
+
+// Apart, so that the step is made where the caller has it: from a function that returns several it would be copied.
+ByteStep Engine::exchange_step(Time now) {
   ByteStep step{.at = never,
                 .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : times_.answer_limit,
                 .gap = times_.gap_limit};
   switch (state_) {
-    case State::ready: {
-      const Time quiet = received_at_ + times_.silence;
-      if (times_.silence != Time{} && now < std::max(quiet, earliest_)) return {.at = std::max(quiet, earliest_)};
+    case State::ready:
       state_ = State::sending;
       disturbed_ = false;
       noise_.clear();
@@ -77,7 +84,6 @@ ByteStep Engine::next(Time now) {
       step.at = std::max(earliest_, times_.silence != Time{} ? now : Time{});
       begun_at_ = std::max(now, earliest_);
       break;
-    }
     case State::receiving: {
       const std::size_t whole = expected(reply());
       step.expect = whole > size_ ? whole - size_ : 0;

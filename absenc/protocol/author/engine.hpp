@@ -118,6 +118,7 @@ class Engine : public Conversation<std::uint8_t> {
     over,
   };
 
+  Step<std::uint8_t> exchange_step(Time now);
   void keep(Bytes bytes);
   void received(Bytes bytes);
   void sent(Time at);
