@@ -132,7 +132,7 @@ class Encoder(unittest.TestCase):
                 said = self.run_well("memory", "read", encoder, str(self.ADDRESS), "--page", str(self.PAGE))
                 self.assertIn("5A", said.upper())
                 _, _, rules = end(process)
-                self.assertNotIn("broken rule", rules)
+                self.assertNotIn("memory access", rules)  # before its page is ready: both clocks go alike
 
     def test_a_shaft_that_turns(self):
         process, encoder = self.start("m0plus", 1)
