@@ -25,7 +25,7 @@ function(firmware_program name machine rom ram)
 endfunction()
 
 # All of the library for a Cortex-M4 with its FPU.
-absenc_sources(m4f_sources ${absenc_layers_sources})
+absenc_sources(m4f_sources ${absenc_firmware_folders})
 add_library(absenc-m4f STATIC EXCLUDE_FROM_ALL ${m4f_sources})
 absenc_settings(absenc-m4f)
 target_include_directories(absenc-m4f PUBLIC "${PROJECT_SOURCE_DIR}")
@@ -43,13 +43,17 @@ set(vector_sources "${PROJECT_SOURCE_DIR}/firmware/vectors.cpp" "${vector_tables
 firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
 firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})
 
-firmware_program(drive-microbit microbit 256K 16K SOURCES "${PROJECT_SOURCE_DIR}/firmware/drive.cpp" LIBRARY absenc)
-firmware_program(drive-m0plus mps2 1M 64K SOURCES "${PROJECT_SOURCE_DIR}/firmware/drive.cpp" LIBRARY absenc)
-firmware_program(drive-m4f mps2 1M 64K SOURCES "${PROJECT_SOURCE_DIR}/firmware/drive.cpp" LIBRARY absenc-m4f
-                 FLAGS ${m4f_flags})
+# A T-format encoder at one end of the line, or at the other.
+foreach(program IN ITEMS drive encoder)
+  set(source "${PROJECT_SOURCE_DIR}/firmware/${program}.cpp")
+  firmware_program(${program}-microbit microbit 256K 16K SOURCES "${source}" LIBRARY absenc)
+  firmware_program(${program}-m0plus mps2 1M 64K SOURCES "${source}" LIBRARY absenc)
+  firmware_program(${program}-m4f mps2 1M 64K SOURCES "${source}" LIBRARY absenc-m4f FLAGS ${m4f_flags})
+endforeach()
 
-add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microbit firmware_drive-m0plus)
-add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f)
+add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microbit firmware_drive-m0plus
+                  firmware_encoder-microbit firmware_encoder-m0plus)
+add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f firmware_encoder-m4f)
 
 # Readers of one position each, which firmware/figures.py measures. Of the library they need little.
 set(reading_sources ${m4f_sources})

@@ -300,7 +300,7 @@ class Behaviour(EmulateCase):
         self.assertTrue(all(len(reply) == 11 and reply != good for reply in replies))
         # Two flips in the same column pass this checksum.
         self.assertGreater(sum(crc(reply[:-1]) != reply[-1] for reply in replies), 10)
-        self.assertIn("faults injected: 20 corrupt", emulator.end()[2])
+        self.assertIn("faults injected: 20 corrupt\n  replies with faults: 20\n", emulator.end()[2])
 
     def test_silence(self):
         emulator = self.emulator("--fault", "silence=1")

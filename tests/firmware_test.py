@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The programs of firmware/ on machines that QEMU emulates. ABSENC_FIRMWARE is the folder they were
 built in; ABSENC_FIRMWARE_POSITIONS how many the drive reads, ABSENC_FIRMWARE_ALL whether all programs were built (./dev firmware)."""
+import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
-from command_support import Emulator
+from command_support import Emulator, absenc, end, read_line
 
 FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE", "build/arm/firmware"))
 SOURCES = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -21,13 +23,18 @@ SINGLETURN, MULTITURN = 74565, 4660
 LATENCY = 250  # ms: a reply that a busy machine delays longer would be a fault that nobody injected
 
 
-def emulated(program, machine, *arguments, serial="null"):
-    """Runs a program to its end; what it says."""
+def emulator_of(program, machine, *arguments, serial="null"):
+    """The command that runs a program."""
     path = os.path.join(FOLDER, program + ".elf")
     semihosting = ",".join(["enable=on,target=native", f"arg={program}", *(f"arg={one}" for one in arguments)])
     serial = ["-serial", "null"] if serial == "null" else ["-chardev", serial, "-serial", "chardev:line"]
-    command = ["qemu-system-arm", "-M", machine, "-display", "none", "-monitor", "none", *serial,
-               "-semihosting-config", semihosting, "-kernel", path]
+    return ["qemu-system-arm", "-M", machine, "-display", "none", "-monitor", "none", *serial,
+            "-semihosting-config", semihosting, "-kernel", path]
+
+
+def emulated(program, machine, *arguments, serial="null"):
+    """Runs a program to its end; what it says."""
+    command = emulator_of(program, machine, *arguments, serial=serial)
     result = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                             timeout=PATIENCE, text=True, check=False)
     return result.returncode, result.stdout
@@ -70,12 +77,13 @@ class Drive(unittest.TestCase):
         self.assertEqual(counted["wrong"], 0, everything)
         self.assertEqual(counted["unasked"], 0, everything)
         self.assertEqual(counted["requests"], int(re.search(r"(\d+) requests answered", summary)[1]), everything)
-        faults = {kind: int(number) for number, kind in re.findall(r"(\d+) (drop|corrupt)", summary)}
-        self.assertEqual(set(faults), {"drop", "corrupt"}, everything)
-        # A reply that is struck twice is noticed once: at these rates one in 10 000. One that a busy machine delivers
-        # late is a silence without a fault.
-        unnoticed = sum(faults.values()) - counted["silences"] - counted["implausible"]
-        self.assertLess(unnoticed, 3 + POSITIONS // 4000, everything)
+        damaged = int(re.search(r"replies with faults: (\d+)", summary)[1])
+        noticed = counted["silences"] + counted["implausible"]
+        # Every fault is noticed, once. A reply that a busy machine delivers late is a silence without a fault.
+        self.assertGreaterEqual(noticed, damaged, everything)
+        self.assertLessEqual(noticed, damaged + 3 + POSITIONS // 400, everything)
+        if POSITIONS >= 1000:
+            self.assertGreater(damaged, 0, everything)
         self.assertNotIn("rules that the host broke", summary)
         page, address, value = 2, 5, "42"
         stored = re.findall(r"^[0-9A-F]{4}: (.*)$", memory, re.MULTILINE)
@@ -85,6 +93,57 @@ class Drive(unittest.TestCase):
         for cpu in ("microbit", *CORES):
             with self.subTest(cpu):
                 self.check(cpu)
+
+
+class Encoder(unittest.TestCase):
+    """The device role on the machine, read by the command. The port adds what the network does."""
+
+    PAGE, ADDRESS, VALUE = 2, 7, 0x5A
+
+    def start(self, cpu, rpm):
+        """The process, and the encoder's name. QEMU says where it waits for whoever connects first."""
+        command = emulator_of(f"encoder-{cpu}", MACHINES[cpu], SINGLETURN, MULTITURN, rpm, LATENCY,
+                              serial="socket,id=line,host=127.0.0.1,port=0,nodelay=on,server=on,wait=on")
+        process = subprocess.Popen(command, bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE)
+        self.addCleanup(lambda: process.poll() is None and end(process))
+        waiting = read_line(process.stderr, time.monotonic() + PATIENCE)
+        port = re.search(r"tcp:127\.0\.0\.1:([1-9]\d*)", waiting or "")
+        self.assertTrue(port, waiting)
+        return process, f"tformat:tcp:127.0.0.1:{port[1]}?latency={LATENCY}"
+
+    def run_well(self, *arguments):
+        done = absenc(*arguments)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return done.stdout
+
+    def readings(self, encoder, count):
+        return [json.loads(line) for line in
+                self.run_well("read", encoder, "--count", str(count), "--rate", "0", "--json").splitlines()]
+
+    def test_positions_an_alarm_and_memory(self):
+        for cpu in ("microbit", *CORES):
+            with self.subTest(cpu):
+                process, encoder = self.start(cpu, 0)
+                read = self.readings(encoder, 200)
+                self.assertEqual({(one["singleturn"], one["multiturn"], *one["alarms"]) for one in read},
+                                 {(SINGLETURN, MULTITURN, "over_heat")})
+                self.run_well("clear-alarms", encoder, "--yes")
+                self.assertEqual(self.readings(encoder, 1)[0]["alarms"], [])
+                self.run_well("memory", "write", encoder, str(self.ADDRESS), str(self.VALUE), "--page",
+                              str(self.PAGE), "--yes")
+                said = self.run_well("memory", "read", encoder, str(self.ADDRESS), "--page", str(self.PAGE))
+                self.assertIn("5A", said.upper())
+                _, _, rules = end(process)
+                self.assertNotIn("memory access", rules)  # before its page is ready: both clocks go alike
+
+    def test_a_shaft_that_turns(self):
+        process, encoder = self.start("m0plus", 1)
+        read = self.readings(encoder, 200)
+        positions = [one["multiturn"] << 17 | one["singleturn"] for one in read]
+        self.assertEqual(positions, sorted(positions))
+        self.assertGreater(positions[-1], positions[0])
+        end(process)
 
 
 class Figures(unittest.TestCase):

@@ -31,8 +31,10 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // Whoever is late to look finds both: the reply came behind the request.
-  if (at(sent) != 0) {
+  // Whoever is late to look finds both, and what was sent comes first. Looked for the other way round: what is received
+  // after the first look may be the answer to what is sent after the second.
+  const bool has_received = at(received) != 0;
+  while (at(sent) != 0) {
     at(sent) = 0;
     if (!going.empty()) going = going.subspan(1);
     if (going.empty()) {
@@ -41,7 +43,7 @@ void handle_uart() {
       at(data_out) = going[0];
     }
   }
-  if (at(received) != 0) {
+  if (has_received) {
     at(received) = 0;
     on_received(static_cast<std::uint8_t>(at(data_in)));
   }

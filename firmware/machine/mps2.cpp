@@ -28,17 +28,20 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // Whoever is late to look finds both: the reply came behind the request.
-  if ((at(pending) & sent_bit) != 0) {
-    at(pending) = sent_bit;
-    if (!going.empty()) going = going.subspan(1);
-    if (going.empty()) {
-      on_sent();
-    } else {
-      at(data) = going[0];
+  // Whoever is late to look finds both, and what was sent comes first. Looked for the other way round: what is received
+  // after the first look may be the answer to what is sent after the second.
+  for (;;) {
+    const bool has_received = (at(state) & receiver_is_full) != 0;
+    while ((at(pending) & sent_bit) != 0) {
+      at(pending) = sent_bit;
+      if (!going.empty()) going = going.subspan(1);
+      if (going.empty()) {
+        on_sent();
+      } else {
+        at(data) = going[0];
+      }
     }
-  }
-  while ((at(state) & receiver_is_full) != 0) {
+    if (!has_received) return;
     at(pending) = received_bit;
     on_received(static_cast<std::uint8_t>(at(data)));
   }

@@ -101,6 +101,11 @@ const sim::FaultCounts* VirtualDevice::faults() const {
   return faulty_node_ ? &faulty_node_->counts() : nullptr;
 }
 
+std::optional<std::uint64_t> VirtualDevice::damaged_replies() const {
+  if (!had_faults_ || !faulty_) return std::nullopt;
+  return faulty_->damaged_replies();
+}
+
 // What both kinds of device can do.
 template <class Use>
 void VirtualDevice::each(Use use) {

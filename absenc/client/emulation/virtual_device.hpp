@@ -67,6 +67,8 @@ class VirtualDevice {
   [[nodiscard]] Machine<CanFrame>* frames() const;
   /// What was injected; null where no fault was ever asked for.
   [[nodiscard]] const sim::FaultCounts* faults() const;
+  /// Replies with at least one fault; none where frames are sent, or no fault was ever asked for.
+  [[nodiscard]] std::optional<std::uint64_t> damaged_replies() const;
 
  private:
   template <class Use>

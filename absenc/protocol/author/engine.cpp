@@ -44,6 +44,7 @@ void Engine::finish(const Outcome& outcome) {
 // ---- Steps
 
 ByteStep Engine::next(Time now) {
+  if (state_ == State::receiving) return waiting_step();  // at once: between two characters there is little time
   // What was on the line before this conversation is not known.
   if (!begun_) received_at_ = now;
   begun_ = true;
@@ -65,11 +66,17 @@ ByteStep Engine::next(Time now) {
   return exchange_step(now);
 }
 
+ByteStep Engine::waiting_step() const {
+  return {.expect = due_,
+          .at = never,
+          .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : times_.answer_limit,
+          .gap = times_.gap_limit};
+}
+
 // Apart, so that the step is made where the caller has it: from a function that returns several it would be copied.
 ByteStep Engine::exchange_step(Time now) {
-  ByteStep step{.at = never,
-                .answer = manner_.answer_limit != Time{} ? manner_.answer_limit : times_.answer_limit,
-                .gap = times_.gap_limit};
+  ByteStep step = waiting_step();
+  step.expect = 0;
   switch (state_) {
     case State::ready:
       state_ = State::sending;
@@ -84,12 +91,8 @@ ByteStep Engine::exchange_step(Time now) {
       step.at = std::max(earliest_, times_.silence != Time{} ? now : Time{});
       begun_at_ = std::max(now, earliest_);
       break;
-    case State::receiving: {
-      const std::size_t whole = expected(reply());
-      step.expect = whole > size_ ? whole - size_ : 0;
-      break;
-    }
     case State::sending:
+    case State::receiving:
     case State::settling:
     case State::sleeping:
     case State::listening:
@@ -147,21 +150,22 @@ void Engine::sent(Time at) {
   if (state_ != State::sending) return;
   if (!manner_.expects_reply) return conclude_with(Error::none);
   state_ = disturbed_ ? State::settling : State::receiving;
-  if (size_ != 0) received({});  // what came during a pulse
+  received({});  // what came during a pulse
 }
 
 // What no longer fits changes nothing: it is too long already.
 void Engine::keep(Bytes bytes) {
-  const std::size_t taken = std::min(bytes.size(), storage_.size() - size_);
-  std::copy_n(bytes.begin(), taken, storage_.begin() + static_cast<std::ptrdiff_t>(size_));
-  size_ += taken;
+  for (const std::uint8_t byte : bytes) {
+    if (size_ < storage_.size()) storage_[size_++] = byte;
+  }
 }
 
 void Engine::received(Bytes bytes) {
   keep(bytes);
-  if (state_ != State::receiving || manner_.ends_by_silence || manner_.any_reply) return;
+  if (state_ != State::receiving) return;
   const std::size_t whole = expected(reply());
-  if (whole == 0 || size_ < whole) return;
+  due_ = whole > size_ ? whole - size_ : 0;
+  if (whole == 0 || due_ != 0 || manner_.ends_by_silence || manner_.any_reply) return;
   const Error error = check(reply());
   if (error == Error::none || is_whole(error)) return conclude_with(error);
   state_ = State::settling;

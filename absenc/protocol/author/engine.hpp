@@ -118,6 +118,7 @@ class Engine : public Conversation<std::uint8_t> {
     over,
   };
 
+  [[nodiscard]] Step<std::uint8_t> waiting_step() const;
   Step<std::uint8_t> exchange_step(Time now);
   void keep(Bytes bytes);
   void received(Bytes bytes);
@@ -131,6 +132,7 @@ class Engine : public Conversation<std::uint8_t> {
   Noise noise_;
   MutableBytes storage_;
   std::size_t size_ = 0;
+  std::size_t due_ = 0;  // of the reply, while it is received
   Bytes out_{};
   Manner manner_{};
   unsigned attempts_left_ = 0;

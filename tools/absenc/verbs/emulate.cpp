@@ -48,6 +48,7 @@ template <class Item>
 void print_rules(const Device<Item>& encoder, const VirtualDevice& device, std::string_view name, Time start) {
   print_message(fmt::format("{}{} requests answered in {}", name, encoder.answer_count(), to_text(os::now() - start)));
   if (device.faults() != nullptr) print_note(fmt::format("  faults injected: {}", fault_counts(*device.faults())));
+  if (device.damaged_replies()) print_note(fmt::format("  replies with faults: {}", *device.damaged_replies()));
   if (encoder.violation_count() == 0) return;
   print_note(fmt::format("  rules that the host broke: {}", encoder.violation_count()));
   for (const Violation& violation : encoder.violations()) {

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// A conversation without a wire: the reply of a Smart-Abs at 74565 of 17 bits and 4660 turns is at hand.
+#include <array>
+#include <cstdint>
+
+#include "absenc/protocol/tformat/host.hpp"
+
+int main() {
+  using namespace absenc;
+  static constexpr auto reply =
+      std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00, 0x4A});
+  tformat::ReadPosition read{tformat::Format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11}};
+  Time now{};
+  for (ByteStep step = read.next(now); step.kind != ByteStep::Kind::done; step = read.next(now)) {
+    now += std::chrono::microseconds(50);
+    if (step.kind == ByteStep::Kind::transfer) {
+      read.feed({.kind = ByteEvent::Kind::sent, .at = now});  // of step.out
+    } else {
+      read.feed({.kind = ByteEvent::Kind::received, .at = now, .items = reply});
+    }
+  }
+  const Reading* const reading = read.reading();
+  const bool good = reading != nullptr && reading->singleturn_valid() && reading->multiturn_valid;
+  return good && reading->singleturn == 74565 && reading->multiturn == 4660 ? 0 : 1;
+}
