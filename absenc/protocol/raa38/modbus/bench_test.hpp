@@ -67,6 +67,7 @@ class Scripted final : public Machine<std::uint8_t> {
     if (event.kind == Event<std::uint8_t>::Kind::received)
       heard_.insert(heard_.end(), event.items.begin(), event.items.end());
     if (event.kind != Event<std::uint8_t>::Kind::silence || heard_.empty()) return;
+    asked_at.push_back(event.at);
     reply_ = script_(heard_, requests++);
     heard_.clear();
     pending_ = !reply_.empty();
@@ -77,6 +78,7 @@ class Scripted final : public Machine<std::uint8_t> {
   }
 
   unsigned requests = 0;
+  std::vector<Time> asked_at{};
 
  private:
   Script script_;
@@ -87,6 +89,7 @@ class Scripted final : public Machine<std::uint8_t> {
 
 struct Conversed : End {
   unsigned requests = 0;
+  std::vector<Time> asked_at{};
 };
 
 /// How a command ends with such a slave.
@@ -97,7 +100,7 @@ struct Conversed : End {
   Talk talk(format, command, std::move(arguments));
   line.attach(sim::Role::device, scripted);
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 60s));
-  return {raa38::testing::end_of<std::uint8_t>(*talk), scripted.requests};
+  return {raa38::testing::end_of<std::uint8_t>(*talk), scripted.requests, scripted.asked_at};
 }
 
 }  // namespace testing

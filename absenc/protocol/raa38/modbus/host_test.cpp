@@ -240,6 +240,24 @@ TEST(Raa38ModbusSettings, ARefusalIsToldAndNotAskedForAgain) {
   EXPECT_TRUE(ended(with(refuses, "set-address", {2}), Error::request_rejected, "illegal function"));
 }
 
+// The document gives no time for it; whoever asks at once may hear the old value, or nothing.
+TEST(Raa38ModbusSettings, TheEncoderHasTimeToKeepASetting) {
+  const std::pair<std::string_view, std::int64_t> commands[]{
+      {"set-address", 2}, {"set-baud", 9600}, {"set-direction", 1}, {"zero", 0}};
+  for (const auto& [command, value] : commands) {
+    unsigned set_at = 0;
+    const auto obeys = [&](Bytes request, unsigned before) -> Wire {
+      if (request[1] == function::read) return request[0] == 1 ? framed({1, 3, 2, 0x10, 0}) : Wire{};
+      set_at = before;
+      return request[1] == function::set_address ? framed({request[2], request[1]})
+                                                 : Wire(request.begin(), request.end());
+    };
+    const Conversed talk = with(obeys, command, {value});
+    ASSERT_LT(set_at + 1, talk.asked_at.size()) << command;
+    EXPECT_GE(talk.asked_at[set_at + 1] - talk.asked_at[set_at], 20ms) << command;
+  }
+}
+
 TEST(Raa38ModbusSettings, ALostReplyIsNoLostSetting) {
   std::uint8_t address = 1;
   const auto obeys = [&](Bytes request, unsigned) -> Wire {
