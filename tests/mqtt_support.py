@@ -32,14 +32,22 @@ def answers(port):
 class Daemon:
     """Somebody else's server, until its port answers."""
 
-    def __init__(self, command, port, log):
+    def __init__(self, command, port, log, wait=True):
         self.command, self.port, self.log = command, port, log
         self.process = None
-        self.start()
+        self.begin()
+        if wait:
+            self.wait()
 
     def start(self):
+        self.begin()
+        self.wait()
+
+    def begin(self):
         with open(self.log, "ab") as log:
             self.process = subprocess.Popen(self.command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+
+    def wait(self):
         wait_until(lambda: self.process.poll() is not None or answers(self.port), f"{self.command[0]} answers")
         if self.process.poll() is not None:
             with open(self.log, encoding="utf-8", errors="replace") as log:

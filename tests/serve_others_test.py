@@ -6,6 +6,7 @@ import pathlib
 import re
 import socket
 import unittest
+import urllib.error
 import urllib.parse
 import urllib.request
 
@@ -119,8 +120,12 @@ class Prometheus(ServeCase):
 
         def ask(query):
             address = f"http://127.0.0.1:{port}/api/v1/query?" + urllib.parse.urlencode({"query": query})
-            with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
-                return json.load(answer)["data"]["result"]
+            try:
+                with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
+                    return json.load(answer)["data"]["result"]
+            except urllib.error.HTTPError as refused:
+                self.assertEqual(refused.code, 503)  # it is not ready yet
+                return []
         wait_until(lambda: [one for one in ask('up{job="absenc"}') if one["value"][1] == "1"], "it is scraped")
         for query in ("absenc_up == 1", 'absenc_alarm{alarm="over_heat"}', "absenc_readings_total > 10",
                       "absenc_errors_total > 0", "absenc_mqtt_connected == 0"):
