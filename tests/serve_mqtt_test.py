@@ -4,6 +4,8 @@ import contextlib
 import json
 import os
 import pathlib
+import re
+import resource
 import signal
 import socket
 import sqlite3
@@ -236,6 +238,58 @@ class Spool(MqttCase):
         self.assertRegex(result.stderr, "the spool .* locked")
 
 
+    def test_many_open_descriptors(self):
+        """More than select() knows."""
+        broker = self.broker()
+        receiver = self.receiver(broker)
+        limit = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+        if limit != resource.RLIM_INFINITY and limit < 4096:
+            self.skipTest("this user may not open 4096 files")
+        crowd = []
+        with open(os.devnull, "rb") as nothing:
+            for number in range(30, 1030):  # what is below is for this program and for the encoders
+                if not os.path.exists(f"/proc/self/fd/{number}"):
+                    crowd.append(os.dup2(nothing.fileno(), number))
+        names = [f"sim:tformat?motion=rpm={i + 1}" for i in range(20)]
+        try:
+            server = self.sender(f"mqtt://localhost:{broker.port}", *names, pass_fds=crowd,
+                                 preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (4096, limit)))
+        finally:
+            for one in crowd:
+                os.close(one)
+        receiver.until("readings")
+        folder = f"/proc/{server.process.pid}/fd"
+        self.assertGreater(max(int(one) for one in os.listdir(folder)), 1024)
+
+    def test_a_full_disk_is_told(self):
+        server = self.sender(f"mqtt://127.0.0.1:{free_port()}", ONE,
+                             preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN))
+        shown = wait_until(lambda: self.taken(server) > 20 and self.taken(server), "readings are spooled")
+        # A limit of the kernel for the size of files is to the writer what a full disk is.
+        resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+        full = wait_until(lambda: self.mqtt(server)["dropped"] > 20 and self.mqtt(server), "it says so")
+        self.assertIn("the spool", full["trouble"])
+        self.assertEqual(server.encoder()["state"], "live")
+        resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        wait_until(lambda: self.taken(server) > full["taken"][ONE], "it goes on")
+        end(server.process, signal.SIGKILL)
+        broker = self.broker()
+        receiver = self.receiver(broker)
+        server = self.sender(broker.url, ONE)
+        wait_until(lambda: self.mqtt(server)["sent"] and self.mqtt(server)["waiting"] < 5, "all is sent")
+        found = wait_until(lambda: self.numbers(receiver), "they come")
+        self.assertLessEqual(set(range(1, shown + 1)), set(found))
+        self.assertGreaterEqual(found[-1] - len(found), 20, "a gap tells of those that were dropped")
+
+    def test_the_example_of_the_documentation(self):
+        text = (SOURCE / "docs/mqtt.md").read_text(encoding="utf-8")
+        path = self.file("absenc.toml", "".join(re.findall(r"```toml\n(.*?)```", text, re.DOTALL)))
+        result = absenc("serve", ONE, "--history", "none", "--listen", "127.0.0.1:0", "--mqtt-spool", self.spool(),
+                        env={**os.environ, "ABSENC_CONFIG": path})
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn("/etc/absenc/mqtt-login", result.stderr)  # all of it was understood: this file is not there
+
+
 class SilentBroker:
     """Takes messages of MQTT 5 and acknowledges none."""
 
@@ -328,9 +382,10 @@ class Access(MqttCase):
         os.chmod(key, 0o644)
         broker = self.broker("allow_anonymous true", f"certfile {cert}", f"keyfile {key}")
         url = f"mqtts://127.0.0.1:{broker.port}"
-        server = self.sender(url, ONE, "--mqtt-ca-file", cert)
-        wait_until(lambda: self.mqtt(server)["sent"], "it is sent")
-        end(server.process)
+        for place in (url, f"mqtts://localhost:{broker.port}"):  # which may be ::1 first
+            server = self.sender(place, ONE, "--mqtt-ca-file", cert)
+            wait_until(lambda s=server: self.mqtt(s)["sent"], "it is sent")
+            end(server.process)
         server = self.sender(url, ONE)
         wait_until(lambda: self.mqtt(server)["trouble"], "a broker that nobody vouches for is not trusted")
         self.assertEqual(self.mqtt(server)["sent"], 0)

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "absenc/client/error.hpp"
+#include "absenc/os/network.hpp"
 #include "absenc/serve/secret_file.hpp"
 
 namespace absenc::serve {
@@ -86,6 +87,11 @@ struct MqttClient::Library {
                      reason >= 128 ? ::mosquitto_reason_string(reason) : ::mosquitto_connack_string(reason)));
   }
 
+  void note(int error) {
+    if (error == MOSQ_ERR_SUCCESS) return;
+    lose(error == MOSQ_ERR_ERRNO && errno != 0 ? std::strerror(errno) : ::mosquitto_strerror(error));
+  }
+
   void lose(const std::string& why) {
     if (state == State::lost) return;
     state = State::lost;
@@ -118,22 +124,31 @@ MqttClient::MqttClient(const Broker& broker, const Identity& identity, Version v
     : library_(std::make_unique<Library>(broker, identity, version)) {}
 MqttClient::~MqttClient() = default;
 
-void MqttClient::connect() {
+void MqttClient::connect(const std::string& host, bool try_all) {
   Library& library = *library_;
-  const int error =
-      ::mosquitto_connect_async(library.client, library.broker.host.c_str(), library.broker.port, keepalive_s);
-  if (error == MOSQ_ERR_SUCCESS) return;
-  library.lose(error == MOSQ_ERR_ERRNO ? std::strerror(errno) : ::mosquitto_strerror(error));
+  const auto begin = try_all ? &::mosquitto_connect : &::mosquitto_connect_async;
+  library.note(begin(library.client, host.c_str(), library.broker.port, keepalive_s));
 }
 
+// mosquitto_loop would do the same with select(), which knows descriptors below 1024 only: many encoders have more.
 MqttClient::State MqttClient::work(Time longest) {
   Library& library = *library_;
   if (library.state == State::lost) return library.state;
-  const auto wait = static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(longest).count());
+  const int socket = ::mosquitto_socket(library.client);
+  if (socket < 0) {
+    library.lose("the connection was lost");
+    return library.state;
+  }
+  const os::Ready ready = os::wait_for_socket(socket, ::mosquitto_want_write(library.client), longest);
+  errno = 0;  // the library looks at it after calls that do not set it
+  int error = MOSQ_ERR_SUCCESS;
+  // TLS begins by reading, also when it wants to write.
+  const bool begins = library.broker.tls && library.state == State::connecting && ready.to_write;
+  if (ready.to_read || begins) error = ::mosquitto_loop_read(library.client, 1);
   errno = 0;
-  const int error = ::mosquitto_loop(library.client, wait, 1);
-  if (error == MOSQ_ERR_SUCCESS) return library.state;
-  library.lose(error == MOSQ_ERR_ERRNO && errno != 0 ? std::strerror(errno) : ::mosquitto_strerror(error));
+  if (error == MOSQ_ERR_SUCCESS && ready.to_write) error = ::mosquitto_loop_write(library.client, 1);
+  if (error == MOSQ_ERR_SUCCESS) error = ::mosquitto_loop_misc(library.client);
+  library.note(error);
   return library.state;
 }
 

@@ -47,8 +47,9 @@ class MqttClient {
   MqttClient& operator=(const MqttClient&) = delete;
 
   enum class State : std::uint8_t { connecting, connected, lost };
-  /// Begins to connect; waits for nothing but the name of the host to be looked up.
-  void connect();
+  /// Begins to connect, to the broker's name or one of its addresses. `try_all`: of a name, tries its addresses one
+  /// after the other until one takes the connection, and waits for that.
+  void connect(const std::string& host, bool try_all);
   /// Sends and receives for at most this long.
   State work(Time longest);
   /// Why it is lost.

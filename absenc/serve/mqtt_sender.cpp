@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "absenc/client/error.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/network.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/view.hpp"
 
@@ -60,6 +62,8 @@ void MqttSender::work(const std::stop_token& stop) {
       attend(stop);
     } catch (const Failure& failure) {
       become_lost(failure.what());
+    } catch (const os::Failure& failure) {  // of its name
+      become_lost(failure.what());
     }
     if (version_ != tried) continue;
     if (has_taken_) pause = first_pause;
@@ -77,25 +81,40 @@ void MqttSender::attend(const std::stop_token& stop) {
   has_taken_ = false;
   retained_.clear();
   next_states_ = {};
-  MqttClient client(settings_->broker, identity(), version_);
-  if (!connect(client, stop)) return;
-  deliver(client, stop);
+  std::vector<std::string> hosts = os::addresses_of(settings_->broker.host);
+  const bool by_name = settings_->broker.tls;  // which the certificate is for
+  const bool try_all = by_name && hosts.size() > 1;
+  if (by_name) hosts = {settings_->broker.host};
+  std::string why;
+  for (const std::string& host : hosts) {
+    MqttClient client(settings_->broker, identity(), version_);
+    const MqttClient::State state = connect(client, host, try_all, stop);
+    if (stop.stop_requested()) return;
+    if (client.wrong_version()) {
+      version_ = MqttClient::Version::v3_1_1;
+      return;
+    }
+    if (state == MqttClient::State::connected) {
+      begin();
+      return deliver(client, stop);
+    }
+    why = state == MqttClient::State::lost ? client.trouble() : "it does not answer";
+  }
+  throw Failure(why);
 }
 
-bool MqttSender::connect(MqttClient& client, const std::stop_token& stop) {
+MqttClient::State MqttSender::connect(MqttClient& client, const std::string& host, bool try_all,
+                                      const std::stop_token& stop) const {
   const Time deadline = os::now() + time_to_connect;
-  client.connect();
+  client.connect(host, try_all);
   MqttClient::State state = MqttClient::State::connecting;
-  while (state == MqttClient::State::connecting && !stop.stop_requested()) {
-    if (os::now() > deadline) throw Failure("it does not answer");
+  while (state == MqttClient::State::connecting && !stop.stop_requested() && os::now() < deadline) {
     state = client.work(one_wait);
   }
-  if (client.wrong_version()) {
-    version_ = MqttClient::Version::v3_1_1;
-    return false;
-  }
-  if (state == MqttClient::State::lost) throw Failure(client.trouble());
-  if (state != MqttClient::State::connected) return false;
+  return state;
+}
+
+void MqttSender::begin() {
   told_lost_ = false;
   {
     const std::lock_guard lock(mutex_);
@@ -107,7 +126,6 @@ bool MqttSender::connect(MqttClient& client, const std::stop_token& stop) {
       {calendar_ms(), "", "mqtt",
        fmt::format("connected to {}{}", settings_->broker.text(),
                    old ? ", which knows MQTT 3.1.1 only: it does not say when it refuses a message" : "")});
-  return true;
 }
 
 void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
@@ -239,7 +257,7 @@ void MqttSender::become_lost(const std::string& why) {
   if (std::exchange(told_lost_, true)) return;
   happenings_->add(
       {calendar_ms(), "", "mqtt",
-       fmt::format("{} is not there: {}; what it shall have waits on disk", settings_->broker.text(), why)});
+       fmt::format("nothing reaches {}: {}; what it shall have waits on disk", settings_->broker.text(), why)});
 }
 
 }  // namespace absenc::serve

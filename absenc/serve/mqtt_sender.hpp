@@ -37,7 +37,9 @@ class MqttSender {
  private:
   void work(const std::stop_token& stop);
   void attend(const std::stop_token& stop);
-  [[nodiscard]] bool connect(MqttClient& client, const std::stop_token& stop);
+  MqttClient::State connect(MqttClient& client, const std::string& host, bool try_all,
+                            const std::stop_token& stop) const;
+  void begin();
   void deliver(MqttClient& client, const std::stop_token& stop);
   void finish(MqttClient& client);
   void step(MqttClient& client);

@@ -12,7 +12,7 @@
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/way/named_encoder.hpp"
 #include "absenc/client/way/settings_file.hpp"
-#include "absenc/os/datagrams.hpp"
+#include "absenc/os/network.hpp"
 #include "absenc/protocol/options.hpp"
 #include "absenc/serve/state_file.hpp"
 

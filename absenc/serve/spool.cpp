@@ -104,7 +104,7 @@ Spool::Counts Spool::add(const std::vector<Message>& messages,
   after.counts.messages -= dropped.counts.messages;
   after.counts.readings -= dropped.counts.readings;
   after.bytes -= dropped.bytes;
-  held_ = after;
+  hold(after);
   return dropped.counts;
 }
 
@@ -152,7 +152,7 @@ void Spool::remove(const std::vector<std::int64_t>& ids) {
       }
     }
   });
-  held_ = after;
+  hold(after);
   if (held_.counts.messages != 0 || sqlite_.number("PRAGMA freelist_count") < pages_worth_freeing) return;
   sqlite_.run("PRAGMA incremental_vacuum");
 }
@@ -162,13 +162,18 @@ void Spool::forget(const std::string& encoder) {
   Statement(sqlite_, "DELETE FROM encoder WHERE name = ?").bind(1, encoder).run();
 }
 
+void Spool::hold(const Held& now) {
+  const std::lock_guard lock(held_mutex_);
+  held_ = now;
+}
+
 Spool::Counts Spool::held() const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(held_mutex_);
   return held_.counts;
 }
 
 std::int64_t Spool::held_bytes() const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(held_mutex_);
   return held_.bytes;
 }
 

@@ -60,14 +60,16 @@ class Spool {
   };
   template <class Work>
   void commit(const Work& work);
+  void hold(const Held& now);
   Held drop_oldest(std::int64_t bytes);
 
   Sqlite sqlite_;
   std::int64_t most_bytes_;
   std::string source_;
   std::string run_;
-  mutable std::mutex mutex_;  // guards all of it
-  Held held_;
+  std::mutex mutex_;               // guards the file
+  Held held_;                      // written with both locked
+  mutable std::mutex held_mutex_;  // so that nobody waits for the disk who only asks how much there is
 };
 
 }  // namespace absenc::serve

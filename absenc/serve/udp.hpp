@@ -6,7 +6,7 @@
 #include <mutex>
 #include <thread>
 
-#include "absenc/os/datagrams.hpp"
+#include "absenc/os/network.hpp"
 #include "absenc/serve/fleet.hpp"
 #include "absenc/serve/outlets.hpp"
 
