@@ -63,11 +63,11 @@ class Stream:
 
 
 class Server:
-    def __init__(self, *arguments, preexec_fn=None, pass_fds=(), **environment):
+    def __init__(self, *arguments, preexec_fn=None, within=(), **environment):
         where = [] if "--listen" in arguments else ["--listen", "127.0.0.1:0"]
-        command = [ABSENC, "serve", *arguments, *where]
+        command = [*within, ABSENC, "serve", *arguments, *where]
         self.process = subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                        preexec_fn=preexec_fn, pass_fds=pass_fds, env={**os.environ, **environment})
+                                        preexec_fn=preexec_fn, env={**os.environ, **environment})
         line = read_line(self.process.stdout, time.monotonic() + PATIENCE)
         if line is None:
             raise AssertionError(f"the server did not become ready: {end(self.process)}")
