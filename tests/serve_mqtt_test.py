@@ -16,7 +16,7 @@ import jsonschema
 
 from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
 from mqtt_support import Broker, Receiver, free_port, now, numbers, twice
-from serve_support import ServeCase, wait_until
+from serve_support import BUSY, ServeCase, wait_until
 
 SOURCE = pathlib.Path(os.environ.get("ABSENC_SOURCE_DIR", pathlib.Path(__file__).resolve().parent.parent))
 SCHEMA = json.loads((SOURCE / "docs/mqtt-schema.json").read_text(encoding="utf-8"))
@@ -423,6 +423,8 @@ class Settings(MqttCase):
         server.process.send_signal(signal.SIGHUP)
         wait_until(lambda: any(topic == "plant/b/elbow/readings" for topic, _, _ in receiver.messages), "b")
         self.assertGreater(server.json("/api/encoder", name="elbow")["readings"], before)
+        times = [one[0] for payload in receiver.all("readings") for one in payload["readings"]]
+        self.assertLess(max(later - earlier for earlier, later in zip(times, times[1:])), 1_000_000 * BUSY)
         self.file("absenc.toml", self.FILE.format("ftp://x", "b", self.spool()))
         server.process.send_signal(signal.SIGHUP)
         line = ""

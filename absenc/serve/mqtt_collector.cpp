@@ -35,7 +35,6 @@ MqttCollector::~MqttCollector() {
   thread_.request_stop();
   thread_.join();
   collect();
-  for (const auto& watch : fleet_->all()) watch->stop_passing(Watch::Outlet::mqtt);
 }
 
 void MqttCollector::add(const std::vector<Happening>& happenings) {

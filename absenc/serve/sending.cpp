@@ -20,6 +20,7 @@ std::string Sending::change_to(const Outlets& outlets) {
     std::shared_ptr<Mqtt> next;
     if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *happenings_);
     now_.mqtt = outlets.mqtt;
+    if (!outlets.mqtt) stop_passing(Watch::Outlet::mqtt);  // else they wait for the next one
     changed += fmt::format("; MQTT: {}", outlets.mqtt ? outlets.mqtt->broker.text() : "none");
     const std::lock_guard lock(mutex_);
     mqtt_ = std::move(next);
@@ -29,9 +30,14 @@ std::string Sending::change_to(const Outlets& outlets) {
     now_.udp.reset();
     if (outlets.udp) udp_ = std::make_unique<UdpSender>(*outlets.udp, *fleet_);
     now_.udp = outlets.udp;
+    if (!outlets.udp) stop_passing(Watch::Outlet::udp);
     changed += fmt::format("; UDP: {}", outlets.udp ? outlets.udp->host : "none");
   }
   return changed;
+}
+
+void Sending::stop_passing(Watch::Outlet outlet) {
+  for (const auto& watch : fleet_->all()) watch->stop_passing(outlet);
 }
 
 std::shared_ptr<Mqtt> Sending::mqtt() const {

@@ -29,6 +29,7 @@ class Sending {
 
  private:
   [[nodiscard]] std::shared_ptr<Mqtt> mqtt() const;
+  void stop_passing(Watch::Outlet outlet);
 
   const Fleet* fleet_;
   Happenings* happenings_;

@@ -31,7 +31,6 @@ UdpSender::UdpSender(const UdpSettings& settings, const Fleet& fleet)
 UdpSender::~UdpSender() {
   thread_.request_stop();
   thread_.join();
-  for (const auto& watch : fleet_->all()) watch->stop_passing(Watch::Outlet::udp);
 }
 
 void UdpSender::work(const std::stop_token& stop) {
