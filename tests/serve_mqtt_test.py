@@ -428,11 +428,20 @@ class Settings(MqttCase):
         self.assertLess(max(later - earlier for earlier, later in zip(times, times[1:])), 1_000_000 * BUSY)
         self.file("absenc.toml", self.FILE.format("ftp://x", "b", self.spool()))
         server.process.send_signal(signal.SIGHUP)
-        line = ""
-        while "goes on as it was" not in line:
-            line = read_line(server.process.stderr, now() + PATIENCE)
-        self.assertIn("mqtt://", line)
+        self.assertIn("mqtt://", self.told(server, "goes on as it was"))
         self.assertTrue(self.mqtt(server)["connected"])
+        self.file("absenc.toml", self.FILE.format(broker.url, "b", "/none/spool"))
+        server.process.send_signal(signal.SIGHUP)
+        self.assertIn("/none/spool", self.told(server, "not all of it can be sent"))
+        self.assertEqual(server.encoder()["state"], "live")
+
+    def told(self, server, words):
+        """The next line of messages that has these."""
+        line = ""
+        while words not in line:
+            line = read_line(server.process.stderr, now() + PATIENCE)
+            self.assertIsNotNone(line, words)
+        return line
 
     def test_what_is_wrong(self):
         good = 'broker = "mqtt://127.0.0.1:1"\n'
