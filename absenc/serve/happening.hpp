@@ -24,7 +24,8 @@ namespace absenc::serve {
 struct Happening {
   std::int64_t at_ms = 0;
   std::string encoder{};  // "": of the server itself
-  std::string kind{};     // alarm, alarm_over, failing, silent, lost, back, restarted, ended, command, change, history, mqtt
+  // alarm, alarm_over, failing, silent, lost, back, restarted, ended, command, change, history, mqtt
+  std::string kind{};
   std::string text{};
   std::string who{};  // of commands: who gave it
 
