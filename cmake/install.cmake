@@ -40,7 +40,8 @@ install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT 
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
   install(FILES cmake/absenc.service DESTINATION lib/systemd/system COMPONENT absenc)
-  install(FILES docs/serve.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
+  install(FILES docs/serve.md docs/mqtt.md docs/mqtt-schema.json docs/grafana-dashboard.json
+          DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
   if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
     add_library(absenc-manual-objects OBJECT tools/manual/completion.cpp tools/manual/man_page.cpp)
     absenc_settings(absenc-manual-objects)

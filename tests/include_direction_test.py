@@ -31,7 +31,7 @@ FREESTANDING_HEADERS = set(
 # Layers whose headers are all public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
 # Each costs seconds for every file that includes it.
-HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h")
+HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
     r"^(sys|linux|asm|asm-generic|net|netinet|arpa|fuse3)/|"

@@ -143,7 +143,8 @@ class Installed(Case):
             "lib/absenc.pc", "lib/absenc-client.pc",
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
-            "share/doc/absenc/LICENSE", "share/doc/absenc/serve.md", "lib/absenc.service"})
+            "share/doc/absenc/LICENSE", "share/doc/absenc/serve.md", "share/doc/absenc/mqtt.md",
+            "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json", "lib/absenc.service"})
         self.assertEqual(headers, public_headers())
 
     def test_headers_need_only_installed_ones(self):

@@ -4,11 +4,9 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <filesystem>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/json.hpp"
-#include "absenc/client/text/text_file.hpp"
 
 namespace absenc::serve {
 
@@ -56,22 +54,7 @@ Access::Access(const std::string& token_file, bool on_loopback) : on_loopback_(o
     if (on_loopback) return;
     throw UsageError("whoever can reach this address could read the encoders: give --token-file too");
   }
-  namespace fs = std::filesystem;
-  const std::string text = read_text_file("the tokens", token_file);
-  const fs::perms others = fs::status(token_file).permissions() & (fs::perms::group_write | fs::perms::others_all);
-  if (others != fs::perms::none) {
-    throw Failure(fmt::format("others may read or write the tokens in {}: chmod 600 {}", token_file, token_file));
-  }
-  for (LineReader lines(text); lines.next();) {
-    const std::size_t space = lines.line.find_first_of(" \t");
-    const std::size_t secret = std::min(lines.line.find_first_not_of(" \t", space), lines.line.size());
-    if (space == std::string_view::npos || lines.line.size() - secret < least_token) {
-      throw Failure(fmt::format("{}:{}: a line must be NAME TOKEN, with a token of {} characters or more", token_file,
-                                lines.number, least_token));
-    }
-    tokens_.push_back({std::string(lines.line.substr(0, space)), std::string(lines.line.substr(secret))});
-  }
-  if (tokens_.empty()) throw Failure(fmt::format("there is no token in {}: lines of NAME TOKEN", token_file));
+  tokens_ = read_secrets("token", token_file, least_token);
 }
 
 std::string Access::who(const Request& request) const {
@@ -79,7 +62,7 @@ std::string Access::who(const Request& request) const {
   const std::string_view given = request.authorization;
   std::string name;
   if (!given.starts_with(scheme)) return name;
-  for (const Token& token : tokens_) {
+  for (const Secret& token : tokens_) {
     if (same_secret(given.substr(scheme.size()), token.secret)) name = token.name;
   }
   return name;

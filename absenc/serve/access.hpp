@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absenc/serve/http.hpp"
+#include "absenc/serve/secret_file.hpp"
 
 namespace absenc::serve {
 
@@ -29,11 +30,7 @@ class Access {
   [[nodiscard]] std::string who(const Request& request) const;
 
  private:
-  struct Token {
-    std::string name;
-    std::string secret;
-  };
-  std::vector<Token> tokens_;
+  std::vector<Secret> tokens_;
   bool on_loopback_;
 };
 

@@ -81,8 +81,13 @@ Json state_json(const Fleet& fleet, const Chronicler* chronicler) {
 }
 
 Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Chronicler* chronicler,
-         const std::string& history_path)
-    : fleet_(&fleet), access_(&access), streams_(&streams), worker_(&worker), chronicler_(chronicler) {
+         const std::string& history_path, const Sending& sending)
+    : fleet_(&fleet),
+      access_(&access),
+      streams_(&streams),
+      worker_(&worker),
+      chronicler_(chronicler),
+      sending_(&sending) {
   if (chronicler != nullptr) reader_ = std::make_shared<HistoryReader>(history_path);
 }
 
@@ -112,11 +117,13 @@ void Api::get(const Request& request, const Reply& reply) {
   if (path == "/metrics") {
     ServerFigures figures{streams_->count(), streams_->dropped(), 0};
     if (chronicler_ != nullptr) figures.history_lost = chronicler_->health().lost;
-    return reply.send({200, "text/plain; version=0.0.4; charset=utf-8", metrics(fleet_->all(), figures)});
+    return reply.send(
+        {200, "text/plain; version=0.0.4; charset=utf-8", metrics(fleet_->all(), figures) + sending_->metrics()});
   }
   if (path == "/api/encoders") return reply.send(json_response(state_json(*fleet_, chronicler_)));
   if (path == "/api/encoder") return reply.send(encoder(request));
   if (path == "/api/stream" && request.method == "GET") return stream(request, reply);
+  if (path == "/api/mqtt") return reply.send(json_response(sending_->json()));
   if (path == "/api/history" || path == "/api/events") return past(request, reply);
   if (path == "/api/history.csv") return past_as_csv(request, reply);
   reply.send(error_response(404, "there is nothing of this name: /openapi.json tells what there is"));

@@ -10,6 +10,7 @@
 #include "absenc/serve/fleet.hpp"
 #include "absenc/serve/history.hpp"
 #include "absenc/serve/http.hpp"
+#include "absenc/serve/sending.hpp"
 #include "absenc/serve/streams.hpp"
 #include "absenc/serve/worker.hpp"
 
@@ -22,7 +23,7 @@ class Api {
  public:
   /// All of them outlive it; `chronicler` null: there is no history.
   Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Chronicler* chronicler,
-      const std::string& history_path);
+      const std::string& history_path, const Sending& sending);
 
   void answer(const Request& request, const Reply& reply);
 
@@ -41,6 +42,7 @@ class Api {
   Streams* streams_;
   Worker* worker_;
   const Chronicler* chronicler_;
+  const Sending* sending_;
   std::shared_ptr<HistoryReader> reader_;  // of the worker's thread; null: there is no history
 };
 

@@ -14,16 +14,18 @@
 
 namespace absenc::serve {
 
-/// Milliseconds of the calendar's clock since 1970.
-[[nodiscard]] inline std::int64_t calendar_ms() {
+/// Microseconds of the calendar's clock since 1970.
+[[nodiscard]] inline std::int64_t calendar_us() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
 }
+[[nodiscard]] inline std::int64_t calendar_ms() { return calendar_us() / 1000; }
 
 struct Happening {
   std::int64_t at_ms = 0;
   std::string encoder{};  // "": of the server itself
-  std::string kind{};     // alarm, alarm_over, failing, silent, lost, back, restarted, ended, command, change, history
+  // alarm, alarm_over, failing, silent, lost, back, restarted, ended, command, change, history, mqtt
+  std::string kind{};
   std::string text{};
   std::string who{};  // of commands: who gave it
 

@@ -58,7 +58,7 @@ std::string csv_text(std::string_view text) {
 }  // namespace
 
 struct HistoryWriter::Database {
-  explicit Database(const std::string& path) : sqlite(path, Sqlite::For::writing) {
+  explicit Database(const std::string& path) : sqlite("the history", path, Sqlite::For::writing) {
     sqlite.run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
     const std::int64_t found = sqlite.number("PRAGMA user_version");
     if (found > version) throw Failure(fmt::format("the history {} was written by a newer absenc", path));
@@ -150,7 +150,7 @@ void HistoryWriter::trim() {
 }
 
 struct HistoryReader::Database {
-  explicit Database(const std::string& path) : sqlite(path, Sqlite::For::reading) {}
+  explicit Database(const std::string& path) : sqlite("the history", path, Sqlite::For::reading) {}
   Sqlite sqlite;
 };
 

@@ -13,6 +13,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/api.hpp"
+#include "absenc/serve/sending.hpp"
 #include "absenc/serve/view.hpp"
 
 namespace absenc::serve {
@@ -39,10 +40,12 @@ struct Server::Parts {
       : listener(os::listen_at(choices.host, choices.port)),
         url(url_of(choices.host, listener.port)),
         access(choices.token_file, listener.on_loopback),
-        fleet(choices.encoders, choices.rate, happenings) {
+        fleet(choices.encoders, choices.rate, happenings),
+        sending(fleet, happenings) {
+    sending.change_to(read_outlets(choices.outlets));
     if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet);
     const Chronicler* history = chronicler ? &*chronicler : nullptr;
-    api.emplace(fleet, access, streams, worker, history, choices.history);
+    api.emplace(fleet, access, streams, worker, history, choices.history, sending);
     http.emplace(std::move(listener),
                  [this](const Request& request, const Reply& reply) { api->answer(request, reply); });
     teller = std::jthread([this](const std::stop_token& stop) { tell(stop); });
@@ -53,6 +56,7 @@ struct Server::Parts {
     teller.join();
     http.reset();  // before what it asks
     tell_happenings();
+    sending.change_to({});
   }
 
   void tell(const std::stop_token& stop) {
@@ -80,6 +84,7 @@ struct Server::Parts {
     const std::vector<Happening> taken = happenings.take();
     if (taken.empty()) return;
     if (chronicler) chronicler->add(taken);
+    sending.add(taken);
     for (const Happening& one : taken) streams.tell("happening", one.json());
   }
 
@@ -104,6 +109,7 @@ struct Server::Parts {
   std::string url;
   Access access;
   Fleet fleet;
+  Sending sending;
   std::optional<Chronicler> chronicler;
   Streams streams;
   Worker worker;
@@ -115,14 +121,16 @@ struct Server::Parts {
   std::jthread teller;
 };
 
-Server::Server(const Choices& choices) : parts_(std::make_unique<Parts>(choices)) {}
+Server::Server(const Choices& choices) : parts_(std::make_unique<Parts>(choices)), outlets_(choices.outlets) {}
 Server::~Server() = default;
 
 const std::string& Server::url() const { return parts_->url; }
 std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {
+  const Outlets outlets = read_outlets(outlets_);  // before anything is changed
   std::string changed = parts_->fleet.reload();
+  changed += parts_->sending.change_to(outlets);
   parts_->happenings.add({calendar_ms(), "", "change", "absenc.toml was read again: " + changed});
   return changed;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `absenc serve` without its command line: encoders that are read, a page, HTTP, history.
+// `absenc serve` without its command line: encoders that are read, a page, HTTP, history, MQTT, UDP.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absenc/serve/history.hpp"
+#include "absenc/serve/outlets.hpp"
 
 namespace absenc::serve {
 
@@ -20,6 +21,7 @@ struct Choices {
   std::string token_file{};   // "": none
   std::string history{};      // the file; "": none is kept
   HistoryLimits limits{};
+  std::vector<OutletOption> outlets{};  // win over what absenc.toml says of MQTT and UDP
 };
 
 class Server {
@@ -40,6 +42,7 @@ class Server {
  private:
   struct Parts;
   std::unique_ptr<Parts> parts_;
+  std::vector<OutletOption> outlets_;
 };
 
 }  // namespace absenc::serve

@@ -14,7 +14,7 @@ constexpr int patience_ms = 2000;  // while another program has it locked
 
 }  // namespace
 
-Sqlite::Sqlite(const std::string& path, For what) : path_(path) {
+Sqlite::Sqlite(const std::string& title, const std::string& path, For what) : title_(title + " " + path) {
   const int flags = what == For::writing ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
   if (::sqlite3_open_v2(path.c_str(), &handle_, flags | SQLITE_OPEN_NOMUTEX, nullptr) == SQLITE_OK) {
     ::sqlite3_busy_timeout(handle_, patience_ms);
@@ -22,14 +22,12 @@ Sqlite::Sqlite(const std::string& path, For what) : path_(path) {
   }
   const std::string why = handle_ == nullptr ? "no memory" : ::sqlite3_errmsg(handle_);
   ::sqlite3_close(handle_);
-  throw client::Failure(fmt::format("the history {}: {}", path, why));
+  throw client::Failure(fmt::format("{}: {}", title_, why));
 }
 
 Sqlite::~Sqlite() { ::sqlite3_close(handle_); }
 
-void Sqlite::fail() const {
-  throw client::Failure(fmt::format("the history {}: {}", path_, ::sqlite3_errmsg(handle_)));
-}
+void Sqlite::fail() const { throw client::Failure(fmt::format("{}: {}", title_, ::sqlite3_errmsg(handle_))); }
 
 void Sqlite::run(const std::string& sql) {
   if (::sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) fail();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// As much of SQLite as history needs, with errors thrown. The library behind it is seen by sqlite.cpp alone.
+// As much of SQLite as history and spool need, with errors thrown. The library behind it is seen by sqlite.cpp alone.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,8 @@ namespace absenc::serve {
 class Sqlite {
  public:
   enum class For : std::uint8_t { writing, reading };
-  Sqlite(const std::string& path, For what);
+  /// `title` begins what it says of errors.
+  Sqlite(const std::string& title, const std::string& path, For what);
   ~Sqlite();
   Sqlite(const Sqlite&) = delete;
   Sqlite& operator=(const Sqlite&) = delete;
@@ -31,7 +32,7 @@ class Sqlite {
   friend class Statement;
   [[noreturn]] void fail() const;
 
-  std::string path_;
+  std::string title_;
   sqlite3* handle_ = nullptr;
 };
 

@@ -14,8 +14,6 @@ namespace {
 double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
-bool is_linear(const Watch& watch) { return watch.address().unit->resolution(watch.address().options).unit_um > 0; }
-
 Json alarms_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
@@ -99,6 +97,18 @@ Json bad_json(const Snapshot& snapshot) {
 }
 
 }  // namespace
+
+bool is_linear(const Watch& watch) { return watch.address().unit->resolution(watch.address().options).unit_um > 0; }
+
+Json condition_json(const Watch& watch, const Snapshot& snapshot) {
+  const bool live = snapshot.state == State::live;
+  const Unit& unit = *watch.address().unit;
+  Json json =
+      Json::object().set("encoder", watch.name()).set("protocol", unit.id).set("state", name_of(snapshot.state));
+  json.set("message", live ? Json() : Json(snapshot.message));
+  json.set("alarms", live ? alarms_json(unit, snapshot.last.reading) : Json());
+  return json.set("status", live ? status_json(unit, snapshot.last.reading) : Json());
+}
 
 Json overview(const Watch& watch, const Snapshot& snapshot) {
   const bool live = snapshot.state == State::live;

@@ -16,6 +16,12 @@ namespace absenc::serve {
 /// unless the encoder is live and they hold.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
+/// What of it holds until it is told otherwise: state, why it is not live, alarms in words, status; no value.
+[[nodiscard]] client::Json condition_json(const Watch& watch, const Snapshot& snapshot);
+
+/// Positions in mm, not degrees.
+[[nodiscard]] bool is_linear(const Watch& watch);
+
 /// All of it: also counters, latencies, the last bad exchanges, the fields of the last reply, and the commands that it
 /// has with their arguments.
 [[nodiscard]] client::Json details(const Watch& watch);

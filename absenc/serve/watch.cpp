@@ -130,6 +130,16 @@ std::vector<Point> Watch::take_points() {
   return taken;
 }
 
+Outbox::Taken Watch::take_passing(Outlet outlet) {
+  const std::lock_guard lock(mutex_);
+  return outboxes_[static_cast<std::size_t>(outlet)].take();
+}
+
+void Watch::stop_passing(Outlet outlet) {
+  const std::lock_guard lock(mutex_);
+  outboxes_[static_cast<std::size_t>(outlet)].close();
+}
+
 std::vector<Second> Watch::take_seconds() {
   const std::int64_t now_s = calendar_ms() / 1000;
   const std::lock_guard lock(mutex_);
@@ -248,6 +258,7 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const std::uint64_t before = known_.counters.bad();
   const std::uint64_t errors = bad < before ? bad : bad - before;  // anew after it had ended
   count_second(sample, errors);
+  pass_on(sample);
   if (errors != 0) known_.bad = live.bad_exchanges();
   known_.counters = encoder.counters();
   known_.losses = live.losses();
@@ -291,6 +302,21 @@ void Watch::count_second(const Sample& sample, std::uint64_t errors) {
   if (!traced_) return;
   points_.push_back(point);
   if (points_.size() > most_points) points_.pop_front();
+}
+
+void Watch::pass_on(const Sample& sample) {
+  const auto is_wanted = [](const Outbox& one) { return one.wanted(); };
+  if (sample.kind != Sample::Kind::reading || std::none_of(outboxes_.begin(), outboxes_.end(), is_wanted)) return;
+  const Reading& reading = sample.reading;
+  Passing passing;
+  passing.at_us = calendar_us() - std::chrono::duration_cast<std::chrono::microseconds>(os::now() - sample.at).count();
+  if (sample.position_valid) passing.place = place_of(sample);
+  if (sample.speed_valid) passing.speed = sample.speed;
+  if (reading.ready && reading.singleturn_valid()) passing.counts = reading.singleturn;
+  if (reading.multiturn_bits != 0 && reading.multiturn_valid) passing.turns = reading.multiturn;
+  for (Outbox& outbox : outboxes_) {
+    if (outbox.wanted()) outbox.put(passing);
+  }
 }
 
 void Watch::tell_alarms(const Reading& reading) {

@@ -18,6 +18,7 @@
 #include "absenc/client/text/json.hpp"
 #include "absenc/client/way/address.hpp"
 #include "absenc/serve/happening.hpp"
+#include "absenc/serve/passing.hpp"
 
 namespace absenc::serve {
 
@@ -107,6 +108,11 @@ class Watch {
   /// From now on points are kept until they are taken, the newest `most_points` of them.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
+  /// All good readings since the last time: each of those who send them on has them all.
+  enum class Outlet : std::uint8_t { mqtt, udp };
+  [[nodiscard]] Outbox::Taken take_passing(Outlet outlet);
+  /// Nobody takes them any more.
+  void stop_passing(Outlet outlet);
   /// The seconds that are over.
   [[nodiscard]] std::vector<Second> take_seconds();
   /// False when another command is still waiting, or it has ended.
@@ -122,6 +128,7 @@ class Watch {
   void publish(const client::Encoder& live, const client::Sample& sample);
   void summarize(const client::Encoder& live, const client::Sample& sample);
   void count_second(const client::Sample& sample, std::uint64_t errors);
+  void pass_on(const client::Sample& sample);
   void tell_alarms(const Reading& reading);
   void become(State state, const std::string& message);
   void carry_out(client::Encoder& live, const Order& order);
@@ -142,6 +149,7 @@ class Watch {
   bool over_ = false;  // nobody takes orders any more
   bool traced_ = false;
   std::deque<Point> points_;
+  std::array<Outbox, 2> outboxes_;  // by Outlet
   Second second_{};
   std::deque<Second> seconds_;
   struct Minute {

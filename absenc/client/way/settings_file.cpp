@@ -62,8 +62,8 @@ class Reader {
   }
 
   [[nodiscard]] SettingsFile config(const toml::table& file) const {
-    static constexpr std::array<std::string_view, 3> known{"defaults", "bus", "encoder"};
-    SettingsFile config{.path = path_, .defaults = {}, .buses = {}, .encoders = {}};
+    static constexpr std::array<std::string_view, 4> known{"defaults", "bus", "encoder", "serve"};
+    SettingsFile config{.path = path_, .defaults = {}, .buses = {}, .encoders = {}, .services = {}};
     for (const auto& [key, node] : in_file_order(file)) {
       if (key->str() == known[0]) {
         config.defaults = section(*key, *node, "[defaults]");
@@ -71,6 +71,8 @@ class Reader {
         config.buses = sections(*key, *node);
       } else if (key->str() == known[2]) {
         config.encoders = sections(*key, *node);
+      } else if (key->str() == known[3]) {
+        config.services = sections(*key, *node);
       } else {
         refuse(*key, fmt::format("there is no section \"{}\"{}", key->str(), suggestion(key->str(), known)));
       }

@@ -32,6 +32,7 @@ struct SettingsFile {
   FileSection defaults;               // [defaults]
   std::vector<FileSection> buses;     // [bus.NAME]
   std::vector<FileSection> encoders;  // [encoder.NAME]
+  std::vector<FileSection> services;  // [serve.NAME]
 };
 
 /// Syntax, sections and types are right afterwards, what stands in the sections is not looked at. Throws UsageError,

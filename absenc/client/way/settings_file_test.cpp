@@ -85,6 +85,16 @@ TEST(SettingsFile, Sections) {
   EXPECT_THAT(refusal("[[defaults]]\n"), AllOf(StartsWith("file:1:3: "), HasSubstr("[defaults]")));
 }
 
+TEST(SettingsFile, Services) {
+  const SettingsFile config = read("[serve.mqtt]\nbroker = \"mqtt://hall\"\nspool_mb = 5\n[serve.udp]\nto = \"a:1\"\n");
+  ASSERT_EQ(config.services.size(), 2u);
+  EXPECT_EQ(config.services[0].name, "mqtt");
+  ASSERT_NE(config.services[0].find("spool_mb"), nullptr);
+  EXPECT_THAT(config.services[0].find("spool_mb")->values, ElementsAre("5"));
+  EXPECT_EQ(config.services[1].place, "file:4:8");
+  EXPECT_THAT(refusal("[serve]\nmqtt = 3\n"), AllOf(StartsWith("file:2:1: "), HasSubstr("[serve.mqtt]")));
+}
+
 TEST(SettingsFile, Types) {
   EXPECT_THAT(refusal_of("bus = 3\n"), AllOf(StartsWith("file:4:1: "), HasSubstr("bus is a whole number")));
   EXPECT_THAT(refusal_of("model = true\n"), AllOf(StartsWith("file:4:1: "), HasSubstr("text in quotes")));

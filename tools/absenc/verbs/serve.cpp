@@ -2,12 +2,11 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cstdlib>
-#include <filesystem>
 
 #include "absenc/os/hangup.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/server.hpp"
+#include "absenc/serve/state_file.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/rate.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -37,30 +36,34 @@ void set_place(serve::Choices& choices, std::string_view written) {
   choices.port = static_cast<std::uint16_t>(*port);
 }
 
-// The folder that systemd gives to a service, or the user's for what programs keep.
-std::string usual_history() {
-  namespace fs = std::filesystem;
-  const auto variable = [](const char* name) {
-    const char* value = std::getenv(name);
-    return value == nullptr ? std::string() : std::string(value);
-  };
-  fs::path folder = variable("STATE_DIRECTORY");
-  if (folder.empty() && !variable("XDG_STATE_HOME").empty()) folder = fs::path(variable("XDG_STATE_HOME")) / "absenc";
-  if (folder.empty() && !variable("HOME").empty()) folder = fs::path(variable("HOME")) / ".local/state/absenc";
-  if (folder.empty())
-    throw UsageError("where to keep the history is not known: give --history FILE, or --history none");
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error)
-    throw Failure(fmt::format("the folder {} for the history cannot be made: {}", folder.string(), error.message()));
-  return folder / "history.sqlite";
-}
+constexpr std::string_view home_assistant = "--home-assistant";  // a flag
+
+// Options that say the same as absenc.toml.
+struct OutletParameter {
+  std::string_view option;
+  std::string_view section;
+  std::string_view setting;
+};
+constexpr std::array<OutletParameter, 8> outlet_parameters{{
+    {"--mqtt", "mqtt", "broker"},
+    {"--mqtt-login-file", "mqtt", "login_file"},
+    {"--mqtt-ca-file", "mqtt", "ca_file"},
+    {"--mqtt-prefix", "mqtt", "prefix"},
+    {"--mqtt-spool", "mqtt", "spool"},
+    {"--mqtt-spool-mb", "mqtt", "spool_mb"},
+    {home_assistant, "mqtt", "home_assistant"},
+    {"--udp", "udp", "to"},
+}};
 
 void reload(serve::Server& server) {
   try {
     print_message("absenc.toml was read again: " + server.reload());
   } catch (const UsageError& error) {
     print_message(fmt::format("everything goes on as it was, because absenc.toml is wrong: {}", error.what()));
+  } catch (const Failure& failure) {
+    print_message(fmt::format("absenc.toml was read again, but not all of it can be sent: {}", failure.what()));
+  } catch (const os::Failure& failure) {
+    print_message(fmt::format("absenc.toml was read again, but not all of it can be sent: {}", failure.what()));
   }
 }
 
@@ -73,10 +76,17 @@ int run_serve(const Invocation& invocation) {
   choices.rate = readings_a_second(invocation, 50);
   set_place(choices, invocation.text("--listen", usual_host));
   choices.token_file = invocation.text("--token-file");
-  choices.history = invocation.has("--history") ? std::string(invocation.text("--history")) : usual_history();
+  choices.history = invocation.has("--history")
+                        ? std::string(invocation.text("--history"))
+                        : serve::state_file("history.sqlite", "--history FILE, or --history none");
   if (choices.history == no_history) choices.history.clear();
   choices.limits.seconds = invocation.number("--history-days", 30, 1, 36'500) * 24 * 3600;
   choices.limits.bytes = invocation.number("--history-mb", 1024, 1, 1'000'000) * 1'000'000;
+  for (const OutletParameter& one : outlet_parameters) {
+    if (!invocation.has(one.option)) continue;
+    const bool is_flag = one.option == home_assistant;
+    choices.outlets.push_back({one.section, one.setting, is_flag ? "true" : std::string(invocation.text(one.option))});
+  }
 
   serve::Server server(choices);
   print_line(server.url());
@@ -91,7 +101,7 @@ int run_serve(const Invocation& invocation) {
   return exit_good;
 }
 
-constexpr std::array<Parameter, 7> serve_parameters{{
+constexpr std::array<Parameter, 15> serve_parameters{{
     {"encoders", "", "as for `absenc read`", "all of absenc.toml", false, true},
     {"--listen", "HOST:PORT", "where the page is; beyond this computer only with --token-file", "127.0.0.1:8420"},
     {"--rate", "HZ", "readings a second of each for which absenc.toml has no rate_hz; 0: as many as the line allows",
@@ -101,13 +111,25 @@ constexpr std::array<Parameter, 7> serve_parameters{{
      "history.sqlite in $STATE_DIRECTORY or ~/.local/state/absenc"},
     {"--history-days", "DAYS", "what is older is deleted", "30"},
     {"--history-mb", "MB", "beyond it the oldest is deleted", "1024"},
+    {"--mqtt", "BROKER",
+     "mqtt://HOST:PORT, or mqtts:// for TLS: readings, alarms and states go there; this and what "
+     "follows are also settings of absenc.toml"},
+    {"--mqtt-login-file", "FILE", "one line of USER PASSWORD, for its owner alone"},
+    {"--mqtt-ca-file", "FILE", "certificates that the broker's must come from", "those that this computer trusts"},
+    {"--mqtt-prefix", "TOPIC", "begins all topics", "absenc/ and the name of this computer"},
+    {"--mqtt-spool", "FILE", "where messages wait until the broker has them",
+     "mqtt-spool.sqlite beside the history's usual place"},
+    {"--mqtt-spool-mb", "MB", "beyond it the oldest messages are dropped, counted and told", "256"},
+    {home_assistant, "", "tell Home Assistant by MQTT what there is"},
+    {"--udp", "HOST:PORT", "every reading goes there as JSON, as PlotJuggler takes it"},
 }};
 
-constexpr std::array<Example, 3> serve_examples{{
+constexpr std::array<Example, 4> serve_examples{{
     {"absenc serve", "all encoders of absenc.toml, at http://127.0.0.1:8420/"},
     {"absenc serve \"sim:tformat?motion=rpm=60\" \"sim:esl?motion=sine=90,0.2\" --history none",
      "try it without hardware"},
     {"absenc serve --listen 0.0.0.0:8420 --token-file /etc/absenc/tokens", "for other computers too"},
+    {"absenc serve --mqtt mqtt://broker.example --home-assistant", "to a broker too"},
 }};
 
 }  // namespace

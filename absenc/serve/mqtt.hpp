@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Readings, events and states to an MQTT broker, by way of a spool on disk. Two threads: a broker that is away or a
+// name that is looked up for long keeps nothing from the spool, and neither keeps an encoder from being read.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/client/text/json.hpp"
+#include "absenc/serve/fleet.hpp"
+#include "absenc/serve/outlets.hpp"
+
+namespace absenc::serve {
+
+struct MqttHealth {
+  std::string broker{};
+  std::string prefix{};
+  bool connected = false;
+  std::string trouble{};      // why it is not, or why nothing can be spooled; "": nothing is wrong
+  std::uint64_t waiting = 0;  // messages in the spool
+  std::int64_t waiting_bytes = 0;
+  std::uint64_t sent = 0;     // messages that the broker has taken since the start
+  std::uint64_t dropped = 0;  // readings since the start: the spool was full, or could not be written
+  std::map<std::string, std::uint64_t> taken{};  // by encoder: up to this number, its readings are in the spool or sent
+
+  [[nodiscard]] client::Json json() const;
+  /// Lines for Prometheus.
+  [[nodiscard]] std::string metrics() const;
+};
+
+class Mqtt {
+ public:
+  /// `fleet` and `happenings` outlive it. Throws Failure: the spool or a file cannot be used.
+  Mqtt(const MqttSettings& settings, const Fleet& fleet, Happenings& happenings);
+  /// Spools what there still is; gives a broker that is there a second to take it.
+  ~Mqtt();
+  Mqtt(const Mqtt&) = delete;
+  Mqtt& operator=(const Mqtt&) = delete;
+
+  void add(const std::vector<Happening>& happenings);
+  [[nodiscard]] MqttHealth health() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace absenc::serve

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/mqtt_collector.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/serve/mqtt_messages.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+constexpr std::size_t most_in_a_message = 250;                       // 15 kB: less than any broker refuses
+constexpr Time between_dropped_tellings = std::chrono::seconds(10);  // each is a message itself
+
+}  // namespace
+
+MqttCollector::MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, Happenings& happenings)
+    : settings_(&settings),
+      spool_(&spool),
+      fleet_(&fleet),
+      happenings_(&happenings),
+      next_id_(spool.next_id()),
+      next_numbers_(spool.next_numbers()),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+MqttCollector::~MqttCollector() {
+  thread_.request_stop();
+  thread_.join();
+  collect();
+}
+
+void MqttCollector::add(const std::vector<Happening>& happenings) {
+  const std::lock_guard lock(mutex_);
+  waiting_.insert(waiting_.end(), happenings.begin(), happenings.end());
+}
+
+MqttCollector::Figures MqttCollector::figures() const {
+  const std::lock_guard lock(mutex_);
+  return figures_;
+}
+
+void MqttCollector::work(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    const Time due = os::now() + settings_->batch;
+    collect();
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, stop, std::max<Time>(due - os::now(), Time{}), [] { return false; });
+  }
+}
+
+// Random, so that after a loss of power, which may take back what stood in the file, no id comes for something else.
+std::string MqttCollector::id_text(std::int64_t id) const { return fmt::format("{}-{}", spool_->run(), id); }
+
+void MqttCollector::collect() {
+  std::vector<Message> messages;
+  std::map<std::string, std::uint64_t> changed;
+  for (const auto& watch : fleet_->all()) {
+    Outbox::Taken taken = watch->take_passing(Watch::Outlet::mqtt);
+    if (taken.dropped != 0) {
+      next_numbers_.try_emplace(watch->name(), 1).first->second += taken.dropped;
+      note_dropped({0, taken.dropped}, "the disk was too slow");
+    }
+    if (taken.readings.empty()) continue;
+    collect_readings(*watch, std::move(taken.readings), messages);
+    changed[watch->name()] = next_numbers_[watch->name()];
+  }
+  std::vector<Happening> happenings;
+  {
+    const std::lock_guard lock(mutex_);
+    happenings = std::exchange(waiting_, {});
+  }
+  for (const Happening& one : happenings) {
+    const std::int64_t id = next_id_ + static_cast<std::int64_t>(messages.size());
+    messages.push_back({id, topic_of(settings_->prefix, one.encoder, "event"), event_text(id_text(id), one), 0});
+  }
+  if (!messages.empty()) spool(messages, changed);
+  if (untold_.messages + untold_.readings == 0 || os::now() < next_told_) return;
+  next_told_ = os::now() + between_dropped_tellings;
+  const Spool::Counts told = std::exchange(untold_, {});
+  happenings_->add({calendar_ms(), "", "mqtt",
+                    fmt::format("{} readings in {} messages were dropped, the oldest first: {}", told.readings,
+                                told.messages, untold_why_)});
+}
+
+void MqttCollector::collect_readings(const Watch& watch, std::vector<Passing> readings,
+                                     std::vector<Message>& messages) {
+  const std::string topic = topic_of(settings_->prefix, watch.name(), "readings");
+  std::uint64_t& next = next_numbers_.try_emplace(watch.name(), 1).first->second;
+  for (std::span<const Passing> rest(readings); !rest.empty();) {
+    const std::span<const Passing> piece = rest.first(std::min(rest.size(), most_in_a_message));
+    const std::int64_t id = next_id_ + static_cast<std::int64_t>(messages.size());
+    messages.push_back({id, topic, readings_text(id_text(id), watch, next, piece), piece.size()});
+    next += piece.size();
+    rest = rest.subspan(piece.size());
+  }
+}
+
+void MqttCollector::spool(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& changed) {
+  try {
+    const Spool::Counts dropped = spool_->add(messages, changed);
+    next_id_ += static_cast<std::int64_t>(messages.size());
+    if (dropped.messages != 0) note_dropped(dropped, "the spool is full");
+    const std::lock_guard lock(mutex_);
+    for (const auto& [name, next] : changed) figures_.taken[name] = next - 1;
+    figures_.trouble.clear();
+  } catch (const Failure& failure) {
+    Spool::Counts lost{messages.size(), 0};
+    for (const Message& one : messages) lost.readings += one.readings;
+    note_dropped(lost, failure.what());
+    const std::lock_guard lock(mutex_);
+    figures_.trouble = failure.what();
+  }
+}
+
+void MqttCollector::note_dropped(const Spool::Counts& dropped, const std::string& why) {
+  untold_.messages += dropped.messages;
+  untold_.readings += dropped.readings;
+  untold_why_ = why;
+  const std::lock_guard lock(mutex_);
+  figures_.dropped += dropped.readings;
+}
+
+}  // namespace absenc::serve

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/mqtt_sender.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "absenc/client/error.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/network.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/serve/view.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t most_messages_out = 500;  // that are not acknowledged yet
+constexpr Time one_wait = 20ms;
+constexpr Time between_state_looks = 200ms;
+constexpr Time between_many_state_looks = 1s;  // of more encoders than many
+constexpr std::size_t many = 50;
+constexpr Time between_values = 1s;  // for Home Assistant
+constexpr Time first_pause = 500ms;  // between two attempts to connect; each is twice the one before
+constexpr Time longest_pause = 5s;
+constexpr Time time_to_connect = 10s;
+constexpr Time time_to_finish = 1s;
+
+}  // namespace
+
+MqttSender::MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, Happenings& happenings)
+    : settings_(&settings), spool_(&spool), fleet_(&fleet), happenings_(&happenings) {
+  for (const auto& [name, next] : spool.next_numbers()) served_.insert(name);
+  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // whether its files are good
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+MqttSender::~MqttSender() {
+  thread_.request_stop();
+  thread_.join();
+}
+
+MqttClient::Identity MqttSender::identity() const {
+  return {"absenc-" + spool_->source(), topic_of(settings_->prefix, "", "state"),
+          server_state_text("offline", "the connection was lost")};
+}
+
+MqttSender::Figures MqttSender::figures() const {
+  const std::lock_guard lock(mutex_);
+  return figures_;
+}
+
+void MqttSender::work(const std::stop_token& stop) {
+  Time pause = first_pause;
+  while (!stop.stop_requested()) {
+    const MqttClient::Version tried = version_;
+    try {
+      attend(stop);
+    } catch (const Failure& failure) {
+      become_lost(failure.what());
+    } catch (const os::Failure& failure) {  // of its name
+      become_lost(failure.what());
+    }
+    if (version_ != tried) continue;
+    if (has_taken_) pause = first_pause;
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, stop, pause, [] { return false; });
+    pause = std::min(2 * pause, longest_pause);
+  }
+}
+
+// One connection, from its begin to its end. What was not acknowledged in it begins anew in the next, in order.
+void MqttSender::attend(const std::stop_token& stop) {
+  outstanding_.clear();
+  messages_out_ = 0;
+  last_sent_ = 0;
+  has_taken_ = false;
+  retained_.clear();
+  next_states_ = {};
+  std::vector<std::string> hosts = os::addresses_of(settings_->broker.host);
+  const bool by_name = settings_->broker.tls;  // which the certificate is for
+  const bool try_all = by_name && hosts.size() > 1;
+  if (by_name) hosts = {settings_->broker.host};
+  std::string why;
+  for (const std::string& host : hosts) {
+    MqttClient client(settings_->broker, identity(), version_);
+    const MqttClient::State state = connect(client, host, try_all, stop);
+    if (stop.stop_requested()) return;
+    if (client.wrong_version()) {
+      version_ = MqttClient::Version::v3_1_1;
+      return;
+    }
+    if (state == MqttClient::State::connected) {
+      begin();
+      return deliver(client, stop);
+    }
+    why = state == MqttClient::State::lost ? client.trouble() : "it does not answer";
+  }
+  throw Failure(why);
+}
+
+MqttClient::State MqttSender::connect(MqttClient& client, const std::string& host, bool try_all,
+                                      const std::stop_token& stop) const {
+  const Time deadline = os::now() + time_to_connect;
+  client.connect(host, try_all);
+  MqttClient::State state = MqttClient::State::connecting;
+  while (state == MqttClient::State::connecting && !stop.stop_requested() && os::now() < deadline) {
+    state = client.work(one_wait);
+  }
+  return state;
+}
+
+void MqttSender::begin() {
+  told_lost_ = false;
+  {
+    const std::lock_guard lock(mutex_);
+    figures_.connected = true;
+    figures_.trouble.clear();
+  }
+  const bool old = version_ == MqttClient::Version::v3_1_1;
+  happenings_->add(
+      {calendar_ms(), "", "mqtt",
+       fmt::format("connected to {}{}", settings_->broker.text(),
+                   old ? ", which knows MQTT 3.1.1 only: it does not say when it refuses a message" : "")});
+}
+
+void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
+  send_retained(client, {topic_of(settings_->prefix, "", "state"), "online", server_state_text("online", "")});
+  while (!stop.stop_requested()) {
+    if (os::now() >= next_states_) {
+      next_states_ = os::now() + (fleet_->all().size() > many ? between_many_state_looks : between_state_looks);
+      send_states(client);
+    }
+    if (!settings_->home_assistant.empty() && os::now() >= next_values_) {
+      next_values_ = os::now() + between_values;
+      send_values(client);
+    }
+    step(client);
+  }
+  finish(client);
+}
+
+void MqttSender::step(MqttClient& client) {
+  send_messages(client);
+  const bool lost = client.work(one_wait) == MqttClient::State::lost;
+  settle(client);  // also what came before it was lost
+  if (lost) throw Failure(client.trouble());
+}
+
+void MqttSender::finish(MqttClient& client) {
+  const Time deadline = os::now() + time_to_finish;
+  send_states(client);
+  while (os::now() < deadline && (spool_->held().messages != 0 || !outstanding_.empty())) step(client);
+  send_retained(client, {topic_of(settings_->prefix, "", "state"), "ended", server_state_text("offline", "it ended")});
+  while (os::now() < deadline && !outstanding_.empty()) step(client);
+  client.end();
+  const std::lock_guard lock(mutex_);
+  figures_.connected = false;
+}
+
+void MqttSender::send_states(MqttClient& client) {
+  const Fleet::Watches watches = fleet_->all();
+  clear_gone(client, watches);
+  for (const auto& watch : watches) {
+    if (!settings_->home_assistant.empty() &&
+        !retained_.contains(topic_of(settings_->prefix, watch->name(), "state"))) {
+      for (const Retained& one : home_assistant_entities(*settings_, *watch)) send_retained(client, one);
+    }
+    send_retained(client, encoder_state(settings_->prefix, *watch, watch->snapshot(false)));
+  }
+}
+
+// What a broker keeps of an encoder that is no longer served would stand there for ever.
+void MqttSender::clear_gone(MqttClient& client, const Fleet::Watches& watches) {
+  std::set<std::string> now;
+  for (const auto& watch : watches) now.insert(watch->name());
+  for (const std::string& name : served_) {
+    if (now.contains(name)) continue;
+    send_retained(client, {topic_of(settings_->prefix, name, "state"), "", ""});
+    retained_.erase(topic_of(settings_->prefix, name, "state"));
+    if (!settings_->home_assistant.empty()) {
+      for (const std::string& topic : home_assistant_topics(*settings_, name)) {
+        send_retained(client, {topic, "", ""});
+        retained_.erase(topic);
+      }
+    }
+    spool_->forget(name);
+  }
+  served_ = now;
+}
+
+void MqttSender::send_values(MqttClient& client) {
+  for (const auto& watch : fleet_->all()) {
+    const Snapshot snapshot = watch->snapshot(false);
+    if (snapshot.state != State::live) continue;
+    const std::string text = overview(*watch, snapshot).line();
+    if (!client.publish(topic_of(settings_->prefix, watch->name(), "value"), text, 0, false)) {
+      throw Failure(client.trouble());
+    }
+  }
+}
+
+void MqttSender::send_retained(MqttClient& client, const Retained& retained) {
+  const auto [known, is_new] = retained_.try_emplace(retained.topic);
+  if (!is_new && known->second == retained.condition) return;
+  known->second = retained.condition;
+  const std::optional<int> number = client.publish(retained.topic, retained.payload, 1, true);
+  if (!number) throw Failure(client.trouble());
+  outstanding_[*number] = 0;
+}
+
+void MqttSender::send_messages(MqttClient& client) {
+  if (messages_out_ >= most_messages_out || spool_->held().messages <= messages_out_) return;
+  for (const Message& one : spool_->after(last_sent_, most_messages_out - messages_out_)) {
+    const std::optional<int> number = client.publish(one.topic, one.payload, 1, false);
+    if (!number) throw Failure(client.trouble());
+    outstanding_[*number] = one.id;
+    ++messages_out_;
+    last_sent_ = one.id;
+  }
+}
+
+// A message leaves the spool when the broker has said that it has it, and in no other way but for want of room.
+void MqttSender::settle(MqttClient& client) {
+  std::vector<std::int64_t> arrived;
+  std::string refused;
+  for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {
+    const auto found = outstanding_.find(one.number);
+    if (found == outstanding_.end()) continue;  // of QoS 0
+    if (found->second != 0) --messages_out_;
+    if (!one.refused.empty()) {
+      refused = one.refused;
+    } else if (found->second != 0) {
+      arrived.push_back(found->second);
+    }
+    outstanding_.erase(found);
+  }
+  if (!arrived.empty()) {
+    spool_->remove(arrived);
+    has_taken_ = true;
+    const std::lock_guard lock(mutex_);
+    figures_.sent += arrived.size();
+  }
+  if (!refused.empty()) throw Failure("the broker refuses a message: " + refused);
+}
+
+void MqttSender::become_lost(const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    figures_.connected = false;
+    figures_.trouble = why;
+  }
+  if (std::exchange(told_lost_, true)) return;
+  happenings_->add(
+      {calendar_ms(), "", "mqtt",
+       fmt::format("nothing reaches {}: {}; what it shall have waits on disk", settings_->broker.text(), why)});
+}
+
+}  // namespace absenc::serve

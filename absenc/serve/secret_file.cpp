@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/secret_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/text_file.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least) {
+  namespace fs = std::filesystem;
+  const std::string text = read_text_file("the " + title + "s", path);
+  const fs::perms others = fs::status(path).permissions() & (fs::perms::group_write | fs::perms::others_all);
+  if (others != fs::perms::none) {
+    throw Failure(fmt::format("others may read or write the {}s in {}: chmod 600 {}", title, path, path));
+  }
+  std::vector<Secret> secrets;
+  for (LineReader lines(text); lines.next();) {
+    const std::size_t space = lines.line.find_first_of(" \t");
+    const std::size_t secret = std::min(lines.line.find_first_not_of(" \t", space), lines.line.size());
+    if (space == std::string_view::npos || lines.line.size() - secret < least) {
+      throw Failure(fmt::format("{}:{}: a line must be NAME and {}, which has {} characters or more", path,
+                                lines.number, title, least));
+    }
+    secrets.push_back({std::string(lines.line.substr(0, space)), std::string(lines.line.substr(secret))});
+  }
+  if (secrets.empty()) throw Failure(fmt::format("there is no {} in {}: lines of NAME and {}", title, path, title));
+  return secrets;
+}
+
+Secret read_secret(const std::string& path) { return read_secrets("password", path, 1).front(); }
+
+}  // namespace absenc::serve

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/sending.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace absenc::serve {
+
+std::string Sending::change_to(const Outlets& outlets) {
+  std::string changed;
+  if (outlets.mqtt != now_.mqtt) {
+    std::shared_ptr<Mqtt> old;
+    {
+      const std::lock_guard lock(mutex_);
+      old = std::exchange(mqtt_, nullptr);
+    }
+    old.reset();  // the next one may have its spool, which is locked
+    now_.mqtt.reset();
+    std::shared_ptr<Mqtt> next;
+    if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *happenings_);
+    now_.mqtt = outlets.mqtt;
+    if (!outlets.mqtt) stop_passing(Watch::Outlet::mqtt);  // else they wait for the next one
+    changed += fmt::format("; MQTT: {}", outlets.mqtt ? outlets.mqtt->broker.text() : "none");
+    const std::lock_guard lock(mutex_);
+    mqtt_ = std::move(next);
+  }
+  if (outlets.udp != now_.udp) {
+    udp_.reset();
+    now_.udp.reset();
+    if (outlets.udp) udp_ = std::make_unique<UdpSender>(*outlets.udp, *fleet_);
+    now_.udp = outlets.udp;
+    if (!outlets.udp) stop_passing(Watch::Outlet::udp);
+    changed += fmt::format("; UDP: {}", outlets.udp ? outlets.udp->host : "none");
+  }
+  return changed;
+}
+
+void Sending::stop_passing(Watch::Outlet outlet) {
+  for (const auto& watch : fleet_->all()) watch->stop_passing(outlet);
+}
+
+std::shared_ptr<Mqtt> Sending::mqtt() const {
+  const std::lock_guard lock(mutex_);
+  return mqtt_;
+}
+
+void Sending::add(const std::vector<Happening>& happenings) {
+  if (const std::shared_ptr<Mqtt> to = mqtt()) to->add(happenings);
+}
+
+client::Json Sending::json() const {
+  const std::shared_ptr<Mqtt> of = mqtt();
+  return of ? of->health().json() : client::Json();
+}
+
+std::string Sending::metrics() const {
+  const std::shared_ptr<Mqtt> of = mqtt();
+  return of ? of->health().metrics() : std::string();
+}
+
+}  // namespace absenc::serve

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A broker of our own and a receiver for the tests of `absenc serve` with MQTT."""
+import json
+import os
+import socket
+import subprocess
+import threading
+import time
+
+import paho.mqtt.client as paho
+
+from command_support import PATIENCE, end
+from serve_support import wait_until
+
+MOSQUITTO = "/usr/sbin/mosquitto"
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def answers(port):
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE).close()
+        return True
+    except OSError:
+        return False
+
+
+class Daemon:
+    """Somebody else's server, until its port answers."""
+
+    def __init__(self, command, port, log, wait=True):
+        self.command, self.port, self.log = command, port, log
+        self.process = None
+        self.begin()
+        if wait:
+            self.wait()
+
+    def start(self):
+        self.begin()
+        self.wait()
+
+    def begin(self):
+        with open(self.log, "ab") as log:
+            self.process = subprocess.Popen(self.command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+
+    def wait(self):
+        wait_until(lambda: self.process.poll() is not None or answers(self.port), f"{self.command[0]} answers")
+        if self.process.poll() is not None:
+            with open(self.log, encoding="utf-8", errors="replace") as log:
+                raise AssertionError(f"{self.command} ended: {log.read()}")
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    def end(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                self.kill()
+
+
+class Broker(Daemon):
+    def __init__(self, directory, *settings, name="broker"):
+        port = free_port()
+        path = os.path.join(directory, name + ".conf")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("\n".join((f"listener {port} 127.0.0.1", "max_queued_messages 0",
+                                  *(settings or ("allow_anonymous true",)), "")))
+        super().__init__([MOSQUITTO, "-c", path], port, os.path.join(directory, name + ".log"))
+
+    @property
+    def url(self):
+        return f"mqtt://127.0.0.1:{self.port}"
+
+
+class Receiver:
+    """All that comes for a topic, in order: (topic, payload as JSON or None, retained)."""
+
+    def __init__(self, port, topics="#", version=paho.MQTTv5, client_id="", login=None):
+        self.messages = []
+        self.lock = threading.Lock()
+        self.ready = threading.Event()
+        keep = {"clean_session": not client_id} if version == paho.MQTTv311 else {}
+        self.client = paho.Client(client_id, protocol=version, **keep)
+        if login:
+            self.client.username_pw_set(*login)
+        self.topics = topics
+        self.client.on_connect = lambda *_: self.client.subscribe(topics, 1)
+        self.client.on_subscribe = lambda *_: self.ready.set()
+        self.client.on_message = self.take
+        self.client.reconnect_delay_set(1, 1)
+        self.client.connect("127.0.0.1", port)
+        self.client.loop_start()
+        if not self.ready.wait(PATIENCE):
+            raise AssertionError("the broker did not let us subscribe")
+
+    def take(self, _client, _data, message):
+        payload = json.loads(message.payload) if message.payload else None
+        with self.lock:
+            self.messages.append((message.topic, payload, bool(message.retain)))
+
+    def all(self, kind):
+        """Payloads of the topics that end in this."""
+        with self.lock:
+            return [payload for topic, payload, _ in self.messages if topic.endswith("/" + kind)]
+
+    def until(self, kind, wanted=lambda payload: True):
+        def found():
+            return next(([one] for one in self.all(kind) if wanted(one)), None)
+        return wait_until(found, f"a message {kind} comes")[0]
+
+    def end(self):
+        self.client.disconnect()
+        self.client.loop_stop()
+
+
+def numbers(messages, encoder):
+    """The numbers of the readings of an encoder, each message once, in the order in which they came."""
+    found, seen = [], set()
+    for one in messages:
+        if one["encoder"] == encoder and one["id"] not in seen:
+            seen.add(one["id"])
+            found += range(one["first"], one["first"] + len(one["readings"]))
+    return found
+
+
+def twice(messages):
+    """How many messages came again."""
+    return len(messages) - len({one["id"] for one in messages})
+
+
+def now():
+    return time.monotonic()
+
+
+__all__ = ["Broker", "Daemon", "Receiver", "answers", "end", "free_port", "now", "numbers", "twice"]
