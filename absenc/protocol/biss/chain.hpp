@@ -11,7 +11,7 @@ namespace absenc::biss {
 
 /// Slave 0 is the farthest from the host, and its word comes last: channel i is that of slave `count - 1 - i`.
 struct ChainFormat {
-  static constexpr unsigned most = 4;
+  static constexpr unsigned most = 8;  // data channels that a frame can have
   std::array<Channel, most> channels{};
   std::uint8_t count = 2;
   std::uint8_t slave = 0;  // whose position a reading shows, and whose registers are meant

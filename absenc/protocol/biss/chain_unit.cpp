@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <tuple>
+#include <utility>
 
 #include "absenc/protocol/biss/commands.hpp"
 #include "absenc/protocol/biss/device.hpp"
@@ -33,9 +34,16 @@ struct ChannelSettings {
             {crc_width, crc_poly, crc_init, crc_inverted, life_counter}};
   }
 };
-struct ChainSettings : ChainFormat, ChannelSettings<0>, ChannelSettings<1>, ChannelSettings<2>, ChannelSettings<3> {
+template <class>
+struct ChainSettingsOf;
+template <std::size_t... channel>
+struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, ChannelSettings<channel>... {
   std::uint8_t slaves = 2;
+
+  [[nodiscard]] constexpr std::array<Channel, most> all() const { return {ChannelSettings<channel>::channel()...}; }
 };
+using EveryChannel = std::make_index_sequence<most>;
+using ChainSettings = ChainSettingsOf<EveryChannel>;
 
 // ---- Names of each channel: channel0_crc_width
 
@@ -73,6 +81,11 @@ constexpr auto channel_options() {
   };
 }
 
+template <std::size_t... channel>
+constexpr auto options_of_channels(std::index_sequence<channel...>) {
+  return std::tuple_cat(channel_options<channel>()...);
+}
+
 constexpr auto options_of_chain = std::apply(
     [](const auto&... all) { return OptionsOf{all...}; },
     std::tuple_cat(
@@ -92,7 +105,7 @@ constexpr auto options_of_chain = std::apply(
                 "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
                 100'000'000)),
         },
-        channel_options<0>(), channel_options<1>(), channel_options<2>(), channel_options<3>()));
+        options_of_channels(EveryChannel{})));
 
 // ---- Fields of each channel; the shown one has those of any word besides
 
@@ -107,8 +120,16 @@ constexpr std::array<FieldInfo, in_all> channel_fields_of{{
     {name_of<i, "life_counter">, FieldInfo::Kind::number, "", "counts up with every frame"},
     {name_of<i, "crc">, FieldInfo::Kind::number, "", "as sent"},
 }};
-constexpr auto channel_fields = joined_fields(joined_fields(channel_fields_of<0>, channel_fields_of<1>),
-                                              joined_fields(channel_fields_of<2>, channel_fields_of<3>));
+template <std::size_t... channel>
+constexpr auto fields_of_channels(std::index_sequence<channel...>) {
+  std::array<FieldInfo, most * in_all> fields{};
+  const auto put = [&fields](std::size_t at, const std::array<FieldInfo, in_all>& of_channel) {
+    for (std::size_t i = 0; i < in_all; ++i) fields[at * in_all + i] = of_channel[i];
+  };
+  (put(channel, channel_fields_of<channel>), ...);
+  return fields;
+}
+constexpr auto channel_fields = fields_of_channels(EveryChannel{});
 
 constexpr void put_channel(FieldSink& sink, const Channel& channel, const ChannelData& data, unsigned index) {
   const auto put = [&](ChannelField field, std::uint64_t value) {
@@ -142,8 +163,7 @@ struct ChainDefinition {
   static constexpr ChainFormat format(const Options& values) {
     ChainSettings given = options.format(values);
     given.count = given.slaves;
-    given.channels = {given.ChannelSettings<0>::channel(), given.ChannelSettings<1>::channel(),
-                      given.ChannelSettings<2>::channel(), given.ChannelSettings<3>::channel()};
+    given.channels = given.all();
     return given;
   }
   static constexpr LineSettings line(const ChainFormat&) { return line_settings; }

@@ -37,7 +37,7 @@ constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, manufacturer
 }  // namespace
 
-VirtualRegisters::VirtualRegisters() {
+VirtualRegisters::VirtualRegisters(unsigned slaves) : slaves_(slaves) {
   for (unsigned slave = 0; slave < most_slaves; ++slave) {
     const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
     own[registers::eds_bank - registers::bank_size] = banks - 1;
@@ -63,7 +63,7 @@ std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
 
 // All but what tells which encoder this is, and banks that there are not.
 bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
-  if (slave >= most_slaves) return false;
+  if (slave >= slaves_) return false;
   if (address < registers::bank_size) return bank_[slave] < banks;
   if (!write || address == registers::bank_select) return true;
   return address >= registers::device && address < registers::device_id;
@@ -94,7 +94,7 @@ bool VirtualRegisters::is_ready() const {
 }
 
 // The commands of the standard, all of which only have to do with the line.
-bool VirtualRegisters::obeys(unsigned slave, unsigned command) const { return slave < most_slaves && command < 2; }
+bool VirtualRegisters::obeys(unsigned slave, unsigned command) const { return slave < slaves_ && command < 2; }
 
 void VirtualRegisters::execute(std::uint8_t, unsigned) {}
 
