@@ -2,6 +2,7 @@
 """BiSS of the command: frames of many encoders, safety words, chains, control frames, and registers."""
 import json
 import os
+import subprocess
 import tempfile
 import unittest
 
@@ -173,6 +174,33 @@ class Registers(Case):
         written = [one for one in control if one["operation"] == "write"]
         self.assertEqual([(one["address"], one["data"]) for one in written], [(3, "5a")])
         self.assertEqual((control[-1]["operation"], control[-1]["address"], control[-1]["data"]), ("read", 3, "5a"))
+
+
+    def test_sigrok_sees_the_same_positions(self):
+        """Its SPI decoder takes the bits, and a motor controller's way the frame apart: the position frame is the old one."""
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "drive.vcd")
+            self.assert_good(absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4"))
+            rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+            # "146500-146500 spi-1: 01": one bit, and when; each frame has its own, and then the clock rests for 40 us.
+            seen = subprocess.run(["sigrok-cli", "-I", "vcd", "-i", path, "--protocol-decoder-samplenum", "-P",
+                                   "spi:clk=clock:miso=data:cpol=1:cpha=1:wordsize=1", "-A", "spi=miso-data"],
+                                  capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
+        frames, before = [], 0
+        for line in seen:
+            at = int(line.split("-")[0])
+            if at - before > 20_000:
+                frames.append("")
+            frames[-1] += line[-1]
+            before = at
+        positions = []
+        for bits in frames:
+            data = bits.index("1", bits.index("0")) + 2
+            self.assertEqual(crc6(bits[data:data + 21]), bits[data + 21:data + 27])
+            self.assertEqual(bits[data + 19:data + 21], "11")
+            positions.append(int(bits[data:data + 19], 2))
+        self.assertGreater(len(set(positions)), 50)
+        self.assertEqual(positions, [row["fields"]["singleturn"] for row in rows if row["kind"] == "reply"])
 
 
 class ChangedRegisters(Case):
