@@ -15,6 +15,7 @@ struct ChainFormat {
   std::array<Channel, most> channels{};
   std::uint8_t count = 2;
   std::uint8_t slave = 0;  // whose position a reading shows, and whose registers are meant
+  RegisterOrder register_order = RegisterOrder::big;
   // As in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;

@@ -37,13 +37,14 @@ constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, manufacturer
 }  // namespace
 
-VirtualRegisters::VirtualRegisters(unsigned slaves) : slaves_(slaves) {
+VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order) : slaves_(slaves) {
+  const unsigned lowest = registers::serial_number + (order == RegisterOrder::big ? 3 : 0);
   for (unsigned slave = 0; slave < most_slaves; ++slave) {
     const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
     own[registers::eds_bank - registers::bank_size] = banks - 1;
     own[registers::profile - registers::bank_size] = 0;
     own[registers::profile + 1 - registers::bank_size] = 0;
-    own[registers::serial_number + 3 - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);
+    own[lowest - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);
     std::copy(identity.begin(), identity.end(), own.begin() + (registers::device_id - registers::bank_size));
   }
 }

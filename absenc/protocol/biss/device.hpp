@@ -87,7 +87,7 @@ class VirtualRegisters final : public ControlTarget {
   static constexpr unsigned most_slaves = ChainFormat::most;
 
   /// Of so many slaves: 1 to `most_slaves`.
-  explicit VirtualRegisters(unsigned slaves);
+  VirtualRegisters(unsigned slaves, RegisterOrder order);
   void power_on();
   /// What is asked for now is there `delay` later.
   void set_time(Time at, Time delay);
@@ -129,7 +129,9 @@ class VirtualEncoderOf final : public author::ClockedDevice {
                           .line_delay = format.line_delay,
                           .register_delay = format.register_delay}) {}
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
-      : encoder_(format, shaft, behaviour), slaves_(slaves_of(format)), registers_(slaves_of(format)) {}
+      : encoder_(format, shaft, behaviour),
+        slaves_(slaves_of(format)),
+        registers_(slaves_of(format), format.register_order) {}
 
   [[nodiscard]] MutableBytes memory() override { return registers_.memory(); }
 

@@ -4,8 +4,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/result.hpp"
@@ -24,6 +26,10 @@ inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
 inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
 
+/// Of registers that are one number.
+enum class RegisterOrder : std::uint8_t { big, little };
+inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
+
 struct Format {
   WordFormat word = "position:19 error:1! warning:1!"_word;
   Check check{};
@@ -35,6 +41,7 @@ struct Format {
   Time line_delay{};
   Time register_delay{};   // until a register that was asked for is there
   std::uint8_t slave = 0;  // whose registers are meant: 0 to 7, counted from the end of the chain
+  RegisterOrder register_order = RegisterOrder::big;
 
   /// Of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }

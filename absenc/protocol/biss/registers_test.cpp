@@ -247,6 +247,32 @@ TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
   EXPECT_EQ(host.machine.found().wrong, 0u);
 }
 
+struct Asked final : author::Run<Protocol, Found, read_info<Format>> {
+  using author::Run<Protocol, Found, read_info<Format>>::Run;
+  void report(FieldSink&) const override {}
+};
+
+TEST(BissRegisters, SomeMakersHaveTheLowByteFirst) {
+  for (const RegisterOrder encoders : {RegisterOrder::big, RegisterOrder::little}) {
+    for (const RegisterOrder hosts : {RegisterOrder::big, RegisterOrder::little}) {
+      Format of_encoder = bits_24;
+      of_encoder.register_order = encoders;
+      Format of_host = bits_24;
+      of_host.register_order = hosts;
+      const sim::Motion motion = sim::Motion::constant_speed(0, 600);
+      VirtualEncoder encoder(of_encoder, motion);
+      encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+      std::vector<std::byte> storage(4096);
+      Asked asked(of_host, {}, storage);
+      sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
+      line.attach(sim::Role::device, encoder);
+      EXPECT_TRUE(line.run(line.attach(sim::Role::host, asked), 10s));
+      ASSERT_EQ(asked.error(), Error::none);
+      EXPECT_EQ(asked.found().serial_number, encoders == hosts ? 1u : 0x0100'0000u);
+    }
+  }
+}
+
 TEST(BissRegisters, AnEncoderThatIsSlowIsWaitedFor) {
   Format format = bits_24;
   format.register_delay = 15ms;

@@ -38,6 +38,7 @@ struct SafetyFormat {
   Time line_delay{};
   Time register_delay{};
   std::uint8_t slave = 0;
+  RegisterOrder register_order = RegisterOrder::big;
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
 };
