@@ -105,6 +105,25 @@ class LongChains(Case):
         self.assertEqual(damaged["error"], "bad_checksum")
 
 
+    def test_a_word_is_that_of_all_of_them(self):
+        chain = "sim:biss-chain?slaves=5&word=skip:3 position:24 temperature=value:8 error:1! warning:1!"
+        for slave in (0, 4):
+            result = absenc("read", f"{chain}&slave={slave}&unit_um=0.05", "--json")
+            self.assert_good(result)
+            self.assertIn("position_um", json.loads(result.stdout))
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "chain.vcd")
+            self.assert_good(absenc("wave", chain.removeprefix("sim:") + "&motion=rpm=600", path, "--count", "5"))
+            rows = json_lines(absenc("decode", "biss-chain", path, "--option", "slaves=5", "--option",
+                                     chain.split("&")[1], "--json").stdout)
+        self.assertEqual([row["ok"] for row in rows], [True] * 5)
+        for fields in (row["fields"] for row in rows):
+            self.assertEqual({fields[f"channel{index}_singleturn"] for index in range(5)}, {fields["singleturn"]})
+            self.assertIn("temperature", fields)
+        beside = absenc("read", f"{chain}&channel0_singleturn_bits=12")
+        self.assertEqual(beside.returncode, 2)
+
+
 class Registers(Case):
     def info(self, encoder):
         result = absenc("info", encoder, "--json")

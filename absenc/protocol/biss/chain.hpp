@@ -22,6 +22,7 @@ struct ChainFormat {
   Time ready{};
   Time line_delay{};
   Time register_delay{};
+  Scale scale{};  // of all: linear encoders
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
   /// The channel of the slave that a reading shows.
@@ -85,7 +86,7 @@ constexpr void show(const ChainFormat& format, const ShaftState& state, std::uin
 
 [[nodiscard]] constexpr Reading reading_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
-  return to_reading(format.channels[shown].word, reply.channels[shown].word, {});
+  return to_reading(format.channels[shown].word, reply.channels[shown].word, format.scale);
 }
 
 }  // namespace absenc::biss

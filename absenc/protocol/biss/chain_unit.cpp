@@ -39,6 +39,7 @@ struct ChainSettingsOf;
 template <std::size_t... channel>
 struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, ChannelSettings<channel>... {
   std::uint8_t slaves = 2;
+  std::int64_t unit_pm = 0;
 
   [[nodiscard]] constexpr std::array<Channel, most> all() const { return {ChannelSettings<channel>::channel()...}; }
 };
@@ -71,8 +72,9 @@ template <unsigned i>
 constexpr auto channel_options() {
   using Of = ChannelSettings<i>;
   return std::tuple{
-      option<&Of::singleturn_bits>(name_of<i, "singleturn_bits">, "bits of the position", 1, 64),
-      option<&Of::multiturn_bits>(name_of<i, "multiturn_bits">, "bits of the turns; 0: no turns", 0, 63),
+      describing_word(option<&Of::singleturn_bits>(name_of<i, "singleturn_bits">, "bits of the position", 1, 64)),
+      describing_word(
+          option<&Of::multiturn_bits>(name_of<i, "multiturn_bits">, "bits of the turns; 0: no turns", 0, 63)),
       option<&Of::crc_width>(name_of<i, "crc_width">, "bits of the CRC; 0: there is none", 0, 16),
       option<&Of::crc_poly>(name_of<i, "crc_poly">, "its polynomial without the highest power", 0, 0xFFFF),
       option<&Of::crc_init>(name_of<i, "crc_init">, "its start value", 0, 0xFFFF),
@@ -94,6 +96,7 @@ constexpr auto options_of_chain = std::apply(
             option<&ChainSettings::slave>(
                 "slave", "whose position is read, and whose registers: 0 is at the end of the line, its word the last",
                 0, most - 1),
+            OptionOf<&ChainSettings::unit_pm>{unit_um_option},
             option<&ChainSettings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
             decimal<3>(option<&ChainSettings::latency>(
                 "latency_us",
@@ -167,11 +170,15 @@ struct ChainDefinition {
     ChainSettings given = options.format(values);
     given.count = given.slaves;
     given.channels = given.all();
+    if (values.has_word()) {
+      for (Channel& channel : given.channels) channel.word = values.word;
+      given.scale = {.linear = given.unit_pm != 0, .unit_um = static_cast<double>(given.unit_pm) / 1e6};
+    }
     return given;
   }
   static constexpr LineSettings line(const ChainFormat&) { return line_settings; }
   static constexpr Resolution resolution(const ChainFormat& format) {
-    return resolution_of(format.channels[format.shown()].word, {});
+    return resolution_of(format.channels[format.shown()].word, format.scale);
   }
   static constexpr bool is_usable(const ChainFormat& format) { return biss::is_usable(format); }
 
@@ -188,7 +195,7 @@ struct ChainDefinition {
     sink.put({&own_fields[field_ack_bits], reply.ack_bits});
     for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
     const unsigned shown = format.shown();
-    put_word(sink, format.channels[shown].word, reply.channels[shown].word, {});
+    put_word(sink, format.channels[shown].word, reply.channels[shown].word, format.scale);
   }
   static constexpr void put(FieldSink& sink, const ChainFormat&, const Found& found) {
     register_fields.put(sink, found);
