@@ -16,12 +16,12 @@ struct ChainFormat {
   std::uint8_t count = 2;
   std::uint8_t slave = 0;  // whose position a reading shows, and whose registers are meant
   RegisterOrder register_order = RegisterOrder::big;
+  std::uint16_t register_delay_us = 0;
   // As in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};
   Time line_delay{};
-  Time register_delay{};
   Scale scale{};  // of all: linear encoders
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }

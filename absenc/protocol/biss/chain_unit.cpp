@@ -107,9 +107,9 @@ constexpr auto options_of_chain = std::apply(
             option<&ChainSettings::register_order>("register_byte_order",
                                                    "of profile and serial number: some makers have the low byte first",
                                                    register_order_choices),
-            decimal<3>(option<&ChainSettings::register_delay>(
+            option<&ChainSettings::register_delay_us>(
                 "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
-                100'000'000)),
+                65'535),
         },
         options_of_channels(EveryChannel{})));
 
@@ -155,7 +155,7 @@ struct ChainDefinition {
   static constexpr std::string_view id = "biss-chain", name = "BiSS-C, several encoders in a chain",
                                     document = "BiSS C Protocol Description rev D2";
   static constexpr LinkKind link = LinkKind::clocked;
-  static constexpr std::size_t frames_size = 2400;
+  static constexpr std::size_t frames_size = 6400;
 
   static constexpr const auto& options = options_of_chain;
   static constexpr std::array models{ModelText{"two-19", "two encoders of 19 bits", 0, "slaves=2"}};

@@ -127,7 +127,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       : VirtualEncoderOf(format, shaft,
                          {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
                           .line_delay = format.line_delay,
-                          .register_delay = format.register_delay}) {}
+                          .register_delay = std::chrono::microseconds(format.register_delay_us)}) {}
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour),
         slaves_(slaves_of(format)),

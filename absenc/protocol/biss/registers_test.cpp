@@ -275,7 +275,7 @@ TEST(BissRegisters, SomeMakersHaveTheLowByteFirst) {
 
 TEST(BissRegisters, AnEncoderThatIsSlowIsWaitedFor) {
   Format format = bits_24;
-  format.register_delay = 15ms;
+  format.register_delay_us = 15'000;
   Host<Format> host(format, 1'000);
   const Outcome seen = run(host, format, {});
   EXPECT_EQ(host.machine.found().failures, 0u);

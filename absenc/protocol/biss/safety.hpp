@@ -36,7 +36,7 @@ struct SafetyFormat {
   Time latency = 10us;
   Time ready{};
   Time line_delay{};
-  Time register_delay{};
+  std::uint16_t register_delay_us = 0;
   std::uint8_t slave = 0;
   RegisterOrder register_order = RegisterOrder::big;
 

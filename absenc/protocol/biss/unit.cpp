@@ -60,9 +60,8 @@ struct Definition {
       option<&Settings::register_order>("register_byte_order",
                                         "of profile and serial number: some makers have the low byte first",
                                         register_order_choices),
-      decimal<3>(option<&Settings::register_delay>(
-          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
-          100'000'000)),
+      option<&Settings::register_delay_us>(
+          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535),
   };
   static constexpr auto models = position_models;
   static constexpr struct {
