@@ -2,6 +2,7 @@
 """BiSS of the command: frames of many encoders, safety words, chains, control frames, and registers."""
 import json
 import os
+import subprocess
 import tempfile
 import unittest
 
@@ -79,6 +80,50 @@ class Vectors(Case):
         self.assertEqual(seen, FORMS)
 
 
+def crc6(bits):
+    """x^6 + x + 1, inverted."""
+    rest = 0
+    for bit in bits + "000000":
+        rest = rest << 1 | int(bit)
+        rest ^= 0x43 if rest & 0x40 else 0
+    return f"{rest ^ 0x3F:06b}"
+
+
+class LongChains(Case):
+    def test_eight_words_are_decoded(self):
+        places = [(12 + index, 0x5A5A5A * (index + 1) % (1 << 12 + index)) for index in range(8)]
+        words = [f"{place:0{bits}b}" + ("10" if bits == 14 else "11") for bits, place in places]
+        frame = "11000010" + "".join(word + crc6(word) for word in words)
+        options = {"slaves": 8, "slave": 2} | {f"channel{i}_singleturn_bits": bits for i, (bits, _) in enumerate(places)}
+        answer = decode("biss-chain", "--hex", frame, *option_arguments(options))
+        self.assertTrue(answer["ok"], answer)
+        fields = answer["fields"]
+        for i, (bits, place) in enumerate(places):
+            self.assertEqual((fields[f"channel{i}_singleturn"], fields[f"channel{i}_warning"]), (place, bits == 14))
+        self.assertEqual(fields["singleturn"], places[5][1])
+        damaged = decode("biss-chain", "--hex", frame[:-1] + str(1 - int(frame[-1])), *option_arguments(options))
+        self.assertEqual(damaged["error"], "bad_checksum")
+
+
+    def test_a_word_is_that_of_all_of_them(self):
+        chain = "sim:biss-chain?slaves=5&word=skip:3 position:24 temperature=value:8 error:1! warning:1!"
+        for slave in (0, 4):
+            result = absenc("read", f"{chain}&slave={slave}&unit_um=0.05", "--json")
+            self.assert_good(result)
+            self.assertIn("position_um", json.loads(result.stdout))
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "chain.vcd")
+            self.assert_good(absenc("wave", chain.removeprefix("sim:") + "&motion=rpm=600", path, "--count", "5"))
+            rows = json_lines(absenc("decode", "biss-chain", path, "--option", "slaves=5", "--option",
+                                     chain.split("&")[1], "--json").stdout)
+        self.assertEqual([row["ok"] for row in rows], [True] * 5)
+        for fields in (row["fields"] for row in rows):
+            self.assertEqual({fields[f"channel{index}_singleturn"] for index in range(5)}, {fields["singleturn"]})
+            self.assertIn("temperature", fields)
+        beside = absenc("read", f"{chain}&channel0_singleturn_bits=12")
+        self.assertEqual(beside.returncode, 2)
+
+
 class Registers(Case):
     def info(self, encoder):
         result = absenc("info", encoder, "--json")
@@ -105,6 +150,29 @@ class Registers(Case):
             info = self.info(f"sim:biss-chain?slaves=3&slave={slave}")
             self.assertEqual((info["slave_id"], info["serial_number"], info["slaves"]), (slave, slave + 1, 3))
 
+    def test_eight_encoders_are_read_emulated_and_decoded(self):
+        """As many as a frame can have: each with a word of its own."""
+        bits = {index: 12 + index for index in range(8)}
+        chain = "slaves=8&" + "&".join(f"channel{index}_singleturn_bits={count}" for index, count in bits.items())
+        for slave in (0, 4, 7):
+            info = self.info(f"sim:biss-chain?{chain}&slave={slave}")
+            self.assertEqual((info["slave_id"], info["serial_number"], info["slaves"]), (slave, slave + 1, 8))
+            read = json.loads(absenc("read", f"sim:biss-chain?{chain}&slave={slave}", "--json").stdout)
+            self.assertEqual(read["singleturn_bits"], bits[7 - slave])
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "chain.vcd")
+            self.assert_good(absenc("wave", f"biss-chain?{chain}&motion=rpm=600", path,
+                                    "--command", "memory-read 68 0 4"))
+            options = [word for option in chain.split("&") for word in ("--option", option)]
+            rows = json_lines(absenc("decode", "biss-chain", path, *options, "--json").stdout)
+        words = [row["fields"] for row in rows if row["kind"] == "reply"]
+        self.assertGreater(len(words), 20)
+        for word in words:
+            places = [word[f"channel{index}_singleturn"] / 2 ** count for index, count in bits.items()]
+            self.assertTrue(all(abs(place - places[-1]) <= 2 ** -12 for place in places), places)
+        asked = [row["fields"] for row in rows if row["kind"] == "exchange"]
+        self.assertEqual([(one["slaves"], one["data"]) for one in asked], [(8, "00000001")])
+
     def test_an_encoder_that_has_safety_words_has_registers_too(self):
         self.assertEqual(self.info("sim:biss-safety")["slaves"], 2)
 
@@ -127,7 +195,34 @@ class Registers(Case):
         self.assertEqual((control[-1]["operation"], control[-1]["address"], control[-1]["data"]), ("read", 3, "5a"))
 
 
-class Registers(Case):
+    def test_sigrok_sees_the_same_positions(self):
+        """Its SPI decoder takes the bits, and a motor controller's way the frame apart: the position frame is the old one."""
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "drive.vcd")
+            self.assert_good(absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4"))
+            rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+            # "146500-146500 spi-1: 01": one bit, and when; each frame has its own, and then the clock rests for 40 us.
+            seen = subprocess.run(["sigrok-cli", "-I", "vcd", "-i", path, "--protocol-decoder-samplenum", "-P",
+                                   "spi:clk=clock:miso=data:cpol=1:cpha=1:wordsize=1", "-A", "spi=miso-data"],
+                                  capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
+        frames, before = [], 0
+        for line in seen:
+            at = int(line.split("-")[0])
+            if at - before > 20_000:
+                frames.append("")
+            frames[-1] += line[-1]
+            before = at
+        positions = []
+        for bits in frames:
+            data = bits.index("1", bits.index("0")) + 2
+            self.assertEqual(crc6(bits[data:data + 21]), bits[data + 21:data + 27])
+            self.assertEqual(bits[data + 19:data + 21], "11")
+            positions.append(int(bits[data:data + 19], 2))
+        self.assertGreater(len(set(positions)), 50)
+        self.assertEqual(positions, [row["fields"]["singleturn"] for row in rows if row["kind"] == "reply"])
+
+
+class ChangedRegisters(Case):
     def test_a_dump_is_loaded_and_verified(self):
         with tempfile.TemporaryDirectory(prefix="absenc-test-") as folder:
             dump = os.path.join(folder, "bank.dump")

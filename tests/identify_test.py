@@ -30,6 +30,14 @@ ENCODERS = [
 ]
 
 
+# What those that are asked say of themselves.
+IDENTITIES = {
+    "tformat": {"encoder_id"},
+    "esl": {"encoder_id"},
+    "encolink": {"part_number", "serial_number", "order_number", "serial_number_extended"},
+    "e201": {"version", "serial"},
+}
+
 SEARCH = 300  # seconds for a search on a busy machine; alone it takes ten
 
 
@@ -66,6 +74,10 @@ class OnALine(EncoderCase):
                 self.assertEqual({name: best["options"][name] for name in wanted}, wanted)
                 self.assertTrue(best["found"])
                 self.assertGreater(best["explained"], 0.9 * best["tried"])
+                said = set() if best["unasked"] else IDENTITIES.get(protocol, set())
+                self.assertEqual(set(best["identity"]), said)
+                if "encoder_id" in wanted:
+                    self.assertEqual(best["identity"]["encoder_id"], wanted["encoder_id"])
                 # The command to go on with does.
                 self.assertEqual(again.returncode, 0, again.stderr)
                 self.assertTrue(json_lines(again.stdout)[0]["ok"])
@@ -75,6 +87,7 @@ class OnALine(EncoderCase):
         result = absenc("identify", f"{emulator.path}?baud=2500000")
         self.assert_good(result)
         self.assertIn("6 of 6", result.stdout)
+        self.assertIn("\n1 says: encoder_id 23\n", result.stdout)
         self.assertRegex(result.stdout, r'go on with: absenc read "tformat:.*\?model=23-bit')
 
     def test_nothing_that_changes_an_encoder_is_sent(self):

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absenc/client/decode.hpp"
+#include "absenc/client/row.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
@@ -25,6 +26,7 @@ struct Found {
   std::size_t explained = 0;            // of them
   double log10_chance = 0;              // of the probability that noise explains as many
   bool sure = false;                    // it is small enough
+  Answer identity{};                    // of a line: what it says of itself, as its serial number
 };
 
 struct Identified {

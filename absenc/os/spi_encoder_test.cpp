@@ -94,6 +94,29 @@ TEST_F(SpiEncoder, RegistersAreAskedForByTheLevelOfTheClock) {
   EXPECT_EQ(host.bytes->error(), Error::none);
 }
 
+// Positions all the same: only who asks for registers is told, by what they can be read.
+TEST_F(SpiEncoder, AControllerThatOnlyIdlesHighReadsNoRegisters) {
+  Options options;
+  ASSERT_EQ(resolve_options(biss::unit, {}, {}, options).kind, OptionError::Kind::none);
+  biss::VirtualEncoder encoder(biss::Format{}, shaft);
+  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
+  SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
+  kernel.refusals[SPI_IOC_WR_MODE32] = EINVAL;
+  biss::ReadPosition read(biss::Format{});
+  ASSERT_TRUE(run(read, port));
+  EXPECT_EQ(read.error(), Error::none);
+  std::vector<std::byte> storage(biss::unit.host_storage);
+  const Any<Conversation> host = biss::unit.host(options, *find_command(biss::unit, Verb::info), {}, storage);
+  try {
+    static_cast<void>(run(*host.bytes, port));
+    ADD_FAILURE() << "it was read";
+  } catch (const Failure& failure) {
+    EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);
+    EXPECT_NE(std::string(failure.what()).find("use one with SPI modes 1 and 3"), std::string::npos) << failure.what();
+  }
+}
+
 TEST_F(SpiEncoder, Encolink) {
   const encolink::Format format{.resolution = 20, .multiturn_bits = 16, .interface = encolink::Interface::spi};
   const auto read = [&](encolink::VirtualEncoder& encoder, const SpiChoice& choice) {

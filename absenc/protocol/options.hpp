@@ -49,7 +49,7 @@ struct Model {
   std::span<const OptionValue> values;
 };
 
-inline constexpr std::size_t maximum_options = 40;
+inline constexpr std::size_t maximum_options = 64;
 
 /// What a word format is given as, beside the options of units that take one.
 inline constexpr std::string_view word_option_name = "word";

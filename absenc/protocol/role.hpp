@@ -18,6 +18,7 @@ enum class Role : std::uint8_t {
   sequence,     // field: counts the replies, so that one that was seen before can be told
   // Of a line
   encoder,      // option, field: which of the encoders on the line; in a scan a new record begins with it
+  identity,     // field: says which encoder it is: its type, its serial number
   clash,        // field of a scan: not 0: whatever answers there is damaged every time
   rate,         // option: bits a second
   maximum_rpm,  // option: how fast the shaft turns at most; 0: not known

@@ -2,7 +2,7 @@
 """Which encoder is on a line."""
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from . import _absenc
 
@@ -19,6 +19,7 @@ class Found(NamedTuple):
     explained: int  #: of them
     log10_chance: float  #: of the probability that noise explains as many
     sure: bool  #: it is small enough
+    identity: dict[str, Any]  #: of a line: what it says of itself, as its serial number
 
 
 class Identified(NamedTuple):

@@ -20,6 +20,7 @@ py::dict to_dict(const client::Found& found) {
   one["explained"] = found.explained;
   one["log10_chance"] = found.log10_chance;
   one["sure"] = found.sure;
+  one["identity"] = to_python(found.identity.columns, found.identity.values);
   return one;
 }
 

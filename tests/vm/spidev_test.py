@@ -161,6 +161,24 @@ class TheCommand(SpidevCase):
             self.assertEqual((reading["singleturn"], reading["multiturn"]), (0x5A5A5, 4660))
         self.assertNotIn("rules", self.summary(process))
 
+    def test_registers_of_biss(self):
+        """The clock idles low through the timeout where the host says 1: the mode is changed between messages."""
+        process = self.serve("biss", "--motion", "rpm=60")
+        encoder = "biss:spi:/dev/spidev9.0"
+        info = json.loads(self.good("info", encoder, "--json").stdout)["answers"]["info"]["fields"]
+        self.assertEqual((info["slaves"], info["serial_number"], bytes.fromhex(info["device_id"])), (1, 1, b"Absenc"))
+        self.good("memory", "write", encoder, "5", "0xA5", "--yes")
+        self.assertIn("a5", self.good("memory", "read", encoder, "5", "--json").stdout)
+        self.assertNotIn("rules", self.summary(process))
+
+    def test_who_it_is(self):
+        """A BiSS encoder that nobody knows: its word, and by its registers its serial number."""
+        self.serve("biss", "--motion", "rpm=60")
+        found = json.loads(self.good("identify", "spi:/dev/spidev9.0", "--json").stdout)["candidates"][0]
+        self.assertEqual((found["protocol"], found["options"]["singleturn_bits"]), ("biss", 19))
+        self.assertEqual(found["identity"]["serial_number"], 1)
+        self.assertEqual(bytes.fromhex(found["identity"]["device_id"]), b"Absenc")
+
     def test_it_turns_in_real_time(self):
         self.serve("encolink", "--motion", "rpm=60")
         lines = self.good("read", "encolink:spi:/dev/spidev9.0", "--count", "20", "--rate", "20", "--json").stdout

@@ -270,7 +270,7 @@ class Bench {
 
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
-  constexpr unsigned frames = 64;
+  constexpr unsigned frames = 20'000;  // one that is moved passes always or never: many of them
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Bench<std::uint8_t>(unit, options, {}, 7).good_replies(frames);
   if (replies.empty()) return {};

@@ -50,7 +50,8 @@ TEST_P(Computed, IsWhatIsCounted) {
 INSTANTIATE_TEST_SUITE_P(Units, Computed,
                          ::testing::Values(Named{"tformat", "bit=0.01", 8, 2}, Named{"tformat", "bit=0.003", 8, 2},
                                            Named{"tformat", "bit=0.05", 8, 2}, Named{"amt21", "bit=0.01", 2, 2},
-                                           Named{"amt21", "bit=0.1", 2, 2}, Named{"ssi", "bit=0.01", 0, 1}));
+                                           Named{"amt21", "bit=0.1", 2, 2}, Named{"ssi", "bit=0.01", 0, 1},
+                                           Named{"biss", "bit=0.005", 6, 3}, Named{"biss", "bit=0.02", 6, 3}));
 
 // The exclusive OR of eleven bytes: two errors pass in the same bit of two bytes, three in none.
 TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {

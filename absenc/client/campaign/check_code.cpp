@@ -190,14 +190,14 @@ bool CheckCode::is_check(std::size_t bit) const {
 
 // All bits but the check's are damaged by chance, the check's so that it is right. Such a word comes as often as its
 // check's bits are damaged just so, which is what it counts. With an error among the fixed bits there may be another
-// frame: then the check's bits are damaged by chance too.
+// frame: then the check's bits are damaged by chance too. An error that moves the frame passes in one frame and not in
+// another, whatever else is damaged: how much the frames differ is part of the deviation.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);
-  double sum = 0;
-  double squares = 0;
+  std::vector<double> of_frame(replies.size());
   for (unsigned i = 0; i < samples; ++i) {
-    const GoodReply& reply = replies[random.below(replies.size())];
+    const GoodReply& reply = replies[i % replies.size()];
     Asked asked(unit, options, reply);
     std::uint32_t syndrome = 0;
     bool damaged = false;
@@ -222,11 +222,17 @@ Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<c
     const double chance =
         by_chance ? 1
                   : std::pow(bit_errors, flipped) * std::pow(1 - bit_errors, static_cast<int>(check_bits()) - flipped);
-    sum += chance;
-    squares += chance * chance;
+    of_frame[i % replies.size()] += chance;
   }
-  const double mean = sum / samples;
-  return {mean, std::sqrt(std::max(0.0, squares / samples - mean * mean) / samples)};
+  double sum = 0;
+  double squares = 0;
+  for (const double one : of_frame) {
+    sum += one;
+    squares += one * one;
+  }
+  const auto frames = static_cast<double>(replies.size());
+  const double variance = std::max(0.0, squares / frames - sum / frames * sum / frames);
+  return {sum / samples, std::sqrt(variance * frames) / samples};
 }
 
 }  // namespace absenc::client

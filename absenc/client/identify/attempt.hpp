@@ -85,6 +85,14 @@ struct Addresses final : FieldSink {
   std::vector<std::int64_t> all;
 };
 
+/// Of what an encoder says only who it is.
+struct IdentitySink final : FieldSink {
+  void put(const FieldValue& value) override {
+    if (value.info->role == Role::identity) all.put(value);
+  }
+  AnswerSink all;
+};
+
 inline std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command) {
   std::vector<std::int64_t> arguments;
   for (const Argument& argument : command.arguments) arguments.push_back(argument.default_value);
@@ -157,6 +165,19 @@ class Attempt {
       }
       if (answered && unit_.link != LinkKind::clocked) return;
     }
+  }
+
+  /// Who the encoder with these options says it is: who was found may be asked more than who is looked for.
+  Answer introduce(const Options& options) {
+    IdentitySink identity;
+    for (const Command& command : unit_.commands) {
+      const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
+                                              [](const Argument& argument) { return argument.required; });
+      if (command.verb != Verb::info || command.changes_encoder || needs_argument) continue;
+      std::vector<HeardExchange> ignored;
+      converse(command, options, ignored, &identity);
+    }
+    return std::move(identity.all.answer);
   }
 
  private:

@@ -34,20 +34,6 @@ std::vector<std::string> differences(const Unit& unit, std::string_view model, c
   return settings;
 }
 
-// Settings of the port that are no options of the unit.
-std::vector<std::string> all_settings(const Candidate& candidate) {
-  std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
-  for (const std::string& one : candidate.link_settings) {
-    const std::string_view name = split_setting(one).name;
-    const Option* option = find_option(*candidate.unit, name);
-    const bool said = std::any_of(settings.begin(), settings.end(), [&](const std::string& other) {
-      return split_setting(other).name == (option != nullptr ? option->name : name);
-    });
-    if (!said) settings.push_back(one);
-  }
-  return settings;
-}
-
 }  // namespace
 
 bool is_found(const Candidate& candidate) { return candidate.hypothesis.chance() <= capture::is_found; }
@@ -69,6 +55,19 @@ std::vector<std::string> settings_for(const Unit& unit, const Options& options) 
   if (resolves_to(unit, {}, settings, options)) return settings;
   // A model agrees with these and says more.
   return option_texts(unit, options);
+}
+
+std::vector<std::string> all_settings(const Candidate& candidate) {
+  std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
+  for (const std::string& one : candidate.link_settings) {
+    const std::string_view name = split_setting(one).name;
+    const Option* option = find_option(*candidate.unit, name);
+    const bool said = std::any_of(settings.begin(), settings.end(), [&](const std::string& other) {
+      return split_setting(other).name == (option != nullptr ? option->name : name);
+    });
+    if (!said) settings.push_back(one);
+  }
+  return settings;
 }
 
 std::string address_of(const Candidate& candidate, std::string_view place) {

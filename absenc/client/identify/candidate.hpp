@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absenc/capture/search/hypotheses.hpp"
+#include "absenc/client/row.hpp"
 
 namespace absenc::client {
 
@@ -18,6 +19,7 @@ struct Candidate {
   bool unasked = false;                      // the encoder sends by itself
   std::string line{};                        // "RS-485 half duplex, 2.5 Mbit/s"
   std::string encoder{};                     // "address=3": which of those on the line; "": the only one
+  Answer identity{};                         // what it says of itself: its type, its serial number; of a line
 };
 
 /// Whether it is more than chance could do.
@@ -28,6 +30,9 @@ void rank(std::vector<Candidate>& candidates, std::size_t searches);
 
 /// The fewest settings ("name=value") that make these options, by a model if that is shorter.
 [[nodiscard]] std::vector<std::string> settings_for(const Unit& unit, const Options& options);
+
+/// What is behind the ? of its address: those and what the port needs.
+[[nodiscard]] std::vector<std::string> all_settings(const Candidate& candidate);
 
 /// To open it by: "tformat:/dev/ttyUSB0?model=23-bit"
 [[nodiscard]] std::string address_of(const Candidate& candidate, std::string_view place);

@@ -20,7 +20,8 @@ Found found(const Candidate& candidate, std::string_view place) {
           .tried = one.evidence.tried,
           .explained = one.evidence.explained,
           .log10_chance = one.chance(),
-          .sure = is_found(candidate)};
+          .sure = is_found(candidate),
+          .identity = candidate.identity};
 }
 
 }  // namespace

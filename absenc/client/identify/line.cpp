@@ -69,28 +69,66 @@ class Search {
   explicit Search(const LineSearch& search) : search_(search), deadline_(os::now() + search.limit) {}
 
   LineFindings run() {
+    while_there_is_time([this] { ask_everybody(); });
+    if (!opened_ && failure_) throw os::Failure(*failure_);
+    rank(findings_.candidates, findings_.searches);
+    drop_repeated();
+    while_there_is_time([this] { ask_who_they_are(); });
+    return std::move(findings_);
+  }
+
+ private:
+  template <class Work>
+  void while_there_is_time(const Work& work) {
+    if (findings_.out_of_time || findings_.interrupted) return;
     try {
-      for (const Unit* unit : all_units()) {
-        if (fits(*unit, search_)) attempt(*unit, search_.settings);
-      }
-      for (const Unit* unit : all_units()) {
-        if (fits(*unit, search_)) try_rates(*unit);
-      }
-      if (is_beyond_doubt()) cut_.clear();
-      patience_ = long_patience;
-      for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
+      work();
     } catch (const Stop&) {
       findings_.out_of_time = true;
     } catch (const os::Interrupted&) {
       findings_.interrupted = true;
     }
-    if (!opened_ && failure_) throw os::Failure(*failure_);
-    rank(findings_.candidates, findings_.searches);
-    drop_repeated();
-    return std::move(findings_);
   }
 
- private:
+  void ask_everybody() {
+    for (const Unit* unit : all_units()) {
+      if (fits(*unit, search_)) attempt(*unit, search_.settings);
+    }
+    for (const Unit* unit : all_units()) {
+      if (fits(*unit, search_)) try_rates(*unit);
+    }
+    if (is_beyond_doubt()) cut_.clear();
+    patience_ = long_patience;
+    for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
+  }
+
+  // Who was found, each of them once: the likeliest candidate.
+  void ask_who_they_are() {
+    std::set<std::pair<const Unit*, std::string>> asked;
+    for (Candidate& one : findings_.candidates) {
+      if (one.unasked || !is_found(one) || find_role(one.unit->fields, Role::identity) == nullptr) continue;
+      if (!asked.emplace(one.unit, one.encoder).second) continue;
+      if (search_.progress) search_.progress(fmt::format("{}: who it is", one.unit->id));
+      if (one.unit->link == LinkKind::can) {
+        introduce<CanFrame>(one);
+      } else {
+        introduce<std::uint8_t>(one);
+      }
+    }
+  }
+
+  // A port that was open a moment ago may be gone: what was found stays.
+  template <class Item>
+  void introduce(Candidate& candidate) {
+    try {
+      Attempt<Item> one(search_, *candidate.unit, all_settings(candidate), short_patience, deadline_, findings_);
+      one.open();
+      candidate.identity = one.introduce(candidate.hypothesis.options);
+    } catch (const os::Failure& failure) {
+      findings_.notes.push_back(fmt::format("not asked who it is: {}: {}", candidate.unit->id, failure.what()));
+    }
+  }
+
   void try_rates(const Unit& unit) {
     if (has_setting(search_.settings, rate_setting) || way_of(search_) != Way::serial) return;
     std::vector<std::string> rates;

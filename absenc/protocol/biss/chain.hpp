@@ -11,16 +11,18 @@ namespace absenc::biss {
 
 /// Slave 0 is the farthest from the host, and its word comes last: channel i is that of slave `count - 1 - i`.
 struct ChainFormat {
-  static constexpr unsigned most = 4;
+  static constexpr unsigned most = 8;  // data channels that a frame can have
   std::array<Channel, most> channels{};
   std::uint8_t count = 2;
   std::uint8_t slave = 0;  // whose position a reading shows, and whose registers are meant
+  RegisterOrder register_order = RegisterOrder::big;
+  std::uint16_t register_delay_us = 0;
   // As in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};
   Time line_delay{};
-  Time register_delay{};
+  Scale scale{};  // of all: linear encoders
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
   /// The channel of the slave that a reading shows.
@@ -84,7 +86,7 @@ constexpr void show(const ChainFormat& format, const ShaftState& state, std::uin
 
 [[nodiscard]] constexpr Reading reading_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
-  return to_reading(format.channels[shown].word, reply.channels[shown].word, {});
+  return to_reading(format.channels[shown].word, reply.channels[shown].word, format.scale);
 }
 
 }  // namespace absenc::biss

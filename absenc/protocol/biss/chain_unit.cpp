@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <tuple>
+#include <utility>
 
 #include "absenc/protocol/biss/commands.hpp"
 #include "absenc/protocol/biss/device.hpp"
@@ -33,9 +34,17 @@ struct ChannelSettings {
             {crc_width, crc_poly, crc_init, crc_inverted, life_counter}};
   }
 };
-struct ChainSettings : ChainFormat, ChannelSettings<0>, ChannelSettings<1>, ChannelSettings<2>, ChannelSettings<3> {
+template <class>
+struct ChainSettingsOf;
+template <std::size_t... channel>
+struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, ChannelSettings<channel>... {
   std::uint8_t slaves = 2;
+  std::int64_t unit_pm = 0;
+
+  [[nodiscard]] constexpr std::array<Channel, most> all() const { return {ChannelSettings<channel>::channel()...}; }
 };
+using EveryChannel = std::make_index_sequence<most>;
+using ChainSettings = ChainSettingsOf<EveryChannel>;
 
 // ---- Names of each channel: channel0_crc_width
 
@@ -63,14 +72,20 @@ template <unsigned i>
 constexpr auto channel_options() {
   using Of = ChannelSettings<i>;
   return std::tuple{
-      option<&Of::singleturn_bits>(name_of<i, "singleturn_bits">, "bits of the position", 1, 64),
-      option<&Of::multiturn_bits>(name_of<i, "multiturn_bits">, "bits of the turns; 0: no turns", 0, 63),
+      describing_word(option<&Of::singleturn_bits>(name_of<i, "singleturn_bits">, "bits of the position", 1, 64)),
+      describing_word(
+          option<&Of::multiturn_bits>(name_of<i, "multiturn_bits">, "bits of the turns; 0: no turns", 0, 63)),
       option<&Of::crc_width>(name_of<i, "crc_width">, "bits of the CRC; 0: there is none", 0, 16),
       option<&Of::crc_poly>(name_of<i, "crc_poly">, "its polynomial without the highest power", 0, 0xFFFF),
       option<&Of::crc_init>(name_of<i, "crc_init">, "its start value", 0, 0xFFFF),
       option<&Of::crc_inverted>(name_of<i, "crc_inverted">, "whether it is sent inverted"),
       option<&Of::life_counter>(name_of<i, "life_counter">, "6 bits before the CRC that count frames"),
   };
+}
+
+template <std::size_t... channel>
+constexpr auto options_of_channels(std::index_sequence<channel...>) {
+  return std::tuple_cat(channel_options<channel>()...);
 }
 
 constexpr auto options_of_chain = std::apply(
@@ -81,6 +96,7 @@ constexpr auto options_of_chain = std::apply(
             option<&ChainSettings::slave>(
                 "slave", "whose position is read, and whose registers: 0 is at the end of the line, its word the last",
                 0, most - 1),
+            OptionOf<&ChainSettings::unit_pm>{unit_um_option},
             option<&ChainSettings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
             decimal<3>(option<&ChainSettings::latency>(
                 "latency_us",
@@ -88,11 +104,14 @@ constexpr auto options_of_chain = std::apply(
                 0, 1'000'000)),
             option<&ChainSettings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
                                                100'000),
-            decimal<3>(option<&ChainSettings::register_delay>(
+            option<&ChainSettings::register_order>("register_byte_order",
+                                                   "of profile and serial number: some makers have the low byte first",
+                                                   register_order_choices),
+            option<&ChainSettings::register_delay_us>(
                 "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
-                100'000'000)),
+                65'535),
         },
-        channel_options<0>(), channel_options<1>(), channel_options<2>(), channel_options<3>()));
+        options_of_channels(EveryChannel{})));
 
 // ---- Fields of each channel; the shown one has those of any word besides
 
@@ -107,8 +126,16 @@ constexpr std::array<FieldInfo, in_all> channel_fields_of{{
     {name_of<i, "life_counter">, FieldInfo::Kind::number, "", "counts up with every frame"},
     {name_of<i, "crc">, FieldInfo::Kind::number, "", "as sent"},
 }};
-constexpr auto channel_fields = joined_fields(joined_fields(channel_fields_of<0>, channel_fields_of<1>),
-                                              joined_fields(channel_fields_of<2>, channel_fields_of<3>));
+template <std::size_t... channel>
+constexpr auto fields_of_channels(std::index_sequence<channel...>) {
+  std::array<FieldInfo, most * in_all> fields{};
+  const auto put = [&fields](std::size_t at, const std::array<FieldInfo, in_all>& of_channel) {
+    for (std::size_t i = 0; i < in_all; ++i) fields[at * in_all + i] = of_channel[i];
+  };
+  (put(channel, channel_fields_of<channel>), ...);
+  return fields;
+}
+constexpr auto channel_fields = fields_of_channels(EveryChannel{});
 
 constexpr void put_channel(FieldSink& sink, const Channel& channel, const ChannelData& data, unsigned index) {
   const auto put = [&](ChannelField field, std::uint64_t value) {
@@ -128,7 +155,7 @@ struct ChainDefinition {
   static constexpr std::string_view id = "biss-chain", name = "BiSS-C, several encoders in a chain",
                                     document = "BiSS C Protocol Description rev D2";
   static constexpr LinkKind link = LinkKind::clocked;
-  static constexpr std::size_t frames_size = 2400;
+  static constexpr std::size_t frames_size = 6400;
 
   static constexpr const auto& options = options_of_chain;
   static constexpr std::array models{ModelText{"two-19", "two encoders of 19 bits", 0, "slaves=2"}};
@@ -142,13 +169,16 @@ struct ChainDefinition {
   static constexpr ChainFormat format(const Options& values) {
     ChainSettings given = options.format(values);
     given.count = given.slaves;
-    given.channels = {given.ChannelSettings<0>::channel(), given.ChannelSettings<1>::channel(),
-                      given.ChannelSettings<2>::channel(), given.ChannelSettings<3>::channel()};
+    given.channels = given.all();
+    if (values.has_word()) {
+      for (Channel& channel : given.channels) channel.word = values.word;
+      given.scale = {.linear = given.unit_pm != 0, .unit_um = static_cast<double>(given.unit_pm) / 1e6};
+    }
     return given;
   }
   static constexpr LineSettings line(const ChainFormat&) { return line_settings; }
   static constexpr Resolution resolution(const ChainFormat& format) {
-    return resolution_of(format.channels[format.shown()].word, {});
+    return resolution_of(format.channels[format.shown()].word, format.scale);
   }
   static constexpr bool is_usable(const ChainFormat& format) { return biss::is_usable(format); }
 
@@ -165,7 +195,7 @@ struct ChainDefinition {
     sink.put({&own_fields[field_ack_bits], reply.ack_bits});
     for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
     const unsigned shown = format.shown();
-    put_word(sink, format.channels[shown].word, reply.channels[shown].word, {});
+    put_word(sink, format.channels[shown].word, reply.channels[shown].word, format.scale);
   }
   static constexpr void put(FieldSink& sink, const ChainFormat&, const Found& found) {
     register_fields.put(sink, found);

@@ -37,13 +37,14 @@ constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, manufacturer
 }  // namespace
 
-VirtualRegisters::VirtualRegisters() {
+VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order) : slaves_(slaves) {
+  const unsigned lowest = registers::serial_number + (order == RegisterOrder::big ? 3 : 0);
   for (unsigned slave = 0; slave < most_slaves; ++slave) {
     const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
     own[registers::eds_bank - registers::bank_size] = banks - 1;
     own[registers::profile - registers::bank_size] = 0;
     own[registers::profile + 1 - registers::bank_size] = 0;
-    own[registers::serial_number + 3 - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);
+    own[lowest - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);
     std::copy(identity.begin(), identity.end(), own.begin() + (registers::device_id - registers::bank_size));
   }
 }
@@ -63,7 +64,7 @@ std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
 
 // All but what tells which encoder this is, and banks that there are not.
 bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
-  if (slave >= most_slaves) return false;
+  if (slave >= slaves_) return false;
   if (address < registers::bank_size) return bank_[slave] < banks;
   if (!write || address == registers::bank_select) return true;
   return address >= registers::device && address < registers::device_id;
@@ -94,7 +95,7 @@ bool VirtualRegisters::is_ready() const {
 }
 
 // The commands of the standard, all of which only have to do with the line.
-bool VirtualRegisters::obeys(unsigned slave, unsigned command) const { return slave < most_slaves && command < 2; }
+bool VirtualRegisters::obeys(unsigned slave, unsigned command) const { return slave < slaves_ && command < 2; }
 
 void VirtualRegisters::execute(std::uint8_t, unsigned) {}
 

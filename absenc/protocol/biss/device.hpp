@@ -86,11 +86,12 @@ class VirtualRegisters final : public ControlTarget {
   static constexpr unsigned slave_size = banks * registers::bank_size + (registers::end - registers::bank_size);
   static constexpr unsigned most_slaves = ChainFormat::most;
 
-  VirtualRegisters();
+  /// Of so many slaves: 1 to `most_slaves`.
+  VirtualRegisters(unsigned slaves, RegisterOrder order);
   void power_on();
   /// What is asked for now is there `delay` later.
   void set_time(Time at, Time delay);
-  [[nodiscard]] MutableBytes memory() { return memory_; }
+  [[nodiscard]] MutableBytes memory() { return MutableBytes(memory_).first(std::size_t{slaves_} * slave_size); }
   [[nodiscard]] std::uint32_t written() const { return written_; }
 
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
@@ -105,6 +106,7 @@ class VirtualRegisters final : public ControlTarget {
 
   std::array<std::uint8_t, most_slaves * slave_size> memory_{};
   std::array<std::uint8_t, most_slaves> bank_{};
+  unsigned slaves_;
   Time now_{};
   Time delay_{};
   mutable Time asked_at_{};
@@ -125,9 +127,11 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       : VirtualEncoderOf(format, shaft,
                          {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
                           .line_delay = format.line_delay,
-                          .register_delay = format.register_delay}) {}
+                          .register_delay = std::chrono::microseconds(format.register_delay_us)}) {}
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
-      : encoder_(format, shaft, behaviour), slaves_(slaves_of(format)) {}
+      : encoder_(format, shaft, behaviour),
+        slaves_(slaves_of(format)),
+        registers_(slaves_of(format), format.register_order) {}
 
   [[nodiscard]] MutableBytes memory() override { return registers_.memory(); }
 

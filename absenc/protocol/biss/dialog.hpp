@@ -64,7 +64,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = ack_bits(this->format().latency, this->format().period());
-      if (head > expected && !late_.is_again(head)) last_ = Error::truncated;
+      const bool again = late_.is_again(head);  // told of all: a late frame of long ago confirms nothing
+      if (head > expected && !again) last_ = Error::truncated;
     }
     if (last_) {
       const Error error = moved(*last_);

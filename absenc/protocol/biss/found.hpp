@@ -92,10 +92,11 @@ inline constexpr auto register_fields = author::fields_of<Found>(
     author::field<&Found::executed>("executed", "", "whether the host had it executed"),
     author::field<&Found::written>("written", "", "whether it was written: what is there already is not"),
     author::field<&Found::eds_bank>("eds_bank", "", "bank of the electronic data sheet; 0: none"),
-    author::field<&Found::profile>("profile", "", "of the encoder"),
-    author::field<&Found::serial_number>("serial_number", "", "of the encoder"),
-    author::field<shown::device_id>("device_id", "", "of the encoder"),
-    author::field<shown::manufacturer>("manufacturer", "", "two letters, which the BiSS Association gives"));
+    author::field<&Found::profile>("profile", "", "of the encoder", Role::identity),
+    author::field<&Found::serial_number>("serial_number", "", "of the encoder", Role::identity),
+    author::field<shown::device_id>("device_id", "", "of the encoder", Role::identity),
+    author::field<shown::manufacturer>("manufacturer", "", "two letters, which the BiSS Association gives",
+                                       Role::identity));
 
 /// A control frame as fields; of a request alone what it asks.
 [[nodiscard]] constexpr Found shown_by(const ControlFrame& frame, bool answered) {

@@ -4,8 +4,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/result.hpp"
@@ -24,17 +26,23 @@ inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
 inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
 
+/// Of registers that are one number.
+enum class RegisterOrder : std::uint8_t { big, little };
+inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
+
 struct Format {
   WordFormat word = "position:19 error:1! warning:1!"_word;
   Check check{};
   Scale scale{};
   std::uint32_t ma_khz = 1000;  // 10 to 10 000
-  Time latency = 10us;          // the longest that the encoder needs, up to 1 ms: makes the number of clocks
+  // Of registers, in no more memory than a reader of positions has without them.
+  std::uint8_t slave = 0;  // whose are meant: 0 to 7, counted from the end of the chain
+  RegisterOrder register_order = RegisterOrder::big;
+  std::uint16_t register_delay_us = 0;  // of the virtual encoder: until a register that was asked for is there
+  Time latency = 10us;                  // the longest that the encoder needs, up to 1 ms: makes the number of clocks
   // Of the virtual encoder.
   Time ready{};  // what it needs itself; 0: as `latency`, but at most 10 us
   Time line_delay{};
-  Time register_delay{};   // until a register that was asked for is there
-  std::uint8_t slave = 0;  // whose registers are meant: 0 to 7, counted from the end of the chain
 
   /// Of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
@@ -70,9 +78,9 @@ struct ReplyWith {
   unsigned ack_bits = 1;
   WordType word{};
   std::uint8_t life_counter = 0;  // of a check that has one
+  bool cds = false;               // the encoder's bit of control communication
   std::uint16_t crc = 0;          // as sent
   unsigned delay_bits = 0;        // idle samples more than those of an encoder at hand: the line's delay, in clocks
-  bool cds = false;               // the encoder's bit of control communication
 };
 using Reply = ReplyWith<Word>;
 

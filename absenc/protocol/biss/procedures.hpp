@@ -212,8 +212,13 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   found.more_slaves = master.frame().more_slaves;
   if (error == Error::none) {
     found.eds_bank = sheet[0];
-    found.profile = static_cast<std::uint16_t>(sheet[1] << 8 | sheet[2]);
-    found.serial_number = load_big_endian(sheet.view().subspan(3, 4));
+    const auto number = [&](unsigned address, std::size_t size) {
+      const Bytes bytes = sheet.view().subspan(address - registers::eds_bank, size);
+      const bool big = dialog.format().register_order == RegisterOrder::big;
+      return big ? load_big_endian(bytes) : load_little_endian(bytes);
+    };
+    found.profile = static_cast<std::uint16_t>(number(registers::profile, 2));
+    found.serial_number = number(registers::serial_number, 4);
   }
   ByteBuffer<control_most> names;
   error = co_await read_registers(dialog, master, names, registers::device_id, registers::end - registers::device_id);

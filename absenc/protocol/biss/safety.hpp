@@ -36,8 +36,9 @@ struct SafetyFormat {
   Time latency = 10us;
   Time ready{};
   Time line_delay{};
-  Time register_delay{};
+  std::uint16_t register_delay_us = 0;
   std::uint8_t slave = 0;
+  RegisterOrder register_order = RegisterOrder::big;
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
 };

@@ -57,9 +57,11 @@ struct Definition {
           "ready_us", "virtual encoder: the time that it needs itself, us; 0: as latency_us, but at most 10", 0,
           1'000'000)),
       option<&Settings::slave>("slave", "whose registers are meant: 0 is the encoder at the end of the line", 0, 7),
-      decimal<3>(option<&Settings::register_delay>(
-          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
-          100'000'000)),
+      option<&Settings::register_order>("register_byte_order",
+                                        "of profile and serial number: some makers have the low byte first",
+                                        register_order_choices),
+      option<&Settings::register_delay_us>(
+          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535),
   };
   static constexpr auto models = position_models;
   static constexpr struct {

@@ -110,8 +110,8 @@ constexpr std::optional<unsigned> khz(const Found& found) {
 using enum FieldInfo::Kind;
 constexpr auto own_fields = fields_of<Found>(
     field<words<&Found::command>>({"command", text, "", "the request"}),
-    field<words<&Found::version>>({"version", text, "", "firmware of the interface"}),
-    field<words<&Found::serial>>({"serial", text, "", "serial number of the interface"}),
+    field<words<&Found::version>>({"version", text, "", "firmware of the interface", {}, Role::identity}),
+    field<words<&Found::serial>>({"serial", text, "", "serial number of the interface", {}, Role::identity}),
     field<words<&Found::supply>>({"supply", text, "", "supply of the encoder, as the interface says it"}),
     field<milli<'V'>>({"supply_mv", number, "mV", "voltage in that text"}),
     field<milli<'A'>>({"supply_ma", number, "mA", "current in that text"}),

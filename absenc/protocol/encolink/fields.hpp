@@ -114,7 +114,7 @@ inline constexpr auto frame_fields = [] {
       field<of<&Values::identity, &Identity::protocol_version>>("protocol_version", "", "of EncoLink: 2 or 4"),
       field<of<&Values::identity, &Identity::frame_bytes>>("frame_bytes", "", "5 without turns, 7 with"),
       field<of<&Values::identity, &Identity::resolution>>("resolution", "bits", "of a turn"),
-      field<detail::part_number_of>("part_number", "", "from the identity"),
+      field<detail::part_number_of>("part_number", "", "from the identity", Role::identity),
       field<&Values::config>("config", "",
                              "first byte of a request: 00 position, AA reset of the channels, BB identify"),
       field<&Values::ra>("ra", "", "second byte of a request: one byte of a register access"),
@@ -140,7 +140,7 @@ inline constexpr auto register_fields = [] {
       {"", real, "degC", "register, in tenths"},
       {"", real, "rpm", "register, in tenths"},
       {"", flags, "", "how the last self-calibration ended", calibration_flags},
-      {"", text, "", "register"},
+      {"", text, "", "register", {}, Role::identity},  // its numbers, all of them
   }};
   std::array<FieldInfo, registers.size()> made{};
   for (std::size_t i = 0; i < made.size(); ++i) {

@@ -119,8 +119,8 @@ inline constexpr auto fields = [] {
       field<in<one, part::singleturn, &Reply::singleturn>>("singleturn", "counts", "ABS: position within the turn",
                                                            Role::position),
       field<in<one, part::multiturn, &Reply::multiturn>>("multiturn", "revolutions", "ABM", Role::turns),
-      field<in<one, part::encoder_id, &ChannelReply::encoder_id>>("encoder_id", "",
-                                                                  "ENID: D8 multi-turn, 98 single-turn"),
+      field<in<one, part::encoder_id, &ChannelReply::encoder_id>>(
+          "encoder_id", "", "ENID: D8 multi-turn, 98 single-turn", Role::identity),
       field<detail::of_encoder_id<7, 1>>("safety", "", "1: a safety encoder (ENID bit 7)"),
       field<detail::of_encoder_id<5, 3>>("multiturn_bytes", "", "of turns (ENID bits 6 and 5)"),
       field<detail::of_encoder_id<0, 0x1F>>("singleturn_bits", "",

@@ -69,7 +69,7 @@ inline constexpr auto fields = [] {
       field<&Values::status>("status", "SF", status_flags),
       field<&Values::singleturn>("singleturn", "counts", "ABS: position within the turn, rising counter-clockwise",
                                  Role::position),
-      field<&Values::encoder_id>("encoder_id", "", "ENID"),
+      field<&Values::encoder_id>("encoder_id", "", "ENID", Role::identity),
       field<&Values::multiturn>("multiturn", "revolutions", "ABM", Role::turns),
       field<&Values::alarms>("alarms", "ALMC", alarm_flags), field<&Values::page>("page", "", "memory page"),
       field<&Values::address>("address", "", "ADF: memory address; 127 selects the page"),

@@ -41,6 +41,7 @@ Json to_json(const Candidate& candidate, const std::string& command) {
   json.set("model", model != nullptr ? Json(model->name) : Json());
   json.set("options", options_to_json(*candidate.unit, candidate.hypothesis.options));
   json.set("encoder", candidate.encoder.empty() ? Json() : Json(candidate.encoder));
+  json.set("identity", to_json(candidate.identity.row()));
   json.set("line", candidate.line).set("unasked", candidate.unasked);
   json.set("explained", evidence.explained).set("tried", evidence.tried).set("distinct", evidence.distinct);
   json.set("log10_chance", candidate.hypothesis.chance()).set("found", is_found(candidate));
@@ -56,6 +57,19 @@ void show_table(std::span<const Candidate> candidates) {
                     fmt::format("{} of {}", evidence.explained, evidence.tried), chance_text(one.hypothesis.chance())});
   }
   print_line(table(rows));
+}
+
+// "  1 says: serial_number 12, device_id 41 62"
+void show_identities(std::span<const Candidate> candidates) {
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Answer& identity = candidates[i].identity;
+    std::vector<std::string> said;
+    for (std::size_t column = 0; column < identity.columns.size(); ++column) {
+      const Column& one = identity.columns[column];
+      said.push_back(fmt::format("{} {}", one.name, to_text(one, identity.values[column])));
+    }
+    if (!said.empty()) print_line(fmt::format("{} says: {}", i + 1, fmt::join(said, ", ")));
+  }
 }
 
 bool same_encoder(const Candidate& one, const Candidate& other) {
@@ -125,7 +139,9 @@ int show_candidates(std::span<const Candidate> candidates, const std::function<s
     return found ? exit_good : exit_failed;
   }
   if (candidates.empty()) return exit_failed;
-  show_table(candidates.first(std::min(candidates.size(), most_shown)));
+  const auto shown = candidates.first(std::min(candidates.size(), most_shown));
+  show_table(shown);
+  show_identities(shown);
   const std::string more = advice(candidates);
   std::string next = found ? "\ngo on with: " : "";
   for (const Candidate* one : encoders(candidates)) {

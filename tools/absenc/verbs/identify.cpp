@@ -228,7 +228,8 @@ const Subcommand identify_subcommand{
     "identify",
     "find out which encoder is on a line, or whose frames were captured",
     "On a port: listens, then asks in every protocol that fits, at its rates and addresses, only by reads that\n"
-    "change nothing. Candidates are ranked by how unlikely it is that chance explains what came.\n"
+    "change nothing. Candidates are ranked by how unlikely it is that chance explains what came. Who was found is\n"
+    "asked who it is: its type, its serial number.\n"
     "Exit status 1 when nothing was found, or nothing that chance could not explain as well.",
     identify_parameters,
     identify_examples,
