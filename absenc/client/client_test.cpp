@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The library as a program uses it: against virtual encoders, in this process and on pseudo-terminals.
-#include <gmock/gmock.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
