@@ -28,10 +28,8 @@ class Virtual(Case):
                 self.assertTrue(readings[0]["singleturn_valid"])
 
     def test_monitor(self):
-        result = absenc("monitor", BISS, SSI, "--json", "--for", "1", "--interval", "0.3")
-        self.assert_good(result)
-        seen = {line["encoder"]: line for line in json_lines(result.stdout)}
-        self.assertEqual({encoder: line["reading"]["singleturn"] for encoder, line in seen.items()}, {BISS: 275087, SSI: 4660})
+        live = self.watch(BISS, SSI, until=lambda live: len(live) == 2)
+        self.assertEqual({encoder: reading["singleturn"] for encoder, reading in live.items()}, {BISS: 275087, SSI: 4660})
 
     def test_record(self):
         for encoder, singleturn in [(BISS, 275087), (SSI, 4660)]:

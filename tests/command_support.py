@@ -150,6 +150,25 @@ class Case(unittest.TestCase):
                 file.write(text)
         return path
 
+    def watch(self, *arguments, until, **settings):
+        """What `monitor --json` says until what is wanted stands in it: `until` of the last reading of each encoder that is
+        live, by its name. How long that takes is the machine's affair."""
+        process = subprocess.Popen([ABSENC, "monitor", *arguments, "--json", "--interval", "0.1"], bufsize=0,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **settings)
+        self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
+        deadline = time.monotonic() + PATIENCE
+        live = {}
+        while not until(live):
+            text = read_line(process.stdout, deadline)
+            if text is None:
+                self.fail(f"in vain waited for it: {live}\n{end(process)}")
+            line = json.loads(text)
+            if line["state"] == "live":
+                live[line["encoder"]] = line["reading"]
+        status, _, messages = end(process, signal.SIGINT)
+        self.assertEqual(status, 0, messages)
+        return live
+
     def assert_good(self, result):
         self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
 

@@ -27,9 +27,9 @@ def shared_names():
     """"folder: name in one.cpp, other.cpp" of each that two sources have."""
     found = []
     folders = defaultdict(list)
-    for top in ("absenc", "tools/absenc"):
+    for top in ("absenc", "python/src", "tools/absenc"):
         for path in sorted((ROOT / top).rglob("*.cpp")):
-            if not NO_SOURCE.search(str(path)) and "os" not in path.relative_to(ROOT).parts:
+            if not NO_SOURCE.search(str(path)):
                 folders[path.parent].append(path)
     for folder, paths in folders.items():
         places = defaultdict(list)

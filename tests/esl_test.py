@@ -477,11 +477,8 @@ class OneLine(EslCase):
             bus = "arm"
             address = 3
             """)
-        result = absenc("monitor", "shoulder", "elbow", "--for", "1.2", "--json",
-                        env=dict(os.environ, ABSENC_CONFIG=config))
-        self.assert_good(result)
-        last = {line["encoder"]: line for line in json_lines(result.stdout)}
-        self.assertEqual([last[name]["reading"]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
+        live = self.watch("shoulder", "elbow", until=lambda live: len(live) == 2, env=dict(os.environ, ABSENC_CONFIG=config))
+        self.assertEqual([live[name]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
 
     def test_memory_is_for_one_encoder_on_its_line(self):
         """By the encoder, which knows that others are there, and by the host, where its file says so."""

@@ -105,9 +105,7 @@ class Reading(ModbusCase):
         self.assert_good(absenc("record", uri, "--output", recording, "--count", "10", "--rate", "0"))
         with open(recording, encoding="utf-8") as file:
             self.assertEqual(sum("singleturn" in line for line in json_lines(file.read())), 10)
-        shown = absenc("monitor", uri, "--json", "--for", "2")
-        self.assert_good(shown)
-        self.assertIn("singleturn", shown.stdout)
+        self.assertIn("singleturn", self.watch(uri, until=len)[uri])
 
     def test_info(self):
         answers = self.good_json("info", self.uri(self.emulator("--singleturn", "7")))["answers"]
@@ -232,10 +230,8 @@ class Line(ModbusCase):
     def test_several_are_watched(self):
         emulator = self.emulator("--also", "address=2&singleturn=222", "--also", "address=3&singleturn=333")
         uris = [self.uri(emulator, f"&address={address}") for address in (1, 2, 3)]
-        shown = absenc("monitor", *uris, "--json", "--for", "2")
-        self.assert_good(shown)
-        positions = {line["reading"]["singleturn"] for line in json_lines(shown.stdout) if "reading" in line}
-        self.assertTrue({0, 222, 333} <= positions, shown.stdout)
+        live = self.watch(*uris, until=lambda live: len(live) == 3)
+        self.assertEqual([live[uri]["singleturn"] for uri in uris], [0, 222, 333])
         self.assertEqual(self.violations(emulator), [])
 
     def test_faults_are_survived(self):

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The library as a program uses it: against virtual encoders, in this process and on pseudo-terminals.
-#include <gmock/gmock.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -425,12 +425,20 @@ TEST(ClientDecode, RowsHaveTypedColumns) {
 
 TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
   const Emulation emulation = emulate("tformat?motion=rpm=60");
-  const Identified all = identify(emulation.path() + "?latency=200", {.limit = std::chrono::minutes(5)});
+  Identified all;
+  // Every question that nobody answers takes several times the latency: much of it only on a machine that needs it.
+  for (const char* const latency : {"20", "200", "1000"}) {
+    all = identify(emulation.path() + "?latency=" + latency, {.limit = std::chrono::minutes(5)});
+    if (!all.found.empty() && all.found[0].sure) break;
+  }
   ASSERT_FALSE(all.found.empty());
   EXPECT_TRUE(all.found[0].sure);
   EXPECT_EQ(all.found[0].unit, &emulation.unit());
   EXPECT_LT(all.found[0].log10_chance, -3);
-  EXPECT_TRUE(open(all.found[0].address).read().ready);
+  Encoder encoder = open(all.found[0].address);
+  bool ready = false;
+  for (int i = 0; i < 100 && !ready; ++i) ready = encoder.read().ready;
+  EXPECT_TRUE(ready);
   EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(identify("sim:tformat")); }), HasSubstr("which protocol"));
 }
 

@@ -2,7 +2,7 @@
 #include "absenc/os/input_lines.hpp"
 
 #include <fcntl.h>
-#include <gmock/gmock.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 

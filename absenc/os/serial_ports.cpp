@@ -94,7 +94,7 @@ Failure no_permission(const std::string& path) {
                                             group_name + " $USER` and log in again"};
 }
 
-Failure not_found(const std::string& path) {
+Failure no_port(const std::string& path) {
   std::string there;
   for (const std::string& port : serial_ports()) there += (there.empty() ? "" : ", ") + port;
   return {Failure::Kind::not_found, "there is no port " + path +
@@ -131,7 +131,7 @@ Failure open_failure(const std::string& path, int error) {
     case ENOTDIR:
     case ENXIO:
     case ENODEV:
-      return not_found(path);
+      return no_port(path);
     case EIO:  // from the terminal's ioctl: a 16550 that is only listed, or a line that was hung up since it was opened
       return {Failure::Kind::not_found, "the port " + path +
                                             " is there, but no hardware is behind it, or not any more: check the name, "

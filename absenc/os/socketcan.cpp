@@ -58,7 +58,7 @@ ifreq request_for(const std::string& interface) {
   return request;
 }
 
-Failure not_found(const std::string& interface) {
+Failure no_interface(const std::string& interface) {
   std::string there;
   for (const std::string& name : can_interfaces()) there += (there.empty() ? "" : ", ") + name;
   const std::string what = "there is no CAN interface " + interface;
@@ -151,10 +151,10 @@ std::string SocketCan::up_command(std::uint32_t rate) const {
 }
 
 int SocketCan::find_interface() {
-  if (interface_.empty() || interface_.size() >= IFNAMSIZ) throw not_found(interface_);
+  if (interface_.empty() || interface_.size() >= IFNAMSIZ) throw no_interface(interface_);
   ifreq request = request_for(interface_);
   if (kernel_->control(socket_.get(), SIOCGIFINDEX, &request) < 0) {
-    if (errno == ENODEV || errno == ENXIO) throw not_found(interface_);
+    if (errno == ENODEV || errno == ENXIO) throw no_interface(interface_);
     fail("looking for " + interface_, errno);
   }
   const int index = request.ifr_ifindex;

@@ -2,7 +2,7 @@
 // What a controller samples, and what a device is told, edge by edge.
 #include "absenc/os/spi_device.hpp"
 
-#include <gmock/gmock.h>
+#include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>

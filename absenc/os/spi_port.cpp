@@ -31,7 +31,7 @@ constexpr std::uint8_t word_bits = 8;  // what every controller can do
 
 std::string reason(int error) { return " (" + std::generic_category().message(error) + ")"; }
 
-Failure not_found(const std::string& path) {
+Failure no_device(const std::string& path) {
   std::string there;
   for (const std::string& device : spi_devices()) there += (there.empty() ? "" : ", ") + device;
   const std::string what = "there is no SPI device " + path;
@@ -47,7 +47,7 @@ Failure spi_failure(const std::string& path, int error) {
     case ENOTDIR:
     case ENXIO:
     case ENODEV:
-      return not_found(path);
+      return no_device(path);
     case ENOTTY:
     case EISDIR:
     case EINVAL:

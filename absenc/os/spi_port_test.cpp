@@ -2,7 +2,7 @@
 // What SpiPort asks of the kernel, and what it says when the kernel refuses.
 #include "absenc/os/spi_port.hpp"
 
-#include <gmock/gmock.h>
+#include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 

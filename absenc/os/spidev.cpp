@@ -16,7 +16,7 @@ constexpr std::size_t most_buffers = 255;  // a request of FUSE has 256, and one
 constexpr std::uint8_t most_wires = 1;
 constexpr std::uint32_t lsb_first = SPI_LSB_FIRST;
 
-SpidevReply refusal(int error) { return {.result = -error}; }
+SpidevReply error_reply(int error) { return {.result = -error}; }
 
 template <class Value>
 SpidevReply value_reply(const Value& value) {
@@ -94,7 +94,7 @@ SpidevReply Spidev::control(unsigned long request, std::uint64_t address, Bytes 
     case SPI_IOC_WR_BITS_PER_WORD:
     case SPI_IOC_WR_MAX_SPEED_HZ:
       if (in.size() != size) return {.again = true, .in = {{address, size}}};
-      return refusal(set(request, in));
+      return error_reply(set(request, in));
     case SPI_IOC_RD_MODE:
     case SPI_IOC_RD_MODE32:
     case SPI_IOC_RD_LSB_FIRST:
@@ -103,7 +103,7 @@ SpidevReply Spidev::control(unsigned long request, std::uint64_t address, Bytes 
       if (room != size) return {.again = true, .out = {{address, size}}};
       return get(request);
     default:
-      return refusal(ENOTTY);
+      return error_reply(ENOTTY);
   }
 }
 
@@ -152,13 +152,13 @@ int Spidev::set_mode(std::uint32_t wanted) {
 // First the list of transfers is fetched, then what they point to. Another thread of the program may change the list
 // between the two: what counts is the list that came with the buffers.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
-  if (size % sizeof(spi_ioc_transfer) != 0) return refusal(EINVAL);
+  if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);
   if (size == 0) return {};
   if (in.size() < size) return {.again = true, .in = {{address, size}}};
   std::vector<spi_ioc_transfer> list(size / sizeof(spi_ioc_transfer));
   std::memcpy(list.data(), in.data(), size);
   const Buffers buffers = buffers_of({address, size}, list);
-  if (const int error = refused(list, buffers); error != 0) return refusal(error);
+  if (const int error = refused(list, buffers); error != 0) return error_reply(error);
   if (in.size() != size + buffers.in || room != buffers.out) return buffers.reply;
 
   std::vector<std::uint8_t> bytes(buffers.out);
@@ -184,7 +184,7 @@ SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, s
 }
 
 SpidevReply Spidev::read(std::size_t size, Time now) {
-  if (size > most_bytes) return refusal(EMSGSIZE);
+  if (size > most_bytes) return error_reply(EMSGSIZE);
   std::vector<std::uint8_t> bytes(size);
   SpiTransfer transfer = transfer_of(size, 0);
   transfer.in = bytes;
@@ -194,7 +194,7 @@ SpidevReply Spidev::read(std::size_t size, Time now) {
 }
 
 SpidevReply Spidev::write(Bytes bytes, Time now) {
-  if (bytes.size() > most_bytes) return refusal(EMSGSIZE);
+  if (bytes.size() > most_bytes) return error_reply(EMSGSIZE);
   SpiTransfer transfer = transfer_of(bytes.size(), 0);
   transfer.out = bytes;
   return run({&transfer, 1}, now);

@@ -2,7 +2,7 @@
 // What the far side of spidev answers, and which memory of the program it asks for.
 #include "absenc/os/spidev.hpp"
 
-#include <gmock/gmock.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 #include <linux/spi/spidev.h>
 #include <sys/ioctl.h>

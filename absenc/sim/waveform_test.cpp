@@ -2,7 +2,7 @@
 // Waveforms as text, and as sigrok-cli's decoders read them.
 #include "absenc/sim/waveform.hpp"
 
-#include <gmock/gmock.h>
+#include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absenc/protocol/all.hpp"
+#include "tests/cases.hpp"
 #include "tests/kit/kit.hpp"
 
 namespace absenc::kit {
@@ -68,7 +69,7 @@ class KitExchanges : public ::testing::TestWithParam<Series> {};
 
 TEST_P(KitExchanges, NothingWrongIsTaken) {
   const auto [series, unit] = GetParam();
-  expect_none(check_exchanges(*unit, {.count = 125'000, .seed = series}));
+  expect_none(check_exchanges(*unit, {.count = test_cases(125'000), .seed = series}));
 }
 
 class KitDamagedRequests : public KitExchanges {};

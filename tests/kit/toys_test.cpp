@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kit can fail: each toy has one mistake, and the kit finds it.
-#include <gmock/gmock.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
 #include "tests/kit/kit.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The man page and the completion of a command with what the real one may not have.
-#include <gmock/gmock.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 

@@ -13,6 +13,7 @@
 #include "absenc/capture/annotate/annotate_frames.hpp"
 #include "absenc/capture/annotate/conversation_test.hpp"
 #include "absenc/protocol/all.hpp"
+#include "tests/cases.hpp"
 
 namespace absenc::capture {
 namespace {
@@ -382,7 +383,8 @@ TEST_P(Characters, BeginsAnywhere) {
   const std::vector<Character> all = characters;
   std::map<std::pair<Tick, Tick>, const Kept*> there;
   for (const Kept& one : truth.expected) there[{one.begin, one.end}] = &one;
-  for (std::size_t from = 1; from < std::min<std::size_t>(all.size(), 200); ++from) {
+  const std::size_t step = 200 / test_cases(200);
+  for (std::size_t from = 1; from < std::min<std::size_t>(all.size(), 200); from += step) {
     characters.assign(all.begin() + static_cast<std::ptrdiff_t>(from), all.end());
     Annotator::Settings settings = settings_of(unit);
     settings.begins_silent = false;

@@ -2,7 +2,7 @@
 // What is written, as text and as sigrok-cli reads it.
 #include "absenc/capture/annotate/drawing.hpp"
 
-#include <gmock/gmock.h>
+#include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 #include <stdio.h>
 #include <stdlib.h>

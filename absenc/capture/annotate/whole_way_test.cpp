@@ -17,6 +17,7 @@
 #include "absenc/capture/lines/pipeline.hpp"
 #include "absenc/os/testing.hpp"
 #include "absenc/protocol/all.hpp"
+#include "tests/cases.hpp"
 
 namespace absenc::capture {
 namespace {
@@ -141,7 +142,8 @@ TEST_P(WholeWay, IsTheShortWay) {
   static_cast<void>(talker.talk());  // so that the waveform begins with a silent line
   talker.draw(waveform);
   std::vector<Character> all;
-  for (int i = 0; i < 300 || (expected.lines.empty() && all.size() < 1200); ++i) {  // some send nothing
+  const unsigned least = test_cases(300);
+  for (unsigned i = 0; i < least || (expected.lines.empty() && all.size() < 1200); ++i) {  // some send nothing
     const Talk talk = talker.talk();
     ASSERT_FALSE(talk.collided);
     for (const Burst& burst : talk.bursts) bursts.put(burst);
@@ -150,7 +152,7 @@ TEST_P(WholeWay, IsTheShortWay) {
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.begin < b.begin; });
   for (const Character& character : all) characters->put(character);
   characters->finish(talker.now());
-  ASSERT_GE(expected.lines.size(), 300u);
+  ASSERT_GE(expected.lines.size(), least);
 
   wires.finish(waveform, std::chrono::microseconds(10));
   std::ostringstream vcd, csv;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each fault is found and named; healthy encoders give no finding, however their timing falls.
-#include <gmock/gmock.h>
+#include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
 #include <random>

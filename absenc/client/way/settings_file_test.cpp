@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/client/way/settings_file.hpp"
 
-#include <gmock/gmock.h>
+#include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
