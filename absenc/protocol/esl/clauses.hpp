@@ -8,7 +8,7 @@
 
 namespace absenc::esl {
 
-inline constexpr std::array<Clause, 6> clauses{{
+inline constexpr std::array<Clause, 10> clauses{{
     {"answer", "Figure 2", "a read request is answered", Demand::answered},
     {"answer-time", "Figure 2", "the answer begins 2.0 us after the request", Demand::in_time},
     {"length", "Table 12", "a reply has the frames of its command", Demand::whole},
@@ -16,6 +16,26 @@ inline constexpr std::array<Clause, 6> clauses{{
     {"fields", "Figures 7 and 8", "the command frame is that of the request, each channel names itself, and both agree",
      Demand::as_drawn},
     {"address", "Figure 7", "a request to another encoder address is not answered", Demand::foreign_silent},
+    {.id = "eeprom-write",
+     .paragraph = "Figure 5",
+     .words = "a byte that was written to the EEPROM is read again",
+     .demand = Demand::byte_written,
+     .address = 0x7E},
+    {.id = "eeprom-beside",
+     .paragraph = "Figure 5",
+     .words = "writing a byte leaves those beside it",
+     .demand = Demand::byte_alone,
+     .address = 0x7E},
+    {.id = "clear-alarms",
+     .paragraph = "Table 4",
+     .words = "eight requests with command C clear the errors, and nothing else",
+     .demand = Demand::reset,
+     .verb = Verb::clear_alarms},
+    {.id = "reset-multiturn",
+     .paragraph = "Table 4",
+     .words = "eight requests with command D clear the turn counter",
+     .demand = Demand::reset,
+     .verb = Verb::reset_multiturn},
 }};
 
 }  // namespace absenc::esl

@@ -8,6 +8,7 @@
 
 #include "absenc/client/text/json.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/consent.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -28,7 +29,13 @@ Json conformance_json(const Conformance& conformance) {
                        .set("verdict", name_of(one.verdict))
                        .set("evidence", one.evidence));
   }
-  return Json::object().set("ok", conformance.good()).set("protocol", conformance.protocol).set("clauses", clauses);
+  Json left = Json::array();
+  for (const std::string& command : conformance.left) left.append(command);
+  return Json::object()
+      .set("ok", conformance.good())
+      .set("protocol", conformance.protocol)
+      .set("clauses", clauses)
+      .set("left", left);
 }
 
 std::string without_end(std::string text) {
@@ -38,8 +45,16 @@ std::string without_end(std::string text) {
 
 int run_conform(const Invocation& invocation) {
   os::catch_interrupts();
-  const ConformChoices choices{.readings =
-                                   static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000))};
+  const ConformChoices choices{.readings = static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000)),
+                               .changes = invocation.has("--changes")};
+  if (choices.changes) {
+    const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+    const std::string_view meaning = "memory and settings are written and put back, resets are sent";
+    if (must_ask(invocation, uri, "conform --changes", meaning) && !confirmed(uri, meaning)) {
+      print_message("nothing was changed");
+      return exit_failed;
+    }
+  }
   const Conformance conformance = conform(invocation.text("encoder"), invocation.texts("--option"), choices);
   if (invocation.has("--junit")) {
     const std::string path(invocation.text("--junit"));
@@ -55,17 +70,20 @@ int run_conform(const Invocation& invocation) {
   return conformance.good() ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 6> conform_parameters{{
+constexpr std::array<Parameter, 8> conform_parameters{{
     parameter::encoder,
     {"--readings", "N", "how many readings are looked at", "100"},
+    {"--changes", "", "test also what is written, set and reset; it is put back as it was"},
+    parameter::yes,
     {"--tap", "", "print the Test Anything Protocol"},
     {"--junit", "FILE", "write JUnit's XML to it as well"},
     parameter::json,
     parameter::option,
 }};
 
-constexpr std::array<Example, 2> conform_examples{{
+constexpr std::array<Example, 3> conform_examples{{
     {"absenc conform sim:tformat", "what its document demands, and whether it does so"},
+    {"absenc conform sim:tformat --changes", "also memory, settings and resets"},
     {"absenc conform amt21:/dev/ttyUSB0 --tap --junit amt21.xml", "for programs that count tests"},
 }};
 
@@ -76,7 +94,10 @@ const Subcommand conform_subcommand{
     "test an encoder against the clauses of its document",
     "Each clause has its paragraph, a verdict (kept, broken, untested) and what was seen: replies that come, in\n"
     "time, whole, with a right checksum and as drawn; requests that must not be answered. Nothing is written to\n"
-    "the encoder. Exit status 1 when a clause is broken or could not be tested.",
+    "the encoder without --changes, which asks first: it saves what it writes and puts it back, also after Ctrl-C, "
+    "and\n"
+    "says with which commands to do it by hand what it could not. A reset is sent only where it changes nothing.\n"
+    "Exit status 1 when a clause is broken or could not be tested.",
     conform_parameters,
     conform_examples,
     run_conform};
