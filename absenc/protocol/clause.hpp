@@ -48,7 +48,24 @@ struct Clause {
   Verb verb = Verb::run;
 };
 
+/// What is looked at when a host is tested.
+enum class HostDemand : std::uint8_t {
+  asks,           // its requests are such that they are answered
+  after_silence,  // it asks again when no reply came
+  after_damage,   // and when the reply was damaged
+  rule            // it never breaks `rule`
+};
+
+struct HostClause {
+  std::string_view id;
+  std::string_view paragraph;
+  std::string_view words;
+  HostDemand demand;
+  std::string_view rule{};  // as the virtual encoder calls it when it is broken
+};
+
 /// Those of this unit, in the order in which they are tested; empty: none are known. Defined with the list of units.
 [[nodiscard]] std::span<const Clause> clauses_of(const Unit& unit);
+[[nodiscard]] std::span<const HostClause> host_clauses_of(const Unit& unit);
 
 }  // namespace absenc

@@ -38,4 +38,20 @@ inline constexpr std::array<Clause, 10> clauses{{
      .verb = Verb::reset_multiturn},
 }};
 
+inline constexpr std::array<HostClause, 8> host_clauses{{
+    {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
+    {"silence", "Figure 2", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "Figures 10 and 11", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"turn", "Figure 2", "a request waits until the reply before it is over", HostDemand::rule,
+     "request during the encoder's transmission"},
+    {"page", "Figure 13", "after a change of the page the memory is left alone", HostDemand::rule,
+     "memory access before the page is ready"},
+    {"eeprom-read", "Figure 3 (b)", "the two requests that read a byte are more than 200 us apart", HostDemand::rule,
+     "memory read again less than 200 us after the request before"},
+    {"reset-standing", "Table 4", "a reset is sent while the shaft stands", HostDemand::rule,
+     "reset while the shaft turns"},
+    {"addressing", "Table 12", "ID 8 is not sent eight times in a row", HostDemand::rule,
+     "ID 8 sent eight times in a row: dynamic addressing, which nothing describes"},
+}};
+
 }  // namespace absenc::esl

@@ -41,4 +41,17 @@ inline constexpr std::array<Clause, 12> clauses{{
      .verb = Verb::reset_multiturn},
 }};
 
+inline constexpr std::array<HostClause, 7> host_clauses{{
+    {"asks", "6.2", "requests are as drawn", HostDemand::asks},
+    {"silence", "8.4", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "6.3.4", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"turn", "8.1", "a request waits until the reply before it is over", HostDemand::rule,
+     "request during the encoder's transmission"},
+    {"page", "6.3.5 (2)", "after a change of the page the EEPROM is left alone for 18 ms", HostDemand::rule,
+     "memory access before the page is ready"},
+    {"reset-interval", "10", "the ten requests of a reset are 40 us apart, or more", HostDemand::rule,
+     "reset sent too fast: less than 40 us after the one before"},
+    {"reset-standing", "10", "a reset is sent while the shaft stands", HostDemand::rule, "reset while the shaft turns"},
+}};
+
 }  // namespace absenc::tformat

@@ -6,6 +6,7 @@
 #include <array>
 #include <fstream>
 
+#include "absenc/client/conform_host.hpp"
 #include "absenc/client/text/json.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/consent.hpp"
@@ -43,6 +44,22 @@ std::string without_end(std::string text) {
   return text;
 }
 
+// As the options say; returns the exit status.
+int tell(const Invocation& invocation, const Conformance& conformance) {
+  if (invocation.has("--junit")) {
+    const std::string path(invocation.text("--junit"));
+    std::ofstream file(path);
+    file << conformance.junit() << std::flush;
+    if (!file) throw UsageError(fmt::format("{} cannot be written", path));
+  }
+  if (invocation.has("--json")) {
+    print_line(conformance_json(conformance).line());
+  } else {
+    print_line(without_end(invocation.has("--tap") ? conformance.tap() : conformance.report()));
+  }
+  return conformance.good() ? exit_good : exit_failed;
+}
+
 int run_conform(const Invocation& invocation) {
   os::catch_interrupts();
   const ConformChoices choices{.readings = static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000)),
@@ -56,18 +73,27 @@ int run_conform(const Invocation& invocation) {
     }
   }
   const Conformance conformance = conform(invocation.text("encoder"), invocation.texts("--option"), choices);
-  if (invocation.has("--junit")) {
-    const std::string path(invocation.text("--junit"));
-    std::ofstream file(path);
-    file << conformance.junit() << std::flush;
-    if (!file) throw UsageError(fmt::format("{} cannot be written", path));
+  return tell(invocation, conformance);
+}
+
+int run_conform_host(const Invocation& invocation) {
+  os::catch_interrupts();
+  std::string text(invocation.text("protocol"));
+  char joint = '?';
+  for (const std::string& option : invocation.texts("--option")) {
+    text += joint + option;
+    joint = '&';
   }
-  if (invocation.has("--json")) {
-    print_line(conformance_json(conformance).line());
-  } else {
-    print_line(without_end(invocation.has("--tap") ? conformance.tap() : conformance.report()));
-  }
-  return conformance.good() ? exit_good : exit_failed;
+  EmulateChoices place{.link = std::string(invocation.text("--pty")), .can = std::string(invocation.text("--can"))};
+  if (invocation.has("--tcp")) place.tcp = static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
+  ConformHostChoices choices{.answers = static_cast<std::size_t>(invocation.number("--answers", 100, 2, 1'000'000))};
+  choices.patience = Time(static_cast<std::int64_t>(invocation.real("--patience", 10, 0.1, 1e6) * 1e9));
+  // Standard output is the result's.
+  choices.ready = [](const Emulation& encoder) {
+    print_message(fmt::format("ready: {}", encoder.path()));
+    if (encoder.tcp_port() != 0) print_message(fmt::format("ready: tcp:127.0.0.1:{}", encoder.tcp_port()));
+  };
+  return tell(invocation, conform_host(text, place, choices));
 }
 
 constexpr std::array<Parameter, 8> conform_parameters{{
@@ -87,6 +113,24 @@ constexpr std::array<Example, 3> conform_examples{{
     {"absenc conform amt21:/dev/ttyUSB0 --tap --junit amt21.xml", "for programs that count tests"},
 }};
 
+constexpr std::array<Parameter, 10> host_parameters{{
+    parameter::protocol,
+    {"--pty", "PATH", "where to put the link to the pseudo-terminal; CAN: that of an slcan adapter",
+     "only the pseudo-terminal itself"},
+    {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
+    {"--can", "INTERFACE", "CAN: be on this interface, as vcan0"},
+    {"--answers", "N", "how many requests are answered well", "100"},
+    {"--patience", "SECONDS", "so long a silence of the host ends it, once it has asked", "10"},
+    {"--tap", "", "print the Test Anything Protocol"},
+    {"--junit", "FILE", "write JUnit's XML to it as well"},
+    parameter::json,
+    parameter::protocol_option,
+}};
+
+constexpr std::array<Example, 1> host_examples{{
+    {"absenc conform-host tformat --pty /tmp/encoder", "then let the drive's program read tformat at /tmp/encoder"},
+}};
+
 }  // namespace
 
 const Subcommand conform_subcommand{
@@ -101,5 +145,16 @@ const Subcommand conform_subcommand{
     conform_parameters,
     conform_examples,
     run_conform};
+
+const Subcommand conform_host_subcommand{
+    "conform-host",
+    "be a virtual encoder and test the host that connects against the clauses of its document",
+    "Says on standard error where it can be opened. Replies are good, stay away for a while and are damaged for a\n"
+    "while; the host has to go on, and must not break a rule of the document: intervals, pauses, turns. Each clause "
+    "has\n"
+    "its paragraph, a verdict and what was seen. Exit status 1 when a clause is broken or could not be tested.",
+    host_parameters,
+    host_examples,
+    run_conform_host};
 
 }  // namespace absenc::tool
