@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc conform` as a user sees it. Every clause with its mutants: client/conform tests."""
+"""`absenc conform` and `absenc conform-host` as a user sees them. Every clause with its mutants: client/conform tests."""
 import json
 import signal
+import time
 import unittest
 import xml.etree.ElementTree
 
-from command_support import EncoderCase, absenc, end
+from command_support import PATIENCE, EncoderCase, absenc, end, read_line
 
 
 def content(path):
@@ -65,6 +66,34 @@ class Conform(EncoderCase):
         status, out, _ = end(process, signal.SIGINT)
         self.assertEqual(content(memory), before)
         self.assertEqual((status, out), (1, ""))
+
+class ConformHost(EncoderCase):
+    def test_our_host_holds_all(self):
+        path = self.file("encoder")
+        judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "10", "--patience", "60", "--json")
+        self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
+        host = self.start("monitor", f"tformat:{path}?latency=100", "--json")
+        out, err = judge.communicate(timeout=PATIENCE)
+        end(host, signal.SIGTERM)
+        answer = json.loads(out)
+        self.assertEqual([one for one in answer["clauses"] if one["verdict"] != "kept"], [], err)
+        self.assertEqual((judge.returncode, answer["ok"]), (0, True))
+
+    def test_a_host_that_asks_only_once_is_told(self):
+        path = self.file("encoder")
+        judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "2", "--patience", "0.5", "--tap")
+        self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
+        absenc("read", f"tformat:{path}?latency=100")
+        out, _ = judge.communicate(timeout=PATIENCE)
+        self.assertEqual(judge.returncode, 1)
+        self.assertRegex(out.decode(), "\\n(not ok .*silence|.*silence.*# SKIP|not ok .*damage|.*damage.*# SKIP)")
+
+    def test_ends_by_ctrl_c_and_knows_its_protocols(self):
+        judge = self.start("conform-host", "tformat", "--pty", self.file("encoder"))
+        self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
+        self.assertEqual(end(judge, signal.SIGINT)[:2], (1, ""))
+        self.assert_wrong_usage(absenc("conform-host", "ssi"), "pseudo-terminal")
+        self.assert_wrong_usage(absenc("conform-host", "e201", "--pty", self.file("other")), "no clauses")
 
 
 if __name__ == "__main__":

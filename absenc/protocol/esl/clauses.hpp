@@ -38,7 +38,7 @@ inline constexpr std::array<Clause, 10> clauses{{
      .verb = Verb::reset_multiturn},
 }};
 
-inline constexpr std::array<HostClause, 8> host_clauses{{
+inline constexpr std::array<HostClause, 9> host_clauses{{
     {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
     {"silence", "Figure 2", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "Figures 10 and 11", "after a damaged reply it asks again", HostDemand::after_damage},
@@ -48,6 +48,8 @@ inline constexpr std::array<HostClause, 8> host_clauses{{
      "memory access before the page is ready"},
     {"eeprom-read", "Figure 3 (b)", "the two requests that read a byte are more than 200 us apart", HostDemand::rule,
      "memory read again less than 200 us after the request before"},
+    {"reset-interval", "Table 4", "the requests of a reset are about 40 us apart, not much less", HostDemand::rule,
+     "reset sent too fast: much less than 40 us after the one before"},
     {"reset-standing", "Table 4", "a reset is sent while the shaft stands", HostDemand::rule,
      "reset while the shaft turns"},
     {"addressing", "Table 12", "ID 8 is not sent eight times in a row", HostDemand::rule,

@@ -127,8 +127,9 @@ constexpr std::array<Parameter, 10> host_parameters{{
     parameter::protocol_option,
 }};
 
-constexpr std::array<Example, 1> host_examples{{
+constexpr std::array<Example, 2> host_examples{{
     {"absenc conform-host tformat --pty /tmp/encoder", "then let the drive's program read tformat at /tmp/encoder"},
+    {"absenc conform-host raa38-modbus --tcp 4001 --tap --junit host.xml", "for programs that count tests"},
 }};
 
 }  // namespace
