@@ -15,7 +15,7 @@ RESERVED = {"absenc", "core", "link", "protocol", "host", "sim", "capture", "os"
 
 
 def list_unit(text, name):
-    """all.cpp with one unit more: its include in order, its line at the end of `units`."""
+    """all.cpp with one unit more: its include in order, its line at the end of `listed`."""
     lines = text.splitlines()
     include = f'#include "absenc/protocol/{name}/unit.hpp"'
     existing = [i for i, line in enumerate(lines) if re.match(r'#include "absenc/protocol/\w+/unit\.hpp"', line)]
@@ -24,9 +24,9 @@ def list_unit(text, name):
     else:
         at = max(i for i, line in enumerate(lines) if line.startswith("#include")) + 1
     lines.insert(at, include)
-    begin = next(i for i, line in enumerate(lines) if "std::array units{" in line)
+    begin = next(i for i, line in enumerate(lines) if "std::array listed{" in line)
     end = next(i for i in range(begin, len(lines)) if lines[i] == "};")
-    lines.insert(end, f"    &{name}::unit,")
+    lines.insert(end, f"    Listed{{&{name}::unit}},")
     return "\n".join(lines) + "\n"
 
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -29,10 +30,11 @@ struct ClauseResult {
 struct Conformance {
   std::string protocol{};
   std::vector<ClauseResult> clauses{};
+  std::vector<std::string> left{};  // commands that put back by hand what could not be: the encoder is changed
 
   [[nodiscard]] std::size_t count(Verdict verdict) const;
-  /// Whether every clause is kept.
-  [[nodiscard]] bool good() const { return count(Verdict::kept) == clauses.size(); }
+  /// Whether every clause is kept, and the encoder as it was.
+  [[nodiscard]] bool good() const { return count(Verdict::kept) == clauses.size() && left.empty(); }
   /// As the Test Anything Protocol, version 13.
   [[nodiscard]] std::string tap() const;
   /// As JUnit's XML.
@@ -42,14 +44,17 @@ struct Conformance {
 };
 
 struct ConformChoices {
-  std::size_t readings = 100;  // at least 1
+  std::size_t readings = 100;    // at least 1
+  bool changes = false;          // also the clauses that change the encoder, which is put back as it was
+  std::function<bool()> over{};  // from the moment on in which it is true, all ends with Cancelled; empty: never
 };
 
 /// "kept", "broken", "untested"
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
-/// Reads only: nothing is ever written to the encoder. `text` and `settings` as those of `open`. Throws UsageError,
-/// what the port throws.
+/// Without `changes` nothing is ever written to the encoder. `text` and `settings` as those of `open`. Throws
+/// UsageError, Cancelled, what the port throws; what was changed is put back first, and where it cannot be, Failure
+/// says so with the commands that do it by hand.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

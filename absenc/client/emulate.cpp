@@ -230,4 +230,12 @@ std::string Emulation::first_violation() const {
   });
 }
 
+std::vector<std::string> Emulation::broken_rules() const {
+  return service_->ask([](const auto& device) {
+    std::vector<std::string> rules;
+    for (const Violation& violation : device.violations()) rules.emplace_back(violation.rule);
+    return rules;
+  });
+}
+
 }  // namespace absenc::client

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absenc/protocol/unit.hpp"
 
@@ -57,6 +58,8 @@ class Emulation {
   /// Rules of the document that the host broke, and the first of them; "": none.
   [[nodiscard]] std::uint32_t violations() const;
   [[nodiscard]] std::string first_violation() const;
+  /// The rules that it broke, as far as they were kept, in order; a rule may be there more than once.
+  [[nodiscard]] std::vector<std::string> broken_rules() const;
 
  private:
   struct Service;

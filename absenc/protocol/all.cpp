@@ -24,28 +24,47 @@
 namespace absenc {
 
 namespace {
-constexpr std::array units{
-    &tformat::unit, &esl::unit,         &encolink::unit,     &encolink::spi_unit, &biss::unit,
-    &ssi::unit,     &e201::unit,        &raa38::serial_unit, &raa38::modbus_unit, &raa38::can_unit,
-    &amt21::unit,   &biss::safety_unit, &biss::chain_unit,
-};
-}  // namespace
 
-// Not in the descriptor: firmware, which keeps that, tests no encoder.
-std::span<const Clause> clauses_of(const Unit& unit) {
-  if (&unit == &tformat::unit) return tformat::clauses;
-  if (&unit == &esl::unit) return esl::clauses;
-  if (&unit == &encolink::unit) return encolink::clauses;
-  if (&unit == &encolink::spi_unit) return encolink::spi_clauses;
-  if (&unit == &biss::unit) return biss::clauses;
-  if (&unit == &ssi::unit) return ssi::clauses;
-  if (&unit == &e201::unit) return e201::clauses;
-  if (&unit == &raa38::serial_unit) return raa38::serial_clauses;
-  if (&unit == &raa38::modbus_unit) return raa38::modbus_clauses;
-  if (&unit == &raa38::can_unit) return raa38::can_clauses;
-  if (&unit == &amt21::unit) return amt21::clauses;
+// The clauses are not in the descriptor: firmware, which keeps that, tests nobody.
+struct Listed {
+  const Unit* unit;
+  std::span<const Clause> clauses{};
+  std::span<const HostClause> host_clauses{};
+};
+
+constexpr std::array listed{
+    Listed{&tformat::unit, tformat::clauses, tformat::host_clauses},
+    Listed{&esl::unit, esl::clauses, esl::host_clauses},
+    Listed{&encolink::unit, encolink::clauses},
+    Listed{&encolink::spi_unit, encolink::spi_clauses},
+    Listed{&biss::unit, biss::clauses},
+    Listed{&ssi::unit, ssi::clauses},
+    Listed{&e201::unit, e201::clauses},
+    Listed{&raa38::serial_unit, raa38::serial_clauses},
+    Listed{&raa38::modbus_unit, raa38::modbus_clauses, raa38::modbus_host_clauses},
+    Listed{&raa38::can_unit, raa38::can_clauses},
+    Listed{&amt21::unit, amt21::clauses, amt21::host_clauses},
+    Listed{&biss::safety_unit},
+    Listed{&biss::chain_unit},
+};
+
+constexpr auto units = [] {
+  std::array<const Unit*, listed.size()> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = listed[i].unit;
+  return all;
+}();
+
+Listed listed_as(const Unit& unit) {
+  for (const Listed& one : listed) {
+    if (one.unit == &unit) return one;
+  }
   return {};
 }
+
+}  // namespace
+
+std::span<const Clause> clauses_of(const Unit& unit) { return listed_as(unit).clauses; }
+std::span<const HostClause> host_clauses_of(const Unit& unit) { return listed_as(unit).host_clauses; }
 
 std::span<const Unit* const> all_units() { return units; }
 

@@ -6,20 +6,30 @@
 #include <span>
 #include <string_view>
 
+#include "absenc/protocol/unit.hpp"
+
 namespace absenc {
 
-/// What is looked at. All of it is seen by reading: nothing changes the encoder.
+/// What is looked at. Up to `unknown_reported` it is seen by reading; the others change the encoder, and only such
+/// things as can be put back.
 enum class Demand : std::uint8_t {
-  answered,         // each request of a reading gets a reply
-  in_time,          // the reply begins within the time that the unit waits for it
-  whole,            // replies have the length of the document
-  checked,          // their checksum is right
-  as_drawn,         // fixed bits, echoes, ranges, and what must agree
-  foreign_silent,   // a request to another address is not answered
-  damaged_silent,   // nor is one whose last byte has a wrong bit
-  unknown_silent,   // nor is `request`
-  unknown_reported  // `request` gets a reply of `reply_size` bytes
+  answered,          // each request of a reading gets a reply
+  in_time,           // the reply begins within the time that the unit waits for it
+  whole,             // replies have the length of the document
+  checked,           // their checksum is right
+  as_drawn,          // fixed bits, echoes, ranges, and what must agree
+  foreign_silent,    // a request to another address is not answered
+  damaged_silent,    // nor is one whose last byte has a wrong bit
+  unknown_silent,    // nor is `request`
+  unknown_reported,  // `request` gets a reply of `reply_size` bytes
+  byte_written,      // what is written to the byte at `page` and `address` is read again
+  byte_alone,        // and the bytes beside it stay as they are
+  set,               // `setting` is what it was set to: `value`, or `other` where it is that already
+  zeroed,  // the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
+  reset    // the command `verb` is obeyed: only where what it resets is so already
 };
+
+[[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
 
 struct Clause {
   std::string_view id;         // unique in its unit: "crc"
@@ -29,11 +39,33 @@ struct Clause {
   std::uint8_t request = 0;     // a whole request of one byte
   std::uint8_t reply_size = 0;  // to it
   std::string_view option{};    // with which it is read for this; "": as the user has it
-  std::int64_t value = 0;       // of this option
+  std::int64_t value = 0;       // of this option, or as the demand says
+  std::uint32_t page = 0;
+  std::uint32_t address = 0;
+  std::string_view setting{};  // by which it is written and read, as `config set` has it
+  std::string_view field{};    // of the setting: the number that is its argument
+  std::int64_t other = 0;
+  Verb verb = Verb::run;
 };
 
-struct Unit;
+/// What is looked at when a host is tested.
+enum class HostDemand : std::uint8_t {
+  asks,           // its requests are such that they are answered
+  after_silence,  // it asks again when no reply came
+  after_damage,   // and when the reply was damaged
+  rule            // it never breaks `rule`
+};
+
+struct HostClause {
+  std::string_view id;
+  std::string_view paragraph;
+  std::string_view words;
+  HostDemand demand;
+  std::string_view rule{};  // as the virtual encoder calls it when it is broken
+};
+
 /// Those of this unit, in the order in which they are tested; empty: none are known. Defined with the list of units.
 [[nodiscard]] std::span<const Clause> clauses_of(const Unit& unit);
+[[nodiscard]] std::span<const HostClause> host_clauses_of(const Unit& unit);
 
 }  // namespace absenc

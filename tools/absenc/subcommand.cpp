@@ -29,7 +29,7 @@ std::span<const Subcommand* const> all_subcommands() {
       &encode_subcommand,       &wave_subcommand,
       &probe_subcommand,        &identify_subcommand,
       &doctor_subcommand,       &conform_subcommand,
-      &crc_find_subcommand,
+      &conform_host_subcommand, &crc_find_subcommand,
       &vectors_subcommand,      &campaign_subcommand,
       &bench_subcommand,
   };

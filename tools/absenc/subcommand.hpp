@@ -92,6 +92,7 @@ extern const Subcommand probe_subcommand;
 extern const Subcommand identify_subcommand;
 extern const Subcommand doctor_subcommand;
 extern const Subcommand conform_subcommand;
+extern const Subcommand conform_host_subcommand;
 extern const Subcommand crc_find_subcommand;
 extern const Subcommand vectors_subcommand;
 extern const Subcommand campaign_subcommand;

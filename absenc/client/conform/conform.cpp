@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <type_traits>
 #include <utility>
 
+#include "absenc/client/conform/changes.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/session.hpp"
@@ -42,7 +44,12 @@ class EditedPort final : public Port<Item> {
     }
     port_.begin(edited);
   }
+  // Once, so that what was changed can still be put back.
   Event<Item> wait(const Step<Item>& step) override {
+    if (!ended && over && over()) {
+      ended = true;
+      throw os::Interrupted{};
+    }
     const Event<Item> event = port_.wait(step);
     if (event.kind == Event<Item>::Kind::sent) sent_at_ = event.at;
     if (event.kind == Event<Item>::Kind::received) hear(event);
@@ -63,6 +70,8 @@ class EditedPort final : public Port<Item> {
     unanswered = 0;
   }
 
+  std::function<bool()> over{};
+  bool ended = false;  // because of `over`
   std::function<void(std::vector<Item>&)> edit{};
   std::vector<Item> received{};
   Time answer{};
@@ -112,16 +121,10 @@ bool breaks(Demand demand, Error error) {
   }
 }
 
-ClauseResult& conclude(ClauseResult& result, bool kept, std::string evidence) {
-  result.verdict = kept ? Verdict::kept : Verdict::broken;
-  result.evidence = std::move(evidence);
-  return result;
-}
-
 template <class Item>
 class Tester {
  public:
-  Tester(const EncoderAddress& address, Port<Item>& port, Time latency)
+  Tester(const EncoderAddress& address, Port<Item>& port, Time latency, const ConformChoices& choices)
       : unit_(*address.unit),
         options_(address.options),
         latency_(latency),
@@ -132,11 +135,21 @@ class Tester {
     if (unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex) {
       port_.character = address.line.with_some_rate().character();
     }
+    port_.over = choices.over;
+    watched_.attach(port_);
+    watched_.abort = [this] { return session_ != nullptr && session_->abort(); };
   }
 
   void read(std::size_t count) {
     find_echo();
     for (std::size_t i = 0; i < count; ++i) exchanges_.push_back(once(options_));
+  }
+
+  [[nodiscard]] bool ended() const { return port_.ended; }
+
+  [[nodiscard]] ChangesLine line() {
+    return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments); },
+            .rest = [this](Time time) { port_.listen(time); }};
   }
 
   void test(const Clause& clause, ClauseResult& result) {
@@ -155,10 +168,42 @@ class Tester {
       case Demand::unknown_silent:
       case Demand::unknown_reported:
         return test_request(clause, result);
+      default:
+        return;
     }
   }
 
  private:
+  // A conversation that changes the encoder for its own use leaves it as it was when somebody asks to end.
+  Ran run(const Command& command, Arguments arguments) {
+    host::Session<Item> session(unit_, options_, watched_, storage_, echo_);
+    session_ = &session;
+    struct Forget {
+      host::Session<Item>*& session;
+      ~Forget() { session = nullptr; }
+    } const forget{session_};
+    const Conversation<Item>* ended = session.run(command, arguments);
+    if (watched_.take_aborted()) throw os::Interrupted{};
+    if (ended == nullptr) throw UsageError(fmt::format("{} cannot run {} with these options", unit_.id, command.name));
+    Ran ran{.error = ended->error(), .detail = std::string(ended->detail())};
+    if (ran.error != Error::none) return ran;
+    if (const Reading* reading = ended->reading()) ran.reading = *reading;
+    Told told(ran);
+    ended->report(told);
+    ran.answer = std::move(told.sink.answer);
+    return ran;
+  }
+  struct Told final : FieldSink {
+    explicit Told(Ran& into) : ran(into) {}
+    void put(const FieldValue& field) override {
+      if (field.info->role == Role::data) ran.data.assign(field.bytes.begin(), field.bytes.end());
+      if (field.info->role == Role::value && ran.data.empty()) ran.data = {static_cast<std::uint8_t>(field.number)};
+      sink.put(field);
+    }
+    Ran& ran;
+    AnswerSink sink;
+  };
+
   // Whether the adapter echoes, from a good exchange; where none is, it does not.
   void find_echo() {
     constexpr unsigned attempts = 5;
@@ -290,44 +335,72 @@ class Tester {
   Time latency_;
   host::EchoMode echo_;
   EditedPort<Item> port_;
+  WatchedPort<Item> watched_;
+  host::Session<Item>* session_ = nullptr;  // of the command that runs
   std::vector<std::byte> storage_;
   const Command& read_;
   std::vector<Exchange> exchanges_;
 };
 
+ClauseResult untested(const Unit& unit, const Clause& clause) {
+  return {.id = clause.id,
+          .document = unit.document,
+          .paragraph = clause.paragraph,
+          .words = clause.words,
+          .verdict = Verdict::untested,
+          .evidence = "nothing came that would tell"};
+}
+
+[[noreturn]] void tell_left(std::string_view why, const std::vector<std::string>& left) {
+  throw Failure(fmt::format("{}\nthe encoder is left changed; to put it back:\n  {}", why, fmt::join(left, "\n  ")));
+}
+
 template <class Item>
 void test_all(const EncoderAddress& address, Port<Item>& port, Time latency, const ConformChoices& choices,
-              Conformance& conformance) {
-  Tester<Item> tester(address, port, latency);
-  tester.read(std::max<std::size_t>(1, choices.readings));
-  for (const Clause& clause : clauses_of(*address.unit)) {
-    ClauseResult result{.id = clause.id,
-                        .document = address.unit->document,
-                        .paragraph = clause.paragraph,
-                        .words = clause.words,
-                        .verdict = Verdict::untested,
-                        .evidence = "nothing came that would tell"};
-    tester.test(clause, result);
-    conformance.clauses.push_back(std::move(result));
+              std::string_view name, Conformance& conformance) {
+  Tester<Item> tester(address, port, latency, choices);
+  Changes changes(*address.unit, name, tester.line());
+  try {
+    tester.read(std::max<std::size_t>(1, choices.readings));
+    for (const Clause& clause : clauses_of(*address.unit)) {
+      if (changes_encoder(clause.demand) && !choices.changes) continue;
+      ClauseResult result = untested(*address.unit, clause);
+      if (changes_encoder(clause.demand)) {
+        changes.test(clause, result);
+      } else {
+        tester.test(clause, result);
+      }
+      conformance.clauses.push_back(std::move(result));
+    }
+  } catch (const os::Interrupted&) {
+    if (!changes.left().empty()) tell_left("interrupted", changes.left());
+    if (tester.ended()) throw Cancelled{};
+    throw;
+  } catch (const std::exception& error) {
+    if (!changes.left().empty()) tell_left(error.what(), changes.left());
+    throw;
   }
+  conformance.left = changes.left();
 }
 
 }  // namespace
 
-Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices) {
+Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices, std::string_view name) {
   if (clauses_of(*address.unit).empty()) throw UsageError(fmt::format("no clauses are known of {}", address.unit->id));
   Conformance conformance{.protocol = std::string(address.unit->id)};
   if (link.bytes != nullptr) {
-    test_all(address, *link.bytes, link.latency, choices, conformance);
+    test_all(address, *link.bytes, link.latency, choices, name, conformance);
   } else {
-    test_all(address, *link.frames, link.latency, choices, conformance);
+    test_all(address, *link.frames, link.latency, choices, name, conformance);
   }
   return conformance;
 }
 
 Conformance conform(std::string_view text, std::span<const std::string> settings, const ConformChoices& choices) {
   const EncoderAddress address = parse_address(text, settings);
-  return conform(address, open_link(address), choices);
+  std::string name = fmt::format("\"{}\"", text);
+  for (const std::string& setting : settings) name += fmt::format(" --option {}", setting);
+  return conform(address, open_link(address), choices, name);
 }
 
 }  // namespace absenc::client

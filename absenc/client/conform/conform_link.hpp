@@ -7,6 +7,8 @@
 
 namespace absenc::client {
 
-[[nodiscard]] Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices);
+/// `name` is how the user calls the encoder.
+[[nodiscard]] Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices,
+                                  std::string_view name = {});
 
 }  // namespace absenc::client

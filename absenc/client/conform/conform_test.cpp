@@ -252,7 +252,10 @@ void check(const Unit& unit, const Make& make) {
   const Conformance good = conform_mutant<Item>(address, {});
   EXPECT_TRUE(good.good()) << good.report();
   std::size_t tried = 0;
+  std::size_t clauses = 0;
   for (const Clause& clause : clauses_of(unit)) {
+    if (changes_encoder(clause.demand)) continue;
+    ++clauses;
     bool found = false;
     std::string last;
     for (const Change<Item>& change : make(address, clause)) {
@@ -264,7 +267,7 @@ void check(const Unit& unit, const Make& make) {
     }
     EXPECT_TRUE(found) << unit.id << " " << clause.id << "\n" << last;
   }
-  std::printf("%s: %zu clauses, %zu mutants\n", std::string(unit.id).c_str(), clauses_of(unit).size(), tried);
+  std::printf("%s: %zu clauses, %zu mutants\n", std::string(unit.id).c_str(), clauses, tried);
 }
 
 class Clauses : public ::testing::TestWithParam<const Unit*> {};

@@ -47,6 +47,7 @@ std::string Conformance::tap() const {
                         one.verdict == Verdict::untested ? " # SKIP " + one.evidence : std::string());
     if (one.verdict == Verdict::broken) text += fmt::format("# {}\n", one.evidence);
   }
+  for (const std::string& command : left) text += fmt::format("# left changed; to put it back: {}\n", command);
   return text;
 }
 
@@ -70,6 +71,8 @@ std::string Conformance::report() const {
     text += fmt::format("{}: {}: {}\n  {}, {}\n  {}\n", name_of(one.verdict), one.id, one.words, one.document,
                         one.paragraph, one.evidence);
   }
+  if (!left.empty())
+    text += fmt::format("the encoder is left changed; to put it back:\n  {}\n", fmt::join(left, "\n  "));
   return text + fmt::format("{} kept, {} broken, {} untested\n", count(Verdict::kept), count(Verdict::broken),
                             count(Verdict::untested));
 }

@@ -16,4 +16,10 @@ inline constexpr std::array<Clause, 5> clauses{{
     {"address", "serial interface, address", "a request to another address is not answered", Demand::foreign_silent},
 }};
 
+inline constexpr std::array<HostClause, 3> host_clauses{{
+    {"asks", "serial interface", "requests are as drawn", HostDemand::asks},
+    {"silence", "serial interface", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "serial interface, checksum", "after a damaged reply it asks again", HostDemand::after_damage},
+}};
+
 }  // namespace absenc::amt21

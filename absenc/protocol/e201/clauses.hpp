@@ -8,12 +8,20 @@
 
 namespace absenc::e201 {
 
-inline constexpr std::array<Clause, 4> clauses{{
+inline constexpr std::array<Clause, 5> clauses{{
     {"answer", "BiSS C timing diagram, command 4", "4 is answered", Demand::answered},
     {"length", "BiSS C timing diagram, command 4", "the answer is 16 hexadecimal digits and CR", Demand::whole},
     {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
     {"header", "BiSS C timing diagram, command 4", "ACK, start bit and CDS bit come before the position",
      Demand::as_drawn},
+    {.id = "clock",
+     .paragraph = "command Mn",
+     .words = "the MA clock is what it was set to",
+     .demand = Demand::set,
+     .value = 3,
+     .setting = "clock",
+     .field = "clock",
+     .other = 4},
 }};
 
 }  // namespace absenc::e201

@@ -8,10 +8,25 @@
 
 namespace absenc::encolink {
 
-inline constexpr std::array<Clause, 3> clauses{{
+inline constexpr std::array<Clause, 5> clauses{{
     {"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
     {"length", "UART, Channel 1", "a frame has position, status and CRC", Demand::whole},
     {"crc", "UART, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
+    {.id = "offset",
+     .paragraph = "UART, Channel 3",
+     .words = "a position offset that was written is read again",
+     .demand = Demand::set,
+     .value = 0x1000,
+     .setting = "position-offset",
+     .field = "position_offset",
+     .other = 0x2000},
+    {.id = "zero",
+     .paragraph = "UART, Channel 3",
+     .words = "the position offset moves the zero of the turn",
+     .demand = Demand::zeroed,
+     .value = 0,
+     .setting = "position-offset",
+     .field = "position_offset"},
 }};
 
 inline constexpr std::array<Clause, 2> spi_clauses{{

@@ -8,7 +8,7 @@
 
 namespace absenc::esl {
 
-inline constexpr std::array<Clause, 6> clauses{{
+inline constexpr std::array<Clause, 10> clauses{{
     {"answer", "Figure 2", "a read request is answered", Demand::answered},
     {"answer-time", "Figure 2", "the answer begins 2.0 us after the request", Demand::in_time},
     {"length", "Table 12", "a reply has the frames of its command", Demand::whole},
@@ -16,6 +16,44 @@ inline constexpr std::array<Clause, 6> clauses{{
     {"fields", "Figures 7 and 8", "the command frame is that of the request, each channel names itself, and both agree",
      Demand::as_drawn},
     {"address", "Figure 7", "a request to another encoder address is not answered", Demand::foreign_silent},
+    {.id = "eeprom-write",
+     .paragraph = "Figure 5",
+     .words = "a byte that was written to the EEPROM is read again",
+     .demand = Demand::byte_written,
+     .address = 0x7E},
+    {.id = "eeprom-beside",
+     .paragraph = "Figure 5",
+     .words = "writing a byte leaves those beside it",
+     .demand = Demand::byte_alone,
+     .address = 0x7E},
+    {.id = "clear-alarms",
+     .paragraph = "Table 4",
+     .words = "eight requests with command C clear the errors, and nothing else",
+     .demand = Demand::reset,
+     .verb = Verb::clear_alarms},
+    {.id = "reset-multiturn",
+     .paragraph = "Table 4",
+     .words = "eight requests with command D clear the turn counter",
+     .demand = Demand::reset,
+     .verb = Verb::reset_multiturn},
+}};
+
+inline constexpr std::array<HostClause, 9> host_clauses{{
+    {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
+    {"silence", "Figure 2", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "Figures 10 and 11", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"turn", "Figure 2", "a request waits until the reply before it is over", HostDemand::rule,
+     "request during the encoder's transmission"},
+    {"page", "Figure 13", "after a change of the page the memory is left alone", HostDemand::rule,
+     "memory access before the page is ready"},
+    {"eeprom-read", "Figure 3 (b)", "the two requests that read a byte are more than 200 us apart", HostDemand::rule,
+     "memory read again less than 200 us after the request before"},
+    {"reset-interval", "Table 4", "the requests of a reset are about 40 us apart, not much less", HostDemand::rule,
+     "reset sent too fast: much less than 40 us after the one before"},
+    {"reset-standing", "Table 4", "a reset is sent while the shaft stands", HostDemand::rule,
+     "reset while the shaft turns"},
+    {"addressing", "Table 12", "ID 8 is not sent eight times in a row", HostDemand::rule,
+     "ID 8 sent eight times in a row: dynamic addressing, which nothing describes"},
 }};
 
 }  // namespace absenc::esl

@@ -27,4 +27,14 @@ inline constexpr std::array<Clause, 2> can_clauses{{
     {"node", "3.4.1", "a request to another node is not answered", Demand::foreign_silent},
 }};
 
+inline constexpr std::array<HostClause, 5> modbus_host_clauses{{
+    {"asks", "3.1.7", "requests are as drawn", HostDemand::asks},
+    {"silence", "3.1.7", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "3.1.7", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"turn", "3.1.7", "a request waits until the reply before it is over", HostDemand::rule,
+     "something was sent during the encoder's transmission"},
+    {"gap", "3.1.7", "3.5 characters of silence come before a request", HostDemand::rule,
+     "less than 3.5 characters of silence before a request"},
+}};
+
 }  // namespace absenc::raa38

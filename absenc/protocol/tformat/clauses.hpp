@@ -8,7 +8,7 @@
 
 namespace absenc::tformat {
 
-inline constexpr std::array<Clause, 8> clauses{{
+inline constexpr std::array<Clause, 12> clauses{{
     {"answer", "6.2.1", "a readout request is answered", Demand::answered},
     {"answer-time", "8.1", "the answer begins 3 us after the request", Demand::in_time},
     {"length", "6.3.1 Table 2", "a reply has the fields of its data ID", Demand::whole},
@@ -19,6 +19,39 @@ inline constexpr std::array<Clause, 8> clauses{{
      11},
     {"bad-parity", "8.4 Table 5 (3)", "a wrong parity bit gets the data of data ID 3", Demand::unknown_reported, 0x9A,
      11},
+    {.id = "eeprom-write",
+     .paragraph = "6.2.2, 6.2.3",
+     .words = "a byte that was written to the EEPROM is read again",
+     .demand = Demand::byte_written,
+     .address = 0x7E},
+    {.id = "eeprom-beside",
+     .paragraph = "6.2.2",
+     .words = "writing a byte leaves those beside it",
+     .demand = Demand::byte_alone,
+     .address = 0x7E},
+    {.id = "clear-alarms",
+     .paragraph = "10",
+     .words = "ten requests with data ID 7 reset all errors, and nothing else",
+     .demand = Demand::reset,
+     .verb = Verb::clear_alarms},
+    {.id = "reset-multiturn",
+     .paragraph = "10",
+     .words = "ten requests with data ID C reset the turns and all errors, not the position",
+     .demand = Demand::reset,
+     .verb = Verb::reset_multiturn},
+}};
+
+inline constexpr std::array<HostClause, 7> host_clauses{{
+    {"asks", "6.2", "requests are as drawn", HostDemand::asks},
+    {"silence", "8.4", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "6.3.4", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"turn", "8.1", "a request waits until the reply before it is over", HostDemand::rule,
+     "request during the encoder's transmission"},
+    {"page", "6.3.5 (2)", "after a change of the page the EEPROM is left alone for 18 ms", HostDemand::rule,
+     "memory access before the page is ready"},
+    {"reset-interval", "10", "the ten requests of a reset are 40 us apart, or more", HostDemand::rule,
+     "reset sent too fast: less than 40 us after the one before"},
+    {"reset-standing", "10", "a reset is sent while the shaft stands", HostDemand::rule, "reset while the shaft turns"},
 }};
 
 }  // namespace absenc::tformat

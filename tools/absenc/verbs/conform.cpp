@@ -6,8 +6,10 @@
 #include <array>
 #include <fstream>
 
+#include "absenc/client/conform_host.hpp"
 #include "absenc/client/text/json.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/consent.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -28,7 +30,13 @@ Json conformance_json(const Conformance& conformance) {
                        .set("verdict", name_of(one.verdict))
                        .set("evidence", one.evidence));
   }
-  return Json::object().set("ok", conformance.good()).set("protocol", conformance.protocol).set("clauses", clauses);
+  Json left = Json::array();
+  for (const std::string& command : conformance.left) left.append(command);
+  return Json::object()
+      .set("ok", conformance.good())
+      .set("protocol", conformance.protocol)
+      .set("clauses", clauses)
+      .set("left", left);
 }
 
 std::string without_end(std::string text) {
@@ -36,11 +44,8 @@ std::string without_end(std::string text) {
   return text;
 }
 
-int run_conform(const Invocation& invocation) {
-  os::catch_interrupts();
-  const ConformChoices choices{.readings =
-                                   static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000))};
-  const Conformance conformance = conform(invocation.text("encoder"), invocation.texts("--option"), choices);
+// As the options say; returns the exit status.
+int tell(const Invocation& invocation, const Conformance& conformance) {
   if (invocation.has("--junit")) {
     const std::string path(invocation.text("--junit"));
     std::ofstream file(path);
@@ -55,18 +60,76 @@ int run_conform(const Invocation& invocation) {
   return conformance.good() ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 6> conform_parameters{{
+int run_conform(const Invocation& invocation) {
+  os::catch_interrupts();
+  const ConformChoices choices{.readings = static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000)),
+                               .changes = invocation.has("--changes")};
+  if (choices.changes) {
+    const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+    const std::string_view meaning = "memory and settings are written and put back, resets are sent";
+    if (must_ask(invocation, uri, "conform --changes", meaning) && !confirmed(uri, meaning)) {
+      print_message("nothing was changed");
+      return exit_failed;
+    }
+  }
+  const Conformance conformance = conform(invocation.text("encoder"), invocation.texts("--option"), choices);
+  return tell(invocation, conformance);
+}
+
+int run_conform_host(const Invocation& invocation) {
+  os::catch_interrupts();
+  std::string text(invocation.text("protocol"));
+  char joint = '?';
+  for (const std::string& option : invocation.texts("--option")) {
+    text += joint + option;
+    joint = '&';
+  }
+  EmulateChoices place{.link = std::string(invocation.text("--pty")), .can = std::string(invocation.text("--can"))};
+  if (invocation.has("--tcp")) place.tcp = static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
+  ConformHostChoices choices{.answers = static_cast<std::size_t>(invocation.number("--answers", 100, 2, 1'000'000))};
+  choices.patience = Time(static_cast<std::int64_t>(invocation.real("--patience", 10, 0.1, 1e6) * 1e9));
+  // Standard output is the result's.
+  choices.ready = [](const Emulation& encoder) {
+    print_message(fmt::format("ready: {}", encoder.path()));
+    if (encoder.tcp_port() != 0) print_message(fmt::format("ready: tcp:127.0.0.1:{}", encoder.tcp_port()));
+  };
+  return tell(invocation, conform_host(text, place, choices));
+}
+
+constexpr std::array<Parameter, 8> conform_parameters{{
     parameter::encoder,
     {"--readings", "N", "how many readings are looked at", "100"},
+    {"--changes", "", "test also what is written, set and reset; it is put back as it was"},
+    parameter::yes,
     {"--tap", "", "print the Test Anything Protocol"},
     {"--junit", "FILE", "write JUnit's XML to it as well"},
     parameter::json,
     parameter::option,
 }};
 
-constexpr std::array<Example, 2> conform_examples{{
+constexpr std::array<Example, 3> conform_examples{{
     {"absenc conform sim:tformat", "what its document demands, and whether it does so"},
+    {"absenc conform sim:tformat --changes", "also memory, settings and resets"},
     {"absenc conform amt21:/dev/ttyUSB0 --tap --junit amt21.xml", "for programs that count tests"},
+}};
+
+constexpr std::array<Parameter, 10> host_parameters{{
+    parameter::protocol,
+    {"--pty", "PATH", "where to put the link to the pseudo-terminal; CAN: that of an slcan adapter",
+     "only the pseudo-terminal itself"},
+    {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
+    {"--can", "INTERFACE", "CAN: be on this interface, as vcan0"},
+    {"--answers", "N", "how many requests are answered well", "100"},
+    {"--patience", "SECONDS", "so long a silence of the host ends it, once it has asked", "10"},
+    {"--tap", "", "print the Test Anything Protocol"},
+    {"--junit", "FILE", "write JUnit's XML to it as well"},
+    parameter::json,
+    parameter::protocol_option,
+}};
+
+constexpr std::array<Example, 2> host_examples{{
+    {"absenc conform-host tformat --pty /tmp/encoder", "then let the drive's program read tformat at /tmp/encoder"},
+    {"absenc conform-host raa38-modbus --tcp 4001 --tap --junit host.xml", "for programs that count tests"},
 }};
 
 }  // namespace
@@ -76,9 +139,23 @@ const Subcommand conform_subcommand{
     "test an encoder against the clauses of its document",
     "Each clause has its paragraph, a verdict (kept, broken, untested) and what was seen: replies that come, in\n"
     "time, whole, with a right checksum and as drawn; requests that must not be answered. Nothing is written to\n"
-    "the encoder. Exit status 1 when a clause is broken or could not be tested.",
+    "the encoder without --changes, which asks first: it saves what it writes and puts it back, also after Ctrl-C, "
+    "and\n"
+    "says with which commands to do it by hand what it could not. A reset is sent only where it changes nothing.\n"
+    "Exit status 1 when a clause is broken or could not be tested.",
     conform_parameters,
     conform_examples,
     run_conform};
+
+const Subcommand conform_host_subcommand{
+    "conform-host",
+    "be a virtual encoder and test the host that connects against the clauses of its document",
+    "Says on standard error where it can be opened. Replies are good, stay away for a while and are damaged for a\n"
+    "while; the host has to go on, and must not break a rule of the document: intervals, pauses, turns. Each clause "
+    "has\n"
+    "its paragraph, a verdict and what was seen. Exit status 1 when a clause is broken or could not be tested.",
+    host_parameters,
+    host_examples,
+    run_conform_host};
 
 }  // namespace absenc::tool

@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc conform` and `absenc conform-host` as a user sees them. Every clause with its mutants: client/conform tests."""
+import json
+import signal
+import time
+import unittest
+import xml.etree.ElementTree
+
+from command_support import PATIENCE, EncoderCase, absenc, end, read_line
+
+
+def content(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+class Conform(EncoderCase):
+    def test_a_good_encoder_holds_all(self):
+        result = absenc("conform", "sim:tformat", "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        answer = json.loads(result.stdout)
+        self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
+        for clause in answer["clauses"]:
+            self.assertEqual(clause["verdict"], "kept", clause)
+            self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)
+
+    def test_tap_and_junit_say_the_same(self):
+        path = self.file("conform.xml")
+        result = absenc("conform", "sim:tformat?fault=drop=1", "--tap", "--junit", path, "--readings", "3")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        lines = result.stdout.splitlines()
+        tests = [line for line in lines if line.startswith(("ok ", "not ok "))]
+        self.assertEqual(lines[:2], ["TAP version 13", f"1..{len(tests)}"])
+        suite = xml.etree.ElementTree.parse(path).getroot()
+        self.assertEqual(int(suite.get("tests")), len(tests))
+        failed = sum(line.startswith("not ok ") for line in tests)
+        self.assertEqual((int(suite.get("failures")), len(suite.findall("*/failure"))), (failed, failed))
+        self.assertGreater(failed, 0)
+        self.assertEqual(int(suite.get("skipped")), sum("# SKIP" in line for line in tests))
+
+    def test_usage(self):
+        for arguments in (("sim:biss-chain",), ("sim:tformat", "--readings", "0"), ("sim:nothing",), ()):
+            self.assert_wrong_usage(absenc("conform", *arguments))
+
+    def test_what_changes_asks_first(self):
+        self.assert_wrong_usage(absenc("conform", self.encoder(), "--changes"), "--yes")
+        self.assertNotIn("eeprom-write", absenc("conform", "sim:tformat").stdout)
+        self.assertIn("kept: eeprom-write", absenc("conform", "sim:tformat", "--changes").stdout)
+
+    def test_what_was_changed_is_put_back(self):
+        memory = self.file("memory.txt")
+        encoder = self.encoder("--memory", memory)
+        before = content(memory)
+        result = absenc("conform", encoder, "--changes", "--yes", "--readings", "5")
+        self.assertIn("kept: eeprom-write", result.stdout, result.stderr)
+        self.assertEqual(content(memory), before)
+
+    def test_what_was_changed_is_put_back_after_ctrl_c(self):
+        memory = self.file("memory.txt")
+        encoder = self.encoder("--memory", memory)
+        before = content(memory)
+        process = self.start("conform", encoder, "--changes", "--yes", "--readings", "1")
+        while process.poll() is None and content(memory) == before:
+            pass
+        status, out, _ = end(process, signal.SIGINT)
+        self.assertEqual(content(memory), before)
+        self.assertEqual((status, out), (1, ""))
+
+class ConformHost(EncoderCase):
+    def test_our_host_holds_all(self):
+        path = self.file("encoder")
+        judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "10", "--patience", "60", "--json")
+        self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
+        host = self.start("monitor", f"tformat:{path}?latency=100", "--json")
+        out, err = judge.communicate(timeout=PATIENCE)
+        end(host, signal.SIGTERM)
+        answer = json.loads(out)
+        self.assertEqual([one for one in answer["clauses"] if one["verdict"] != "kept"], [], err)
+        self.assertEqual((judge.returncode, answer["ok"]), (0, True))
+
+    def test_a_host_that_asks_only_once_is_told(self):
+        path = self.file("encoder")
+        judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "2", "--patience", "0.5", "--tap")
+        self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
+        absenc("read", f"tformat:{path}?latency=100")
+        out, _ = judge.communicate(timeout=PATIENCE)
+        self.assertEqual(judge.returncode, 1)
+        self.assertRegex(out.decode(), "\\n(not ok .*silence|.*silence.*# SKIP|not ok .*damage|.*damage.*# SKIP)")
+
+    def test_ends_by_ctrl_c_and_knows_its_protocols(self):
+        judge = self.start("conform-host", "tformat", "--pty", self.file("encoder"))
+        self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
+        self.assertEqual(end(judge, signal.SIGINT)[:2], (1, ""))
+        self.assert_wrong_usage(absenc("conform-host", "ssi"), "pseudo-terminal")
+        self.assert_wrong_usage(absenc("conform-host", "e201", "--pty", self.file("other")), "no clauses")
+
+
+if __name__ == "__main__":
+    unittest.main()
