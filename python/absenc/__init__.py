@@ -14,6 +14,8 @@
 
     capture = absenc.decode("drive.sr", "tformat", channel="D0")
     capture["angle_deg"].mean()                # NumPy, masked where nothing was told or it does not hold
+    recording = absenc.load("log.csv")         # of `absenc record`: columns as of a capture
+    recording["speed_rpm"][recording.good()]
 
 Encoders are written as for the command: "tformat:/dev/ttyUSB0?model=23-bit", "raa38-can:can0", "sim:esl", or a name of
 absenc.toml. Options may be given as keywords. A position that does not hold is None, or masked: never a number.
@@ -29,6 +31,7 @@ from .encoder import Alarm, Config, Encoder, Info, Memory, Samples, open, scan
 from .errors import AbsencError, EncoderError, Failure, PortError, UsageError
 from .identification import Found, Identified, identify
 from .protocols import Command, Flag, Protocol, crc, protocol
+from .recordings import Recording, load
 
 __all__ = [
     "AbsencError",
@@ -49,6 +52,7 @@ __all__ = [
     "PortError",
     "Protocol",
     "Reading",
+    "Recording",
     "Sample",
     "Samples",
     "UsageError",
@@ -59,6 +63,7 @@ __all__ = [
     "emulate",
     "errors",
     "identify",
+    "load",
     "open",
     "protocol",
     "scan",

@@ -27,18 +27,12 @@ class Column(NamedTuple):
     meaning: str
 
 
-class Capture:
-    """What was said on a line, exchange by exchange: `capture["angle_deg"]` is a column, `rows` all of them as one
-    structured masked array. Where nothing was told, or a position does not hold, it is masked (and NaN in floats).
+class Table:
+    """Columns by name, and `rows`, all of them as one structured masked array."""
 
-    Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; of CAN
-    and clocked links text), `turnaround_us`, `angle_deg` (of linear encoders `position_mm`), each field of the unit,
-    and `error` with `message`, "" in good rows. Flags are numbers: `Protocol.flag_names` names them."""
-
-    def __init__(self, rows: Masked, columns: dict[str, Column], notes: list[str]) -> None:
+    def __init__(self, rows: Masked, columns: dict[str, Column]) -> None:
         self.rows = rows
         self.columns = columns  #: by name, with units and meanings
-        self.notes = notes  #: what is damaged or missing in the file, and what was found out
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -49,11 +43,7 @@ class Capture:
         return self.rows[column]  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
-        return f"<absenc.Capture of {len(self)} rows: {', '.join(self.columns)}>"
-
-    def good(self) -> npt.NDArray[np.bool_]:
-        """Which rows have no error."""
-        return np.asarray(self.rows.data["error"] == "", np.bool_)
+        return f"<absenc.{type(self).__name__} of {len(self)} rows: {', '.join(self.columns)}>"
 
     def to_pandas(self) -> pandas.DataFrame:
         """A DataFrame of the columns; what is masked is NaN or <NA>. Needs pandas."""
@@ -69,6 +59,23 @@ class Capture:
                 series[missing] = pandas.NA
             frame[name] = series
         return pandas.DataFrame(frame)
+
+
+class Capture(Table):
+    """What was said on a line, exchange by exchange: `capture["angle_deg"]` is a column, `rows` all of them as one
+    structured masked array. Where nothing was told, or a position does not hold, it is masked (and NaN in floats).
+
+    Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; of CAN
+    and clocked links text), `turnaround_us`, `angle_deg` (of linear encoders `position_mm`), each field of the unit,
+    and `error` with `message`, "" in good rows. Flags are numbers: `Protocol.flag_names` names them."""
+
+    def __init__(self, rows: Masked, columns: dict[str, Column], notes: list[str]) -> None:
+        super().__init__(rows, columns)
+        self.notes = notes  #: what is damaged or missing in the file, and what was found out
+
+    def good(self) -> npt.NDArray[np.bool_]:
+        """Which rows have no error."""
+        return np.asarray(self.rows.data["error"] == "", np.bool_)
 
 
 def _masked(chunks: list[list[tuple[Any, npt.NDArray[np.bool_]]]], columns: list[Column]) -> Masked:

@@ -46,14 +46,24 @@ def test_info_answers(address):
 
 
 def test_requests_are_encoded_and_decoded(unit):
+    """What is encoded is understood as a request, and another that begins and goes on otherwise is refused."""
+    requests = []
     for command in unit.commands.values():
-        if command.verb == "read" and not command.arguments and unit.link not in ("clocked",):
-            try:
-                request = unit.encode(command.name)
-            except absenc.UsageError:
-                continue
-            if request:
-                assert isinstance(request, str if unit.link == "can" else bytes)
+        if command.arguments:
+            continue
+        try:
+            request = unit.encode(command.name)
+        except absenc.UsageError:
+            continue  # not with the options of the first model
+        if request:
+            requests.append(request)
+    assert bool(requests) == (unit.link != "clocked")
+    for request in requests:
+        assert isinstance(request, str if unit.link == "can" else bytes)
+        if unit.link != "can":  # where a request alone is not decoded
+            unit.decode(b"", request=request)
+            with pytest.raises(absenc.EncoderError):
+                unit.decode(b"", request=b"\xff" + request[1:] + b"\xff")
 
 
 def test_alarms_of_the_virtual_encoder(unit, absenc_emulate):

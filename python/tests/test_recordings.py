@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `absenc record` wrote, loaded."""
+import csv
+import json
+import os
+import subprocess
+
+import absenc
+import numpy as np
+import pytest
+
+FAULTY = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.3"
+
+
+def record(path, address, count=50):
+    subprocess.run([os.environ["ABSENC"], "record", address, "--output", str(path), "--rate", "0", "--count", str(count)],
+                   check=False, capture_output=True)  # status 1 when the last one failed
+    return path
+
+
+@pytest.fixture
+def json_lines(tmp_path):
+    return record(tmp_path / "run.jsonl", FAULTY)
+
+
+@pytest.fixture
+def both(tmp_path, json_lines):
+    """The same rows in both formats: those of JSON lines under the header of a CSV recording."""
+    header = record(tmp_path / "header.csv", FAULTY, 1).read_text().splitlines()
+    names = next(line for line in header if not line.startswith("#"))
+    path = tmp_path / "run.csv"
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        file.write("\n".join(line for line in header if line.startswith("#")) + f"\n{names}\n")
+        for line in json_lines.read_text().splitlines()[1:]:
+            row = json.loads(line)
+            cells = [row.get(name) for name in names.split(",")]
+            csv.writer(file, lineterminator="\n").writerow(
+                "" if cell is None else str(cell).lower() if isinstance(cell, bool)
+                else " ".join(cell) if isinstance(cell, list) else cell for cell in cells)
+    return absenc.load(path), absenc.load(json_lines)
+
+
+def test_both_formats_are_the_same(both):
+    of_csv, of_json = both
+    assert of_csv.columns == of_json.columns
+    assert of_csv.rows.dtype == of_json.rows.dtype
+    assert len(of_csv) == len(of_json) >= 50
+    for name in of_csv.columns:
+        assert list(np.ma.getmaskarray(of_csv[name])) == list(np.ma.getmaskarray(of_json[name])), name
+        assert of_csv[name].compressed().tolist() == of_json[name].compressed().tolist(), name
+    assert {name: of_csv.header[name] for name in of_json.header if name != "started"} == {
+        name: value for name, value in of_json.header.items() if name != "started"}
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.jsonl"])
+def test_types_units_and_what_does_not_hold(tmp_path, name):
+    recording = absenc.load(record(tmp_path / name, FAULTY))
+    good = recording.good()
+    assert good.sum() == 50 and not good.all()
+    assert set(recording["event"][~good]) <= {*absenc.errors.by_name, "gap"}
+    for column in ("angle_deg", "singleturn", "position", "alarms"):
+        assert list(np.ma.getmaskarray(recording[column])) == list(~good), column
+    assert np.isnan(recording.rows.data["angle_deg"][~good]).all()
+    assert [recording[column].dtype.kind for column in ("position", "singleturn", "singleturn_valid", "time_s")] == [
+        "i", "u", "b", "f"]
+    heat = absenc.protocol["tformat"].flag_names("alarms", int(recording["alarms"][good][0]))
+    assert heat == ["over_heat"]
+    assert recording["angle_deg"][good].tolist() == (360 * recording["singleturn"][good] / 2**17).tolist()
+    assert (recording.columns["angle_deg"].unit, recording.columns["position"].unit) == ("deg", "counts")
+    assert (recording.header["protocol"], recording.header["encoder"]) == ("tformat", FAULTY)
+    assert recording.header["rate_hz"] == "0"
+
+
+def test_files_that_are_no_recordings(tmp_path):
+    with pytest.raises(absenc.UsageError, match="csv"):
+        absenc.load(tmp_path / "run.txt")
+    other = tmp_path / "other.csv"
+    other.write_text("a,b\n1,2\n")
+    with pytest.raises(absenc.Failure, match="other.csv"):
+        absenc.load(other)
+    damaged = record(tmp_path / "run.csv", "sim:tformat", 1)
+    damaged.write_text(damaged.read_text() + "0.1,x\n")
+    with pytest.raises(absenc.Failure, match="damaged"):
+        absenc.load(damaged)
