@@ -19,7 +19,7 @@ namespace {
 
 using Resolved = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
 
-Resolved resolve(const std::string& host, const std::string& port, int kind) {
+Resolved addresses_for(const std::string& host, const std::string& port, int kind) {
   addrinfo wanted{};
   wanted.ai_flags = AI_NUMERICSERV;
   wanted.ai_socktype = kind;
@@ -32,7 +32,7 @@ Resolved resolve(const std::string& host, const std::string& port, int kind) {
 }  // namespace
 
 Datagrams::Datagrams(const std::string& host, std::uint16_t port) {
-  const Resolved one = resolve(host, std::to_string(port), SOCK_DGRAM);
+  const Resolved one = addresses_for(host, std::to_string(port), SOCK_DGRAM);
   socket_ = Descriptor(::socket(one->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (socket_.get() < 0 || ::connect(socket_.get(), one->ai_addr, one->ai_addrlen) < 0) {
     throw system_failure("sending to " + host + ":" + std::to_string(port), errno);
@@ -45,7 +45,7 @@ bool Datagrams::send(std::string_view text) {
 
 std::vector<std::string> addresses_of(const std::string& host) {
   std::vector<std::string> addresses;
-  const Resolved found = resolve(host, "0", SOCK_STREAM);
+  const Resolved found = addresses_for(host, "0", SOCK_STREAM);
   for (const addrinfo* one = found.get(); one != nullptr; one = one->ai_next) {
     addresses.push_back(host_text(*one->ai_addr));
   }

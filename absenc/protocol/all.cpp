@@ -44,8 +44,8 @@ constexpr std::array listed{
     Listed{&raa38::modbus_unit, raa38::modbus_clauses, raa38::modbus_host_clauses},
     Listed{&raa38::can_unit, raa38::can_clauses},
     Listed{&amt21::unit, amt21::clauses, amt21::host_clauses},
-    Listed{&biss::safety_unit},
-    Listed{&biss::chain_unit},
+    Listed{&biss::safety_unit, biss::safety_clauses},
+    Listed{&biss::chain_unit, biss::chain_clauses},
 };
 
 constexpr auto units = [] {

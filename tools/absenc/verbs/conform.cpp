@@ -45,7 +45,7 @@ std::string without_end(std::string text) {
 }
 
 // As the options say; returns the exit status.
-int tell(const Invocation& invocation, const Conformance& conformance) {
+int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
   if (invocation.has("--junit")) {
     const std::string path(invocation.text("--junit"));
     std::ofstream file(path);
@@ -73,7 +73,7 @@ int run_conform(const Invocation& invocation) {
     }
   }
   const Conformance conformance = conform(invocation.text("encoder"), invocation.texts("--option"), choices);
-  return tell(invocation, conformance);
+  return tell_verdict(invocation, conformance);
 }
 
 int run_conform_host(const Invocation& invocation) {
@@ -93,7 +93,7 @@ int run_conform_host(const Invocation& invocation) {
     print_message(fmt::format("ready: {}", encoder.path()));
     if (encoder.tcp_port() != 0) print_message(fmt::format("ready: tcp:127.0.0.1:{}", encoder.tcp_port()));
   };
-  return tell(invocation, conform_host(text, place, choices));
+  return tell_verdict(invocation, conform_host(text, place, choices));
 }
 
 constexpr std::array<Parameter, 8> conform_parameters{{
