@@ -24,7 +24,7 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATIO
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}/${absenc_pkgconfig_dir}"
            OUTPUT_VARIABLE absenc_prefix_from_pkgconfig)
 set(absenc_client_needs ${gpiod_LIBRARIES} ${hwy_LIBRARIES} ${libzip_LIBRARIES} ${libdeflate_LIBRARIES}
-    ${fmt_LIBRARIES} ${tomlplusplus_LIBRARIES})
+    ${fmt_LIBRARIES} ${tomlplusplus_LIBRARIES} ${hdf5_LIBRARIES})
 list(TRANSFORM absenc_client_needs PREPEND -l)
 list(JOIN absenc_client_needs " " absenc_client_needs)
 string(APPEND absenc_client_needs " ${CMAKE_THREAD_LIBS_INIT}")

@@ -250,7 +250,7 @@ TEST(ClientRecording, HasALineForEachReading) {
   Recording recording({.path = own_path("record") + ".csv", .encoder = "motor", .rate_hz = 0, .count = 20}, encoder);
   std::uint64_t heard = 0;
   EXPECT_TRUE(recording.run([&](const Sample&) { ++heard; }));
-  EXPECT_EQ(recording.readings(), 20U);
+  EXPECT_EQ(recording.counts().readings, 20U);
   EXPECT_EQ(heard, 20U);
   const std::vector<std::string> lines = lines_of(recording.names());
   std::filesystem::remove(recording.names());
@@ -276,7 +276,7 @@ TEST(ClientRecording, SaysWhenItsFileIsGone) {
   Recording recording({.path = own_path("record") + ".csv", .encoder = "motor", .rate_hz = 0, .count = 20}, encoder);
   std::filesystem::remove(recording.names());
   EXPECT_THAT(thrown_by<os::Failure>([&] { recording.run(); }), HasSubstr(recording.names()));
-  EXPECT_EQ(recording.readings(), 0U);
+  EXPECT_EQ(recording.counts().readings, 0U);
 }
 
 TEST(ClientEmulation, EveryUnitOfALineIsServedAndRead) {

@@ -9,16 +9,14 @@
 #include <cctype>
 #include <chrono>
 #include <filesystem>
-#include <iterator>
 #include <utility>
 #include <vector>
 
 #include "absenc/client/error.hpp"
-#include "absenc/client/text/row_text.hpp"
+#include "absenc/client/recording/record_file.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/client/way/pace.hpp"
-#include "absenc/os/line_file.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::client {
@@ -42,14 +40,7 @@ Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
       start_(os::now()),
       rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion),
       started_(date_and_time()) {
-  const std::string ending = fs::path(settings.path).extension();
-  if (ending != ".csv" && ending != ".jsonl" && ending != ".ndjson") {
-    throw UsageError(
-        fmt::format("\"{}\" does not say how to write it: the name must end in .csv, or in .jsonl for JSON "
-                    "lines",
-                    settings.path));
-  }
-  format_ = ending == ".csv" ? Format::csv : Format::json_lines;
+  static_cast<void>(record_form(settings.path));  // before the folder is looked at
   if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();
   open_part();
 }
@@ -57,6 +48,11 @@ Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
 Recording::~Recording() = default;
 
 std::uint64_t Recording::bytes() const { return finished_bytes_ + file_->size(); }
+
+RecordCounts Recording::counts() const {
+  RecordCounts all = finished_;
+  return all += file_->counts();
+}
 
 bool Recording::run(const std::function<void(const Sample&)>& heard) {
   const Time end = settings_.duration ? start_ + *settings_.duration : never;
@@ -75,7 +71,7 @@ bool Recording::run(const std::function<void(const Sample&)>& heard) {
       sample = encoder_.next();
       take(sample);
       if (heard) heard(sample);
-      if (settings_.count != 0 && readings_ >= settings_.count) break;
+      if (settings_.count != 0 && taken_ >= settings_.count) break;
       pace.wait(end, [this](Time time) { encoder_.wait_until(time); });
       tell_missed();
     }
@@ -117,40 +113,23 @@ void Recording::open_part() {
   if (file_) {
     file_->sync();
     finished_bytes_ += file_->size();
+    finished_ += file_->counts();
   }
   ++part_;
   part_start_ = os::now();
-  file_ = std::make_unique<os::LineFile>(part_path(part_));
-  file_->append(header());
+  file_ = make_record_file(part_path(part_), rows_.columns(), header());
 }
 
-std::string Recording::header() const {
-  const std::vector<std::string> options = option_texts(encoder_.unit(), encoder_.options());
-  std::vector<Column> explained;
-  std::copy_if(rows_.columns().begin(), rows_.columns().end(), std::back_inserter(explained),
-               [](const Column& column) { return !column.look.is_detail && !column.meaning.empty(); });
+RecordHeader Recording::header() const {
   const Model* known = encoder_.options().model;
-  const std::string_view model = known != nullptr ? known->name : "none";
-  if (format_ == Format::json_lines) {
-    Json json =
-        Json::object().set("absenc_record", 1).set("encoder", settings_.encoder).set("protocol", encoder_.unit().id);
-    json.set("model", model).set("options", fmt::format("{}", fmt::join(options, " ")));
-    json.set("started", started_).set("rate_hz", settings_.rate_hz).set("every", settings_.every).set("part", part_);
-    Json units = Json::object();
-    for (const Column& column : explained) units.set(column.name, column.meaning);
-    return json.set("units", units).line() + '\n';
-  }
-  std::string text = fmt::format(
-      "# absenc record 1\n# encoder: {}\n# protocol: {}\n# model: {}\n# options: {}\n# started: {}\n# rate_hz: {}\n"
-      "# every: {}\n# part: {}\n",
-      settings_.encoder, encoder_.unit().id, model, fmt::join(options, " "), started_, settings_.rate_hz,
-      settings_.every, part_);
-  for (const Column& column : explained) text += fmt::format("# {}: {}\n", column.name, column.meaning);
-  return text + csv_header(rows_.columns()) + '\n';
-}
-
-std::string Recording::line_of(const Row& row) const {
-  return format_ == Format::csv ? to_csv(row) + '\n' : to_json(row).line() + '\n';
+  return {.encoder = settings_.encoder,
+          .protocol = std::string(encoder_.unit().id),
+          .model = std::string(known != nullptr ? known->name : "none"),
+          .options = fmt::format("{}", fmt::join(option_texts(encoder_.unit(), encoder_.options()), " ")),
+          .started = started_,
+          .rate_hz = settings_.rate_hz,
+          .every = settings_.every,
+          .part = part_};
 }
 
 // Of the readings every so manieth, but none with other alarms is left out; of what went wrong everything but waiting.
@@ -170,9 +149,8 @@ void Recording::miss(std::uint64_t readings) {
 
 void Recording::write_gap() {
   if (gap_ == 0) return;
-  file_->append(line_of(rows_.of_gap(gap_at_, gap_)));
-  ++gaps_;
-  missed_ += std::exchange(gap_, 0);
+  const std::uint64_t missed = std::exchange(gap_, 0);
+  file_->append(rows_.of_gap(gap_at_, missed), {.gaps = 1, .missed = missed});
 }
 
 void Recording::take(const Sample& sample) {
@@ -181,9 +159,10 @@ void Recording::take(const Sample& sample) {
   const bool over = settings_.part_time && os::now() - part_start_ >= *settings_.part_time;
   if (full || over) open_part();
   write_gap();
-  file_->append(line_of(rows_.of(sample)));
-  readings_ += sample.kind == Sample::Kind::reading ? 1 : 0;
-  failures_ += sample.kind == Sample::Kind::failed ? 1 : 0;
+  const std::uint64_t is_reading = sample.kind == Sample::Kind::reading ? 1 : 0;
+  const std::uint64_t is_failure = sample.kind == Sample::Kind::failed ? 1 : 0;
+  file_->append(rows_.of(sample), {.readings = is_reading, .failures = is_failure});
+  taken_ += is_reading;
 }
 
 std::string Recording::names() const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of readings, for hours: a header, then a line for each reading and for each thing that went wrong. Each line is
-// handed to the system at once, whole or not at all, so that nothing is lost when the process is killed.
+// Files of readings, for hours: a header, then a row for each reading and for each thing that went wrong. A line is
+// handed to the system at once, whole or not at all, so that nothing is lost when the process is killed; rows of HDF5
+// within a second.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +11,21 @@
 #include <string>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/record_counts.hpp"
 #include "absenc/client/sample_rows.hpp"
-
-namespace absenc::os {
-class LineFile;
-}
 
 namespace absenc::client {
 
+class RecordFile;
+struct RecordHeader;
+
 struct RecordingSettings {
-  std::string path;                // ending in .csv; in .jsonl or .ndjson for JSON lines. There is no such file yet
-  std::string encoder;             // what the header calls it
-  double rate_hz = 100;            // readings a second that are intended; 0: as many as can be
-  std::uint64_t every = 1;         // of so many readings one is written, and each with other alarms than the one before
-  std::uint64_t count = 0;         // written readings after which it ends; 0: without end
-  std::optional<Time> duration{};  // after which it ends
+  std::string path;         // ending in .csv; .jsonl or .ndjson: JSON lines; .h5: HDF5. There is no such file yet
+  std::string encoder;      // what the header calls it
+  double rate_hz = 100;     // readings a second that are intended; 0: as many as can be
+  std::uint64_t every = 1;  // of so many readings one is written, and each with other alarms than the one before
+  std::uint64_t count = 0;  // written readings after which it ends; 0: without end
+  std::optional<Time> duration{};             // after which it ends
   std::optional<std::uint64_t> part_bytes{};  // after which another file is begun
   std::optional<Time> part_time{};            // after which another file is begun
 };
@@ -43,23 +44,18 @@ class Recording {
   /// reading. Throws os::Failure: the disk, and `lost` when the file was removed or replaced; UsageError, Failure.
   bool run(const std::function<void(const Sample&)>& heard = {});
 
-  [[nodiscard]] std::uint64_t readings() const { return readings_; }  // written
-  [[nodiscard]] std::uint64_t failures() const { return failures_; }  // written: attempts to read
-  [[nodiscard]] std::uint64_t gaps() const { return gaps_; }          // written
-  [[nodiscard]] std::uint64_t missed() const { return missed_; }      // readings, in these gaps
+  /// Of what is in the files.
+  [[nodiscard]] RecordCounts counts() const;
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] Time start() const { return start_; }  // of os::now
   /// "log.csv", or "log-0001.csv to log-0003.csv"
   [[nodiscard]] std::string names() const;
 
  private:
-  enum class Format : std::uint8_t { csv, json_lines };
-
   [[nodiscard]] std::string part_path(unsigned part) const;
   void refuse_parts_of_another_recording() const;
   void open_part();
-  [[nodiscard]] std::string header() const;
-  [[nodiscard]] std::string line_of(const Row& row) const;
+  [[nodiscard]] RecordHeader header() const;
   [[nodiscard]] bool wanted(const Sample& sample);
   void take(const Sample& sample);
   void miss(std::uint64_t readings);
@@ -67,20 +63,17 @@ class Recording {
 
   RecordingSettings settings_;
   Encoder& encoder_;
-  Format format_;
   Time start_;
   SampleRows rows_;
   std::string started_;  // the same as date and time
-  std::unique_ptr<os::LineFile> file_;
+  std::unique_ptr<RecordFile> file_;
   unsigned part_ = 0;
   Time part_start_{};
   std::uint64_t finished_bytes_ = 0;
+  RecordCounts finished_;  // of the files before
   std::uint64_t seen_ = 0;
-  std::uint64_t readings_ = 0;
-  std::uint64_t failures_ = 0;
-  std::uint64_t gaps_ = 0;
-  std::uint64_t missed_ = 0;
-  std::uint64_t gap_ = 0;  // missed, and not written yet
+  std::uint64_t taken_ = 0;  // readings
+  std::uint64_t gap_ = 0;    // missed, and not written yet
   Time gap_at_{};
   std::uint32_t alarms_ = 0;
 };

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 
 #include "absenc/os/error.hpp"
@@ -31,8 +32,8 @@ Failure::Kind kind_of(int error) {
 
 }  // namespace
 
-LineFile::LineFile(const std::string& path)
-    : path_(path), file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0666)) {
+OwnFile::OwnFile(const std::string& path)
+    : path_(path), file_(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666)) {
   if (file_) return;
   const int error = errno;
   if (error == EEXIST)
@@ -41,7 +42,7 @@ LineFile::LineFile(const std::string& path)
   throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
 }
 
-void LineFile::require_there() const {
+void OwnFile::require_there() const {
   struct stat ours {};
   struct stat there {};
   if (::fstat(file_.get(), &ours) < 0) throw system_failure("looking at " + path_, errno);
@@ -58,26 +59,55 @@ void LineFile::require_there() const {
   if (static_cast<std::uint64_t>(ours.st_size) < size_) lose("cut by another program while it was written");
 }
 
-void LineFile::append(std::string_view lines) {
-  require_there();
-  std::string_view rest = lines;
-  while (!rest.empty()) {
-    const ssize_t written = ::write(file_.get(), rest.data(), rest.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) {
-      const int error = errno;
-      [[maybe_unused]] const int ignored = ::ftruncate(file_.get(), static_cast<off_t>(size_));
-      throw system_failure("writing " + path_, error);
-    }
-    rest.remove_prefix(static_cast<std::size_t>(written));
-  }
-  size_ += lines.size();
-}
-
-void LineFile::sync() {
+void OwnFile::sync() {
   require_there();
   // What cannot be synchronised, a pipe or /dev/null, needs not be.
   if (::fsync(file_.get()) < 0 && errno != EINVAL && errno != EROFS) throw system_failure("writing " + path_, errno);
+}
+
+int OwnFile::put(std::uint64_t at, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::pwrite(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(at));
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+    at += static_cast<std::uint64_t>(written);
+  }
+  size_ = std::max(size_, at);
+  return 0;
+}
+
+void LineFile::append(std::string_view lines) {
+  require_there();
+  const int error = put(size(), lines);
+  if (error == 0) return;
+  [[maybe_unused]] const int ignored = ::ftruncate(file_.get(), static_cast<off_t>(size()));
+  throw system_failure("writing " + path_, error);
+}
+
+void BlockFile::write(std::uint64_t at, Bytes bytes) {
+  require_there();
+  const int error = put(at, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  if (error != 0) throw system_failure("writing " + path_, error);
+}
+
+void BlockFile::grow(std::uint64_t size) {
+  require_there();
+  if (size <= size_) return;
+  if (::ftruncate(file_.get(), static_cast<off_t>(size)) < 0) throw system_failure("writing " + path_, errno);
+  size_ = size;
+}
+
+void BlockFile::read(std::uint64_t at, MutableBytes bytes) const {
+  std::fill(bytes.begin(), bytes.end(), std::uint8_t{0});
+  while (!bytes.empty()) {
+    const ssize_t got = ::pread(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw system_failure("reading " + path_, errno);
+    if (got == 0) return;
+    bytes = bytes.subspan(static_cast<std::size_t>(got));
+    at += static_cast<std::uint64_t>(got);
+  }
 }
 
 }  // namespace absenc::os

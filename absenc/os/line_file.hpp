@@ -1,24 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that grows by whole lines, for what must still be readable after the disk was full or the process killed.
+// Files of ours that must still be readable after the disk was full or the process killed: of whole lines, or of
+// blocks.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <string_view>
 
+#include "absenc/core/bytes.hpp"
 #include "absenc/os/descriptor.hpp"
 
 namespace absenc::os {
 
-class LineFile {
+class OwnFile {
  public:
   /// Makes the file. Throws Failure: `in_use` when there is one already, `no_permission`, `not_found`, `system`.
-  explicit LineFile(const std::string& path);
+  explicit OwnFile(const std::string& path);
 
-  /// Hands `lines` to the system at once, which costs a few us, so that they survive the end of this process (not of
-  /// the power: `sync`). When they do not all fit, none of them stays. Throws Failure, as `require_there` too.
-  void append(std::string_view lines);
-  /// Waits for the disk. Throws as `append`.
+  /// Waits for the disk. Throws Failure, as `require_there` too.
   void sync();
   /// Throws Failure, `lost`, when the file is no longer what its path leads to, or was cut: what is written then is
   /// nowhere to be found.
@@ -27,10 +26,37 @@ class LineFile {
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::uint64_t size() const { return size_; }
 
- private:
+ protected:
+  ~OwnFile() = default;
+  OwnFile(const OwnFile&) = delete;
+  OwnFile& operator=(const OwnFile&) = delete;
+
+  /// What is written survives the end of this process (not of the power: `sync`). Returns 0, or the error of the
+  /// system.
+  [[nodiscard]] int put(std::uint64_t at, std::string_view bytes);
+
   std::string path_;
   Descriptor file_;
   std::uint64_t size_ = 0;
+};
+
+class LineFile final : public OwnFile {
+ public:
+  using OwnFile::OwnFile;
+  /// Hands `lines` to the system at once, which costs a few us. When they do not all fit, none of them stays. Throws
+  /// Failure, as `require_there` too.
+  void append(std::string_view lines);
+};
+
+class BlockFile final : public OwnFile {
+ public:
+  using OwnFile::OwnFile;
+  /// Anywhere; what lies between the end and `at` is zero. Throws Failure, as `require_there` too.
+  void write(std::uint64_t at, Bytes bytes);
+  /// Makes it at least so long. Throws Failure.
+  void grow(std::uint64_t size);
+  /// What is behind the end is zero. Throws Failure.
+  void read(std::uint64_t at, MutableBytes bytes) const;
 };
 
 }  // namespace absenc::os

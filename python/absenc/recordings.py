@@ -121,14 +121,49 @@ def _load_json_lines(text: str) -> Recording:
     return _recording(header, meanings, names, lines)
 
 
+def _load_hdf5(path: Path) -> Recording:
+    try:
+        import h5py  # type: ignore[import]
+    except ImportError as error:
+        raise Failure("recordings in HDF5 need h5py: Debian's package is python3-h5py") from error
+    with h5py.File(path, "r") as file:
+        attributes = {
+            name: value.decode() if isinstance(value, bytes) else f"{value:g}" for name, value in file.attrs.items()
+        }
+        if attributes.pop("absenc_record", "") != "1":
+            raise Failure(f"{path} is HDF5, but no recording of absenc")
+        names = attributes.pop("columns").split(",")
+        count = len(file["time_s"])  # written after all others: of a killed recording they may have more
+        dtypes = {
+            name: {"i1": "?", "S48": "O"}.get(f"{type.kind}{type.itemsize}", f"{type.kind}{type.itemsize}")
+            for name, type in ((name, file[name].dtype) for name in names)
+        }
+        rows = np.empty(count, [(name, dtype) for name, dtype in dtypes.items()])
+        missing = np.zeros(count, [(name, "?") for name in names])
+        columns = {}
+        for name in names:
+            data, about = file[name][:count], file[name].attrs
+            empty = about["missing_value"]
+            if dtypes[name] == "O":
+                rows[name] = np.char.decode(data, "utf-8")
+            else:
+                missing[name] = np.isnan(data) if data.dtype.kind == "f" else data == empty
+                rows[name] = np.where(missing[name], np.nan if data.dtype.kind == "f" else 0, data)
+            unit, meaning = (about.get(key, b"").decode() for key in ("unit", "meaning"))
+            columns[name] = Column(name, unit, dtypes[name], meaning)
+    return Recording(np.ma.MaskedArray(rows, mask=missing), columns, attributes)  # type: ignore[no-untyped-call]
+
+
 def load(file: Union[str, os.PathLike[str]]) -> Recording:
-    """A recording of `absenc record`, whose name ends in .csv, or in .jsonl or .ndjson for JSON lines. Columns have the
-    same names and types whichever it is. Details that only JSON lines have (`message`, `sent` ...) are left out; and
-    times have microseconds in CSV. Raises UsageError; Failure when the file is no recording; OSError."""
+    """A recording of `absenc record`, whose name ends in .csv, in .jsonl or .ndjson for JSON lines, or in .h5 or .hdf5.
+    Columns have the same names and types whichever it is. Details that only JSON lines have (`message`, `sent` ...) are
+    left out; and times have microseconds in CSV. Raises UsageError; Failure when the file is no recording; OSError."""
     path = Path(file)
+    if path.suffix in (".h5", ".hdf5"):
+        return _load_hdf5(path)
     loaders = {".csv": _load_csv, ".jsonl": _load_json_lines, ".ndjson": _load_json_lines}
     if path.suffix not in loaders:
-        raise UsageError(f"{path} is no recording by its name: it must end in {', '.join(loaders)}")
+        raise UsageError(f"{path} is no recording by its name: it must end in {', '.join(loaders)}, .h5 or .hdf5")
     text = path.read_text(encoding="utf-8")
     if not text.startswith(("# absenc record 1\n", '{"absenc_record":1,')):
         raise Failure(f"{path} does not begin as a recording does")

@@ -52,7 +52,14 @@ def test_both_formats_are_the_same(both):
         name: value for name, value in of_json.header.items() if name != "started"}
 
 
-@pytest.mark.parametrize("name", ["run.csv", "run.jsonl"])
+def test_hdf5_has_the_same_columns(tmp_path):
+    of_csv, of_hdf5 = (absenc.load(record(tmp_path / name, FAULTY)) for name in ("run.csv", "run.h5"))
+    assert of_hdf5.columns == of_csv.columns
+    assert of_hdf5.rows.dtype == of_csv.rows.dtype
+    assert {**of_hdf5.header, "started": ""} == {**of_csv.header, "started": ""}
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
 def test_types_units_and_what_does_not_hold(tmp_path, name):
     recording = absenc.load(record(tmp_path / name, FAULTY))
     good = recording.good()

@@ -31,9 +31,9 @@ class Report {
     next_ = now + std::chrono::seconds(1);
     const bool connected = live.connection().connected();
     progress_.show(fmt::format("{}: {} readings, {}, {} failures, {} bytes", to_text(now - recording.start()),
-                               recording.readings(),
+                               recording.counts().readings,
                                connected ? fmt::format("{:.1f} a second", live.rate()) : "the port is away",
-                               recording.failures(), recording.bytes()));
+                               recording.counts().failures, recording.bytes()));
   }
   void clear() { progress_.clear(); }
 
@@ -75,12 +75,12 @@ RecordingSettings settings_of(const Invocation& invocation) {
 
 // `whole`: what was written is in the files.
 void summarize_recording(const Recording& recording, const Encoder& live, bool whole) {
-  std::string text = fmt::format("{} readings and {} failures in {} {}", recording.readings(), recording.failures(),
+  std::string text = fmt::format("{} readings and {} failures in {} {}", recording.counts().readings, recording.counts().failures,
                                  to_text(os::now() - recording.start()),
                                  whole ? fmt::format("are in {}", recording.names()) : "were written");
-  if (recording.gaps() != 0) {
-    text += fmt::format("; {} readings that were due were not taken, in {} gap{}", recording.missed(), recording.gaps(),
-                        recording.gaps() == 1 ? "" : "s");
+  if (recording.counts().gaps != 0) {
+    text += fmt::format("; {} readings that were due were not taken, in {} gap{}", recording.counts().missed, recording.counts().gaps,
+                        recording.counts().gaps == 1 ? "" : "s");
   }
   if (live.restarts() != 0) {
     text += fmt::format("; the position started again {} times (event restarted): turns are only right between",
@@ -125,8 +125,8 @@ int run_record(const Invocation& invocation) {
 
 constexpr std::array<Parameter, 9> record_parameters{{
     parameter::encoder,
-    {"--output", "FILE", "where to; the name ends in .csv, or in .jsonl for JSON lines; it must not exist yet", "",
-     true},
+    {"--output", "FILE",
+     "where to; the name ends in .csv, in .jsonl for JSON lines or in .h5 for HDF5; it must not exist yet", "", true},
     {"--rate", "HZ", "readings a second; 0: as many as the line allows", "100"},
     {"--every", "N", "of N readings write one, and each with other alarms than the one before", "1"},
     {"--count", "N", "end after so many readings in the file", "until Ctrl-C"},
@@ -154,7 +154,8 @@ const Subcommand record_subcommand{
     "replaced ends the recording at once, with status 1.\n"
     "After a pause in which the shaft may have turned too far to know, the position starts again: the event of that\n"
     "reading is restarted. max_rpm=RPM behind ? says how fast the shaft turns at most.\n"
-    "In CSV, lines before the column names begin with #.",
+    "In CSV, lines before the column names begin with #. HDF5 has a dataset for each column, with its unit, meaning\n"
+    "and missing_value; rows reach it four times a second, and however the command ends it can be opened.",
     record_parameters,
     record_examples,
     run_record};

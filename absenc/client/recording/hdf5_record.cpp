@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// HDF5: rows are kept for a quarter of a second and written by a thread of their own, so that neither the library nor the disk
+// delays a reading.
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "absenc/client/recording/hdf5_table.hpp"
+#include "absenc/client/recording/record_file.hpp"
+#include "absenc/os/line_file.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+constexpr std::chrono::milliseconds between_commits{250};
+
+Hdf5Attributes attributes_of(const RecordHeader& header) {
+  return {{"absenc_record", std::uint64_t{1}},
+          {"encoder", header.encoder},
+          {"protocol", header.protocol},
+          {"model", header.model},
+          {"options", header.options},
+          {"started", header.started},
+          {"rate_hz", header.rate_hz},
+          {"every", header.every},
+          {"part", header.part}};
+}
+
+class Hdf5Record final : public RecordFile {
+ public:
+  Hdf5Record(const std::string& path, std::span<const Column> columns, const RecordHeader& header)
+      : file_(path),
+        table_({.grow = [this](std::uint64_t size) { file_.grow(size); },
+                .write = [this](std::uint64_t at, Bytes bytes) { file_.write(at, bytes); },
+                .read = [this](std::uint64_t at, MutableBytes bytes) { file_.read(at, bytes); }},
+               columns, attributes_of(header)),
+        rows_(columns),
+        size_(file_.size()),
+        thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+  ~Hdf5Record() override {
+    thread_.request_stop();
+    thread_.join();
+  }
+
+  void append(const Row& row, const RecordCounts& counts) override {
+    const std::lock_guard lock(mutex_);
+    if (failure_) std::rethrow_exception(failure_);
+    rows_.add(row);
+    counts_ += counts;
+  }
+
+  void sync() override {
+    {
+      std::unique_lock lock(mutex_);
+      hurry_ = true;
+      changed_.notify_all();
+      changed_.wait(lock, [this] { return !hurry_ || failure_; });
+      if (failure_) std::rethrow_exception(failure_);
+    }
+    file_.sync();
+  }
+
+  void require_there() const override {
+    const std::lock_guard lock(mutex_);
+    if (failure_) std::rethrow_exception(failure_);
+    file_.require_there();
+  }
+
+  std::uint64_t size() const override {
+    const std::lock_guard lock(mutex_);
+    return size_;
+  }
+  RecordCounts counts() const override {
+    const std::lock_guard lock(mutex_);
+    return committed_;
+  }
+
+ private:
+  void work(const std::stop_token& stop) {
+    try {
+      while (!stop.stop_requested()) {
+        {
+          std::unique_lock lock(mutex_);
+          changed_.wait_for(lock, stop, between_commits, [this] { return hurry_; });
+        }
+        commit();
+      }
+    } catch (...) {  // for whoever appends next
+      const std::lock_guard lock(mutex_);
+      failure_ = std::current_exception();
+      changed_.notify_all();
+    }
+  }
+
+  void commit() {
+    Hdf5Rows rows = rows_of_now();
+    table_.commit(rows);
+    const std::lock_guard lock(mutex_);
+    committed_ += taken_;
+    size_ = file_.size();
+    hurry_ = false;
+    changed_.notify_all();
+  }
+
+  Hdf5Rows rows_of_now() {
+    const std::lock_guard lock(mutex_);
+    Hdf5Rows rows = rows_;
+    rows_.clear();
+    taken_ = std::exchange(counts_, {});
+    return rows;
+  }
+
+  os::BlockFile file_;
+  Hdf5Table table_;  // of the thread
+  mutable std::mutex mutex_;
+  std::condition_variable_any changed_;
+  Hdf5Rows rows_;        // that wait
+  RecordCounts counts_;  // of them
+  RecordCounts taken_;   // that are being written
+  RecordCounts committed_;
+  std::uint64_t size_;
+  bool hurry_ = false;
+  std::exception_ptr failure_;
+  std::jthread thread_;  // the last: it uses all others
+};
+
+}  // namespace
+
+std::unique_ptr<RecordFile> make_hdf5_file(const std::string& path, std::span<const Column> columns,
+                                           const RecordHeader& header) {
+  return std::make_unique<Hdf5Record>(path, columns, header);
+}
+
+}  // namespace absenc::client
