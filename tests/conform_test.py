@@ -40,7 +40,7 @@ class Conform(EncoderCase):
         self.assertEqual(int(suite.get("skipped")), sum("# SKIP" in line for line in tests))
 
     def test_usage(self):
-        for arguments in (("sim:biss-chain",), ("sim:tformat", "--readings", "0"), ("sim:nothing",), ()):
+        for arguments in (("sim:tformat", "--readings", "0"), ("sim:nothing",), ()):
             self.assert_wrong_usage(absenc("conform", *arguments))
 
     def test_what_changes_asks_first(self):

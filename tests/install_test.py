@@ -348,6 +348,7 @@ class Packages(unittest.TestCase):
         self.assertEqual(command, {
             "bin/absenc", "share/man/man1/absenc.1.gz", "share/bash-completion/completions/absenc",
             "share/doc/absenc/README.md", "share/doc/absenc/serve.md", "share/doc/absenc/copyright",
+            "share/doc/absenc/mqtt.md", "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json",
             "lib/systemd/system/absenc.service"})
         for name, held in (("absenc", command), ("libabsenc-dev", development), ("python3-absenc", python)):
             self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})

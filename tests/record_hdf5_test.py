@@ -75,7 +75,7 @@ class Hdf5(RecordCase):
         for number, part in enumerate(parts, 1):
             attributes, columns = self.read(self.output(part))
             self.assertEqual(attributes["part"], number)
-                self.assertTrue(set(columns["event"]) - {b"", b"gap"}, part)
+            self.assertTrue(set(columns["event"]) - {b"", b"gap"}, part)
 
     def test_killed(self):
         """SIGKILL at any time: it can be opened, and little is missing."""

@@ -66,12 +66,14 @@ bool Recording::run(const std::function<void(const Sample&)>& heard) {
     const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
     if (was_there) miss(missed);
   };
+  bool has_all = false;
   try {
     while (os::now() < end && !os::interrupted()) {
       sample = encoder_.next();
       take(sample);
       if (heard) heard(sample);
-      if (settings_.count != 0 && taken_ >= settings_.count) break;
+      has_all = settings_.count != 0 && taken_ >= settings_.count;
+      if (has_all) break;
       pace.wait(end, [this](Time time) { encoder_.wait_until(time); });
       tell_missed();
     }
@@ -79,6 +81,7 @@ bool Recording::run(const std::function<void(const Sample&)>& heard) {
   } catch (const Cancelled&) {
   }
   encoder_.end_when({});
+  if (!has_all) pace.leave_out(end);  // the end may have come while a reading was taken
   tell_missed();
   write_gap();
   file_->sync();

@@ -73,8 +73,8 @@ class Uart(EncoderCase):
         return absenc("read", f"tformat:{PORT}?latency=2000&{more}", *arguments)
 
     def reader(self, more):
-        """`read` that goes on, after its first reading."""
-        process = self.start("read", f"tformat:{PORT}?latency=2000&{more}", "--count", "0", "--rate", "10")
+        """`read` that goes on, after its first reading: whoever looks into the UART then disturbs nothing under way."""
+        process = self.start("read", f"tformat:{PORT}?latency=2000&{more}", "--count", "0", "--rate", "0.01")
         self.first_line(process)
         return process
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// HDF5: rows are kept for a quarter of a second and written by a thread of their own, so that neither the library nor the disk
-// delays a reading.
+// HDF5: rows are kept for a quarter of a second and written by a thread of their own, so that neither the library nor
+// the disk delays a reading.
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>

@@ -36,8 +36,8 @@ using Hdf5Attributes = std::vector<std::pair<std::string, std::variant<std::stri
 
 class Hdf5Table {
  public:
-  /// `attributes`: of the file, which has `columns` too, their names. Columns have `unit`, `meaning`, and `missing_value`: what stands where nothing was
-  /// told, NaN of reals. Throws Failure, and what `disk` throws.
+  /// `attributes`: of the file, which has `columns` too, their names. Columns have `unit`, `meaning`, and
+  /// `missing_value`: what stands where nothing was told, NaN of reals. Throws Failure, and what `disk` throws.
   Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes);
   ~Hdf5Table();
   Hdf5Table(const Hdf5Table&) = delete;

@@ -140,7 +140,6 @@ TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
     if (failed) continue;
     EXPECT_EQ(rows, 5900) << failing;
     return;  // all writes were there
-
   }
 }
 

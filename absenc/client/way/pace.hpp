@@ -43,20 +43,11 @@ class Pace {
 
   void wait() { wait(never, os::sleep_until); }
 
-  /// How many times before the end `wait` has left out since this was last asked, because they were over: whoever took
-  /// longer than a period, or was stopped, has missed them.
-  [[nodiscard]] std::uint64_t take_missed() { return std::exchange(missed_, 0); }
-
-  /// The first time, again.
-  void start_at(Time start) { next_ = start; }
-
-  [[nodiscard]] Time period() const { return period_; }
-
- private:
-  // One that is over by less than a period is late, and not missed unless the end has come.
+  /// Leaves out what is over, because nothing was done at the next time yet. One that is over by less than a period is
+  /// late, and not missed unless the end has come.
   void leave_out(Time end) {
     const Time now = os::now();
-    if (now < next_) return;
+    if (period_ == Time{} || now < next_) return;
     const Time first = next_;
     const auto over = (now - next_) / period_;
     next_ += over * period_;
@@ -68,6 +59,16 @@ class Pace {
     if (first < end) missed_ += static_cast<std::uint64_t>((end - first - Time{1}) / period_ + 1);
   }
 
+  /// How many times before the end were left out since this was last asked, because they were over: whoever took longer
+  /// than a period, or was stopped, has missed them.
+  [[nodiscard]] std::uint64_t take_missed() { return std::exchange(missed_, 0); }
+
+  /// The first time, again.
+  void start_at(Time start) { next_ = start; }
+
+  [[nodiscard]] Time period() const { return period_; }
+
+ private:
   Time period_;
   Time next_;
   std::uint64_t missed_ = 0;
