@@ -3,10 +3,10 @@
 #include "absenc/client/recording/hdf5_table.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <array>
 #include <filesystem>
+#include <random>
 
 #include "absenc/os/line_file.hpp"
 
@@ -25,7 +25,7 @@ struct Write {
 
 struct Bench {
   explicit Bench(const char* name)
-      : path(fs::path(::testing::TempDir()) / (std::to_string(::getpid()) + name + ".h5")), file(path) {}
+      : path(fs::path(::testing::TempDir()) / (std::to_string(std::random_device{}()) + name + ".h5")), file(path) {}
   ~Bench() { fs::remove(path); }
 
   [[nodiscard]] Hdf5Store::Disk disk() {

@@ -75,12 +75,12 @@ RecordingSettings settings_of(const Invocation& invocation) {
 
 // `whole`: what was written is in the files.
 void summarize_recording(const Recording& recording, const Encoder& live, bool whole) {
-  std::string text = fmt::format("{} readings and {} failures in {} {}", recording.counts().readings, recording.counts().failures,
-                                 to_text(os::now() - recording.start()),
+  std::string text = fmt::format("{} readings and {} failures in {} {}", recording.counts().readings,
+                                 recording.counts().failures, to_text(os::now() - recording.start()),
                                  whole ? fmt::format("are in {}", recording.names()) : "were written");
   if (recording.counts().gaps != 0) {
-    text += fmt::format("; {} readings that were due were not taken, in {} gap{}", recording.counts().missed, recording.counts().gaps,
-                        recording.counts().gaps == 1 ? "" : "s");
+    text += fmt::format("; {} readings that were due were not taken, in {} gap{}", recording.counts().missed,
+                        recording.counts().gaps, recording.counts().gaps == 1 ? "" : "s");
   }
   if (live.restarts() != 0) {
     text += fmt::format("; the position started again {} times (event restarted): turns are only right between",
