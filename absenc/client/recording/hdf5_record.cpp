@@ -58,9 +58,9 @@ class Hdf5Record final : public RecordFile {
   void sync() override {
     {
       std::unique_lock lock(mutex_);
-      hurry_ = true;
+      const std::uint64_t mine = ++asked_;
       changed_.notify_all();
-      changed_.wait(lock, [this] { return !hurry_ || failure_; });
+      changed_.wait(lock, [&] { return served_ >= mine || failure_; });
       if (failure_) std::rethrow_exception(failure_);
     }
     file_.sync();
@@ -87,7 +87,7 @@ class Hdf5Record final : public RecordFile {
       while (!stop.stop_requested()) {
         {
           std::unique_lock lock(mutex_);
-          changed_.wait_for(lock, stop, between_commits, [this] { return hurry_; });
+          changed_.wait_for(lock, stop, between_commits, [this] { return asked_ != served_; });
         }
         commit();
       }
@@ -104,7 +104,7 @@ class Hdf5Record final : public RecordFile {
     const std::lock_guard lock(mutex_);
     committed_ += taken_;
     size_ = file_.size();
-    hurry_ = false;
+    served_ = serving_;
     changed_.notify_all();
   }
 
@@ -113,6 +113,7 @@ class Hdf5Record final : public RecordFile {
     Hdf5Rows rows = rows_;
     rows_.clear();
     taken_ = std::exchange(counts_, {});
+    serving_ = asked_;
     return rows;
   }
 
@@ -125,7 +126,10 @@ class Hdf5Record final : public RecordFile {
   RecordCounts taken_;   // that are being written
   RecordCounts committed_;
   std::uint64_t size_;
-  bool hurry_ = false;
+  // Who waits for the disk is served by a commit that began afterwards.
+  std::uint64_t asked_ = 0;
+  std::uint64_t serving_ = 0;
+  std::uint64_t served_ = 0;
   std::exception_ptr failure_;
   std::jthread thread_;  // the last: it uses all others
 };
