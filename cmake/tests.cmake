@@ -126,7 +126,8 @@ if(ABSENC_COMMAND)
     add_test(NAME ${name}.py COMMAND "${Python3_EXECUTABLE}" -B "${source}")
     set_tests_properties(${name}.py PROPERTIES
       ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}"
-      COST 100)  # they mostly wait: first, beside what computes
+      COST 100  # they mostly wait: first, beside what computes
+      TIMEOUT 400)  # and some minutes on a machine that does something else
   endforeach()
 endif()
 
