@@ -6,7 +6,6 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
-#include <random>
 #include <set>
 #include <thread>
 
@@ -15,8 +14,8 @@
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/find_crc.hpp"
 #include "absenc/client/identify.hpp"
-#include "absenc/client/recording.hpp"
 #include "absenc/client/sample_rows.hpp"
+#include "absenc/client/test_support.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/protocol/all.hpp"
 
@@ -26,11 +25,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 using Kind = Sample::Kind;
-
-/// A path of this test alone.
-std::string own_path(std::string_view what) {
-  return testing::TempDir() + "absenc-client-" + std::string(what) + std::to_string(std::random_device{}());
-}
 
 /// A file of this test alone.
 class TestFile {
@@ -47,16 +41,6 @@ std::string flag_text(const Unit& unit, const Reading& reading) {
   std::string text;
   for (const Flags& flags : alarms_of(unit, reading)) text += to_text(Value(flags));
   return text;
-}
-
-template <class Thrown, class Work>
-std::string thrown_by(const Work& work) {
-  try {
-    work();
-  } catch (const Thrown& thrown) {
-    return thrown.what();
-  }
-  return "nothing was thrown";
 }
 
 // ---- The check of an unknown encoder
@@ -236,48 +220,6 @@ TEST(ClientEncoder, AnotherEndLeavesCancelAsItIs) {
 }
 
 // ---- A virtual encoder that others open: half a second for the way, because others may use the machine
-
-// ---- Recordings
-std::vector<std::string> lines_of(const std::string& path) {
-  std::ifstream file(path);
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(file, line);) lines.push_back(line);
-  return lines;
-}
-
-TEST(ClientRecording, HasALineForEachReading) {
-  Encoder encoder = open("sim:tformat?singleturn=32768");
-  Recording recording({.path = own_path("record") + ".csv", .encoder = "motor", .rate_hz = 0, .count = 20}, encoder);
-  std::uint64_t heard = 0;
-  EXPECT_TRUE(recording.run([&](const Sample&) { ++heard; }));
-  EXPECT_EQ(recording.counts().readings, 20U);
-  EXPECT_EQ(heard, 20U);
-  const std::vector<std::string> lines = lines_of(recording.names());
-  std::filesystem::remove(recording.names());
-  ASSERT_GT(lines.size(), 21U);
-  EXPECT_EQ(lines[0], "# absenc record 1");
-  EXPECT_EQ(lines[1], "# encoder: motor");
-  EXPECT_EQ(std::count_if(lines.begin(), lines.end(), [](const std::string& line) { return line[0] != '#'; }), 21);
-  EXPECT_THAT(lines.back(), HasSubstr(",90,32768,"));
-}
-
-TEST(ClientRecording, EndsByCancelWhileItWaits) {
-  Encoder encoder = open("sim:tformat");
-  Recording recording({.path = own_path("record") + ".jsonl", .encoder = "motor", .rate_hz = 1e-3}, encoder);
-  std::thread other;
-  recording.run([&](const Sample&) { other = std::thread([&] { encoder.cancel(); }); });  // within 1000 s
-  other.join();
-  EXPECT_EQ(lines_of(recording.names()).size(), 2U);
-  std::filesystem::remove(recording.names());
-}
-
-TEST(ClientRecording, SaysWhenItsFileIsGone) {
-  Encoder encoder = open("sim:tformat");
-  Recording recording({.path = own_path("record") + ".csv", .encoder = "motor", .rate_hz = 0, .count = 20}, encoder);
-  std::filesystem::remove(recording.names());
-  EXPECT_THAT(thrown_by<os::Failure>([&] { recording.run(); }), HasSubstr(recording.names()));
-  EXPECT_EQ(recording.counts().readings, 0U);
-}
 
 TEST(ClientEmulation, EveryUnitOfALineIsServedAndRead) {
   for (const Unit* unit : all_units()) {

@@ -2,33 +2,19 @@
 #include "absenc/os/listener.hpp"
 
 #include <arpa/inet.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <array>
 #include <cerrno>
-#include <memory>
 #include <string>
 
+#include "absenc/os/addresses.hpp"
 #include "absenc/os/error.hpp"
 
 namespace absenc::os {
 
 namespace {
-
-using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
-
-Addresses look_up(const std::string& host, std::uint16_t port) {
-  addrinfo wanted{};
-  wanted.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  wanted.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  const std::string plain = host.size() > 2 && host.front() == '[' ? host.substr(1, host.size() - 2) : host;
-  const int error = ::getaddrinfo(plain.c_str(), std::to_string(port).c_str(), &wanted, &found);
-  if (error != 0) throw Failure(Failure::Kind::not_found, "cannot listen at " + host + ": " + ::gai_strerror(error));
-  return {found, &::freeaddrinfo};
-}
 
 Failure refusal(const std::string& host, std::uint16_t port, int error) {
   const std::string where = host + ":" + std::to_string(port);
@@ -61,7 +47,7 @@ std::uint16_t port_of(int socket) {
 }  // namespace
 
 Listener listen_at(const std::string& host, std::uint16_t port) {
-  const Addresses found = look_up(host, port);
+  const Addresses found = look_up(host, port, SOCK_STREAM, AI_PASSIVE, "cannot listen at " + host);
   const addrinfo& one = *found;
   Listener listener;
   listener.socket = Descriptor(::socket(one.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));

@@ -1,38 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/network.hpp"
 
-#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
-#include <memory>
 
+#include "absenc/os/addresses.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/listener.hpp"
 
 namespace absenc::os {
 
-namespace {
-
-using Resolved = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
-
-Resolved addresses_for(const std::string& host, const std::string& port, int kind) {
-  addrinfo wanted{};
-  wanted.ai_flags = AI_NUMERICSERV;
-  wanted.ai_socktype = kind;
-  addrinfo* found = nullptr;
-  const int error = ::getaddrinfo(host.c_str(), port.c_str(), &wanted, &found);
-  if (error != 0) throw Failure(Failure::Kind::not_found, "cannot send to " + host + ": " + ::gai_strerror(error));
-  return {found, &::freeaddrinfo};
-}
-
-}  // namespace
-
 Datagrams::Datagrams(const std::string& host, std::uint16_t port) {
-  const Resolved one = addresses_for(host, std::to_string(port), SOCK_DGRAM);
+  const Addresses one = look_up(host, port, SOCK_DGRAM, 0, "cannot send to " + host);
   socket_ = Descriptor(::socket(one->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (socket_.get() < 0 || ::connect(socket_.get(), one->ai_addr, one->ai_addrlen) < 0) {
     throw system_failure("sending to " + host + ":" + std::to_string(port), errno);
@@ -45,7 +28,7 @@ bool Datagrams::send(std::string_view text) {
 
 std::vector<std::string> addresses_of(const std::string& host) {
   std::vector<std::string> addresses;
-  const Resolved found = addresses_for(host, "0", SOCK_STREAM);
+  const Addresses found = look_up(host, 0, SOCK_STREAM, 0, "cannot send to " + host);
   for (const addrinfo* one = found.get(); one != nullptr; one = one->ai_next) {
     addresses.push_back(host_text(*one->ai_addr));
   }

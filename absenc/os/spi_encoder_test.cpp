@@ -80,36 +80,40 @@ TEST_F(SpiEncoder, Biss) {
   EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
 }
 
-TEST_F(SpiEncoder, RegistersAreAskedForByTheLevelOfTheClock) {
+/// An encoder with registers behind the controller, and who asks for them.
+struct BissRegisters {
+  BissRegisters(FakeSpi& kernel, const Shaft& shaft) : encoder(biss::Format{}, shaft) {
+    EXPECT_EQ(resolve_options(biss::unit, {}, {}, options).kind, OptionError::Kind::none);
+    encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
+  }
+  Conversation<std::uint8_t>& info() {
+    return *biss::unit.host(options, *find_command(biss::unit, Verb::info), {}, storage).bytes;
+  }
+
   Options options;
-  ASSERT_EQ(resolve_options(biss::unit, {}, {}, options).kind, OptionError::Kind::none);
-  biss::VirtualEncoder encoder(biss::Format{}, shaft);
-  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-  kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
+  biss::VirtualEncoder encoder;
+  std::vector<std::byte> storage = std::vector<std::byte>(biss::unit.host_storage);
+};
+
+TEST_F(SpiEncoder, RegistersAreAskedForByTheLevelOfTheClock) {
+  BissRegisters registers(kernel, shaft);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
-  std::vector<std::byte> storage(biss::unit.host_storage);
-  const Any<Conversation> host = biss::unit.host(options, *find_command(biss::unit, Verb::info), {}, storage);
-  ASSERT_NE(host.bytes, nullptr);
-  ASSERT_TRUE(run(*host.bytes, port));
-  EXPECT_EQ(host.bytes->error(), Error::none);
+  Conversation<std::uint8_t>& info = registers.info();
+  ASSERT_TRUE(run(info, port));
+  EXPECT_EQ(info.error(), Error::none);
 }
 
 // Positions all the same: only who asks for registers is told, by what they can be read.
 TEST_F(SpiEncoder, AControllerThatOnlyIdlesHighReadsNoRegisters) {
-  Options options;
-  ASSERT_EQ(resolve_options(biss::unit, {}, {}, options).kind, OptionError::Kind::none);
-  biss::VirtualEncoder encoder(biss::Format{}, shaft);
-  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-  kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
+  BissRegisters registers(kernel, shaft);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
   kernel.refusals[SPI_IOC_WR_MODE32] = EINVAL;
   biss::ReadPosition read(biss::Format{});
   ASSERT_TRUE(run(read, port));
   EXPECT_EQ(read.error(), Error::none);
-  std::vector<std::byte> storage(biss::unit.host_storage);
-  const Any<Conversation> host = biss::unit.host(options, *find_command(biss::unit, Verb::info), {}, storage);
   try {
-    static_cast<void>(run(*host.bytes, port));
+    static_cast<void>(run(registers.info(), port));
     ADD_FAILURE() << "it was read";
   } catch (const Failure& failure) {
     EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);

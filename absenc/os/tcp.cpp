@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/tcp.hpp"
 
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
 #include <cerrno>
-#include <memory>
 
+#include "absenc/os/addresses.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 
@@ -17,21 +16,6 @@ namespace absenc::os {
 using namespace std::chrono_literals;
 
 namespace {
-
-using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
-
-Addresses resolve(std::string host, std::uint16_t port) {
-  if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  const int error = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
-  if (error != 0) {
-    throw Failure(Failure::Kind::not_found,
-                  "the host " + host + " is not known (" + ::gai_strerror(error) + "): check the name and the network");
-  }
-  return {found, &::freeaddrinfo};
-}
 
 // 0, or an errno; `descriptor` is the connection then.
 int connect_to(const addrinfo& address, Time deadline, Descriptor& descriptor) {
@@ -63,7 +47,7 @@ Failure connect_failure(const std::string& host, std::uint16_t port, int error) 
 }
 
 Descriptor open_connection(const std::string& host, std::uint16_t port) {
-  const Addresses addresses = resolve(host, port);
+  const Addresses addresses = look_up(host, port, SOCK_STREAM, 0, "the host " + host + " is not known");
   const Time deadline = now() + 3s;
   int error = ETIMEDOUT;
   for (const addrinfo* address = addresses.get(); address != nullptr; address = address->ai_next) {

@@ -22,13 +22,15 @@ std::mutex& library() {
   return mutex;
 }
 
+void require(herr_t result) {
+  if (result < 0) throw Failure("HDF5 could not go on writing: record to a name that ends in .csv");
+}
+
 /// An identifier that is released.
 class Handle {
  public:
   using Release = herr_t (*)(hid_t);
-  Handle(hid_t id, Release release) : id_(id), release_(release) {
-    if (id_ < 0) throw Failure("HDF5 could not go on writing");
-  }
+  Handle(hid_t id, Release release) : id_(id), release_(release) { require(id_ < 0 ? -1 : 0); }
   ~Handle() { release_(id_); }
   Handle(const Handle&) = delete;
   Handle& operator=(const Handle&) = delete;
@@ -38,10 +40,6 @@ class Handle {
   hid_t id_;
   Release release_;
 };
-
-void require(herr_t result) {
-  if (result < 0) throw Failure("HDF5 could not go on writing");
-}
 
 Handle hdf5_type(Type type) {
   const auto made = [&] {

@@ -6,8 +6,8 @@
 
 #include <array>
 #include <filesystem>
-#include <random>
 
+#include "absenc/client/test_support.hpp"
 #include "absenc/os/line_file.hpp"
 
 namespace absenc::client {
@@ -24,8 +24,7 @@ struct Write {
 };
 
 struct Bench {
-  explicit Bench(const char* name)
-      : path(fs::path(::testing::TempDir()) / (std::to_string(std::random_device{}()) + name + ".h5")), file(path) {}
+  explicit Bench(const char* name) : path(own_path(name) + ".h5"), file(path) {}
   ~Bench() { fs::remove(path); }
 
   [[nodiscard]] Hdf5Store::Disk disk() {

@@ -50,7 +50,8 @@ int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
     const std::string path(invocation.text("--junit"));
     std::ofstream file(path);
     file << conformance.junit() << std::flush;
-    if (!file) throw UsageError(fmt::format("{} cannot be written", path));
+    if (!file)
+      throw UsageError(fmt::format("{} cannot be written: choose a folder that is there and may be written", path));
   }
   if (invocation.has("--json")) {
     print_line(conformance_json(conformance).line());

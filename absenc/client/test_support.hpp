@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+#include <string_view>
+
+namespace absenc::client {
+
+/// A path of this test alone.
+inline std::string own_path(std::string_view what) {
+  return testing::TempDir() + "absenc-client-" + std::string(what) + std::to_string(std::random_device{}());
+}
+
+template <class Thrown, class Work>
+std::string thrown_by(const Work& work) {
+  try {
+    work();
+  } catch (const Thrown& thrown) {
+    return thrown.what();
+  }
+  return "nothing was thrown";
+}
+
+}  // namespace absenc::client
