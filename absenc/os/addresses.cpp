@@ -5,7 +5,8 @@
 
 namespace absenc::os {
 
-Addresses look_up(const std::string& host, std::uint16_t port, int socket_type, int flags, const std::string& trouble) {
+Addresses look_up(const std::string& host, std::uint16_t port, int socket_type, int flags, const std::string& before,
+                  const std::string& behind) {
   const bool in_brackets = host.size() > 2 && host.front() == '[' && host.back() == ']';
   const std::string plain = in_brackets ? host.substr(1, host.size() - 2) : host;
   addrinfo wanted{};
@@ -15,7 +16,7 @@ Addresses look_up(const std::string& host, std::uint16_t port, int socket_type, 
   const int error = ::getaddrinfo(plain.c_str(), std::to_string(port).c_str(), &wanted, &found);
   if (error != 0) {
     throw Failure(Failure::Kind::not_found,
-                  trouble + " (" + ::gai_strerror(error) + "): check the name and the network");
+                  before + plain + behind + " (" + ::gai_strerror(error) + "): check the name and the network");
   }
   return {found, &::freeaddrinfo};
 }

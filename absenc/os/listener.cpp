@@ -47,7 +47,7 @@ std::uint16_t port_of(int socket) {
 }  // namespace
 
 Listener listen_at(const std::string& host, std::uint16_t port) {
-  const Addresses found = look_up(host, port, SOCK_STREAM, AI_PASSIVE, "cannot listen at " + host);
+  const Addresses found = look_up(host, port, SOCK_STREAM, AI_PASSIVE, "cannot listen at ");
   const addrinfo& one = *found;
   Listener listener;
   listener.socket = Descriptor(::socket(one.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));

@@ -15,7 +15,7 @@
 namespace absenc::os {
 
 Datagrams::Datagrams(const std::string& host, std::uint16_t port) {
-  const Addresses one = look_up(host, port, SOCK_DGRAM, 0, "cannot send to " + host);
+  const Addresses one = look_up(host, port, SOCK_DGRAM, 0, "cannot send to ");
   socket_ = Descriptor(::socket(one->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (socket_.get() < 0 || ::connect(socket_.get(), one->ai_addr, one->ai_addrlen) < 0) {
     throw system_failure("sending to " + host + ":" + std::to_string(port), errno);
@@ -28,7 +28,7 @@ bool Datagrams::send(std::string_view text) {
 
 std::vector<std::string> addresses_of(const std::string& host) {
   std::vector<std::string> addresses;
-  const Addresses found = look_up(host, 0, SOCK_STREAM, 0, "cannot send to " + host);
+  const Addresses found = look_up(host, 0, SOCK_STREAM, 0, "cannot send to ");
   for (const addrinfo* one = found.get(); one != nullptr; one = one->ai_next) {
     addresses.push_back(host_text(*one->ai_addr));
   }

@@ -47,7 +47,7 @@ Failure connect_failure(const std::string& host, std::uint16_t port, int error) 
 }
 
 Descriptor open_connection(const std::string& host, std::uint16_t port) {
-  const Addresses addresses = look_up(host, port, SOCK_STREAM, 0, "the host " + host + " is not known");
+  const Addresses addresses = look_up(host, port, SOCK_STREAM, 0, "the host ", " is not known");
   const Time deadline = now() + 3s;
   int error = ETIMEDOUT;
   for (const addrinfo* address = addresses.get(); address != nullptr; address = address->ai_next) {
