@@ -135,7 +135,7 @@ def _load_hdf5(path: Path) -> Recording:
         names = attributes.pop("columns").split(",")
         count = len(file["time_s"])  # written after all others: of a killed recording they may have more
         dtypes = {
-            name: {"i1": "?", "S48": "O"}.get(f"{type.kind}{type.itemsize}", f"{type.kind}{type.itemsize}")
+            name: "O" if type.kind == "S" else "?" if type == np.int8 else f"{type.kind}{type.itemsize}"
             for name, type in ((name, file[name].dtype) for name in names)
         }
         rows = np.empty(count, [(name, dtype) for name, dtype in dtypes.items()])
