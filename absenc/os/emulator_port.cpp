@@ -157,6 +157,17 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
   return filled;
 }
 
+// On a busy machine a program that could run is not let run for milliseconds, in which a host gives up and asks again:
+// both requests are there at once then, and the host has broken no rule. The kernel's threads that carry the bytes of
+// pseudo-terminals are kept waiting as we are, at other moments: the longest delay of a second is taken for theirs.
+Time EmulatorPort::lateness() {
+  const Time delay = delay_.take();
+  const Time now = os::now();
+  if (delay < late_ && now < late_until_) return late_;
+  late_until_ = now + 1s;
+  return late_ = delay;
+}
+
 bool EmulatorPort::understands_terminal() const {
   constexpr std::uint32_t unset = 38'400;
   if (device_rate_ == 0) return true;

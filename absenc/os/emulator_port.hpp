@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "absenc/os/process.hpp"
 #include "absenc/os/stream_port.hpp"
 
 namespace absenc::os {
@@ -36,6 +37,7 @@ class EmulatorPort final : public StreamPort {
 
  private:
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
+  Time lateness() override;
   void write_all(Bytes bytes) override;
   void drive(ExtraWire, bool) override {}
   void change_rate(std::uint32_t rate) override { device_rate_ = rate; }
@@ -58,6 +60,9 @@ class EmulatorPort final : public StreamPort {
   std::string terminal_;
   std::string link_;
   std::uint16_t tcp_port_ = 0;
+  RunDelay delay_;
+  Time late_{};
+  Time late_until_{};
   std::uint64_t dropped_ = 0;
   std::uint32_t device_rate_ = 0;  // 0: the device did not say
 };

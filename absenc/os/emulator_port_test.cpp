@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <thread>
 
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
@@ -120,6 +122,33 @@ TEST(EmulatorPort, RefusesClientsAboveItsLimit) {
   EXPECT_EQ(receive(device), request);
   hosts.back()->set_end(now() + 5s);
   EXPECT_EQ(failure_of([&] { static_cast<void>(hosts.back()->wait({.at = never})); }).kind(), Failure::Kind::lost);
+}
+
+// What a busy machine does: two threads want one processor, and the one that others wait for has to wait.
+TEST(EmulatorPort, TellsThatItWasKeptFromLooking) {
+  cpu_set_t before;
+  cpu_set_t one;
+  ASSERT_EQ(::sched_getaffinity(0, sizeof before, &before), 0);
+  CPU_ZERO(&one);
+  CPU_SET(::sched_getcpu(), &one);
+  ASSERT_EQ(::sched_setaffinity(0, sizeof one, &one), 0);
+  EmulatorPort device;
+  SerialPort host(device.path(), fast);
+  const auto hear = [&] {
+    host.begin(transfer(request));
+    return device.wait({.at = never, .answer = 5s}).late;
+  };
+  {
+    const std::jthread busy([](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+      }
+    });
+    const Time end = os::now() + 60s;
+    Time late{};
+    while (late < 1ms && os::now() < end) late = hear();
+    EXPECT_GE(late, 1ms);
+  }
+  ::sched_setaffinity(0, sizeof before, &before);
 }
 
 TEST(EmulatorPort, GoesOnWhenAUserLeaves) {

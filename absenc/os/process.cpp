@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -35,6 +36,17 @@ Time processor_time() {
     return Time(std::chrono::seconds(time.tv_sec)) + std::chrono::microseconds(time.tv_usec);
   };
   return of(usage.ru_utime) + of(usage.ru_stime);
+}
+
+RunDelay::RunDelay() : file_(::open("/proc/thread-self/schedstat", O_RDONLY | O_CLOEXEC)) { (void)take(); }
+
+Time RunDelay::take() {
+  std::array<char, 64> text{};  // "time on a processor, time ready to run but not let, time slices": nanoseconds
+  if (!file_ || ::pread(file_.get(), text.data(), text.size() - 1, 0) <= 0) return {};
+  char* end = text.data();
+  std::strtoull(end, &end, 10);
+  const Time total(static_cast<std::int64_t>(std::strtoull(end, &end, 10)));
+  return total - std::exchange(before_, total);
 }
 
 int replaceable(const std::string& path) {

@@ -21,6 +21,19 @@ void protect_standard_streams();
 /// User and system time of this process so far.
 [[nodiscard]] Time processor_time();
 
+/// How long the thread that makes it was ready to run and was not let run, because others ran: what it missed
+/// meanwhile it could not have seen earlier.
+class RunDelay {
+ public:
+  RunDelay();
+  /// Since it was made, or the last call; 0 where the kernel does not tell (proc(5), schedstat).
+  [[nodiscard]] Time take();
+
+ private:
+  Descriptor file_;
+  Time before_{};
+};
+
 /// Whether `replace_file` may replace this existing file. A file that is itself protected is not to be replaced,
 /// although its directory would allow it. Returns 0 or a value of errno.
 [[nodiscard]] int replaceable(const std::string& path);

@@ -70,7 +70,10 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
         heard_ = true;
         silence_told_ = false;
         quiet_since_ = std::max(time, sent_at_);  // an echo comes before the computed end of sending
-        return tell({.kind = ByteEvent::Kind::received, .at = quiet_since_, .items = {buffer_.data(), size}});
+        return tell({.kind = ByteEvent::Kind::received,
+                     .at = quiet_since_,
+                     .items = {buffer_.data(), size},
+                     .late = lateness()});
       }
     } else if (time >= armed_ && armed_ <= quiet_end) {
       armed_ = never;

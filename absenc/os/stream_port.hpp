@@ -59,6 +59,8 @@ class StreamPort : public Port<std::uint8_t> {
   [[nodiscard]] Poller& poller() { return poller_; }
   /// What has come on these descriptors, as far as it fits; 0 when that was not bytes.
   virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
+  /// How long this program may have been kept from looking at what `read_some` brought; 0: not known.
+  virtual Time lateness() { return {}; }
   virtual void write_all(Bytes bytes) = 0;
   /// Both throw `unsupported` unless overridden.
   virtual void drive(ExtraWire wire, bool active);

@@ -32,6 +32,7 @@ ByteStep Responder::next(Time) {
 void Responder::feed(const ByteEvent& event) {
   switch (event.kind) {
     case ByteEvent::Kind::received:
+      late_ = event.late;
       for (const std::uint8_t byte : event.items) hear(byte, event.at);
       break;
     case ByteEvent::Kind::sent: {
@@ -86,7 +87,10 @@ void Responder::hear(std::uint8_t byte, Time at) {
     return;
   }
   if (transmitting_) {
-    if (interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) {
+    const bool begins_request = interruption_.begins_request(request_size({&byte, 1}), at, times_.character);
+    // Had this program been let run, the reply might have been out before.
+    const bool may_have_waited = late_ > times_.answer_time + static_cast<int>(reply_.size()) * times_.character;
+    if (begins_request && !may_have_waited) {
       violate("request during the encoder's transmission", at);
     }
     return;

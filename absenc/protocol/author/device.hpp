@@ -80,6 +80,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<32> request_;
   bool damaged_ = false;  // a character of it: the rest is none until the line is silent
   Time heard_at_{};
+  Time late_{};               // what was heard last may have come so much earlier
   std::size_t skipping_ = 0;  // characters of another encoder's reply
   bool refusing_ = false;     // what was heard is answered when the line is silent
   ByteBuffer<64> reply_;
