@@ -166,6 +166,80 @@ class Page(ServeCase):
         wait_until(lambda: "anna from 127.0.0.1" in self.text("table"), "the history on the page has it")
         self.shot("zero")
 
+    def box(self, title):
+        """The section under that heading."""
+        return self.browser.find_element(By.XPATH, f"//section[h2='{title}']")
+
+    def press(self, title, button):
+        """The button in that section; by keyboard, as whoever sees no pointer does."""
+        found = self.box(title).find_element(By.XPATH, f".//button[text()='{button}']")
+        wait_until(lambda: found.is_displayed() and found.is_enabled(), f"{title} can be asked")
+        found.send_keys(Keys.ENTER)
+
+    def says(self, title, words):
+        return wait_until(lambda: words in self.box(title).text and self.box(title).text, f"{title} says {words!r}")
+
+    def look(self, name):
+        """Light, dark and on a phone: nothing is wider than the window."""
+        node = self.box("Doctor")
+        for width, scheme in ((1200, "light"), (1200, "dark"), (500, "dark")):
+            self.browser.set_window_size(width, 1400)
+            self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia",
+                                         {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
+            wide = self.browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
+            self.assertLessEqual(wide, 0)
+            self.browser.execute_script("arguments[0].scrollIntoView()", node)
+            self.shot(f"{name}-{width}-{scheme}")
+
+    def test_doctor_finds_nothing_and_the_way_there_is_told(self):
+        self.open("#encoder=" + self.name)
+        self.wait_for("live", ".state")
+        self.press("Doctor", "Examine")
+        self.says("Doctor", "it is examined, readings go on afterwards")
+        self.wait_for("examined: no reading for", ".state")
+        self.assertNotIn("°", self.text("dd"))
+        self.says("Doctor", "nothing is to be mended")
+        self.assertIn("good:", self.box("Doctor").find_element(By.CSS_SELECTOR, "[role=status]").text)
+        wait_until(lambda: self.text(".state") == "live", "readings go on")
+        self.assert_no_errors()
+
+    def test_doctor_names_what_is_wrong(self):
+        name = "sim:tformat?alarm=over_heat&fault=corrupt=0.2"
+        self.open("#encoder=" + name)
+        self.press("Doctor", "Examine")
+        words = self.says("Doctor", "warning: damaged_bits")
+        for part in ("first: damaged_bits", "seen", "likely", "try", "alarm"):
+            self.assertIn(part, words)
+        self.press("Settings", "Read")
+        self.assertIn("overheat-threshold", self.says("Settings", "read at"))
+        self.press("Memory", "Read")
+        self.says("Memory", "762 bytes read at")
+        self.look("inside")
+        self.assert_no_errors()
+
+    def test_memory_and_settings_are_those_of_the_encoder(self):
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        self.assertEqual(self.served.command(self.name, "memory-write", good, argument=[1, 0x41, 2])[0], 200)
+        self.assertEqual(self.served.command(self.name, "set-overheat-threshold", good, argument=[77])[0], 200)
+        self.open("#encoder=" + self.name)
+        self.press("Settings", "Read")
+        self.assertIn("77 degC", self.says("Settings", "read at"))
+        wait_until(lambda: self.box("Memory").is_displayed(), "it has memory")
+        Select(self.box("Memory").find_element(By.TAG_NAME, "select")).select_by_value("2")
+        self.press("Memory", "Read")
+        self.says("Memory", "127 bytes read at")
+        first = self.box("Memory").find_element(By.CSS_SELECTOR, "tbody tr").text
+        self.assertRegex(first, "^2 0x00 [0-9A-F]{2} 41 ")
+        self.emulator.process.kill()
+        self.says("Memory", "no longer shown: the encoder is lost")
+        self.assertNotIn("0x00", self.box("Memory").text)
+        self.assertNotIn("77 degC", self.box("Settings").text)
+        self.press("Settings", "Read")
+        self.says("Settings", "was not done")
+        self.press("Doctor", "Examine")
+        self.says("Doctor", "fault: port_")
+        self.assert_no_errors()
+
     def answer(self, words):
         button = self.browser.find_element(By.ID, "dialog-yes")
         wait_until(lambda: button.is_displayed() and button.text == words, f"it asks: {words}")
