@@ -21,7 +21,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
 from command_support import PATIENCE, Emulator
-from serve_support import BUSY, TOKEN, ServeCase, wait_until
+from serve_support import BUSY, TOKEN, ServeCase, SilentLine, wait_until
 
 SCREENSHOTS = os.environ.get("ABSENC_SCREENSHOTS")  # a folder to look at them
 
@@ -68,7 +68,7 @@ class Page(ServeCase):
     def assert_no_errors(self):
         wrong = [entry for entry in self.browser.get_log("browser")
                  if entry["level"] == "SEVERE" and "net::ERR" not in entry["message"]
-                 and "status of 40" not in entry["message"]]
+                 and "status of 40" not in entry["message"] and "status of 502" not in entry["message"]]
         self.assertEqual([entry["message"] for entry in wrong], [])
 
     def test_at_a_glance(self):
@@ -191,16 +191,19 @@ class Page(ServeCase):
             self.browser.execute_script("arguments[0].scrollIntoView()", node)
             self.shot(f"{name}-{width}-{scheme}")
 
-    def test_doctor_finds_nothing_and_the_way_there_is_told(self):
-        self.open("#encoder=" + self.name)
-        self.wait_for("live", ".state")
+    def test_what_doctor_does_is_told_meanwhile(self):
+        line = SilentLine()
+        line.__enter__()
+        self.addCleanup(line.__exit__, None, None, None)
+        self.served = self.without_history(f"tformat:{line.path}?latency=200")
+        self.open(f"#encoder=tformat:{line.path}?latency=200")
         self.press("Doctor", "Examine")
-        self.says("Doctor", "it is examined, readings go on afterwards")
+        self.says("Doctor", "it is examined, readings go on afterwards: reading")
         self.wait_for("examined: no reading for", ".state")
-        self.assertNotIn("°", self.text("dd"))
-        self.says("Doctor", "nothing is to be mended")
-        self.assertIn("good:", self.box("Doctor").find_element(By.CSS_SELECTOR, "[role=status]").text)
-        wait_until(lambda: self.text(".state") == "live", "readings go on")
+        self.assertFalse(self.box("Doctor").find_element(By.TAG_NAME, "button").is_enabled())
+        self.shot("examined")
+        self.says("Doctor", "fault: no_answer")
+        wait_until(lambda: "failing" in self.text(".state"), "it is asked again")
         self.assert_no_errors()
 
     def test_doctor_names_what_is_wrong(self):
@@ -208,13 +211,9 @@ class Page(ServeCase):
         self.open("#encoder=" + name)
         self.press("Doctor", "Examine")
         words = self.says("Doctor", "warning: damaged_bits")
-        for part in ("first: damaged_bits", "seen", "likely", "try", "alarm"):
+        for part in ("first: damaged_bits", "seen", "likely", "try", "warning: alarm"):
             self.assertIn(part, words)
-        self.press("Settings", "Read")
-        self.assertIn("overheat-threshold", self.says("Settings", "read at"))
-        self.press("Memory", "Read")
-        self.says("Memory", "762 bytes read at")
-        self.look("inside")
+        self.look("doctor")
         self.assert_no_errors()
 
     def test_memory_and_settings_are_those_of_the_encoder(self):
@@ -230,6 +229,10 @@ class Page(ServeCase):
         self.says("Memory", "127 bytes read at")
         first = self.box("Memory").find_element(By.CSS_SELECTOR, "tbody tr").text
         self.assertRegex(first, "^2 0x00 [0-9A-F]{2} 41 ")
+        self.press("Doctor", "Examine")
+        self.says("Doctor", "nothing is to be mended")
+        self.assertIn("good:", self.box("Doctor").find_element(By.CSS_SELECTOR, "[role=status]").text)
+        self.look("inside")
         self.emulator.process.kill()
         self.says("Memory", "no longer shown: the encoder is lost")
         self.assertNotIn("0x00", self.box("Memory").text)

@@ -4,7 +4,6 @@ import contextlib
 import json
 import os
 import resource
-import select
 import signal
 import sqlite3
 import subprocess
@@ -12,8 +11,8 @@ import threading
 import time
 import unittest
 
-from command_support import ABSENC, PATIENCE, Emulator, FakeLine, absenc, end, read_line
-from serve_support import BUSY, TOKEN, ServeCase, Server, wait_until
+from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
+from serve_support import BUSY, TOKEN, ServeCase, Server, SilentLine, wait_until
 
 
 class Values(ServeCase):
@@ -249,11 +248,6 @@ class WhoMayWhat(ServeCase):
         os.chmod(path, 0o600)
         self.file("tokens", "anna short\n")
         self.assertIn("16 characters", Losses.run_serve("sim:tformat", "--token-file", path).stderr)
-
-
-class SilentLine(FakeLine):
-    def serve(self):
-        select.select([self.wake], [], [])
 
 
 class Inside(ServeCase):
