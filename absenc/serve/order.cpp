@@ -73,13 +73,14 @@ class Questions {
   std::string last_;
 };
 
-// What it may be set to, as its setter says: "degC, 1 to 127; 0: never; 0 to 127". "": it can only be read.
+// What it may be set to, as its setter says: "degrees: degC, 1 to 127; 0: never (0 to 127)". "": it can only be read.
 std::string range_of(const Unit& unit, const Command& getter) {
   std::vector<std::string> texts;
   for (const Command& setter : unit.commands) {
     if (setter.verb != Verb::config_set || setter.reads_back != getter.name) continue;
     for (const Argument& argument : setter.arguments) {
-      texts.push_back(fmt::format("{}; {} to {}", argument.meaning, argument.minimum, argument.maximum));
+      texts.push_back(
+          fmt::format("{}: {} ({} to {})", argument.name, argument.meaning, argument.minimum, argument.maximum));
     }
   }
   return fmt::format("{}", fmt::join(texts, ", "));

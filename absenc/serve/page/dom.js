@@ -79,9 +79,9 @@ export function fieldText(value) {
   return Array.isArray(value) ? value.join(" ") || "none" : String(value);
 }
 
-/** A row for each of the list; cells(one, index) are texts or elements. */
+/** A row for each of the list; cells(one) are texts or elements. */
 export function rows(list, cells) {
-  return element("tbody", {}, ...list.map((one, i) => element("tr", {}, ...cells(one, i).map((cell) => element("td", {}, cell)))));
+  return element("tbody", {}, ...list.map((one) => element("tr", {}, ...cells(one).map((cell) => element("td", {}, cell)))));
 }
 
 /** One that scrolls by itself where it is too wide. */

@@ -3,8 +3,9 @@
 import {element, rows, setText, table} from "./dom.js";
 import {request} from "./server.js";
 
-const IN_LINE = 16;
+const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
 const GONE = new Set(["opening", "lost", "ended"]);  // another encoder may be there when the port comes back
+const THERE = new Set(["live", "examined"]);
 
 const hex = (number, digits) => number.toString(16).toUpperCase().padStart(digits, "0");
 const clock = () => new Date().toLocaleTimeString();
@@ -13,8 +14,9 @@ const clock = () => new Date().toLocaleTimeString();
 function dumpLines(part) {
   const bytes = part.data.match(/../g).map((pair) => parseInt(pair, 16));
   const lines = [];
-  for (let i = 0; i < bytes.length; i += IN_LINE) {
-    const some = bytes.slice(i, i + IN_LINE);
+  const count = inLine();
+  for (let i = 0; i < bytes.length; i += count) {
+    const some = bytes.slice(i, i + count);
     const characters = some.map((byte) => byte > 0x20 && byte < 0x7f ? String.fromCharCode(byte) : ".").join("");
     lines.push([String(part.page), "0x" + hex(part.address + i, 2), element("code", {}, some.map((byte) => hex(byte, 2)).join(" ")),
                 element("code", {}, characters)]);
@@ -42,18 +44,24 @@ class Asked {
     if (this.button.disabled) return;
     this.button.disabled = true;
     this.wiped = null;
-    setText(this.status, doing);
+    this.tell(doing);
     this.result.replaceChildren();
     try {
       const {status, body} = await request(path, values, method);
-      if (status !== 200) setText(this.status, body.error);
-      else if (this.wiped !== null) setText(this.status, this.wiped);
+      if (status !== 200) this.tell(body.error);
+      else if (this.wiped !== null) this.tell(this.wiped);
       else this.take(body);
     } catch (error) {
-      setText(this.status, `no answer came: ${error.message}`);
+      this.tell(`no answer came: ${error.message}`);
     } finally {
       this.button.disabled = false;
     }
+  }
+
+  tell(words, good = false) {
+    this.said = words;
+    this.status.classList.toggle("good", good);
+    setText(this.status, words);
   }
 
   /** What was read is not shown as if it still were so. */
@@ -61,7 +69,14 @@ class Asked {
     this.wiped = `what was read is no longer shown: ${why}`;
     if (this.result.childElementCount === 0) return;
     this.result.replaceChildren();
-    setText(this.status, this.wiped);
+    this.tell(this.wiped);
+  }
+
+  show(state) {
+    if (GONE.has(state)) this.wipe(`the encoder is ${state}`);
+    const old = !THERE.has(state) && this.result.childElementCount !== 0;
+    this.result.classList.toggle("stale", old);
+    if (this.said) setText(this.status, old ? `${this.said}. It does not answer now: this is as it was then` : this.said);
   }
 }
 
@@ -71,17 +86,16 @@ class Doctor extends Asked {
     this.run = () => this.ask("the examination begins", "api/doctor", {encoder: name}, "POST");
   }
 
-  show(one) {
-    if (this.button.disabled && one.state === "examined") setText(this.status, one.message);
+  progress(one) {
+    if (this.button.disabled && one.state === "examined") this.tell(one.message);
   }
 
   take(found) {
-    setText(this.status, `At ${clock()}: ${found.verdict}`);
+    this.tell(`At ${clock()}: ${found.verdict}`, found.ok);
     this.result.replaceChildren(...found.findings.map((one) => element("div", {class: `finding ${one.severity}`},
       element("h3", {}, `${one.severity}: ${one.id}`),
       element("dl", {}, element("dt", {}, "seen"), element("dd", {}, one.evidence), element("dt", {}, "likely"), element("dd", {}, one.cause),
               element("dt", {}, "try"), element("dd", {}, one.action)))));
-    if (found.findings.length === 0) this.result.replaceChildren(element("p", {class: "good"}, "nothing is to be mended"));
   }
 }
 
@@ -92,10 +106,13 @@ class Settings extends Asked {
   }
 
   take(found) {
-    setText(this.status, `read at ${clock()}`);
-    this.result.replaceChildren(table(["setting", "field", "value", "meaning", "may be"],
-      rows(found.rows, (row, i) => [row.setting === found.rows[i - 1]?.setting ? "" : row.setting, row.field, element("strong", {}, row.value || "INVALID"), row.meaning, row.range]),
-      "settings"), ...failures(found.failed));
+    this.tell(`read at ${clock()}`);
+    const names = [...new Set(found.rows.map((row) => row.setting))];
+    this.result.replaceChildren(...names.flatMap((name) => {
+      const own = found.rows.filter((row) => row.setting === name);
+      return [element("h3", {}, name), element("p", {class: "faint"}, own[0].range === "" ? "can only be read" : `may be set to ${own[0].range}`),
+              table(["field", "value", "meaning"], rows(own, (row) => [row.field, element("strong", {}, row.value || "INVALID"), row.meaning]), name)];
+    }), ...failures(found.failed));
   }
 }
 
@@ -117,7 +134,7 @@ class Memory extends Asked {
 
   take(found) {
     const registers = found.registers;
-    setText(this.status, `${registers ? `${registers.length} registers` : `${found.bytes} bytes`} read at ${clock()}`);
+    this.tell(`${registers ? `${registers.length} registers` : `${found.bytes} bytes`} read at ${clock()}`);
     const body = registers
       ? table(["register", "address", "value"], rows(registers, (one) => [one.name, "0x" + hex(one.address, 2), one.value]), "registers")
       : table(["page", "address", "bytes", ""], rows(found.memory.flatMap(dumpLines), (line) => line), "memory");
@@ -145,15 +162,11 @@ export class Examine {
   }
 
   show(one) {
-    this.doctor.show(one);
-    if (GONE.has(one.state)) this.wipe(`the encoder is ${one.state}`);
+    this.doctor.progress(one);
+    for (const other of [this.settings, this.memory]) other.show(one.state);
   }
 
   lose(why) {
-    this.wipe(why);
-  }
-
-  wipe(why) {
     for (const one of [this.settings, this.memory]) one.wipe(why);
   }
 }
