@@ -266,15 +266,20 @@ class Inside(ServeCase):
         return wait_until(lambda: server.encoder(index)["state"] == "live", "it is live")
 
     def test_settings_are_those_of_config(self):
-        for unit in ("tformat", "encolink", "e201"):
-            server = self.without_history(f"sim:{unit}")
+        units = ("tformat", "encolink", "e201")
+        server = self.without_history(*(f"sim:{unit}" for unit in units))
+        for unit in units:
             wanted = json.loads(absenc("config", "get", f"sim:{unit}", "--json").stdout)["settings"]
+            told = json.loads(absenc("info", f"sim:{unit}", "--json").stdout)["answers"]
             with self.subTest(unit):
                 found = server.json("/api/settings", encoder=f"sim:{unit}")
                 self.assertEqual((found["settings"], found["failed"]), (wanted, {}))
-                self.assertEqual({row["setting"] for row in found["rows"]}, set(wanted))
+                self.assertTrue(found["identity"])
+                for name, fields in found["identity"].items():
+                    self.assertEqual(list(fields), list(told[name]["fields"]))
                 readable = server.json("/api/encoder", name=f"sim:{unit}")["readable"]
-                self.assertEqual(readable["settings"], list(wanted))
+                self.assertEqual(readable["settings"], [*found["identity"], *wanted])
+                self.assertLessEqual({row["setting"] for row in found["rows"]}, set(readable["settings"]))
 
     def test_a_setting_that_was_written(self):
         server = self.without_history("sim:tformat", "--token-file", self.tokens())
@@ -284,7 +289,8 @@ class Inside(ServeCase):
         found = server.json("/api/settings", encoder="sim:tformat")
         row = next(row for row in found["rows"] if row["field"] == "overheat_threshold_c")
         self.assertEqual(row["value"], "77 degC")
-        self.assertIn("0 to 127", found["rows"][0]["range"])
+        self.assertEqual([row["range"] for row in found["rows"] if row["range"]],
+                         ["degrees: degC, 1 to 127; 0: never (0 to 127)"])
 
     def test_memory_is_what_was_written(self):
         emulator, name = self.emulator()

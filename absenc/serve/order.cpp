@@ -44,6 +44,7 @@ class Questions {
   std::optional<Answer> ask(std::string_view command, std::span<const std::int64_t> arguments) {
     const bool first = !std::exchange(asked_, true);
     if (!first) (*between_)();
+    was_asked_ = true;
     try {
       Answer answer = live_->run(command, arguments);
       answered_ = true;
@@ -51,6 +52,7 @@ class Questions {
     } catch (const EncoderFailure& failure) {
       last_ = fmt::format("{}: {}", text_of(failure.trouble.error).name, failure.trouble.message);
     } catch (const UsageError& error) {
+      was_asked_ = false;
       last_ = error.what();
     }
     if (first_.empty()) first_ = last_;
@@ -59,6 +61,8 @@ class Questions {
 
   /// Of the question before.
   [[nodiscard]] const std::string& reason() const { return last_; }
+  /// False: with these options there is no such question.
+  [[nodiscard]] bool was_asked() const { return was_asked_; }
   [[nodiscard]] Done done(Json json) const {
     if (answered_) return {true, "read", std::move(json)};
     return {false, first_, {}};
@@ -67,7 +71,8 @@ class Questions {
  private:
   Encoder* live_;
   const Between* between_;
-  bool asked_ = false;
+  bool asked_ = false;  // anything
+  bool was_asked_ = false;
   bool answered_ = false;
   std::string first_;
   std::string last_;
@@ -86,18 +91,33 @@ std::string range_of(const Unit& unit, const Command& getter) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
+// What an encoder says of itself, as `absenc info` asks it, and what it is set to.
+std::vector<const Command*> getters(const Unit& unit) {
+  std::vector<const Command*> all;
+  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
+    for (const Command& command : unit.commands) {
+      const bool alone = std::none_of(command.arguments.begin(), command.arguments.end(),
+                                      [](const Argument& argument) { return argument.required; });
+      if (command.verb == verb && alone) all.push_back(&command);
+    }
+  }
+  return all;
+}
+
 Done read_settings(Encoder& live, const Between& between) {
+  Json identity = Json::object();
   Json settings = Json::object();
   Json rows = Json::array();
   Json failed = Json::object();
   Questions questions(live, between);
-  for (const Command* getter : readable_settings(live.unit())) {
+  for (const Command* getter : getters(live.unit())) {
+    const bool is_setting = getter->verb == Verb::config_get;
     const std::optional<Answer> answer = questions.ask(getter->name, {});
     if (!answer) {
-      failed.set(getter->name, questions.reason());
+      if (is_setting || questions.was_asked()) failed.set(getter->name, questions.reason());
       continue;
     }
-    settings.set(getter->name, to_json(answer->row()));
+    (is_setting ? settings : identity).set(getter->name, to_json(answer->row()));
     for (std::size_t i = 0; i < answer->columns.size(); ++i) {
       const Column& column = answer->columns[i];
       rows.append(Json::object()
@@ -108,8 +128,8 @@ Done read_settings(Encoder& live, const Between& between) {
                       .set("range", i == 0 ? range_of(live.unit(), *getter) : ""));
     }
   }
-  return questions.done(
-      Json::object().set("ok", true).set("settings", settings).set("rows", rows).set("failed", failed));
+  Json json = Json::object().set("ok", true).set("identity", identity).set("settings", settings);
+  return questions.done(json.set("rows", rows).set("failed", failed));
 }
 
 // What is told last of a register is its meaning.
@@ -166,7 +186,7 @@ std::string_view Order::name() const {
 }
 
 Order settings_order(const Unit& unit) {
-  static_cast<void>(readable_settings(unit));
+  if (getters(unit).empty()) throw UsageError(fmt::format("{} has no settings and does not say what it is", unit.id));
   Order order;
   order.kind = Order::Kind::settings;
   return order;
@@ -210,9 +230,7 @@ Done carry_out(Encoder& live, const Order& order, const Between& between) {
 
 Json readable_json(const Unit& unit) {
   Json settings = Json::array();
-  for (const Command& command : unit.commands) {
-    if (command.verb == Verb::config_get) settings.append(command.name);
-  }
+  for (const Command* command : getters(unit)) settings.append(command->name);
   Json memory = Json::array();
   const bool has_memory = find_command(unit, Verb::memory_read) != nullptr;
   for (const MemoryArea& area : unit.memory) {

@@ -24,7 +24,7 @@ struct Done {
 struct Order {
   enum class Kind : std::uint8_t {
     command,
-    settings,     // all that can be read
+    settings,     // all that can be read, and what it says of itself
     memory,       // the bytes of `addresses`; of encoders with registers all that can be read
     examination,  // as `absenc doctor`
   };

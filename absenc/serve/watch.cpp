@@ -148,11 +148,16 @@ std::vector<Second> Watch::take_seconds() {
 std::string_view Watch::give(Order order) {
   const std::lock_guard lock(mutex_);
   if (over_) return "the encoder is no longer watched";
-  if (known_.state == State::examined) return "the encoder is being examined: ask again when that is over";
+  if (examines_) return "the encoder is being examined: ask again when that is over";
   if (order_) return "something else waits for this encoder already: ask again when that is done";
   order_ = std::move(order);
   changed_.notify_all();
   return "";
+}
+
+void Watch::take_orders(bool on) {
+  const std::lock_guard lock(mutex_);
+  examines_ = !on;
 }
 
 void Watch::tell(std::string_view kind, std::string text, std::string who) {
@@ -355,6 +360,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   Done done;
   const auto finish = [&] {
     command_runs_ = false;
+    take_orders(true);
     if (is_told) tell("command", done.text, order.who);
     order.done(done);
   };
@@ -363,6 +369,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     finish();
   };
   command_runs_ = order.kind == Order::Kind::command;
+  take_orders(!is_examination);
   try {
     if (!is_examination && !live.connection().connected()) live.connect();
     done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);

@@ -124,6 +124,7 @@ class Watch {
   [[nodiscard]] Done examine(client::Encoder& live, const std::stop_token& stop);
   void open_again(client::Encoder& live);
   void refuse_order(const std::string& why);
+  void take_orders(bool on);
   [[nodiscard]] State state_now(Time age) const;
   void tell(std::string_view kind, std::string text, std::string who = {});
 
@@ -138,7 +139,8 @@ class Watch {
   Snapshot known_;
   Time known_at_{};  // of the last reading, or of the last change of state
   std::optional<Order> order_;
-  bool over_ = false;  // nobody takes orders any more
+  bool over_ = false;      // nobody takes orders any more
+  bool examines_ = false;  // and takes none meanwhile
   bool traced_ = false;
   std::deque<Point> points_;
   std::array<Outbox, 2> outboxes_;  // by Outlet

@@ -101,7 +101,7 @@ class Doctor extends Asked {
 
 class Settings extends Asked {
   constructor(name) {
-    super("Settings", "Read");
+    super("Settings", "Read", "What it says of itself, and what it is set to. ");
     this.run = () => this.ask("the settings are being read", "api/settings", {encoder: name});
   }
 
@@ -110,7 +110,7 @@ class Settings extends Asked {
     const names = [...new Set(found.rows.map((row) => row.setting))];
     this.result.replaceChildren(...names.flatMap((name) => {
       const own = found.rows.filter((row) => row.setting === name);
-      return [element("h3", {}, name), element("p", {class: "faint"}, own[0].range === "" ? "can only be read" : `may be set to ${own[0].range}`),
+      return [element("h3", {}, name), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${own[0].range}`),
               table(["field", "value", "meaning"], rows(own, (row) => [row.field, element("strong", {}, row.value || "INVALID"), row.meaning]), name)];
     }), ...failures(found.failed));
   }
