@@ -289,6 +289,7 @@ class Inside(ServeCase):
         found = server.json("/api/settings", encoder="sim:tformat")
         row = next(row for row in found["rows"] if row["field"] == "overheat_threshold_c")
         self.assertEqual(row["value"], "77 degC")
+        self.assertEqual([row["value"] for row in found["rows"] if row["field"] == "status"], ["none"])
         self.assertEqual([row["range"] for row in found["rows"] if row["range"]],
                          ["degrees: degC, 1 to 127; 0: never (0 to 127)"])
 

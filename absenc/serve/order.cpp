@@ -91,6 +91,13 @@ std::string range_of(const Unit& unit, const Command& getter) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
+// Null: it does not hold.
+Json shown(const Column& column, const Value& value) {
+  if (std::holds_alternative<Invalid>(value)) return {};
+  const std::string text = to_text(column, value);
+  return text.empty() ? "none" : text;
+}
+
 // What an encoder says of itself, as `absenc info` asks it, and what it is set to.
 std::vector<const Command*> getters(const Unit& unit) {
   std::vector<const Command*> all;
@@ -123,7 +130,7 @@ Done read_settings(Encoder& live, const Between& between) {
       rows.append(Json::object()
                       .set("setting", getter->name)
                       .set("field", column.name)
-                      .set("value", to_text(column, answer->values[i]))
+                      .set("value", shown(column, answer->values[i]))
                       .set("meaning", column.meaning)
                       .set("range", i == 0 ? range_of(live.unit(), *getter) : ""));
     }

@@ -111,7 +111,7 @@ class Settings extends Asked {
     this.result.replaceChildren(...names.flatMap((name) => {
       const own = found.rows.filter((row) => row.setting === name);
       return [element("h3", {}, name), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${own[0].range}`),
-              table(["field", "value", "meaning"], rows(own, (row) => [row.field, element("strong", {}, row.value || "INVALID"), row.meaning]), name)];
+              table(["field", "value", "meaning"], rows(own, (row) => [row.field, element("strong", {}, row.value ?? "INVALID"), row.meaning]), name)];
     }), ...failures(found.failed));
   }
 }
