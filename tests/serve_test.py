@@ -63,7 +63,8 @@ class Values(ServeCase):
 
     def test_what_describes_it(self):
         server = self.without_history("sim:tformat")
-        self.assertIn("/api/command", server.json("/openapi.json")["paths"])
+        paths = set(server.json("/openapi.json")["paths"])
+        self.assertLessEqual({"/api/command", "/api/settings", "/api/memory", "/api/doctor"}, paths)
         self.assertTrue(server.json("/healthz")["ok"])
         page = server.ask("/")
         self.assertEqual(page[0], 200)
@@ -372,7 +373,7 @@ class Inside(ServeCase):
         server = self.without_history(*names)
         for name, wanted in zip(names, ("alarm", "damaged_bits")):
             status, found = self.post(server, name)
-            self.assertEqual((status, [one["id"] for one in found["findings"]]), (200, [wanted]), found)
+            self.assertEqual((status, found["findings"][0]["id"]), (200, wanted), found)
             for part in ("severity", "evidence", "cause", "action"):
                 self.assertTrue(found["findings"][0][part])
         self.assertIn("battery_alarm", self.post(server, names[0])[1]["findings"][0]["evidence"])
@@ -458,7 +459,8 @@ class Inside(ServeCase):
         server = self.without_history("sim:tformat")
         asked = (("/api/settings", "GET"), ("/api/memory", "GET"), ("/api/doctor", "POST"))
         for path, method in asked:
-            for headers in ({"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"}, {"Host": "evil.example"}):
+            for headers in ({"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"},
+                            {"Host": "evil.example"}):
                 self.assertEqual(server.ask(path, method, headers, encoder="sim:tformat")[0], 403)
             self.assertEqual(server.ask(path, method, encoder="sim:tformat")[0], 200)
         self.assertEqual(server.ask("/api/doctor", encoder="sim:tformat")[0], 404)
@@ -468,7 +470,8 @@ class Inside(ServeCase):
         for path, method in asked:
             self.assertEqual(server.ask(path, method, encoder="sim:tformat")[0], 401)
             self.assertEqual(server.ask(path, method, good, encoder="sim:tformat")[0], 200)
-            self.assertEqual(server.ask(path, method, {**good, "Origin": "http://evil.example"}, encoder="sim:tformat")[0], 403)
+            evil = {**good, "Origin": "http://evil.example"}
+            self.assertEqual(server.ask(path, method, evil, encoder="sim:tformat")[0], 403)
 
 
 class History(ServeCase):
