@@ -80,8 +80,20 @@ class Abuse(ServeCase):
         self.assertGreaterEqual(statuses.count(b"200"), 200)
         self.assert_well()
 
+    def test_many_who_want_the_same_encoder(self):
+        name = urllib.parse.quote("sim:tformat?motion=rpm=60", safe="").encode()
+        asked = [b"POST /api/doctor", b"GET /api/memory", b"GET /api/settings"] * 20
+        clients = [self.connect() for _ in asked]
+        for client, what in zip(clients, asked):
+            client.sendall(what + b"?encoder=" + name + b" HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n")
+        statuses = [client.recv(15)[9:12] for client in clients]
+        self.assertLessEqual(set(statuses), {b"200", b"409"})
+        self.assertIn(b"200", statuses)
+        self.assertIn(b"409", statuses)
+
     def test_random_bytes(self):
-        for path in ("/", "/metrics", "/api/encoders", "/api/encoder", "/api/stream", "/api/history", "/api/events"):
+        for path in ("/", "/metrics", "/api/encoders", "/api/encoder", "/api/stream", "/api/history", "/api/events",
+                     "/api/settings", "/api/memory"):
             for _ in range(5):
                 with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
                     with contextlib.suppress(OSError):

@@ -4,11 +4,12 @@ import contextlib
 import http.client
 import json
 import os
+import select
 import subprocess
 import time
 import urllib.parse
 
-from command_support import ABSENC, PATIENCE, Case, end, read_line
+from command_support import ABSENC, PATIENCE, Case, FakeLine, end, read_line
 
 TOKEN = "a-secret-of-nobody-else"
 BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))  # what "at once" is
@@ -94,6 +95,13 @@ class Server:
     def command(self, encoder, command, headers, **values):
         status, body = self.ask("/api/command", "POST", headers, encoder=encoder, command=command, **values)
         return status, json.loads(body)
+
+
+class SilentLine(FakeLine):
+    """Nobody answers: doctor takes long, because it tries all rates."""
+
+    def serve(self):
+        select.select([self.wake], [], [])
 
 
 class ServeCase(Case):

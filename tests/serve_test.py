@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """`absenc serve`: what it tells, to whom, and what it keeps."""
 import contextlib
+import json
 import os
 import resource
 import signal
 import sqlite3
 import subprocess
+import threading
 import time
 import unittest
 
-from command_support import ABSENC, PATIENCE, Emulator, end, read_line
-from serve_support import BUSY, TOKEN, ServeCase, Server, wait_until
+from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
+from serve_support import BUSY, TOKEN, ServeCase, Server, SilentLine, wait_until
 
 
 class Values(ServeCase):
@@ -61,7 +63,8 @@ class Values(ServeCase):
 
     def test_what_describes_it(self):
         server = self.without_history("sim:tformat")
-        self.assertIn("/api/command", server.json("/openapi.json")["paths"])
+        paths = set(server.json("/openapi.json")["paths"])
+        self.assertLessEqual({"/api/command", "/api/settings", "/api/memory", "/api/doctor"}, paths)
         self.assertTrue(server.json("/healthz")["ok"])
         page = server.ask("/")
         self.assertEqual(page[0], 200)
@@ -246,6 +249,229 @@ class WhoMayWhat(ServeCase):
         os.chmod(path, 0o600)
         self.file("tokens", "anna short\n")
         self.assertIn("16 characters", Losses.run_serve("sim:tformat", "--token-file", path).stderr)
+
+
+class Inside(ServeCase):
+    """Settings, memory, doctor: what is asked of an encoder between two readings, or instead of them."""
+
+    def post(self, server, encoder, headers=None):
+        status, body = server.ask("/api/doctor", "POST", headers, encoder=encoder)
+        return status, json.loads(body)
+
+    def emulator(self, *arguments, **settings):
+        emulator = Emulator(self.directory, *arguments, **settings)
+        self.addCleanup(emulator.end)
+        return emulator, f"{settings.get('protocol', 'tformat')}:{emulator.path}?latency=300"
+
+    def live(self, server, index=0):
+        return wait_until(lambda: server.encoder(index)["state"] == "live", "it is live")
+
+    def test_settings_are_those_of_config(self):
+        units = ("tformat", "encolink", "e201")
+        server = self.without_history(*(f"sim:{unit}" for unit in units))
+        for unit in units:
+            wanted = json.loads(absenc("config", "get", f"sim:{unit}", "--json").stdout)["settings"]
+            told = json.loads(absenc("info", f"sim:{unit}", "--json").stdout)["answers"]
+            with self.subTest(unit):
+                found = server.json("/api/settings", encoder=f"sim:{unit}")
+                self.assertEqual((found["settings"], found["failed"]), (wanted, {}))
+                self.assertTrue(found["identity"])
+                for name, fields in found["identity"].items():
+                    self.assertEqual(list(fields), list(told[name]["fields"]))
+                readable = server.json("/api/encoder", name=f"sim:{unit}")["readable"]
+                self.assertEqual(readable["settings"], [*found["identity"], *wanted])
+                self.assertLessEqual({row["setting"] for row in found["rows"]}, set(readable["settings"]))
+
+    def test_a_setting_that_was_written(self):
+        server = self.without_history("sim:tformat", "--token-file", self.tokens())
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        status, body = server.command("sim:tformat", "set-overheat-threshold", good, argument=["77"])
+        self.assertEqual(status, 200, body)
+        found = server.json("/api/settings", encoder="sim:tformat")
+        row = next(row for row in found["rows"] if row["field"] == "overheat_threshold_c")
+        self.assertEqual(row["value"], "77 degC")
+        self.assertEqual([row["value"] for row in found["rows"] if row["field"] == "status"], ["none"])
+        self.assertEqual([row["range"] for row in found["rows"] if row["range"]],
+                         ["degrees: degC, 1 to 127; 0: never (0 to 127)"])
+
+    def test_memory_is_what_was_written(self):
+        emulator, name = self.emulator()
+        server = self.without_history(name, "--token-file", self.tokens(), "--rate", "200")
+        self.live(server)
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        for address, value, page in ((5, 0x5A, 0), (126, 0xC3, 2)):
+            status, body = server.command(name, "memory-write", good, argument=[address, value, page])
+            self.assertEqual(status, 200, body)
+        before = server.json("/api/encoder", name=name)["readings"]
+        found = server.json("/api/memory", encoder=name)
+        self.assertGreater(server.json("/api/encoder", name=name)["readings"], before)
+        self.assertEqual(found["bytes"], 6 * 127)
+        pages = {part["page"]: bytes.fromhex(part["data"]) for part in found["memory"]}
+        self.assertEqual((pages[0][5], pages[2][126]), (0x5A, 0xC3))
+        self.assertEqual({part["address"] for part in found["memory"]}, {0})
+        one = server.json("/api/memory", encoder=name, page=2)
+        self.assertEqual([(part["page"], bytes.fromhex(part["data"])) for part in one["memory"]], [(2, pages[2])])
+        end(server.process)
+        for page, content in pages.items():
+            told = absenc("memory", "read", name, "0", "--page", str(page), "--count", "127", "--json")
+            self.assertEqual(bytes.fromhex(json.loads(told.stdout)["data"]), content, told)
+
+    def test_registers(self):
+        server = self.without_history("sim:encolink")
+        found = server.json("/api/memory", encoder="sim:encolink")
+        told = json.loads(absenc("memory", "read", "sim:encolink", "serial_number", "--json").stdout)
+        serial = next(one for one in found["registers"] if one["name"] == "serial_number")
+        self.assertEqual((serial["fields"], serial["value"]), (told["fields"], told["fields"]["serial_number"]))
+        self.assertEqual(server.json("/api/encoder", name="sim:encolink")["readable"]["registers"],
+                         len(found["registers"]) + len(found["failed"]))
+
+    def test_what_has_none_says_so(self):
+        server = self.without_history("sim:ssi", "sim:tformat")
+        for path, values, words in (("/api/settings", {}, "no settings"), ("/api/memory", {}, "cannot be read"),
+                                    ("/api/memory", {"encoder": "sim:tformat", "page": 6}, "no page 6"),
+                                    ("/api/memory", {"encoder": "sim:tformat", "page": "x"}, "page"),
+                                    ("/api/settings", {"encoder": "nobody"}, "nobody")):
+            with self.subTest(values=values):
+                status, body = server.ask(path, **{"encoder": "sim:ssi", **values})
+                self.assertEqual(status, 400, body)
+                self.assertIn(words, json.loads(body)["error"])
+
+    def test_an_encoder_that_is_away(self):
+        server = self.without_history("tformat:" + self.file("nothing"))
+        for path in ("/api/settings", "/api/memory"):
+            status, body = server.ask(path, encoder="tformat:" + self.file("nothing"))
+            self.assertEqual(status, 502, body)
+            self.assertIn("was not done", json.loads(body)["error"])
+        status, found = self.post(server, "tformat:" + self.file("nothing"))
+        self.assertEqual((status, [one["id"] for one in found["findings"]]), (200, ["port_missing"]), found)
+
+    def test_a_healthy_encoder_is_good(self):
+        emulator, name = self.emulator("--singleturn", "1000")
+        server = self.server(name, "--history", self.file("history"))
+        self.live(server)
+        stream = self.stream(server)
+        status, found = self.post(server, name)
+        self.assertEqual((status, found["ok"], found["findings"]), (200, True, []), found)
+        self.assertRegex(found["verdict"], "^good: ")
+        examined = stream.state(lambda one: one["state"] == "examined")
+        self.assertEqual((examined["angle_deg"], examined["counts"], examined["alarms"]), (None, None, None))
+        self.assertIn("examined", examined["message"])
+        self.assertEqual(stream.state(lambda one: one["state"] == "live")["counts"], 1000)
+
+        def commands():
+            return [event for event in server.json("/api/events", encoder=name)["events"]
+                    if event["kind"] == "command"]
+        events = wait_until(commands, "the history has it")
+        self.assertEqual([(event["text"], event["who"]) for event in events],
+                         [(f"doctor: {found['verdict']}", "127.0.0.1")])
+        end(server.process)
+        told = json.loads(absenc("doctor", name, "--json").stdout)
+        self.assertEqual(list(found), list(told))
+
+    def test_what_is_wrong_is_named(self):
+        names = ("sim:tformat?alarm=battery_alarm", "sim:tformat?fault=corrupt=0.3&seed=1")
+        server = self.without_history(*names)
+        for name, wanted in zip(names, ("alarm", "damaged_bits")):
+            status, found = self.post(server, name)
+            self.assertEqual((status, found["findings"][0]["id"]), (200, wanted), found)
+            for part in ("severity", "evidence", "cause", "action"):
+                self.assertTrue(found["findings"][0][part])
+        self.assertIn("battery_alarm", self.post(server, names[0])[1]["findings"][0]["evidence"])
+
+    def test_a_virtual_encoder_stays_the_same(self):
+        server = self.without_history("sim:tformat", "--token-file", self.tokens())
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        self.assertEqual(server.command("sim:tformat", "memory-write", good, argument=[2, 0x77, 1])[0], 200)
+        self.assertTrue(self.post(server, "sim:tformat")[1]["ok"])
+        page = server.json("/api/memory", encoder="sim:tformat", page=1)
+        self.assertEqual(bytes.fromhex(page["memory"][0]["data"])[2], 0x77)
+
+    def test_others_on_the_line(self):
+        names = [f"amt21:{self.file('line')}?address={address}" for address in ("0x54", "0x58")]
+        server = self.without_history(*names, "sim:tformat")
+        status, body = self.post(server, names[0])
+        self.assertEqual(status, 409, body)
+        self.assertIn(names[1], body["error"])
+        self.assertIn(f'`absenc doctor "{names[0]}"`', body["error"])
+        self.assertEqual(self.post(server, "sim:tformat")[0], 200)
+
+    def silent(self):
+        """The port of an encoder that never answers: it takes doctor long to try all rates."""
+        line = SilentLine()
+        line.__enter__()
+        self.addCleanup(line.__exit__, None, None, None)
+        return line.path
+
+    def begin(self, server, name):
+        """The doctor of another client, running."""
+        answers = []
+
+        def ask():
+            with contextlib.suppress(OSError, ValueError):  # the server may end
+                answers.append(self.post(server, name))
+        client = threading.Thread(target=ask)
+        client.start()
+        self.addCleanup(client.join)
+        wait_until(lambda: server.encoder()["state"] == "examined", "it is examined")
+        return client, answers
+
+    def test_one_at_a_time_and_others_go_on(self):
+        name = f"tformat:{self.silent()}?latency=200"
+        server = self.without_history(name, "sim:tformat")
+        self.live(server, 1)
+        client, answers = self.begin(server, name)
+        before = server.json("/api/encoder", name="sim:tformat")["readings"]
+        for path, method in (("/api/doctor", "POST"), ("/api/settings", "GET"), ("/api/memory", "GET")):
+            status, body = server.ask(path, method, encoder=name)
+            self.assertEqual(status, 409, body)
+            self.assertIn("examined", json.loads(body)["error"])
+        wait_until(lambda: server.json("/api/encoder", name="sim:tformat")["readings"] > before + 20, "others are read")
+        self.assertEqual(server.encoder(1)["state"], "live")
+        client.join()
+        status, found = answers[0]
+        self.assertEqual((status, found["ok"], found["findings"][0]["id"]), (200, False, "no_answer"), found)
+        wait_until(lambda: server.encoder()["state"] == "failing", "it is asked again")
+
+    def test_it_ends_with_the_server(self):
+        port = self.silent()
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            path = self.file("absenc.toml", f'[encoder.still]\nprotocol = "tformat"\nport = "{port}"\n'
+                             'latency = 200\n[encoder.other]\nprotocol = "esl"\nport = "sim"\n')
+            server = self.without_history(ABSENC_CONFIG=path)
+            wait_until(lambda: server.encoder()["state"] == "failing", "it is asked in vain")
+            client, answers = self.begin(server, "still")
+            self.file("absenc.toml", '[encoder.other]\nprotocol = "esl"\nport = "sim"\n')
+            sent = time.monotonic()
+            server.process.send_signal(number)
+            if number == signal.SIGTERM:
+                server.process.wait(PATIENCE)
+            else:
+                wait_until(lambda: server.encoder()["encoder"] == "other", "it is no longer served")
+            self.assertLess(time.monotonic() - sent, 1 + BUSY)
+            client.join()
+            if number == signal.SIGHUP:
+                self.assertEqual(answers[0][0], 502, answers)
+                self.assertIn("broken off", answers[0][1]["error"])
+            else:
+                self.assertEqual(server.process.returncode, 0)
+
+    def test_who_may(self):
+        server = self.without_history("sim:tformat")
+        asked = (("/api/settings", "GET"), ("/api/memory", "GET"), ("/api/doctor", "POST"))
+        for path, method in asked:
+            for headers in ({"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"},
+                            {"Host": "evil.example"}):
+                self.assertEqual(server.ask(path, method, headers, encoder="sim:tformat")[0], 403)
+            self.assertEqual(server.ask(path, method, encoder="sim:tformat")[0], 200)
+        self.assertEqual(server.ask("/api/doctor", encoder="sim:tformat")[0], 404)
+        server = Server("sim:tformat", "--token-file", self.tokens(), "--history", "none", "--listen", "0.0.0.0:0")
+        self.addCleanup(end, server.process)
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        for path, method in asked:
+            self.assertEqual(server.ask(path, method, encoder="sim:tformat")[0], 401)
+            self.assertEqual(server.ask(path, method, good, encoder="sim:tformat")[0], 200)
+            evil = {**good, "Origin": "http://evil.example"}
+            self.assertEqual(server.ask(path, method, evil, encoder="sim:tformat")[0], 403)
 
 
 class History(ServeCase):

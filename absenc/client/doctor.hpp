@@ -104,6 +104,7 @@ struct DoctorChoices {
   Time limit = std::chrono::seconds(3);  // of all these readings
   Time turning{};                        // how long the shaft is then read while somebody turns it by hand; 0: not
   std::function<void(const std::string& what)> progress{};  // what is done now
+  std::function<bool()> over{};  // true: it ends with Cancelled. Asked all the time. Empty: never
 };
 
 /// "note", "warning", "fault"

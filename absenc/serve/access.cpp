@@ -72,10 +72,10 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
   if (on_loopback_ && !names_loopback(request.host)) {
     return error_response(403, "this server answers to localhost, 127.0.0.1 and [::1] only");
   }
-  if (what == To::change && !from_own_page(request)) {
-    return error_response(403, "no other site may change anything here");
+  if (what >= To::ask && !from_own_page(request)) {
+    return error_response(403, "no other site may change anything here, or have an encoder asked");
   }
-  if (what == To::anybody || (what == To::look && on_loopback_)) return {};
+  if (what == To::anybody || (what != To::change && on_loopback_)) return {};
   if (tokens_.empty()) {
     return error_response(403, "nothing can be changed here: the server was started without --token-file");
   }

@@ -17,6 +17,7 @@ class Access {
   enum class To : std::uint8_t {
     anybody,  // the page itself, and whether the server lives
     look,
+    ask,  // of an encoder what costs its time, or keeps it from being read; changes nothing
     change,
   };
 

@@ -2,6 +2,7 @@
 #include "absenc/serve/api.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -109,9 +110,9 @@ void Api::get(const Request& request, const Reply& reply) {
   const std::string& path = request.path;
   const Asset* asset = find_asset(path);
   const bool for_anybody = asset != nullptr || path == "/healthz";
-  if (const auto refused = access_->refusal(request, for_anybody ? Access::To::anybody : Access::To::look)) {
-    return reply.send(*refused);
-  }
+  const bool asks = path == "/api/settings" || path == "/api/memory";
+  const Access::To what = for_anybody ? Access::To::anybody : asks ? Access::To::ask : Access::To::look;
+  if (const auto refused = access_->refusal(request, what)) return reply.send(*refused);
   if (asset != nullptr) return reply.send({200, std::string(asset->type), std::string(asset->content)});
   if (path == "/healthz") return reply.send(health());
   if (path == "/metrics") {
@@ -123,6 +124,7 @@ void Api::get(const Request& request, const Reply& reply) {
   if (path == "/api/encoders") return reply.send(json_response(state_json(*fleet_, chronicler_)));
   if (path == "/api/encoder") return reply.send(encoder(request));
   if (path == "/api/stream" && request.method == "GET") return stream(request, reply);
+  if (asks && request.method == "GET") return inside(request, reply);
   if (path == "/api/mqtt") return reply.send(json_response(sending_->json()));
   if (path == "/api/history" || path == "/api/events") return past(request, reply);
   if (path == "/api/history.csv") return past_as_csv(request, reply);
@@ -130,7 +132,11 @@ void Api::get(const Request& request, const Reply& reply) {
 }
 
 void Api::post(const Request& request, const Reply& reply) {
-  if (const auto refused = access_->refusal(request, Access::To::change)) return reply.send(*refused);
+  const bool is_doctor = request.path == "/api/doctor";
+  if (const auto refused = access_->refusal(request, is_doctor ? Access::To::ask : Access::To::change)) {
+    return reply.send(*refused);
+  }
+  if (is_doctor) return doctor(request, reply);
   if (request.path == "/api/command") return command(request, reply);
   reply.send(error_response(404, "there is nothing of this name: /openapi.json tells what there is"));
 }
@@ -167,13 +173,46 @@ void Api::command(const Request& request, const Reply& reply) {
   const std::shared_ptr<Watch> watch = encoder_in(*fleet_, request, "encoder");
   const Command& wanted = require_command(*watch->address().unit, request.value("command"));
   if (wanted.verb == Verb::scan) throw BadRequest("a scan is for a line without encoders that are being read");
-  Order order{&wanted, arguments_in(request, wanted), {}, {}};
-  order.who = fmt::format("{} from {}", access_->who(request), request.peer);
+  Order order;
+  order.command = &wanted;
+  order.arguments = arguments_in(request, wanted);
   order.done = [reply](const Done& done) {
-    Json json = Json::object().set("ok", done.good).set("text", done.text).set("fields", done.fields);
+    Json json = Json::object().set("ok", done.good).set("text", done.text).set("fields", done.json);
     reply.send({done.good ? 200U : 502U, "application/json", json.line() + "\n"});
   };
-  if (!watch->give(std::move(order))) reply.send(error_response(409, "another command is waiting for this encoder"));
+  give(*watch, std::move(order), request, reply);
+}
+
+// Settings or memory.
+void Api::inside(const Request& request, const Reply& reply) {
+  const std::shared_ptr<Watch> watch = encoder_in(*fleet_, request, "encoder");
+  const Unit& unit = *watch->address().unit;
+  if (request.path == "/api/settings") return give(*watch, settings_order(unit), request, reply);
+  give(*watch, memory_order(unit, number_in(request, "page", -1, 0, UINT16_MAX)), request, reply);
+}
+
+// It opens the port anew, with other settings too: others on the line would lose it.
+void Api::doctor(const Request& request, const Reply& reply) {
+  const std::shared_ptr<Watch> watch = encoder_in(*fleet_, request, "encoder");
+  const std::vector<std::string> others = fleet_->company_of(*watch);
+  if (others.empty()) return give(*watch, examination_order(), request, reply);
+  reply.send(error_response(
+      409, fmt::format("{} shares its line with {}, whose readings would stop too: end this server, then run "
+                       "`absenc doctor \"{}\"`",
+                       watch->name(), fmt::join(others, ", "), watch->name())));
+}
+
+// What answers is JSON of its own, or {"error":"..."}.
+void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
+  const std::string who = access_->who(request);
+  order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);
+  if (!order.done) {
+    order.done = [reply](const Done& done) {
+      reply.send(done.good ? json_response(done.json) : error_response(502, done.text));
+    };
+  }
+  const std::string_view refused = watch.give(std::move(order));
+  if (!refused.empty()) reply.send(error_response(409, refused));
 }
 
 void Api::past(const Request& request, const Reply& reply) {

@@ -34,6 +34,9 @@ class Api {
   [[nodiscard]] Response encoder(const Request& request) const;
   void stream(const Request& request, const Reply& reply);
   void command(const Request& request, const Reply& reply);
+  void inside(const Request& request, const Reply& reply);
+  void doctor(const Request& request, const Reply& reply);
+  void give(Watch& watch, Order order, const Request& request, const Reply& reply);
   void past(const Request& request, const Reply& reply);
   void past_as_csv(const Request& request, const Reply& reply);
 

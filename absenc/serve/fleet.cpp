@@ -130,4 +130,13 @@ std::shared_ptr<Watch> Fleet::find(std::string_view name) const {
   return nullptr;
 }
 
+std::vector<std::string> Fleet::company_of(const Watch& watch) const {
+  std::vector<std::string> names;
+  for (const auto& other : all()) {
+    if (other.get() == &watch || other->name() == watch.name()) continue;
+    if (share_line(other->address(), watch.address())) names.push_back(other->name());
+  }
+  return names;
+}
+
 }  // namespace absenc::serve

@@ -30,6 +30,8 @@ class Fleet {
   [[nodiscard]] Watches all() const;
   /// Null when there is none of this name.
   [[nodiscard]] std::shared_ptr<Watch> find(std::string_view name) const;
+  /// The names of the others on its line.
+  [[nodiscard]] std::vector<std::string> company_of(const Watch& watch) const;
 
  private:
   struct Wanted;

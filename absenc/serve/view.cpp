@@ -138,6 +138,7 @@ Json details(const Watch& watch) {
                              .set("max", microseconds_of(snapshot.longest)));
   json.set("fields", snapshot.state == State::live ? snapshot.fields : Json());
   json.set("bad_exchanges", bad_json(snapshot));
+  json.set("readable", readable_json(*watch.address().unit));
   return json.set("commands", commands_json(*watch.address().unit));
 }
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "absenc/client/settings.hpp"
+#include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
@@ -46,23 +46,10 @@ std::string trouble_words(const Trouble& trouble) {
   return words;
 }
 
-Done done_well(const Command& command, const Answer& answer, const std::string& note) {
-  return {true, fmt::format("{}: done{}{}", command.name, note.empty() ? "" : "; ", note), to_json(answer.row())};
-}
-
-// Settings are compared with what is read back.
-Done do_command(Encoder& live, const Order& order) {
-  const Command& command = *order.command;
-  if (command.verb != Verb::config_set) return done_well(command, live.run(command.name, order.arguments), "");
-  const std::string_view setting = command.reads_back.empty() ? command.name : command.reads_back;
-  const SettingChange change = live.settings().set(setting, order.arguments);
-  return done_well(command, change.now, change.was_so ? "it was so already" : change.note);
-}
-
 }  // namespace
 
 std::string_view name_of(State state) {
-  constexpr std::array<std::string_view, 6> names{"opening", "live", "silent", "failing", "lost", "ended"};
+  constexpr std::array<std::string_view, 7> names{"opening", "live", "silent", "failing", "lost", "ended", "examined"};
   return names[static_cast<std::size_t>(state)];
 }
 
@@ -89,13 +76,20 @@ Watch::~Watch() {
 
 void Watch::wait() {
   if (thread_.joinable()) thread_.join();
-  std::optional<Order> left;
   {
     const std::lock_guard lock(mutex_);
     over_ = true;
+  }
+  refuse_order("it was not done: the encoder is no longer watched");
+}
+
+void Watch::refuse_order(const std::string& why) {
+  std::optional<Order> left;
+  {
+    const std::lock_guard lock(mutex_);
     left = std::exchange(order_, std::nullopt);
   }
-  if (left) left->done({false, "it was not done: the encoder is no longer watched", {}});
+  if (left) left->done({false, why, {}});
 }
 
 State Watch::state_now(Time age) const {
@@ -151,12 +145,19 @@ std::vector<Second> Watch::take_seconds() {
   return taken;
 }
 
-bool Watch::give(Order order) {
+std::string_view Watch::give(Order order) {
   const std::lock_guard lock(mutex_);
-  if (order_ || over_) return false;
+  if (over_) return "the encoder is no longer watched";
+  if (examines_) return "the encoder is being examined: ask again when that is over";
+  if (order_) return "something else waits for this encoder already: ask again when that is done";
   order_ = std::move(order);
   changed_.notify_all();
-  return true;
+  return "";
+}
+
+void Watch::take_orders(bool on) {
+  const std::lock_guard lock(mutex_);
+  examines_ = !on;
 }
 
 void Watch::tell(std::string_view kind, std::string text, std::string who) {
@@ -173,9 +174,10 @@ void Watch::work(const std::stop_token& stop) {
       return;
     } catch (const std::exception& error) {
       become(State::ended, error.what());
+      refuse_order(error.what());
     }
     std::unique_lock lock(mutex_);
-    changed_.wait_until(lock, stop, to_time_point(os::now() + before_another_try), [] { return false; });
+    changed_.wait_until(lock, stop, to_time_point(os::now() + before_another_try), [&] { return order_.has_value(); });
   }
 }
 
@@ -184,6 +186,16 @@ void Watch::read_on(const std::stop_token& stop) {
   Encoder live(address_, pace.period());
   live.end_when([&] { return stop.stop_requested() && !command_runs_; });
   Time next = os::now() + offset_;
+  const auto read = [&] {
+    publish(live, live.next());
+    next = pace.next();
+  };
+  // What is long is done in pieces, and readings come between.
+  const auto between = [&] {
+    if (os::now() < next) return;
+    read();
+    if (!live.connection().connected()) throw os::Failure(os::Failure::Kind::lost, "the port was lost meanwhile");
+  };
   while (!stop.stop_requested()) {
     std::optional<Order> order;
     {
@@ -192,10 +204,9 @@ void Watch::read_on(const std::stop_token& stop) {
       order = std::exchange(order_, std::nullopt);
     }
     if (order) {
-      carry_out(live, *order);
+      carry_out(live, *order, between, stop);
     } else if (!stop.stop_requested()) {
-      publish(live, live.next());
-      next = pace.next();
+      read();
     }
   }
 }
@@ -340,29 +351,73 @@ void Watch::tell_alarms(const Reading& reading) {
   }
 }
 
-void Watch::carry_out(Encoder& live, const Order& order) {
-  const std::string_view name = order.command->name;
+// Everybody is told of commands, and of examinations, which keep readings away; not of what was looked at.
+void Watch::carry_out(Encoder& live, const Order& order, const std::function<void()>& between,
+                      const std::stop_token& stop) {
+  const std::string_view name = order.name();
+  const bool is_examination = order.kind == Order::Kind::examination;
+  const bool is_told = is_examination || order.kind == Order::Kind::command;
   Done done;
-  command_runs_ = true;
+  const auto finish = [&] {
+    command_runs_ = false;
+    take_orders(true);
+    if (is_told) tell("command", done.text, order.who);
+    order.done(done);
+  };
+  const auto end = [&](std::string_view advice) {
+    done.text = fmt::format("{} was broken off, because the server ends or lets go of this encoder{}", name, advice);
+    finish();
+  };
+  command_runs_ = order.kind == Order::Kind::command;
+  take_orders(!is_examination);
   try {
-    if (!live.connection().connected()) live.connect();
-    done = do_command(live, order);
+    if (!is_examination && !live.connection().connected()) live.connect();
+    done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);
   } catch (const os::Failure& failure) {  // the next reading will find the port lost
     const std::string_view how =
-        live.connection().connected() ? "was broken off, read whether it was done" : "was not done";
+        command_runs_ && live.connection().connected() ? "was broken off, read whether it was done" : "was not done";
     done.text = fmt::format("{} {}: {}", name, how, failure.what());
   } catch (const os::Interrupted&) {
-    done.text = fmt::format("{} was broken off, because the server ends: read whether it was done", name);
-    tell("command", done.text, order.who);
-    order.done(done);
+    end(command_runs_ ? ": read whether it was done" : "");
+    throw;
+  } catch (const os::Ended&) {
+    end("");
     throw;
   } catch (const std::exception& error) {
     done.text = fmt::format("{} failed: {}", name, error.what());
   }
-  if (order.command->changes_encoder) live.forget_position();
-  command_runs_ = false;
-  tell("command", done.text, order.who);
-  order.done(done);
+  if (order.changes_encoder()) live.forget_position();
+  if (is_examination) open_again(live);
+  finish();
+}
+
+// It opens the port itself, and again with other settings where nobody answers. A virtual encoder that is opened anew
+// would be another one: it is examined as it is.
+Done Watch::examine(Encoder& live, const std::stop_token& stop) {
+  const std::string words = "it is examined, readings go on afterwards";
+  become(State::examined, words);
+  const EncoderAddress address = live.connection().uri();
+  Surroundings surroundings;
+  if (address.place == client::Place::sim) {
+    if (!live.connection().connected()) live.connect();
+    surroundings.open = [&](const EncoderAddress&) { return live.connection().lend(); };
+  } else {
+    live.connection().disconnect();
+  }
+  DoctorChoices choices;
+  choices.progress = [&](const std::string& what) { become(State::examined, fmt::format("{}: {}", words, what)); };
+  choices.over = [&] { return stop.stop_requested(); };
+  const Examination examination = client::examine(address, choices, surroundings);
+  return {true, fmt::format("doctor: {}", examination.verdict()), to_json(examination)};
+}
+
+void Watch::open_again(Encoder& live) {
+  if (live.connection().connected()) return;
+  try {
+    live.connect();
+  } catch (const os::Failure& failure) {
+    become(State::lost, failure.what());
+  }
 }
 
 }  // namespace absenc::serve

@@ -18,17 +18,19 @@
 #include "absenc/client/text/json.hpp"
 #include "absenc/client/way/address.hpp"
 #include "absenc/serve/happening.hpp"
+#include "absenc/serve/order.hpp"
 #include "absenc/serve/passing.hpp"
 
 namespace absenc::serve {
 
 enum class State : std::uint8_t {
-  opening,  // its port was not there yet
-  live,     // the reading is new
-  silent,   // none has come for a while
-  failing,  // the last attempt failed
-  lost,     // the port has gone away
-  ended,    // it cannot be read as it is: `message` says why. It is tried again every few seconds
+  opening,   // its port was not there yet
+  live,      // the reading is new
+  silent,    // none has come for a while
+  failing,   // the last attempt failed
+  lost,      // the port has gone away
+  ended,     // it cannot be read as it is: `message` says why. It is tried again every few seconds
+  examined,  // an examination has its port; `message` says what it looks at
 };
 [[nodiscard]] std::string_view name_of(State state);
 
@@ -77,20 +79,6 @@ struct Second {
   Spread speed{};
 };
 
-/// How a command ended.
-struct Done {
-  bool good = false;
-  std::string text{};
-  client::Json fields{};
-};
-
-struct Order {
-  const Command* command = nullptr;
-  std::vector<std::int64_t> arguments{};
-  std::string who{};
-  std::function<void(const Done&)> done{};  // called once, from the thread of the encoder
-};
-
 class Watch {
  public:
   /// The first reading comes `offset` after the start. `happenings` outlives it.
@@ -115,8 +103,8 @@ class Watch {
   void stop_passing(Outlet outlet);
   /// The seconds that are over.
   [[nodiscard]] std::vector<Second> take_seconds();
-  /// False when another command is still waiting, or it has ended.
-  [[nodiscard]] bool give(Order order);
+  /// "", or why it is not taken: another waits, an examination runs, or it has ended.
+  [[nodiscard]] std::string_view give(Order order);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const client::EncoderAddress& address() const { return address_; }
@@ -131,7 +119,12 @@ class Watch {
   void pass_on(const client::Sample& sample);
   void tell_alarms(const Reading& reading);
   void become(State state, const std::string& message);
-  void carry_out(client::Encoder& live, const Order& order);
+  void carry_out(client::Encoder& live, const Order& order, const std::function<void()>& between,
+                 const std::stop_token& stop);
+  [[nodiscard]] Done examine(client::Encoder& live, const std::stop_token& stop);
+  void open_again(client::Encoder& live);
+  void refuse_order(const std::string& why);
+  void take_orders(bool on);
   [[nodiscard]] State state_now(Time age) const;
   void tell(std::string_view kind, std::string text, std::string who = {});
 
@@ -146,7 +139,8 @@ class Watch {
   Snapshot known_;
   Time known_at_{};  // of the last reading, or of the last change of state
   std::optional<Order> order_;
-  bool over_ = false;  // nobody takes orders any more
+  bool over_ = false;      // nobody takes orders any more
+  bool examines_ = false;  // and takes none meanwhile
   bool traced_ = false;
   std::deque<Point> points_;
   std::array<Outbox, 2> outboxes_;  // by Outlet

@@ -357,6 +357,25 @@ TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
 }
 
+/// Whatever it does then: listening, reading, or trying other rates where nobody answers.
+TEST(Doctor, EndsAsSoonAsItIsToldTo) {
+  for (const bool answers : {true, false}) {
+    const auto open = [&](const EncoderAddress&) {
+      auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+      port->answer = [&](const ByteList&) { return answers ? good_reply() : ByteList{}; };
+      return link_to(std::move(port));
+    };
+    const Surroundings surroundings{open, [](const std::string&) { return os::PortFacts{}; }};
+    for (const unsigned when : {0u, 1u, 3u, 10u, 60u}) {
+      unsigned asked = 0;
+      DoctorChoices choices{.readings = 120, .limit = 20s};
+      choices.over = [&] { return asked++ >= when; };
+      EXPECT_THROW(static_cast<void>(examine(parse_address(serial), choices, surroundings)), Cancelled) << when;
+      EXPECT_LE(asked, when + 2) << "it goes on";
+    }
+  }
+}
+
 // ---- SPI as the kernel has it
 
 TEST(Doctor, TheModeOfAnSpiControllerIsFoundOnItsWires) {

@@ -186,7 +186,7 @@ class Doctor {
   template <class Item>
   void look_over() {
     {
-      Examiner<Item> examiner(address_, surroundings_.open(address_));
+      Examiner<Item> examiner(address_, surroundings_.open(address_), choices_.over);
       const bool wired = address_.unit->link == LinkKind::half_duplex || address_.unit->link == LinkKind::full_duplex;
       if (wired && !streams(address_)) {
         tell("listening");
@@ -239,7 +239,7 @@ class Doctor {
       tell(other.setting);
       Trial trial{other.ailment, other.said, other.setting};
       try {
-        Examiner<Item> examiner(other.address, surroundings_.open(other.address));
+        Examiner<Item> examiner(other.address, surroundings_.open(other.address), choices_.over);
         std::vector<Attempted> attempts;
         const auto good = [](const Attempted& one) { return one.error == Error::none; };
         // One that is not answered at all is asked no more.
@@ -279,6 +279,21 @@ Examination examine(const EncoderAddress& address, const DoctorChoices& choices,
 
 Examination examine(std::string_view text, std::span<const std::string> settings, const DoctorChoices& choices) {
   return examine(parse_address(text, settings), choices);
+}
+
+Json to_json(const Examination& examination) {
+  Json findings = Json::array();
+  for (const Finding& one : examination.findings) {
+    findings.append(Json::object()
+                        .set("id", one.id)
+                        .set("severity", name_of(one.severity))
+                        .set("evidence", one.evidence)
+                        .set("cause", one.cause)
+                        .set("action", one.action));
+  }
+  Json json = Json::object().set("ok", examination.healthy()).set("findings", findings);
+  json.set("readings", examination.tried).set("good", examination.good).set("complete", examination.complete);
+  return json.set("verdict", examination.verdict());
 }
 
 }  // namespace absenc::client

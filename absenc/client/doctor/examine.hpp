@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// An examination whose surroundings are given: a test has its own.
+// An examination whose surroundings are given: a test has its own. And what it found, for programs.
 #pragma once
 
 #include <functional>
 #include <string>
 
 #include "absenc/client/doctor/observations.hpp"
+#include "absenc/client/text/json.hpp"
 #include "absenc/client/way/link.hpp"
 
 namespace absenc::client {
@@ -20,5 +21,8 @@ struct Surroundings {
 /// As the one of client/doctor.hpp.
 [[nodiscard]] Examination examine(const EncoderAddress& address, const DoctorChoices& choices,
                                   const Surroundings& surroundings = {});
+
+/// {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good","complete","verdict"}
+[[nodiscard]] Json to_json(const Examination& examination);
 
 }  // namespace absenc::client

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -18,9 +19,11 @@ namespace absenc::client {
 template <class Item>
 class Examiner {
  public:
-  Examiner(const EncoderAddress& address, Link link)
+  /// All waiting ends with os::Ended from the moment on in which `over` is true; empty: never.
+  Examiner(const EncoderAddress& address, Link link, std::function<bool()> over)
       : address_(address),
         link_(std::move(link)),
+        over_(std::move(over)),
         storage_(std::make_unique<std::byte[]>(address.unit->host_storage)),
         session_(*address.unit, address.options, port_, {storage_.get(), address.unit->host_storage}, address.echo, 1) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -29,6 +32,7 @@ class Examiner {
       port_.attach(*link_.bytes);
     }
     port_.abort = [this] { return session_.abort(); };
+    port_.over = over_;
   }
 
   /// What comes though nothing is asked, in pieces of the time.
@@ -57,7 +61,7 @@ class Examiner {
     const Time end = port_.now() + limit;
     // On a line that is never silent. Not by the port's clock: to ask for it between a step and its wait lets the time
     // of the step pass.
-    port_.over = [last = os::now() + 2 * limit] { return os::now() > last; };
+    port_.over = [this, last = os::now() + 2 * limit] { return os::now() > last || is_over(); };
     std::size_t good = 0;
     for (std::size_t i = 0; i < count && port_.now() < end; ++i) {
       const auto unheard = [](const Attempted& one) { return !one.heard; };
@@ -66,11 +70,12 @@ class Examiner {
       try {
         into.push_back(read_once(command));
       } catch (const os::Ended&) {
+        if (is_over()) throw;
         break;
       }
       good += into.back().error == Error::none ? 1 : 0;
     }
-    port_.over = {};
+    port_.over = over_;
   }
 
   /// Fields of another command that only reads. Throws as the port.
@@ -91,6 +96,8 @@ class Examiner {
   static constexpr std::size_t most_silent = 8;  // requests in vain, until nobody is there
   static constexpr std::size_t most_bad = 24;    // without a good one
   static constexpr std::size_t most_heard = 4096;
+
+  [[nodiscard]] bool is_over() const { return over_ && over_(); }
 
   // Whether anything came.
   bool hear(std::vector<std::uint8_t>& into, Time time) {
@@ -161,6 +168,7 @@ class Examiner {
 
   EncoderAddress address_;
   Link link_;
+  std::function<bool()> over_;
   WatchedPort<Item> port_;
   std::unique_ptr<std::byte[]> storage_;
   host::Session<Item> session_;

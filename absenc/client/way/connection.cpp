@@ -88,6 +88,17 @@ class ConnectionOn final : public Connection {
     return kept;
   }
 
+  Link lend() const override {
+    const Link& link = link_->link();
+    return {.device = nullptr,
+            .owner = link_,
+            .bytes = link.bytes,
+            .frames = link.frames,
+            .latency = link.latency,
+            .place = link.place,
+            .notes = link.notes};
+  }
+
   std::uint64_t items() const override { return port_.items_sent + port_.items_received; }
   Time now() override {
     return link_->take_turn([&] { return port_.now(); });

@@ -59,6 +59,8 @@ class Connection {
   [[nodiscard]] virtual std::vector<BadExchangeText> bad_exchanges() const = 0;
   /// Bytes or frames over the line so far, both ways.
   [[nodiscard]] virtual std::uint64_t items() const = 0;
+  /// Its way, open as it is, for others who converse over it while this does not.
+  [[nodiscard]] virtual Link lend() const = 0;
   /// The clock of the readings.
   [[nodiscard]] virtual Time now() = 0;
 

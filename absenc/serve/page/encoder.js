@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Everything about one encoder: live trace, history, errors, commands.
 /* global Dygraph */
-import {NOTHING, alarmText, ask, dial, duration, element, fieldText, positionText, setText, speedText, stateText} from "./dom.js";
+import {NOTHING, alarmText, ask, dial, duration, element, fieldText, positionText, rows, setText, speedText, stateText, table} from "./dom.js";
+import {Examine} from "./examine.js";
 import {download, hasToken, request, setToken} from "./server.js";
 
 const SHOWN_MS = 20000;
@@ -19,15 +20,6 @@ function plot(node, title, options) {
     title, labels: ["time", title], axisLabelColor: ink(), axisLabelWidth: 72, axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
     colors: ["#2f7fd0", "#d07a1f"], strokeWidth: 1.5, legend: "never", ...options,
   });
-}
-
-function rows(list, cells) {
-  return element("tbody", {}, ...list.map((one) => element("tr", {}, ...cells(one).map((cell) => element("td", {}, cell)))));
-}
-
-function table(head, body, caption) {
-  return element("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": caption},
-                 element("table", {}, element("thead", {}, element("tr", {}, ...head.map((text) => element("th", {scope: "col"}, text)))), body));
 }
 
 export class One {
@@ -65,6 +57,7 @@ export class One {
     this.pastPlot = element("div", {class: "plot", role: "img", "aria-label": "least, mean and greatest position"});
     this.past = element("p", {class: "why", role: "status"});
     this.events = element("div");
+    this.examine = new Examine(this.name);
     const box = (title, ...children) => element("section", {class: "box"}, element("h2", {}, title), ...children);
     main.replaceChildren(
       element("p", {}, element("a", {href: "#"}, "all encoders")),
@@ -74,6 +67,7 @@ export class One {
       box("Last bad exchanges", this.bad),
       box("Commands", element("p", {}, this.command, " ", element("button", {type: "button", onclick: () => this.run()}, "Run")),
           this.arguments, this.outcome),
+      ...this.examine.nodes,
       box("History", element("p", {}, element("label", {}, "the last ", this.hours), " ",
                              element("button", {type: "button", onclick: () => this.save()}, "CSV")),
           this.past, this.pastPlot, this.events));
@@ -99,6 +93,7 @@ export class One {
     const words = (one.alarms ?? []).map((alarm) => element("p", {class: "alarm"}, alarmText(alarm)));
     if (one.message) words.push(element("p", {class: "why"}, one.message));
     this.words.replaceChildren(...words);
+    this.examine.show(one);
   }
 
   lose(why = "no connection to the server") {
@@ -110,6 +105,7 @@ export class One {
     this.fields.replaceChildren();
     this.words.replaceChildren();
     for (const node of [this.placePlot, this.speedPlot]) node.classList.add("stale");
+    this.examine.lose(why);
   }
 
   take(event, data) {
@@ -146,6 +142,7 @@ export class One {
     if (this.closed || answer.status !== 200) return;
     const one = answer.body;
     const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, fieldText(value)]);
+    this.examine.describe(one.readable);
     const latency = one.latency_us;
     fields.push(["latency", `50 % ${latency.p50.toFixed(0)} µs, 99 % ${latency.p99.toFixed(0)} µs, longest ${latency.max.toFixed(0)} µs`]);
     fields.push(["readings", `${one.readings}; port lost ${one.losses} times; repeated ${one.repeated}`]);

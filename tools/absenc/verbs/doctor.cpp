@@ -5,7 +5,6 @@
 #include <string>
 
 #include "absenc/client/doctor/examine.hpp"
-#include "absenc/client/text/json.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
@@ -16,21 +15,6 @@
 namespace absenc::tool {
 
 namespace {
-
-Json examination_json(const Examination& examination) {
-  Json findings = Json::array();
-  for (const Finding& one : examination.findings) {
-    findings.append(Json::object()
-                        .set("id", one.id)
-                        .set("severity", name_of(one.severity))
-                        .set("evidence", one.evidence)
-                        .set("cause", one.cause)
-                        .set("action", one.action));
-  }
-  Json json = Json::object().set("ok", examination.healthy()).set("findings", findings);
-  json.set("readings", examination.tried).set("good", examination.good).set("complete", examination.complete);
-  return json.set("verdict", examination.verdict());
-}
 
 std::string finding_text(const Finding& one) {
   return fmt::format("{}: {}: {}\n  Likely: {}\n  Try: {}\n", name_of(one.severity), one.id, one.evidence, one.cause,
@@ -53,7 +37,7 @@ int run_doctor(const Invocation& invocation) {
   const Examination examination = examine(address, choices);
   progress.clear();
   if (invocation.has("--json")) {
-    print_line(examination_json(examination).line());
+    print_line(to_json(examination).line());
   } else {
     std::string text;
     for (const Finding& one : examination.findings) text += finding_text(one);

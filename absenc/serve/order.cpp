@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/order.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/settings.hpp"
+#include "absenc/client/text/row_text.hpp"
+#include "absenc/client/text/unit_text.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+constexpr std::size_t most_bytes = 4096;  // of memory in one answer
+
+using Between = std::function<void()>;
+
+Done done_well(const Command& command, const Answer& answer, const std::string& note) {
+  return {true, fmt::format("{}: done{}{}", command.name, note.empty() ? "" : "; ", note), to_json(answer.row())};
+}
+
+// Settings are compared with what is read back.
+Done do_command(Encoder& live, const Order& order) {
+  const Command& command = *order.command;
+  if (command.verb != Verb::config_set) return done_well(command, live.run(command.name, order.arguments), "");
+  const std::string_view setting = command.reads_back.empty() ? command.name : command.reads_back;
+  const SettingChange change = live.settings().set(setting, order.arguments);
+  return done_well(command, change.now, change.was_so ? "it was so already" : change.note);
+}
+
+// Asks for one after the other. What this encoder has not, or not with these options, is told in its place; `why` has
+// the first of these reasons while none was answered.
+class Questions {
+ public:
+  Questions(Encoder& live, const Between& between) : live_(&live), between_(&between) {}
+
+  std::optional<Answer> ask(std::string_view command, std::span<const std::int64_t> arguments) {
+    const bool first = !std::exchange(asked_, true);
+    if (!first) (*between_)();
+    was_asked_ = true;
+    try {
+      Answer answer = live_->run(command, arguments);
+      answered_ = true;
+      return answer;
+    } catch (const EncoderFailure& failure) {
+      last_ = fmt::format("{}: {}", text_of(failure.trouble.error).name, failure.trouble.message);
+    } catch (const UsageError& error) {
+      was_asked_ = false;
+      last_ = error.what();
+    }
+    if (first_.empty()) first_ = last_;
+    return std::nullopt;
+  }
+
+  /// Of the question before.
+  [[nodiscard]] const std::string& reason() const { return last_; }
+  /// False: with these options there is no such question.
+  [[nodiscard]] bool was_asked() const { return was_asked_; }
+  [[nodiscard]] Done done(Json json) const {
+    if (answered_) return {true, "read", std::move(json)};
+    return {false, first_, {}};
+  }
+
+ private:
+  Encoder* live_;
+  const Between* between_;
+  bool asked_ = false;  // anything
+  bool was_asked_ = false;
+  bool answered_ = false;
+  std::string first_;
+  std::string last_;
+};
+
+// What it may be set to, as its setter says: "degrees: degC, 1 to 127; 0: never (0 to 127)". "": it can only be read.
+std::string range_of(const Unit& unit, const Command& getter) {
+  std::vector<std::string> texts;
+  for (const Command& setter : unit.commands) {
+    if (setter.verb != Verb::config_set || setter.reads_back != getter.name) continue;
+    for (const Argument& argument : setter.arguments) {
+      texts.push_back(
+          fmt::format("{}: {} ({} to {})", argument.name, argument.meaning, argument.minimum, argument.maximum));
+    }
+  }
+  return fmt::format("{}", fmt::join(texts, ", "));
+}
+
+// Null: it does not hold.
+Json shown(const Column& column, const Value& value) {
+  if (std::holds_alternative<Invalid>(value)) return {};
+  const std::string text = to_text(column, value);
+  return text.empty() ? "none" : text;
+}
+
+// What an encoder says of itself, as `absenc info` asks it, and what it is set to.
+std::vector<const Command*> getters(const Unit& unit) {
+  std::vector<const Command*> all;
+  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
+    for (const Command& command : unit.commands) {
+      const bool alone = std::none_of(command.arguments.begin(), command.arguments.end(),
+                                      [](const Argument& argument) { return argument.required; });
+      if (command.verb == verb && alone) all.push_back(&command);
+    }
+  }
+  return all;
+}
+
+Done read_settings(Encoder& live, const Between& between) {
+  Json identity = Json::object();
+  Json settings = Json::object();
+  Json rows = Json::array();
+  Json failed = Json::object();
+  Questions questions(live, between);
+  for (const Command* getter : getters(live.unit())) {
+    const bool is_setting = getter->verb == Verb::config_get;
+    const std::optional<Answer> answer = questions.ask(getter->name, {});
+    if (!answer) {
+      if (is_setting || questions.was_asked()) failed.set(getter->name, questions.reason());
+      continue;
+    }
+    (is_setting ? settings : identity).set(getter->name, to_json(answer->row()));
+    for (std::size_t i = 0; i < answer->columns.size(); ++i) {
+      const Column& column = answer->columns[i];
+      rows.append(Json::object()
+                      .set("setting", getter->name)
+                      .set("field", column.name)
+                      .set("value", shown(column, answer->values[i]))
+                      .set("meaning", column.meaning)
+                      .set("range", i == 0 ? range_of(live.unit(), *getter) : ""));
+    }
+  }
+  Json json = Json::object().set("ok", true).set("identity", identity).set("settings", settings);
+  return questions.done(json.set("rows", rows).set("failed", failed));
+}
+
+// What is told last of a register is its meaning.
+Done read_registers(Encoder& live, const Between& between) {
+  const Command& command = *find_command(live.unit(), Verb::memory_read);
+  Json registers = Json::array();
+  Json failed = Json::object();
+  Questions questions(live, between);
+  for (const RegisterInfo& one : live.unit().registers) {
+    if (!one.readable) continue;
+    const std::optional<Answer> answer =
+        questions.ask(command.name, role_arguments(command, {{Role::address, one.address}}));
+    if (!answer) {
+      failed.set(one.name, questions.reason());
+      continue;
+    }
+    registers.append(Json::object()
+                         .set("name", one.name)
+                         .set("address", one.address)
+                         .set("fields", to_json(answer->row()))
+                         .set("value", to_text(answer->columns.back(), answer->values.back())));
+  }
+  return questions.done(Json::object().set("ok", true).set("registers", registers).set("failed", failed));
+}
+
+Done read_memory(Encoder& live, const MemoryImage& addresses, const Between& between) {
+  const MemoryImage image = live.memory().read(addresses, [&](std::size_t done, std::size_t all) {
+    if (done < all) between();
+  });
+  Json parts = Json::array();
+  for (const MemoryRun& run : runs(image)) {
+    parts.append(Json::object()
+                     .set("page", run.first.page)
+                     .set("address", run.first.address)
+                     .set("data", fmt::format("{:02x}", fmt::join(run.bytes, ""))));
+  }
+  return {true, "read", Json::object().set("ok", true).set("bytes", image.size()).set("memory", parts)};
+}
+
+}  // namespace
+
+std::string_view Order::name() const {
+  switch (kind) {
+    case Kind::settings:
+      return "reading the settings";
+    case Kind::memory:
+      return "reading the memory";
+    case Kind::examination:
+      return "doctor";
+    case Kind::command:
+      break;
+  }
+  return command->name;
+}
+
+Order settings_order(const Unit& unit) {
+  if (getters(unit).empty()) throw UsageError(fmt::format("{} has no settings and does not say what it is", unit.id));
+  Order order;
+  order.kind = Order::Kind::settings;
+  return order;
+}
+
+Order memory_order(const Unit& unit, std::int64_t page) {
+  Order order;
+  order.kind = Order::Kind::memory;
+  if (!unit.registers.empty() && find_command(unit, Verb::memory_read) != nullptr) return order;
+  require_memory(unit, client::Access::read);
+  if (page < 0) order.addresses = dump_addresses(unit);
+  for (const MemoryArea& area : unit.memory) {
+    if (area.page != page) continue;
+    for (std::uint32_t i = 0; i < area.count; ++i) order.addresses[{area.page, area.first + i}] = 0;
+  }
+  if (order.addresses.empty()) throw UsageError(fmt::format("the memory of {} has no page {}", unit.id, page));
+  if (order.addresses.size() > most_bytes) {
+    throw UsageError(fmt::format("these are {} bytes, but at most {} are read at once: take a page of them",
+                                 order.addresses.size(), most_bytes));
+  }
+  return order;
+}
+
+Order examination_order() {
+  Order order;
+  order.kind = Order::Kind::examination;
+  return order;
+}
+
+Done carry_out(Encoder& live, const Order& order, const Between& between) {
+  switch (order.kind) {
+    case Order::Kind::settings:
+      return read_settings(live, between);
+    case Order::Kind::memory:
+      if (order.addresses.empty()) return read_registers(live, between);
+      return read_memory(live, order.addresses, between);
+    default:
+      return do_command(live, order);
+  }
+}
+
+Json readable_json(const Unit& unit) {
+  Json settings = Json::array();
+  for (const Command* command : getters(unit)) settings.append(command->name);
+  Json memory = Json::array();
+  const bool has_memory = find_command(unit, Verb::memory_read) != nullptr;
+  for (const MemoryArea& area : unit.memory) {
+    if (!has_memory) break;
+    memory.append(Json::object()
+                      .set("page", area.page)
+                      .set("first", area.first)
+                      .set("count", area.count)
+                      .set("meaning", area.meaning)
+                      .set("in_dump", area.in_dump));
+  }
+  const auto readable = [](const RegisterInfo& one) { return one.readable; };
+  const auto registers = std::count_if(unit.registers.begin(), unit.registers.end(), readable);
+  return Json::object().set("settings", settings).set("memory", memory).set("registers", has_memory ? registers : 0);
+}
+
+}  // namespace absenc::serve

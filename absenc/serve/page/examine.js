@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is asked of one encoder on a button: an examination, its settings, its memory. Each answer says of when it is.
+import {element, rows, setText, table} from "./dom.js";
+import {request} from "./server.js";
+
+const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
+const GONE = new Set(["opening", "lost", "ended"]);  // another encoder may be there when the port comes back
+const THERE = new Set(["live", "examined"]);
+
+const hex = (number, digits) => number.toString(16).toUpperCase().padStart(digits, "0");
+const clock = () => new Date().toLocaleTimeString();
+
+/** "00 5A", and what of it can be shown as characters. */
+function dumpLines(part) {
+  const bytes = part.data.match(/../g).map((pair) => parseInt(pair, 16));
+  const lines = [];
+  const count = inLine();
+  for (let i = 0; i < bytes.length; i += count) {
+    const some = bytes.slice(i, i + count);
+    const characters = some.map((byte) => byte > 0x20 && byte < 0x7f ? String.fromCharCode(byte) : ".").join("");
+    lines.push([String(part.page), "0x" + hex(part.address + i, 2), element("code", {}, some.map((byte) => hex(byte, 2)).join(" ")),
+                element("code", {}, characters)]);
+  }
+  return lines;
+}
+
+function failures(failed) {
+  return Object.entries(failed ?? {}).map(([name, why]) => element("p", {class: "why"}, `${name}: ${why}`));
+}
+
+/** A box with a button, a line that says what became of it, and what came. */
+class Asked {
+  constructor(title, text, ...before) {
+    this.button = element("button", {type: "button", onclick: () => this.run()}, text);
+    this.status = element("p", {class: "status", role: "status"});
+    this.result = element("div");
+    const id = `asked-${title.toLowerCase()}`;
+    this.button.setAttribute("aria-describedby", id);
+    this.node = element("section", {class: "box"}, element("h2", {id}, title), element("p", {}, ...before, this.button),
+                        this.status, this.result);
+  }
+
+  async ask(doing, path, values, method) {
+    if (this.button.disabled) return;
+    this.button.disabled = true;
+    this.wiped = null;
+    this.tell(doing);
+    this.result.replaceChildren();
+    try {
+      const {status, body} = await request(path, values, method);
+      if (status !== 200) this.tell(body.error);
+      else if (this.wiped !== null) this.tell(this.wiped);
+      else this.take(body);
+    } catch (error) {
+      this.tell(`no answer came: ${error.message}`);
+    } finally {
+      this.button.disabled = false;
+    }
+  }
+
+  tell(words, good = false) {
+    this.said = words;
+    this.status.classList.toggle("good", good);
+    setText(this.status, words);
+  }
+
+  /** What was read is not shown as if it still were so. */
+  wipe(why) {
+    this.wiped = `what was read is no longer shown: ${why}`;
+    if (this.result.childElementCount === 0) return;
+    this.result.replaceChildren();
+    this.tell(this.wiped);
+  }
+
+  show(state) {
+    if (GONE.has(state)) this.wipe(`the encoder is ${state}`);
+    const old = !THERE.has(state) && this.result.childElementCount !== 0;
+    this.result.classList.toggle("stale", old);
+    if (this.said) setText(this.status, old ? `${this.said}. It does not answer now: this is as it was then` : this.said);
+  }
+}
+
+class Doctor extends Asked {
+  constructor(name) {
+    super("Doctor", "Examine", element("span", {}, "What is wrong with it, or with the way to it? It is not read meanwhile, some seconds. Nothing is written to it. "));
+    this.run = () => this.ask("the examination begins", "api/doctor", {encoder: name}, "POST");
+  }
+
+  progress(one) {
+    if (this.button.disabled && one.state === "examined") this.tell(one.message);
+  }
+
+  take(found) {
+    this.tell(`At ${clock()}: ${found.verdict}`, found.ok);
+    this.result.replaceChildren(...found.findings.map((one) => element("div", {class: `finding ${one.severity}`},
+      element("h3", {}, `${one.severity}: ${one.id}`),
+      element("dl", {}, element("dt", {}, "seen"), element("dd", {}, one.evidence), element("dt", {}, "likely"), element("dd", {}, one.cause),
+              element("dt", {}, "try"), element("dd", {}, one.action)))));
+  }
+}
+
+class Settings extends Asked {
+  constructor(name) {
+    super("Settings", "Read", "What it says of itself, and what it is set to. ");
+    this.run = () => this.ask("the settings are being read", "api/settings", {encoder: name});
+  }
+
+  take(found) {
+    this.tell(`read at ${clock()}`);
+    const names = [...new Set(found.rows.map((row) => row.setting))];
+    this.result.replaceChildren(...names.flatMap((name) => {
+      const own = found.rows.filter((row) => row.setting === name);
+      return [element("h3", {}, name), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${own[0].range}`),
+              table(["field", "value", "meaning"], rows(own, (row) => [row.field, element("strong", {}, row.value ?? "INVALID"), row.meaning]), name)];
+    }), ...failures(found.failed));
+  }
+}
+
+class Memory extends Asked {
+  constructor(name) {
+    const part = element("select", {});
+    super("Memory", "Read", element("label", {}, "which ", part), " ");
+    this.part = part;
+    this.run = () => this.ask("the memory is being read", "api/memory", part.value === "" ? {encoder: name} : {encoder: name, page: part.value});
+  }
+
+  describe(areas, registers) {
+    const pages = new Map();
+    for (const area of areas) pages.set(area.page, [...new Set([...(pages.get(area.page) ?? []), area.meaning])]);
+    const all = areas.filter((area) => area.in_dump).reduce((sum, area) => sum + area.count, 0);
+    this.part.replaceChildren(element("option", {value: ""}, registers > 0 ? `${registers} registers` : `all that a copy has: ${all} bytes`),
+                              ...[...pages].map(([page, meanings]) => element("option", {value: page}, `page ${page}: ${meanings.join(", ")}`)));
+  }
+
+  take(found) {
+    const registers = found.registers;
+    this.tell(`${registers ? `${registers.length} registers` : `${found.bytes} bytes`} read at ${clock()}`);
+    const body = registers
+      ? table(["register", "address", "value"], rows(registers, (one) => [one.name, "0x" + hex(one.address, 2), one.value]), "registers")
+      : table(["page", "address", "bytes", ""], rows(found.memory.flatMap(dumpLines), (line) => line), "memory");
+    body.classList.add("dump");
+    this.result.replaceChildren(body, ...failures(found.failed));
+  }
+}
+
+export class Examine {
+  constructor(name) {
+    this.doctor = new Doctor(name);
+    this.settings = new Settings(name);
+    this.memory = new Memory(name);
+    this.nodes = [this.doctor, this.settings, this.memory].map((one) => one.node);
+    for (const one of [this.settings, this.memory]) one.node.hidden = true;  // until it is known that there are some
+  }
+
+  /** What of the encoder can be read. */
+  describe(readable) {
+    if (this.described) return;
+    this.described = true;
+    this.settings.node.hidden = readable.settings.length === 0;
+    this.memory.node.hidden = readable.memory.length === 0 && readable.registers === 0;
+    this.memory.describe(readable.memory, readable.registers);
+  }
+
+  show(one) {
+    this.doctor.progress(one);
+    for (const other of [this.settings, this.memory]) other.show(one.state);
+  }
+
+  lose(why) {
+    for (const one of [this.settings, this.memory]) one.wipe(why);
+  }
+}
