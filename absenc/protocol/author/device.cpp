@@ -5,6 +5,10 @@
 
 namespace absenc::author {
 
+namespace {
+constexpr std::string_view turn_rule = "request during the encoder's transmission";
+}  // namespace
+
 void Responder::power_off(Time now) {
   EncoderOn::power_off(now);
   forget();
@@ -86,9 +90,7 @@ void Responder::hear(std::uint8_t byte, Time at) {
     return;
   }
   if (transmitting_) {
-    if (interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) {
-      violate("request during the encoder's transmission", at);
-    }
+    if (interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) expect(false, turn_rule, at);
     return;
   }
   heard_at_ = at;
@@ -106,6 +108,7 @@ void Responder::hear(std::uint8_t byte, Time at) {
     return may_begin_one ? hear(byte, at) : void();
   }
   if (request_.size() < size) return;
+  if (answer_count() > 0) expect(true, turn_rule, at);
   reply_.clear();
   longer_ = {};
   ended(respond(request_, at, reply_), at);
