@@ -4,8 +4,8 @@
 No list of places: rules over the tokens of sources that clang-format has formatted (a binary operator stands between
 spaces, a template's bracket does not). By the name that they have in a mutant's id, the coarse ones:
 
-  never        a check does not refuse: its condition is false, or one of those joined by || is left out
-  silent       a broken timing rule is not told, where more than that depends on its condition
+  never        a check does not refuse: its condition is false, or one of those joined by || is left out; a rule counts
+               as kept
   skip         a step of a procedure whose answer nobody looks at is left out
   half, twice  a time in a header, where those of the document stand
   zero, ten    a time in a source, which its author chose: nothing, and ten times as much
@@ -21,9 +21,9 @@ and the fine ones:
   shift        one bit further
   sign         + 1 for - 1, and the other way round
 
-A check is an `if` that refuses: with an error, with nothing (`return false`, `return std::nullopt`), or by telling a
-broken rule; `good ? value : Error::x`; and an error that is left when all cases are through. Terms and edges are also
-those of what is returned or assigned.
+A check is an `if` that refuses: with an error or with nothing (`return false`, `return std::nullopt`); what `expect`
+takes for a kept rule; `good ? value : Error::x`; and an error that is left when all cases are through. Terms and edges
+are also those of what is returned or assigned.
 """
 
 import hashlib
@@ -35,10 +35,10 @@ from cpp_source import CLOSING, OPENING, Source
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
 # What no operand of && or || reaches across.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
-COARSE = {"never", "silent", "skip", "half", "twice", "zero", "ten"}
+COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
 ARITHMETIC = {"bit", "shift", "sign"}  # one of them in a line says what all of them would
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
-REFUSES = re.compile(r"violate|fail|failed|refuse\w*|reject\w*|settle\w*")
+REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
 TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}  # texts and their numbers
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
@@ -123,8 +123,6 @@ class Finder:
                 self._change("edge", i, i + 1, EDGE[token.text])
             elif token.text in ("return", "co_return"):
                 self._predicate(i)
-            elif token.text == "violate":
-                self._told(i)
             elif token.text == "co_await" and source[i - 1] in (";", "{", "}", ")", "else"):
                 end = source.statement(i) - 1
                 self._change("skip", i, end, "", self._switch(i, end, "if (IS) {} else ", ""))
@@ -172,6 +170,8 @@ class Finder:
                 continue
             if source[i] == "if" and source[i + 1] == "(":
                 self._check(i)
+            elif source[i] in ("expect", "note"):
+                self._rule(i)
             elif source[i] == "?":
                 self._choice(i)
             elif source[i] in ("return", "="):
@@ -277,11 +277,14 @@ class Finder:
     def _is_nested(self, index, outer):
         return any(self.source.partner.get(i, 0) > index for i in range(outer, index) if self.source[i] in OPENING)
 
-    def _told(self, index):
+    def _rule(self, index):
+        """What `expect(kept, rule, at)` takes for kept; not where it is declared."""
         source = self.source
-        if source[index + 1] == "(" and source[index - 1] in (";", "{", "}", "return"):
-            end = source.partner[index + 1] + 1
-            self._change("silent", index, end, "", self._switch(index, end, "(IS ? void() : ", ")"))
+        first = index + 2
+        last = source.right(first, {","})
+        if source[index + 1] == "(" and source[index - 1] not in ("bool", "void", "::") and source[first] != "true":
+            self._mark(first, last)
+            self._never(first, last, "&&", "true")
 
     # ---- Constants
 

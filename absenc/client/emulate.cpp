@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "absenc/client/emulation/attended.hpp"
+#include "absenc/client/emulation/rule_counter.hpp"
 #include "absenc/client/emulation/serve_forever.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -64,6 +65,7 @@ struct Emulation::Service {
       require_can_alone(*address.unit, choices);
       can = open_can();
     }
+    device.watch_rules(&rules);
     device.power_on(os::now());
     thread = std::jthread([this] { serve(); });
   }
@@ -146,6 +148,7 @@ struct Emulation::Service {
   }
 
   EncoderAddress address;
+  RuleCounter rules;
   VirtualDevice device;
   std::string interface;  // or else
   std::shared_ptr<os::EmulatorPort> port;
@@ -172,6 +175,7 @@ const std::string& Emulation::path() const {
 }
 std::uint16_t Emulation::tcp_port() const { return service_->port != nullptr ? service_->port->tcp_port() : 0; }
 const Unit& Emulation::unit() const { return *service_->address.unit; }
+const Options& Emulation::options() const { return service_->address.options; }
 
 std::string Emulation::address() const {
   return fmt::format("{}:{}{}", unit().id, unit().link == LinkKind::can && service_->interface.empty() ? "slcan:" : "",
@@ -230,12 +234,8 @@ std::string Emulation::first_violation() const {
   });
 }
 
-std::vector<std::string> Emulation::broken_rules() const {
-  return service_->ask([](const auto& device) {
-    std::vector<std::string> rules;
-    for (const Violation& violation : device.violations()) rules.emplace_back(violation.rule);
-    return rules;
-  });
+std::vector<RuleCount> Emulation::rule_counts() const {
+  return service_->ask([this](const auto&) { return service_->rules.counts(); });
 }
 
 }  // namespace absenc::client

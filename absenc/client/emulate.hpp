@@ -21,6 +21,14 @@ struct EmulateChoices {
   std::string can{};                   // CAN: instead of an adapter this interface, "can0"
 };
 
+/// How often the virtual encoder looked at whether its host keeps a rule of the document, which it names when it is
+/// broken.
+struct RuleCount {
+  std::string_view rule{};
+  std::uint64_t looked = 0;
+  std::uint64_t broken = 0;
+};
+
 /// Serves in a thread of its own until it is destroyed. What is done to it is so when the call returns; any thread may.
 class Emulation {
  public:
@@ -38,6 +46,7 @@ class Emulation {
   /// To open it by: "tformat:/dev/pts/3", "raa38-can:slcan:/dev/pts/3", without the options.
   [[nodiscard]] std::string address() const;
   [[nodiscard]] const Unit& unit() const;
+  [[nodiscard]] const Options& options() const;
 
   void power_off();
   /// `real`: with the document's start-up time.
@@ -58,8 +67,8 @@ class Emulation {
   /// Rules of the document that the host broke, and the first of them; "": none.
   [[nodiscard]] std::uint32_t violations() const;
   [[nodiscard]] std::string first_violation() const;
-  /// The rules that it broke, as far as they were kept, in order; a rule may be there more than once.
-  [[nodiscard]] std::vector<std::string> broken_rules() const;
+  /// Every rule that was looked at: the host did what it is about.
+  [[nodiscard]] std::vector<RuleCount> rule_counts() const;
 
  private:
   struct Service;

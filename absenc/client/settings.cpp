@@ -68,19 +68,10 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
 
 // What the encoder was set to may be what it is reached with. Returns what is to be said of it.
 std::string follow(Connection& encoder, const Command& setter, std::int64_t value) {
-  const std::span<const Option> options = encoder.unit().options;
-  const auto option = std::find_if(options.begin(), options.end(),
-                                   [&](const Option& one) { return one.name == setter.changes_option; });
-  if (option == options.end()) return {};
-  const std::string text = fmt::format("{}", value);
-  if (!option->choices.empty()) {
-    value = std::find(option->choices.begin(), option->choices.end(), text) - option->choices.begin();
-  }
-  Options changed = encoder.uri().options;
-  std::int64_t& present = changed.values[static_cast<std::size_t>(option - options.begin())];
-  if (std::exchange(present, value) == value) return {};
+  const Options changed = options_behind(encoder.unit(), encoder.uri().options, setter, value);
+  if (changed.values == encoder.uri().options.values) return {};
   encoder.set_options(changed);
-  return fmt::format("from now on it is reached with {}={}", option->name, text);
+  return fmt::format("from now on it is reached with {}={}", setter.changes_option, value);
 }
 
 }  // namespace

@@ -13,11 +13,11 @@ namespace absenc {
 /// What is looked at. Up to `unknown_reported` it is seen by reading; the others change the encoder, and only such
 /// things as can be put back.
 enum class Demand : std::uint8_t {
-  answered,          // each request of a reading gets a reply
-  in_time,           // the reply begins within the time that the unit waits for it
-  whole,             // replies have the length of the document
-  checked,           // their checksum is right
-  as_drawn,          // fixed bits, echoes, ranges, and what must agree
+  answered,  // each request of a reading gets a reply
+  in_time,   // the reply begins within the time that the unit waits for it: documents give typical times, no limits
+  whole,     // replies have the length of the document
+  checked,   // their checksum is right
+  as_drawn,  // fixed bits, echoes, ranges, and what must agree
   foreign_silent,    // a request to another address is not answered
   damaged_silent,    // nor is one whose last byte has a wrong bit
   unknown_silent,    // nor is `request`
@@ -25,8 +25,9 @@ enum class Demand : std::uint8_t {
   byte_written,      // what is written to the byte at `page` and `address` is read again
   byte_alone,        // and the bytes beside it stay as they are
   set,               // `setting` is what it was set to: `value`, or `other` where it is that already
-  zeroed,  // the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
-  reset    // the command `verb` is obeyed: only where what it resets is so already
+  zeroed,   // the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
+  reset,    // the command `verb` is obeyed: only where what it resets is so already
+  restarts  // after the command `command` it is silent at first, and has the same position behind `value` ms
 };
 
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
@@ -46,6 +47,7 @@ struct Clause {
   std::string_view field{};    // of the setting: the number that is its argument
   std::int64_t other = 0;
   Verb verb = Verb::run;
+  std::string_view command{};
 };
 
 /// What is looked at when a host is tested.
@@ -53,7 +55,8 @@ enum class HostDemand : std::uint8_t {
   asks,           // its requests are such that they are answered
   after_silence,  // it asks again when no reply came
   after_damage,   // and when the reply was damaged
-  rule            // it never breaks `rule`
+  rule,           // it never breaks `rule`
+  row             // nor does it this one, of requests in a row: looked at while replies are good, as a host may give up
 };
 
 struct HostClause {
@@ -61,7 +64,7 @@ struct HostClause {
   std::string_view paragraph;
   std::string_view words;
   HostDemand demand;
-  std::string_view rule{};  // as the virtual encoder calls it when it is broken
+  std::string_view rule{};  // as the virtual encoder calls it when it is broken; untested until it looked at it
 };
 
 /// Those of this unit, in the order in which they are tested; empty: none are known. Defined with the list of units.

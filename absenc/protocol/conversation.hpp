@@ -61,6 +61,14 @@ struct Violation {
   Time at;
 };
 
+/// Is told of each look at whether the host keeps a rule: it did what the rule is about.
+struct RuleWatch {
+  virtual void looked(std::string_view rule, bool kept) = 0;
+
+ protected:
+  ~RuleWatch() = default;
+};
+
 /// Device side: a virtual encoder with its own memory, alarms and timing rules.
 template <class Item>
 struct Device : Machine<Item> {
@@ -83,6 +91,8 @@ struct Device : Machine<Item> {
   /// The first rules broken, in order; `violation_count` goes on counting when they no longer fit.
   [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
+  /// Null: nobody. `watch` must outlive the encoder.
+  virtual void watch_rules(RuleWatch* /*watch*/) {}
   /// Requests answered so far.
   [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <span>
 #include <utility>
 
 #include "absenc/client/error.hpp"
@@ -27,12 +28,6 @@ struct Refused {
   std::string evidence;
 };
 
-bool is_near(const Reading& reading, std::uint64_t wanted) {
-  const std::uint64_t turn = std::uint64_t{1} << reading.singleturn_bits;
-  const std::uint64_t away = (reading.singleturn - wanted) & (turn - 1);
-  return std::min(away, turn - away) <= turn / nearness;
-}
-
 std::int64_t number_of(const Answer& answer, std::string_view field) {
   const Value& value = answer[field];
   if (const auto* number = std::get_if<std::int64_t>(&value)) return *number;
@@ -41,6 +36,12 @@ std::int64_t number_of(const Answer& answer, std::string_view field) {
 }
 
 }  // namespace
+
+bool is_near(const Reading& reading, std::uint64_t wanted) {
+  const std::uint64_t turn = std::uint64_t{1} << reading.singleturn_bits;
+  const std::uint64_t away = (reading.singleturn - wanted) & (turn - 1);
+  return std::min(away, turn - away) <= turn / nearness;
+}
 
 void Changes::test(const Clause& clause, ClauseResult& result) {
   try {
@@ -75,6 +76,7 @@ void Changes::test_one(const Clause& clause, ClauseResult& result) {
 
 void Changes::test_byte(const Clause& clause, ClauseResult& result) {
   const bool alone = clause.demand == Demand::byte_alone;
+  if (!clause.setting.empty()) save_setting(clause);  // which reading the memory changes
   const std::uint32_t first = alone && clause.address >= beside ? clause.address - beside : clause.address;
   for (std::uint32_t at = first; at <= clause.address; ++at) save_byte(clause, at);
   const Saved& byte = saved_.back();
@@ -84,9 +86,10 @@ void Changes::test_byte(const Clause& clause, ClauseResult& result) {
     const std::int64_t now = value_of(byte);
     return conclude(result, now == written, fmt::format("0x{:02X} was written, 0x{:02X} is read", written, now));
   }
-  const auto same = std::count_if(saved_.begin(), saved_.end() - 1,
-                                  [&](const Saved& other) { return value_of(other) == other.value; });
-  conclude(result, same == std::ssize(saved_) - 1, fmt::format("{} of {} are as before", same, saved_.size() - 1));
+  const auto others = std::span(saved_).first(saved_.size() - 1).last(clause.address - first);
+  const auto same =
+      std::count_if(others.begin(), others.end(), [&](const Saved& other) { return value_of(other) == other.value; });
+  conclude(result, same == std::ssize(others), fmt::format("{} of {} are as before", same, others.size()));
 }
 
 void Changes::test_setting(const Clause& clause, ClauseResult& result) {
@@ -141,6 +144,10 @@ std::int64_t Changes::save_setting(const Clause& clause) {
   one.arguments = complete_arguments(*setting.setter, std::array{clause.value});
   one.value = value_of(one);
   one.by_hand = fmt::format("absenc config set {} {} {}", name_, clause.setting, one.value);
+  if (!setting.setter->changes_option.empty()) {
+    const std::int64_t wanted = one.value == clause.value ? clause.other : clause.value;
+    one.by_hand += fmt::format(" --option {}={}", setting.setter->changes_option, wanted);
+  }
   saved_.push_back(std::move(one));
   return saved_.back().value;
 }
@@ -174,7 +181,11 @@ bool Changes::put_back(const Saved& one) {
 
 std::int64_t Changes::value_of(const Saved& one) const {
   const Ran ran = run(*one.getter, one.where);
-  if (!one.field.empty()) return number_of(ran.answer, one.field);
+  if (!one.field.empty()) {
+    const std::int64_t value = number_of(ran.answer, one.field);
+    line_.follow(*one.setter, value);
+    return value;
+  }
   if (ran.data.empty()) throw Refused{"no byte was told"};
   return ran.data.front();
 }
@@ -184,6 +195,7 @@ void Changes::write(const Saved& one, std::int64_t value) const {
   const Argument* place = find_role(one.setter->arguments, Role::value);
   arguments[place != nullptr ? static_cast<std::size_t>(place - one.setter->arguments.data()) : 0] = value;
   static_cast<void>(run(*one.setter, arguments));
+  if (!one.field.empty()) line_.follow(*one.setter, value);
 }
 
 Ran Changes::run(const Command& command, Arguments arguments) const {

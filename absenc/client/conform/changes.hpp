@@ -35,7 +35,11 @@ struct Ran {
 struct ChangesLine {
   std::function<Ran(const Command&, Arguments)> run;
   std::function<void(Time)> rest;
+  std::function<void(const Command& setter, std::int64_t value)> follow;  // it is set so now, and reached so
 };
+
+/// Within what a shaft at rest may tremble.
+[[nodiscard]] bool is_near(const Reading& reading, std::uint64_t wanted);
 
 class Changes {
  public:

@@ -23,6 +23,7 @@ namespace absenc::client {
 namespace {
 
 constexpr Time listening = std::chrono::milliseconds(20);  // for what comes though nobody waits for it any more
+constexpr std::size_t longest_request = 64;
 
 struct Exchange {
   Error error = Error::none;
@@ -74,7 +75,9 @@ class Tester {
 
   [[nodiscard]] ChangesLine line() {
     return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments); },
-            .rest = [this](Time time) { port_.listen(time); }};
+            .rest = [this](Time time) { port_.listen(time); },
+            .follow = [this](const Command& setter,
+                             std::int64_t value) { options_ = options_behind(unit_, options_, setter, value); }};
   }
 
   void test(const Clause& clause, ClauseResult& result) {
@@ -93,6 +96,8 @@ class Tester {
       case Demand::unknown_silent:
       case Demand::unknown_reported:
         return test_request(clause, result);
+      case Demand::restarts:
+        return test_restart(clause, result);
       default:
         return;
     }
@@ -173,8 +178,10 @@ class Tester {
     }
     if (!worst) return;
     const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
-    conclude(result, worst->after <= worst->limit,
-             fmt::format("at most {:.1f} us, of {:.1f} us", us(worst->after), us(worst->limit)));
+    std::string seen =
+        fmt::format("at most {:.1f} us, of {:.1f} us that a host waits", us(worst->after), us(worst->limit));
+    if (latency_ > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(latency_));
+    conclude(result, worst->after <= worst->limit, std::move(seen));
   }
 
   [[nodiscard]] std::vector<Exchange> read_with(std::string_view option, std::int64_t value) {
@@ -255,6 +262,34 @@ class Tester {
     }
   }
 
+  // Nothing is changed by it that would have to be put back; but for turns that nothing but power keeps.
+  void test_restart(const Clause& clause, ClauseResult& result) {
+    if constexpr (std::is_same_v<Item, std::uint8_t>) {
+      const Ran before = run(read_, {});
+      if (!before.reading) return;
+      if (before.reading->multiturn_bits != 0 && before.reading->multiturn != 0) {
+        result.evidence = fmt::format("there are {} turns, which nothing could bring back", before.reading->multiturn);
+        return;
+      }
+      std::vector<std::uint8_t> sent(longest_request);
+      const auto size = unit_.encode(options_, *find_command(unit_, clause.command), {}, sent);
+      if (!size) return;
+      sent.resize(*size);
+      port_.edit = [&](std::vector<std::uint8_t>& request) { request = sent; };
+      once(options_);
+      port_.edit = {};
+      const bool silent = !once(options_).came;
+      port_.listen(std::chrono::milliseconds(clause.value) + listening);
+      const Ran after = run(read_, {});
+      const bool there = after.reading && is_near(*after.reading, before.reading->singleturn);
+      conclude(result, silent && there,
+               fmt::format("it {} at once; later {}", silent ? "does not answer" : "answers",
+                           after.reading ? fmt::format("position {}, {} before", after.reading->singleturn,
+                                                       before.reading->singleturn)
+                                         : std::string("no position was told")));
+    }
+  }
+
   const Unit& unit_;
   Options options_;
   Time latency_;
@@ -290,7 +325,7 @@ void test_all(const EncoderAddress& address, Port<Item>& port, Time latency, con
     for (const Clause& clause : clauses_of(*address.unit)) {
       if (changes_encoder(clause.demand) && !choices.changes) continue;
       ClauseResult result = untested(*address.unit, clause);
-      if (changes_encoder(clause.demand)) {
+      if (changes_encoder(clause.demand) && clause.demand != Demand::restarts) {
         changes.test(clause, result);
       } else {
         tester.test(clause, result);

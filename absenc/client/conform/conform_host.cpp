@@ -15,8 +15,7 @@ constexpr Time between_looks = std::chrono::milliseconds(5);
 
 void set_fault(Emulation& encoder, HostTrial::Fault fault) {
   encoder.clear_faults();
-  if (fault == HostTrial::Fault::silence) encoder.set_fault("drop", 1);
-  if (fault == HostTrial::Fault::damage) encoder.set_fault("corrupt", 1);
+  if (fault != HostTrial::Fault::none) encoder.set_fault(name_of(fault), 1);
 }
 
 }  // namespace
@@ -25,6 +24,12 @@ Conformance conform_host(std::string_view text, const EmulateChoices& place, con
   Emulation encoder(text, place);
   if (host_clauses_of(encoder.unit()).empty()) {
     throw UsageError(fmt::format("no clauses are known of a host of {}", encoder.unit().id));
+  }
+  if (encoder.unit().streams != nullptr && encoder.unit().streams(encoder.options())) {
+    throw UsageError(
+        fmt::format("{} is asked nothing with these options, so there is no host to judge: choose others "
+                    "(absenc list {} has them)",
+                    encoder.unit().id, encoder.unit().id));
   }
   if (choices.ready) choices.ready(encoder);
   HostTrial trial(choices.answers);
@@ -37,12 +42,13 @@ Conformance conform_host(std::string_view text, const EmulateChoices& place, con
     if (now_answered != answered || answered == 0) heard_at = os::now();
     answered = now_answered;
     if (os::now() - heard_at > choices.patience) break;
-    const HostTrial::Fault wanted = trial.look(answered);
+    const HostTrial::Fault wanted = trial.look(answered, encoder.rule_counts());
     if (wanted != fault) set_fault(encoder, wanted);
     fault = wanted;
     os::sleep_until(os::now() + between_looks);
   }
-  return trial.judge(encoder.unit(), encoder.broken_rules());
+  trial.look(encoder.answer_count(), encoder.rule_counts());
+  return trial.judge(encoder.unit());
 }
 
 }  // namespace absenc::client

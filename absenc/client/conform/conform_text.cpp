@@ -38,6 +38,13 @@ std::size_t Conformance::count(Verdict verdict) const {
       std::count_if(clauses.begin(), clauses.end(), [&](const ClauseResult& one) { return one.verdict == verdict; }));
 }
 
+bool Conformance::good() const {
+  const auto is_good = [](const ClauseResult& one) {
+    return one.verdict == Verdict::kept || (one.verdict == Verdict::untested && one.need_not_come);
+  };
+  return left.empty() && std::all_of(clauses.begin(), clauses.end(), is_good);
+}
+
 std::string Conformance::tap() const {
   std::string text = fmt::format("TAP version 13\n1..{}\n", clauses.size());
   std::size_t number = 0;

@@ -9,13 +9,44 @@
 
 namespace absenc::client {
 
+namespace {
+
+std::vector<RuleCount>::iterator entry_of(std::vector<RuleCount>& counts, std::string_view rule) {
+  const auto same = [&](const RuleCount& one) { return one.rule == rule; };
+  const auto found = std::find_if(counts.begin(), counts.end(), same);
+  return found != counts.end() ? found : counts.insert(found, {.rule = rule});
+}
+
+RuleCount count_of(std::span<const RuleCount> counts, std::string_view rule) {
+  const auto same = [&](const RuleCount& one) { return one.rule == rule; };
+  const auto found = std::find_if(counts.begin(), counts.end(), same);
+  return found != counts.end() ? *found : RuleCount{};
+}
+
+}  // namespace
+
 std::uint64_t HostTrial::length() const {
   if (phase_ == Phase::silence || phase_ == Phase::damage) return asked_again;
   if (phase_ == Phase::between) return asked_again;
   return answers_ / 2;
 }
 
-HostTrial::Fault HostTrial::look(std::uint64_t answered) {
+// What was given up for a fault may show in the first requests behind it.
+bool HostTrial::is_calm() const {
+  return phase_ == Phase::good || phase_ == Phase::over ||
+         (phase_ == Phase::last && answered_ - begun_at_ >= asked_again);
+}
+
+HostTrial::Fault HostTrial::look(std::uint64_t answered, std::span<const RuleCount> rules) {
+  if (is_calm()) {
+    for (const RuleCount& now : rules) {
+      const RuleCount before = count_of(rules_, now.rule);
+      RuleCount& calm = *entry_of(calm_, now.rule);
+      calm.looked += now.looked - before.looked;
+      calm.broken += now.broken - before.broken;
+    }
+  }
+  rules_.assign(rules.begin(), rules.end());
   answered_ = answered;
   while (phase_ != Phase::over && answered - begun_at_ >= length()) {
     begun_at_ += length();
@@ -26,7 +57,7 @@ HostTrial::Fault HostTrial::look(std::uint64_t answered) {
   return phase_ == Phase::damage ? Fault::damage : Fault::none;
 }
 
-Conformance HostTrial::judge(const Unit& unit, std::span<const std::string> broken_rules) const {
+Conformance HostTrial::judge(const Unit& unit) const {
   Conformance conformance{.protocol = std::string(unit.id)};
   for (const HostClause& clause : host_clauses_of(unit)) {
     ClauseResult result{.id = clause.id,
@@ -35,14 +66,13 @@ Conformance HostTrial::judge(const Unit& unit, std::span<const std::string> brok
                         .words = clause.words,
                         .verdict = Verdict::untested,
                         .evidence = "the host did not come so far"};
-    judge_one(clause, broken_rules, result);
+    judge_one(clause, result);
     conformance.clauses.push_back(std::move(result));
   }
   return conformance;
 }
 
-void HostTrial::judge_one(const HostClause& clause, std::span<const std::string> broken_rules,
-                          ClauseResult& result) const {
+void HostTrial::judge_one(const HostClause& clause, ClauseResult& result) const {
   const auto goes_on = [&](Phase phase, std::string_view what) {
     if (phase_ < phase) return;
     // The one that is on its way when the fault begins tells nothing.
@@ -56,10 +86,15 @@ void HostTrial::judge_one(const HostClause& clause, std::span<const std::string>
       return goes_on(Phase::silence, "silence");
     case HostDemand::after_damage:
       return goes_on(Phase::damage, "damaged replies");
-    case HostDemand::rule: {
+    case HostDemand::rule:
+    case HostDemand::row: {
+      result.need_not_come = true;
       if (answered_ == 0) return;
-      const auto times = std::count(broken_rules.begin(), broken_rules.end(), clause.rule);
-      return conclude(result, times == 0, fmt::format("broken {} times in {} requests", times, answered_));
+      const RuleCount count = count_of(clause.demand == HostDemand::rule ? rules_ : calm_, clause.rule);
+      result.evidence = "the host did nothing that it is about";
+      if (count.looked == 0) return;
+      return conclude(result, count.broken == 0,
+                      fmt::format("looked at {} times, broken {} times", count.looked, count.broken));
     }
   }
 }

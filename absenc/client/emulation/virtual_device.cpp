@@ -134,6 +134,10 @@ void VirtualDevice::switch_off(Time now) {
   each([&](auto& device) { device.power_off(now); });
 }
 
+void VirtualDevice::watch_rules(RuleWatch* watch) {
+  each([&](auto& device) { device.watch_rules(watch); });
+}
+
 void VirtualDevice::raise_alarms(std::uint32_t bits) {
   each([&](auto& device) { device.raise_alarms(bits); });
 }

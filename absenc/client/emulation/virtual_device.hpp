@@ -57,6 +57,9 @@ class VirtualDevice {
   void set_condition(std::size_t index, std::int64_t value, Time now);
   [[nodiscard]] std::int64_t condition(std::size_t index) const { return conditions_[index]; }
 
+  /// Null: nobody. `watch` must outlive it.
+  void watch_rules(RuleWatch* watch);
+
   /// From its next reply on. Only with `faults_may_come`, or where there were faults at the start.
   void set_faults(const sim::FaultRates& rates);
   [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }

@@ -145,6 +145,18 @@ std::vector<std::int64_t> complete_arguments(const Command& command, std::span<c
   return values;
 }
 
+Options options_behind(const Unit& unit, const Options& options, const Command& setter, std::int64_t value) {
+  Options changed = options;
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const Option& option = unit.options[i];
+    if (option.name != setter.changes_option) continue;
+    const std::string text = fmt::format("{}", value);
+    const auto choice = std::find(option.choices.begin(), option.choices.end(), text);
+    changed.values[i] = option.choices.empty() ? value : choice - option.choices.begin();
+  }
+  return changed;
+}
+
 std::vector<std::int64_t> role_arguments(const Command& command, std::initializer_list<RoleArgument> values) {
   std::vector<std::int64_t> all;
   for (const Argument& argument : command.arguments) {

@@ -33,6 +33,10 @@ namespace absenc::client {
 /// The same of numbers; those that are left out have their defaults. Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> complete_arguments(const Command& command, std::span<const std::int64_t> given);
 
+/// The options that reach an encoder from now on when this setting was given `value`.
+[[nodiscard]] Options options_behind(const Unit& unit, const Options& options, const Command& setter,
+                                     std::int64_t value);
+
 struct RoleArgument {
   Role role;
   std::int64_t value;

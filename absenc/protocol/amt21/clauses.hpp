@@ -8,18 +8,28 @@
 
 namespace absenc::amt21 {
 
-inline constexpr std::array<Clause, 5> clauses{{
+inline constexpr std::array<Clause, 6> clauses{{
     {"answer", "serial interface", "a request is answered", Demand::answered},
-    {"answer-time", "serial interface", "the answer begins after the turn-around time of its rate", Demand::in_time},
+    {"answer-time", "serial interface",
+     "the answer begins after the turn-around time of its rate: no later than a host waits", Demand::in_time},
     {"length", "serial interface", "an answer is two bytes", Demand::whole},
     {"check", "serial interface, checksum", "K1 and K0 make the odd and the even bits odd in number", Demand::checked},
     {"address", "serial interface, address", "a request to another address is not answered", Demand::foreign_silent},
+    // Its zero is moved by a command that no other takes back.
+    {.id = "reset",
+     .paragraph = "serial interface, extended commands",
+     .words = "a reset restarts the encoder, which answers again 200 ms later, at the same position",
+     .demand = Demand::restarts,
+     .value = 200,
+     .command = "reset"},
 }};
 
-inline constexpr std::array<HostClause, 3> host_clauses{{
+inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "serial interface", "requests are as drawn", HostDemand::asks},
     {"silence", "serial interface", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "serial interface, checksum", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"turn", "serial interface", "a request waits until the reply before it is over", HostDemand::rule,
+     "request during the encoder's transmission"},
 }};
 
 }  // namespace absenc::amt21

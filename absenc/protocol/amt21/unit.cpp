@@ -76,11 +76,10 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its z
     if (asked.ask == Ask::turns) {
       return Reply{static_cast<std::int32_t>(wrapped_difference(turns(at) - lost_, 0, turns_bits))};
     }
-    if (asked.ask == Ask::zero && format().multiturn_bits != 0) {
-      violate("zero sent to an encoder with turns", at);
-      return std::nullopt;
+    if (asked.ask == Ask::zero) {
+      if (!expect(format().multiturn_bits == 0, "zero sent to an encoder with turns", at)) return std::nullopt;
+      store_zero(at, 0);
     }
-    if (asked.ask == Ask::zero) store_zero(at, 0);
     restart(at + restart_time);
     return std::nullopt;
   }

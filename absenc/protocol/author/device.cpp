@@ -5,6 +5,10 @@
 
 namespace absenc::author {
 
+namespace {
+constexpr std::string_view turn_rule = "request during the encoder's transmission";
+}  // namespace
+
 void Responder::power_off(Time now) {
   EncoderOn::power_off(now);
   forget();
@@ -90,9 +94,7 @@ void Responder::hear(std::uint8_t byte, Time at) {
     const bool begins_request = interruption_.begins_request(request_size({&byte, 1}), at, times_.character);
     // Had this program been let run, the reply might have been out before.
     const bool may_have_waited = late_ > times_.answer_time + static_cast<int>(reply_.size()) * times_.character;
-    if (begins_request && !may_have_waited) {
-      violate("request during the encoder's transmission", at);
-    }
+    if (begins_request && !may_have_waited) expect(false, turn_rule, at);
     return;
   }
   heard_at_ = at;
@@ -110,6 +112,7 @@ void Responder::hear(std::uint8_t byte, Time at) {
     return may_begin_one ? hear(byte, at) : void();
   }
   if (request_.size() < size) return;
+  if (answer_count() > 0) expect(true, turn_rule, at);
   reply_.clear();
   longer_ = {};
   ended(respond(request_, at, reply_), at);

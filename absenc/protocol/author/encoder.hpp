@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "absenc/core/bytes.hpp"
 #include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/host_rules.hpp"
 
 namespace absenc::author {
 
@@ -26,8 +26,9 @@ class EncoderOn : public Device<Item> {
   void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
   void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
-  [[nodiscard]] std::span<const Violation> violations() const final { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const final { return violation_count_; }
+  [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
+  [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
+  void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
@@ -35,11 +36,10 @@ class EncoderOn : public Device<Item> {
   explicit EncoderOn(Time start_time) : start_time_(start_time) {}
   ~EncoderOn() = default;
 
-  /// A rule of the document that the host broke.
-  void violate(std::string_view rule, Time at) {
-    violations_.push_back({rule, at});
-    ++violation_count_;
-  }
+  /// The host did what a rule of the document is about: whether it kept it, which is returned.
+  bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
+  /// The same of what is no violation: a host may do so, or have had to give up.
+  void note(bool kept, std::string_view rule) { rules_.note(kept, rule); }
   /// Does not hear anything until `time`, as after a reset.
   void restart(Time until) {
     power_ = Power::starting;
@@ -68,8 +68,7 @@ class EncoderOn : public Device<Item> {
   Time ready_at_{};
   std::uint32_t raised_ = 0;
   std::uint32_t memory_version_ = 0;
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
+  HostRules rules_;
   std::uint64_t answer_count_ = 0;
 };
 

@@ -139,14 +139,14 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   void selected(Time at, Time period, bool held_low, Samples& samples) override {
     const Behaviour& behaviour = encoder_.behaviour();
     if (period == Time{}) period = line_settings.bits(1);
-    if (period < shortest_period) violate("MA faster than 10 MHz", at);
+    expect(period >= shortest_period, "MA faster than 10 MHz", at);
     needed_ = 0;
-    if (at < free_at_) {  // SLO is still low
-      violate("clocked before the BiSS timeout has passed", at);
+    // Else SLO is still low.
+    if (!expect(at >= free_at_, "clocked before the BiSS timeout has passed", at)) {
       samples.append(0, 64);
       return;
     }
-    if (period / 2 >= behaviour.timeout) violate("MA slower than the BiSS timeout allows", at);
+    expect(period / 2 < behaviour.timeout, "MA slower than the BiSS timeout allows", at);
     registers_.set_time(at, behaviour.register_delay);
     const std::uint32_t written = registers_.written();
     if (clocked_before_) slaves_.take(held_low, registers_);
@@ -156,8 +156,10 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     needed_ = clocks(encoder_.format(), behaviour.latency, period);
   }
   void clocked(Time at, std::size_t clocks) override {
-    if (clocks < needed_) violate("fewer clocks than the frame has bits", at);
-    if (needed_ > 0) count_answer();
+    if (needed_ > 0) {
+      expect(clocks >= needed_, "fewer clocks than the frame has bits", at);
+      count_answer();
+    }
     clocked_before_ = true;
     free_at_ = at + encoder_.behaviour().timeout;
   }

@@ -15,13 +15,23 @@ inline constexpr std::array<Clause, 5> clauses{{
     {"header", "BiSS C timing diagram, command 4", "ACK, start bit and CDS bit come before the position",
      Demand::as_drawn},
     {.id = "clock",
-     .paragraph = "command Mn",
+     .paragraph = "BiSS C timing diagram, command Mn",
      .words = "the MA clock is what it was set to",
      .demand = Demand::set,
      .value = 3,
      .setting = "clock",
      .field = "clock",
      .other = 4},
+}};
+
+inline constexpr std::array<HostClause, 5> host_clauses{{
+    {"asks", "BiSS C timing diagram, command 4", "requests are as drawn", HostDemand::asks},
+    {"silence", "BiSS C timing diagram, command 4", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "BiSS C timing diagram, CRC", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"command", "BiSS C timing diagram, command 4", "only commands of the interface are sent", HostDemand::rule,
+     "an unknown command"},
+    {"clock", "BiSS C timing diagram, command Mn", "M is sent with the number of a clock", HostDemand::rule,
+     "a command without its number"},
 }};
 
 }  // namespace absenc::e201

@@ -44,10 +44,8 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
   if (trimmed(bytes).empty()) return Answer::for_others;
   const Result<Request> request = Protocol::decode_request(format_, bytes);
   if (request.error() == Error::out_of_range) return Answer::none;
-  if (!request) {
-    violate(bytes[0] == letter::set_clock ? "a command without its number" : "an unknown command", at);
-    return Answer::for_others;
-  }
+  const std::string_view rule = bytes[0] == letter::set_clock ? "a command without its number" : "an unknown command";
+  if (!expect(request.has_value(), rule, at)) return Answer::for_others;
   if (change(*request, at)) return Answer::none;
   switch (request->letter) {
     case letter::samples:

@@ -13,7 +13,7 @@ inline constexpr std::array<Clause, 5> clauses{{
     {"length", "UART, Channel 1", "a frame has position, status and CRC", Demand::whole},
     {"crc", "UART, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
     {.id = "offset",
-     .paragraph = "UART, Channel 3",
+     .paragraph = "UART, Encoder programming",
      .words = "a position offset that was written is read again",
      .demand = Demand::set,
      .value = 0x1000,
@@ -21,7 +21,7 @@ inline constexpr std::array<Clause, 5> clauses{{
      .field = "position_offset",
      .other = 0x2000},
     {.id = "zero",
-     .paragraph = "UART, Channel 3",
+     .paragraph = "UART, Encoder programming",
      .words = "the position offset moves the zero of the turn",
      .demand = Demand::zeroed,
      .value = 0,
@@ -32,6 +32,14 @@ inline constexpr std::array<Clause, 5> clauses{{
 inline constexpr std::array<Clause, 2> spi_clauses{{
     {"answer", "SPI timing diagram", "the encoder drives its output while it is selected", Demand::answered},
     {"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
+}};
+
+inline constexpr std::array<HostClause, 4> host_clauses{{
+    {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
+    {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},
+    {"damage", "UART, Channel 1", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"access", "UART, Encoder programming", "a register is not asked for before the last one was answered",
+     HostDemand::rule, "register access before the last one was answered"},
 }};
 
 }  // namespace absenc::encolink

@@ -8,7 +8,8 @@ namespace absenc::encolink {
 namespace {
 
 constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8..9] hold the resolution
-constexpr Time access_time = 200us;                         // until an access is executed; assumed
+constexpr std::string_view access_rule = "register access before the last one was answered";
+constexpr Time access_time = 200us;  // until an access is executed; assumed
 
 struct Text {
   std::size_t index;
@@ -84,15 +85,15 @@ VirtualEncoder::Answer VirtualEncoder::respond(Bytes request, Time at, ByteBuffe
 }
 
 void VirtualEncoder::selected(Time at) {
-  if (was_selected_ && at - pause_since_ < spi_pause) violate("NCS high for less than 5 us", at);
+  if (was_selected_) expect(at - pause_since_ >= spi_pause, "NCS high for less than 5 us", at);
   was_selected_ = true;
   if (is_on(at)) transmit(make_frame(at), at);
 }
 
 void VirtualEncoder::stopped_clocking(const ByteEvent& event) {
   pause_since_ = event.at;
-  if (event.bits > 0 && event.lead < spi_lead) violate("clock less than 5 us after NCS went low", event.at);
-  if (event.width > Time{} && event.width < shortest_clock) violate("clock faster than 4 MHz", event.at);
+  if (event.bits > 0) expect(event.lead >= spi_lead, "clock less than 5 us after NCS went low", event.at);
+  if (event.width > Time{}) expect(event.width >= shortest_clock, "clock faster than 4 MHz", event.at);
 }
 
 ReplyBytes VirtualEncoder::make_frame(Time now) {
@@ -155,10 +156,7 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
   if (access_.size() < access_keys.size() && byte != access_keys[access_.size()]) access_.clear();
   if (access_.empty() && byte != access_keys[0]) return;
   access_.push_back(byte);
-  if (access_.size() == 2 && answered_bytes_ != answer_.size()) {
-    violate("register access before the last one was answered", at);
-    access_.clear();
-  }
+  if (access_.size() == 2 && !expect(answered_bytes_ == answer_.size(), access_rule, at)) access_.clear();
   if (access_.size() < access_header) return;
   const auto length = static_cast<std::size_t>(load_big_endian(access_.view().subspan(access_keys.size() + 1, 2)));
   const bool writes = access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);

@@ -10,7 +10,8 @@ namespace absenc::esl {
 
 inline constexpr std::array<Clause, 10> clauses{{
     {"answer", "Figure 2", "a read request is answered", Demand::answered},
-    {"answer-time", "Figure 2", "the answer begins 2.0 us after the request", Demand::in_time},
+    {"answer-time", "Figure 2",
+     "the answer begins 2.0 us after the request, which is typical: no later than a host waits", Demand::in_time},
     {"length", "Table 12", "a reply has the frames of its command", Demand::whole},
     {"crc", "Figures 10 and 11", "each channel ends with its CRC", Demand::checked},
     {"fields", "Figures 7 and 8", "the command frame is that of the request, each channel names itself, and both agree",
@@ -38,16 +39,22 @@ inline constexpr std::array<Clause, 10> clauses{{
      .verb = Verb::reset_multiturn},
 }};
 
-inline constexpr std::array<HostClause, 9> host_clauses{{
+inline constexpr std::array<HostClause, 12> host_clauses{{
     {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
-    {"silence", "Figure 2", "after no reply it asks again", HostDemand::after_silence},
+    {"silence", "Overview of Communication", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "Figures 10 and 11", "after a damaged reply it asks again", HostDemand::after_damage},
-    {"turn", "Figure 2", "a request waits until the reply before it is over", HostDemand::rule,
+    {"turn", "Table 1, Figure 1", "a request waits until the reply before it is over", HostDemand::rule,
      "request during the encoder's transmission"},
-    {"page", "Figure 13", "after a change of the page the memory is left alone", HostDemand::rule,
+    {"page", "Table 11, note 3", "after a change of the page the memory is left alone", HostDemand::rule,
      "memory access before the page is ready"},
     {"eeprom-read", "Figure 3 (b)", "the two requests that read a byte are more than 200 us apart", HostDemand::rule,
      "memory read again less than 200 us after the request before"},
+    {"eeprom-again", "Figure 3 (a)", "a byte of the EEPROM is asked for twice", HostDemand::row,
+     "an EEPROM byte asked for only once"},
+    {"eeprom-write", "Figure 5 (e)", "two writes to the EEPROM are more than 6 ms apart", HostDemand::rule,
+     "memory written less than 6 ms after the write before"},
+    {"reset-eight", "Table 4", "a reset is sent eight times in a row, or more", HostDemand::row,
+     "reset not sent eight times in a row"},
     {"reset-interval", "Table 4", "the requests of a reset are about 40 us apart, not much less", HostDemand::rule,
      "reset sent too fast: much less than 40 us after the one before"},
     {"reset-standing", "Table 4", "a reset is sent while the shaft stands", HostDemand::rule,

@@ -117,6 +117,8 @@ class VirtualEncoder final : public author::Responder {
   static constexpr Time start_up = 100ms;                // until ready; the document gives none
   static constexpr Time reset_interval_least = 35us;     // "typical 40 us": what is surely too fast
 
+  static constexpr std::string_view eight_rule = "reset not sent eight times in a row";
+
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
   static constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<std::uint32_t>(position) >> 8; }
 
@@ -176,15 +178,24 @@ class VirtualEncoder final : public author::Responder {
     reply.append(encode_reply(profile_, report, field));
     return Answer::sent;
   }
+  // What is sent too fast does not count, but was sent.
+  void end_resets() {
+    if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, eight_rule);
+    resets_sent_ = 0;
+  }
   void count(DataId id, Time at) {
-    if (is_reset(id) && in_a_row_ > 0 && id == last_id_ && at - last_reset_ < reset_interval_least) {
-      violate("reset sent too fast: much less than 40 us after the one before", at);
+    constexpr std::string_view interval_rule = "reset sent too fast: much less than 40 us after the one before";
+    if (is_reset(id) && in_a_row_ > 0 && id == last_id_ &&
+        !expect(at - last_reset_ >= reset_interval_least, interval_rule, at)) {
       in_a_row_ = 0;
     }
+    if (id != last_id_) end_resets();
+    if (is_reset(id) && ++resets_sent_ == reset_requests) note(true, eight_rule);
     in_a_row_ = id == last_id_ ? in_a_row_ + 1 : 1;
     last_id_ = id;
-    if (id == DataId::encoder_id && in_a_row_ == reset_requests) {
-      violate("ID 8 sent eight times in a row: dynamic addressing, which nothing describes", at);
+    if (id == DataId::encoder_id) {
+      expect(in_a_row_ != reset_requests, "ID 8 sent eight times in a row: dynamic addressing, which nothing describes",
+             at);
     }
     if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) {
       for (std::uint8_t& counter : counters_) ++counter;
@@ -192,10 +203,8 @@ class VirtualEncoder final : public author::Responder {
   }
   // That there is no such address is not acknowledged: the document does not say it.
   std::optional<Reply> access_memory(const Request& request, Time at) {
-    if (profile_.bus == sharing_yes) {
-      violate("memory access with several encoders on the line", at);
+    if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;
-    }
     const bool writing = request.id == DataId::write_memory;
     const bool exists = request.memory_address == page_select_address
                             ? !writing || is_page(request.value)
@@ -205,8 +214,15 @@ class VirtualEncoder final : public author::Responder {
                 .encoder_address = profile_.address,
                 .memory_address = request.memory_address,
                 .value = request.value};
-    if (at < page_ready_at_) violate("memory access before the page is ready", at);
-    reply.busy = at < page_ready_at_ || (at < busy_until_ && !is_immediate(page_, request.memory_address));
+    const bool immediate = is_immediate(page_, request.memory_address);
+    if (byte_pending_) {
+      const bool again = !writing && request.memory_address == pending_address_;
+      note(again, "an EEPROM byte asked for only once");
+    }
+    if (!page_changed_ && writing && !immediate && busy_until_ > Time{})
+      note(at >= busy_until_, "memory written less than 6 ms after the write before");
+    if (page_changed_) page_changed_ = !expect(at >= page_ready_at_, "memory access before the page is ready", at);
+    reply.busy = at < page_ready_at_ || (at < busy_until_ && !immediate);
     if (!reply.busy) writing ? write_byte(request.memory_address, request.value, at) : read_byte(reply, at);
     if (reply.busy) reply.value = 0;
     return reply;
@@ -215,7 +231,7 @@ class VirtualEncoder final : public author::Responder {
     const std::uint8_t address = reply.memory_address;
     const bool fetched = byte_pending_ && at - pending_at_ >= eeprom_read_time;
     if (!is_immediate(page_, address)) {
-      if (byte_pending_ && !fetched) violate("memory read again less than 200 us after the request before", at);
+      if (byte_pending_) expect(fetched, "memory read again less than 200 us after the request before", at);
       byte_pending_ = reply.busy = !fetched || pending_address_ != address;
       if (reply.busy) {
         pending_address_ = address;
@@ -233,6 +249,7 @@ class VirtualEncoder final : public author::Responder {
     if (address == page_select_address) {
       page_ = value;
       page_ready_at_ = at + page_time;
+      page_changed_ = true;
       return;
     }
     *stored(page_, address) = value;
@@ -244,8 +261,8 @@ class VirtualEncoder final : public author::Responder {
     last_reset_ = at;
     if (in_a_row_ < reset_requests) return;
     in_a_row_ = 0;
-    if (magnitude(shaft_->at(at).speed_millirpm) > standing_still) return violate("reset while the shaft turns", at);
-    execute_reset(id, at);
+    const bool stands = magnitude(shaft_->at(at).speed_millirpm) <= standing_still;
+    if (expect(stands, "reset while the shaft turns", at)) execute_reset(id, at);
   }
   void execute_reset(DataId id, Time at) {
     if (id == DataId::clear_alarms) {
@@ -324,6 +341,7 @@ class VirtualEncoder final : public author::Responder {
   void started(Time) override {
     page_ = register_page;
     page_ready_at_ = busy_until_ = Time{};
+    page_changed_ = false;
     registers_.fill(0);
     counters_.fill(0);
   }
@@ -331,7 +349,7 @@ class VirtualEncoder final : public author::Responder {
     latches_ &= alarms::turns_wrong;  // the others need a power cycle; these an ID C
     turns_cleared_ = false;
     byte_pending_ = false;
-    in_a_row_ = 0;
+    in_a_row_ = resets_sent_ = 0;
   }
   // Of channel 2 the one behind that of channel 1.
   [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
@@ -352,6 +370,7 @@ class VirtualEncoder final : public author::Responder {
 
   std::uint8_t page_ = register_page;
   Time page_ready_at_{};
+  bool page_changed_ = false;  // and the memory not used since
   Time busy_until_{};
   bool byte_pending_ = false;  // an EEPROM byte is on its way into the temporary register
   std::uint8_t pending_address_ = 0;
@@ -359,6 +378,7 @@ class VirtualEncoder final : public author::Responder {
 
   DataId last_id_{};
   unsigned in_a_row_ = 0;           // requests of `last_id_`
+  unsigned resets_sent_ = 0;        // of `last_id_`
   std::uint8_t refused_field_ = 0;  // CF of a damaged request
   Time last_reset_{};
 };

@@ -7,6 +7,7 @@ namespace {
 
 constexpr Time answer_time = 200us;  // behind the silence that ends a request; the standard gives none
 constexpr Time late = 20ms;          // behind that silence: a client may have given up, and asked again
+constexpr std::string_view turn_rule = "something was sent during the encoder's transmission";
 
 }  // namespace
 
@@ -67,7 +68,7 @@ void Server::feed(const ByteEvent& event) {
 void Server::hear(const ByteEvent& event) {
   if (transmitting_) {
     // A request is one broken rule, not each of its bytes.
-    if (!company_ && !interrupted_ && !late_) violate("something was sent during the encoder's transmission", event.at);
+    if (!company_ && !interrupted_ && !late_) expect(false, turn_rule, event.at);
     interrupted_ = true;
     return;
   }
@@ -75,7 +76,8 @@ void Server::hear(const ByteEvent& event) {
   const Time begun = event.items.size() == 1 ? event.at - line_.character() : event.at;
   const Time idle = begun - quiet_since_;
   if (frame_.empty()) {
-    early_ = heard_ && !late_ && idle < line_.character() * 7 / 2;
+    follows_ = heard_ && !late_;
+    early_ = follows_ && idle < line_.character() * 7 / 2;
   } else if (idle > character_gap(line_)) {
     gappy_ = true;
   }
@@ -103,17 +105,13 @@ void Server::frame_ended(Time at) {
 
 void Server::forget_frame() {
   frame_.clear();
-  damaged_ = early_ = gappy_ = false;
+  damaged_ = follows_ = early_ = gappy_ = false;
 }
 
 void Server::heed_line(Time at) {
-  if (early_) violate("less than 3.5 characters of silence before a request", at);
-  if (gappy_) violate("more than 1.5 characters of silence inside a request", at);
-}
-
-void Server::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
+  if (answer_count_ > 0) expect(true, turn_rule, at);
+  if (follows_) expect(!early_, "less than 3.5 characters of silence before a request", at);
+  expect(!gappy_, "more than 1.5 characters of silence inside a request", at);
 }
 
 void Server::refuse(FrameBytes& reply, std::uint8_t address, std::uint8_t function, Exception exception) {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/host_rules.hpp"
 #include "absenc/protocol/modbus/frame.hpp"
 #include "absenc/protocol/modbus/timing.hpp"
 
@@ -19,8 +20,9 @@ class Server : public Device<std::uint8_t> {
 
   void power_on(Time now, PowerOn kind) final;
   void power_off(Time now) final;
-  [[nodiscard]] std::span<const Violation> violations() const final { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const final { return violation_count_; }
+  [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
+  [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
+  void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
@@ -35,8 +37,9 @@ class Server : public Device<std::uint8_t> {
 
   /// Once what is being sent has left.
   void set_rate(std::uint32_t rate);
-  void violate(std::string_view rule, Time at);
-  /// The rules of the line that this frame broke: of frames for others they say nothing.
+  /// The host did what a rule of the document is about: whether it kept it, which is returned.
+  bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
+  /// The rules of the line, of this frame: of frames for others they say nothing.
   void heed_line(Time at);
   /// The request that is being answered may be answered by others at the same time.
   void expect_company() { company_ = true; }
@@ -55,7 +58,8 @@ class Server : public Device<std::uint8_t> {
 
   FrameBytes frame_;
   bool damaged_ = false;  // a wrong character, or too many
-  bool early_ = false;    // it began too soon after what was before
+  bool follows_ = false;  // something was before it
+  bool early_ = false;    // it began too soon after that
   bool gappy_ = false;    // too much time between two of its characters
   bool heard_ = false;    // anything, since power on
   bool late_ = false;     // it ended so long ago that its client need not wait for the reply any more
@@ -66,8 +70,7 @@ class Server : public Device<std::uint8_t> {
   bool transmitting_ = false;
   bool interrupted_ = false;  // something came while it was
   Time reply_at_{};
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
+  HostRules rules_;
   std::uint64_t answer_count_ = 0;
 };
 

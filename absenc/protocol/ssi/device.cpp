@@ -10,11 +10,12 @@ constexpr Time period_of(std::uint32_t khz) { return LineSettings{.rate = khz * 
 }  // namespace
 
 void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bits) {
-  if (period > 0ns && (period < period_of(format_.fastest_khz) || period > period_of(format_.slowest_khz))) {
-    violate("clock outside min_clock_khz to max_clock_khz", at);
+  if (period > 0ns) {
+    const bool allowed = period >= period_of(format_.fastest_khz) && period <= period_of(format_.slowest_khz);
+    expect(allowed, "clock outside min_clock_khz to max_clock_khz", at);
   }
-  if (at < free_at_) {  // the shift register goes on
-    violate("clocked again within monoflop_us", at);
+  // Else the shift register goes on.
+  if (!expect(at >= free_at_, "clocked again within monoflop_us", at)) {
     shifted_ %= 2 * (format_.word.bits() + (format_.after_word == AfterWord::separated ? 1 : 0));
   } else {
     latched_ = word_of(format_.word, shaft_->at(at), raised());
@@ -29,7 +30,7 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
 
 void VirtualEncoder::clocked(Time at, std::size_t clocks) {
   shifted_ += clocks;
-  if (shifted_ < format_.word.bits()) violate("fewer clocks than the word has bits", at);
+  expect(shifted_ >= format_.word.bits(), "fewer clocks than the word has bits", at);
   free_at_ = at + (format_.monoflop == Time{} ? format_.pause : std::min(format_.monoflop, format_.pause));
   count_answer();
 }

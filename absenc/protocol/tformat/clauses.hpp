@@ -10,8 +10,9 @@ namespace absenc::tformat {
 
 inline constexpr std::array<Clause, 12> clauses{{
     {"answer", "6.2.1", "a readout request is answered", Demand::answered},
-    {"answer-time", "8.1", "the answer begins 3 us after the request", Demand::in_time},
-    {"length", "6.3.1 Table 2", "a reply has the fields of its data ID", Demand::whole},
+    {"answer-time", "8.1", "the answer begins 3 us after the request, which is typical: no later than a host waits",
+     Demand::in_time},
+    {"length", "6.3.3 Table 2", "a reply has the fields of its data ID", Demand::whole},
     {"crc", "6.3.4", "the CRC field is that of all fields before it", Demand::checked},
     {"fields", "6.3", "the control field is that of the request, fixed bits are as drawn", Demand::as_drawn},
     {"bad-sync", "8.4 Table 5 (1)", "a request with a wrong sync code is not answered", Demand::unknown_silent, 0x1F},
@@ -41,14 +42,20 @@ inline constexpr std::array<Clause, 12> clauses{{
      .verb = Verb::reset_multiturn},
 }};
 
-inline constexpr std::array<HostClause, 7> host_clauses{{
+inline constexpr std::array<HostClause, 10> host_clauses{{
     {"asks", "6.2", "requests are as drawn", HostDemand::asks},
-    {"silence", "8.4", "after no reply it asks again", HostDemand::after_silence},
+    {"silence", "8.4 Table 5 (1)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "6.3.4", "after a damaged reply it asks again", HostDemand::after_damage},
-    {"turn", "8.1", "a request waits until the reply before it is over", HostDemand::rule,
+    {"turn", "11", "a request waits until the reply before it is over", HostDemand::rule,
      "request during the encoder's transmission"},
     {"page", "6.3.5 (2)", "after a change of the page the EEPROM is left alone for 18 ms", HostDemand::rule,
      "memory access before the page is ready"},
+    {"write-busy", "6.3.5 (3) Table 5", "nothing is written while the encoder still writes, up to 18 ms",
+     HostDemand::rule, "memory written while the encoder writes"},
+    {"busy-again", "6.3.5 (3) Table 5", "a readout that was refused as busy is sent again", HostDemand::row,
+     "what was refused as busy was not asked for again"},
+    {"reset-ten", "10", "a reset is sent ten times in one sequence", HostDemand::row,
+     "reset not sent ten times in a row"},
     {"reset-interval", "10", "the ten requests of a reset are 40 us apart, or more", HostDemand::rule,
      "reset sent too fast: less than 40 us after the one before"},
     {"reset-standing", "10", "a reset is sent while the shaft stands", HostDemand::rule, "reset while the shaft turns"},

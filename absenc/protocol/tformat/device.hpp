@@ -75,6 +75,7 @@ class VirtualEncoder final : public author::Responder {
     }
     page_ = 0;
     busy_until_ = Time{};
+    busy_with_ = Work::none;
     Responder::power_on(now, kind);
     if (!battery && kind == PowerOn::real) restart(now + start_up_without_battery);
   }
@@ -87,7 +88,8 @@ class VirtualEncoder final : public author::Responder {
     zero_pending_ = false;
     latches_ &= static_cast<std::uint8_t>(~(alarms::counting_error | alarms::multiturn_error));
     refused_status_ = 0;
-    reset_count_ = 0;
+    reset_count_ = resets_sent_ = 0;
+    refused_address_.reset();
   }
 
  private:
@@ -99,6 +101,11 @@ class VirtualEncoder final : public author::Responder {
   static constexpr std::int32_t power_off_acceleration = 4'000;  // rad/s^2
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
   static constexpr Time power_off_timer = 5s;
+
+  static constexpr std::string_view page_rule = "memory access before the page is ready";
+  static constexpr std::string_view write_rule = "memory written while the encoder writes";
+  static constexpr std::string_view again_rule = "what was refused as busy was not asked for again";
+  static constexpr std::string_view ten_rule = "reset not sent ten times in a row";
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
 
@@ -127,14 +134,14 @@ class VirtualEncoder final : public author::Responder {
   }
   void refuse(Time at, ByteBuffer<64>& reply) override {
     update(at);
-    reset_count_ = 0;
+    reset_count_ = resets_sent_ = 0;
     Reply refusal = everything(at);
     refusal.status |= refused_status_;
     refused_status_ = 0;
     reply.append(encode_reply(refusal).view());
   }
   std::optional<Reply> answer(const Request& request, Time at) {
-    if (!is_reset(request.id)) reset_count_ = 0;
+    if (!is_reset(request.id)) end_resets();
     if (is_memory_access(request.id)) return access_memory(request, at);
     Reply reply = everything(at);
     reply.id = request.id;                                  // encoding takes what this id carries
@@ -146,20 +153,25 @@ class VirtualEncoder final : public author::Responder {
 
   std::optional<Reply> access_memory(const Request& request, Time at) {
     Reply reply{.id = request.id, .address = request.address, .value = request.value};
-    if (at < busy_until_) {
-      if (page_changing_) violate("memory access before the page is ready", at);
+    const bool writing = request.id == DataId::write_memory;
+    const bool busy = at < busy_until_;
+    if (refused_address_) note(!writing && request.address == *refused_address_, again_rule);
+    refused_address_.reset();
+    if (busy && !writing && busy_with_ == Work::write) refused_address_ = request.address;
+    if (writing && busy_with_ == Work::write) note(!busy, write_rule);
+    if (busy_with_ == Work::page && expect(!busy, page_rule, at)) busy_with_ = Work::none;
+    if (busy) {
       reply.busy = true;
       reply.value = 0;
       return reply;
     }
-    const bool writing = request.id == DataId::write_memory;
     const bool of_page = request.address == page_select_address;
     const MemoryArea* const area = find_area(page_, request.address);
     const bool open = of_page ? !writing || is_page(request.value) : area != nullptr && (!writing || area->writable);
     if (!open) return std::nullopt;
     if (writing) {
       busy_until_ = at + memory_time;
-      page_changing_ = of_page;
+      busy_with_ = of_page ? Work::page : Work::write;
       write(request.address, request.value);
     } else {
       reply.value = value_at(request.address);
@@ -186,18 +198,22 @@ class VirtualEncoder final : public author::Responder {
 
   // ---- Resets
 
+  // What is sent too fast does not count, but was sent.
+  void end_resets() {
+    if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, ten_rule);
+    reset_count_ = resets_sent_ = 0;
+  }
   void count_reset(DataId id, Time at) {
-    if (reset_count_ > 0 && at - last_reset_ < reset_interval) {
-      violate("reset sent too fast: less than 40 us after the one before", at);
-      reset_count_ = 0;
-    }
-    if (id != reset_id_) reset_count_ = 0;
+    if (id != reset_id_) end_resets();
+    if (++resets_sent_ == reset_requests) note(true, ten_rule);
+    constexpr std::string_view interval_rule = "reset sent too fast: less than 40 us after the one before";
+    if (reset_count_ > 0 && !expect(at - last_reset_ >= reset_interval, interval_rule, at)) reset_count_ = 0;
     reset_id_ = id;
     last_reset_ = at;
     if (++reset_count_ < reset_requests) return;
     reset_count_ = 0;
-    if (magnitude(shaft_->at(at).speed_millirpm) > standing_still) return violate("reset while the shaft turns", at);
-    execute_reset(id, at);
+    const bool stands = magnitude(shaft_->at(at).speed_millirpm) <= standing_still;
+    if (expect(stands, "reset while the shaft turns", at)) execute_reset(id, at);
   }
   void execute_reset(DataId id, Time at) {
     if (id == DataId::zero) {
@@ -205,7 +221,7 @@ class VirtualEncoder final : public author::Responder {
       zero_request_ = counts(at) + zero();
       zero_turns_ = turns(at);
       busy_until_ = at + memory_time;
-      page_changing_ = false;
+      busy_with_ = Work::write;
       return;
     }
     latches_ = 0;
@@ -294,13 +310,15 @@ class VirtualEncoder final : public author::Responder {
 
   std::uint8_t page_ = 0;
   Time busy_until_{};
-  bool page_changing_ = false;
+  enum class Work : std::uint8_t { none, page, write } busy_with_ = Work::none;  // or was last
+  std::optional<std::uint8_t> refused_address_{};                                // of a readout while it wrote
   bool zero_pending_ = false;
   std::int64_t zero_request_ = 0;  // counts to become zero when the EEPROM is written
   std::int64_t zero_turns_ = 0;    // to be kept then
 
   DataId reset_id_{};
   unsigned reset_count_ = 0;
+  unsigned resets_sent_ = 0;
   Time last_reset_{};
   std::uint8_t refused_status_ = 0;
 };

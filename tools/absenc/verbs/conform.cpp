@@ -154,7 +154,8 @@ const Subcommand conform_host_subcommand{
     "Says on standard error where it can be opened. Replies are good, stay away for a while and are damaged for a\n"
     "while; the host has to go on, and must not break a rule of the document: intervals, pauses, turns. Each clause "
     "has\n"
-    "its paragraph, a verdict and what was seen. Exit status 1 when a clause is broken or could not be tested.",
+    "its paragraph, a verdict and what was seen. Rules of what the host never does are untested, which is no fault.\n"
+    "Exit status 1 when a clause is broken, or the host did not come so far.",
     host_parameters,
     host_examples,
     run_conform_host};

@@ -90,10 +90,14 @@ void VirtualNode::hear(const CanFrame& frame, Time at) {
   const bool sets = for_all && info != nullptr && info->answer == Answer::error;
   // What nodes answer on 7E5 is heard there by the others.
   if (sets && is_zero_from(frame, 1) && !configuring_) return;
-  if (frame.remote || frame.size != frame_size) return violate("a frame without its 8 bytes of data", at);
-  if (!for_all && frame.data[1] != node()) return violate("the second byte is not the node's number", at);
-  if (for_all && !configuring_ && (info == nullptr || sets)) return violate("a setting without configuration mode", at);
-  if (info == nullptr) return violate(for_all ? "an unknown configuration command" : "an unknown command", at);
+  if (!rules_.expect(!frame.remote && frame.size == frame_size, "a frame without its 8 bytes of data", at)) return;
+  if (!for_all && !rules_.expect(frame.data[1] == node(), "the second byte is not the node's number", at)) return;
+  if (for_all && (info == nullptr || sets) &&
+      !rules_.expect(configuring_, "a setting without configuration mode", at)) {
+    return;
+  }
+  const std::string_view unknown = for_all ? "an unknown configuration command" : "an unknown command";
+  if (!rules_.expect(info != nullptr, unknown, at)) return;
   // The rate's first byte is another table of rates, which the document does not have.
   const bool is_other_table = info->order == Order::rate && frame.data[1] != 0;
   const std::uint8_t value = frame.data[info->value_at];
@@ -102,14 +106,14 @@ void VirtualNode::hear(const CanFrame& frame, Time at) {
 }
 
 void VirtualNode::answer(const CanFrame& frame, Time at) {
-  if (!pending_.push_back({frame, at + answer_time})) return violate("more requests than it can keep answers for", at);
-  ++answer_count_;
+  const bool room = pending_.push_back({frame, at + answer_time});
+  if (rules_.expect(room, "more requests than it can keep answers for", at)) ++answer_count_;
 }
 
 void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
   // Its answer could be taken for a position, and the other way round.
-  if (changes && readings_per_s_ != 0) violate("a setting changed while the node sends by itself", at);
+  if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
   if (info.order == Order::start && readings_per_s_ == 0) send_by_itself(format_.cyclic, at);
   if (info.order == Order::cyclic) send_by_itself(value, at);
@@ -117,8 +121,8 @@ void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.order == Order::direction) {
     const std::uint8_t negative = value == format_.negative ? 1 : 0;
     const bool known = negative != 0 || value == format_.positive;
-    if (!known) violate("an unknown counting direction", at);
-    if (known) wrote(settings_.write(Settings::direction_at, {&negative, 1}), at);
+    if (rules_.expect(known, "an unknown counting direction", at))
+      wrote(settings_.write(Settings::direction_at, {&negative, 1}), at);
   }
   if (info.answer == Answer::position) answer(encode_position(node(), settings_.position(at)), at);
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
@@ -128,19 +132,14 @@ void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;
-  if (!known) violate(is_rate ? "an unknown bit rate" : "a node number of 0", at);
-  if (known) wrote(settings_.write(is_rate ? Settings::rate_at : Settings::number_at, {&value, 1}), at);
+  if (rules_.expect(known, is_rate ? "an unknown bit rate" : "a node number of 0", at))
+    wrote(settings_.write(is_rate ? Settings::rate_at : Settings::number_at, {&value, 1}), at);
   switch_rate_ = switch_rate_ || (known && is_rate);
   answer(encode_configuration_answer(format_.answer_id(), info.order, known ? std::uint8_t{0} : refused), at);
 }
 
 void VirtualNode::wrote(bool changed, Time at) {
-  if (!changed) violate("a setting written that was set already: it wears out", at);
-}
-
-void VirtualNode::violate(std::string_view rule, Time at) {
-  violations_.push_back({rule, at});
-  ++violation_count_;
+  rules_.expect(changed, "a setting written that was set already: it wears out", at);
 }
 
 }  // namespace absenc::raa38::can

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/host_rules.hpp"
 #include "absenc/protocol/raa38/can/frame.hpp"
 #include "absenc/protocol/raa38/settings.hpp"
 
@@ -22,8 +23,9 @@ class VirtualNode final : public Device<CanFrame> {
   void lower_alarms(std::uint32_t) override {}
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
-  [[nodiscard]] std::span<const Violation> violations() const override { return violations_; }
-  [[nodiscard]] std::uint32_t violation_count() const override { return violation_count_; }
+  [[nodiscard]] std::span<const Violation> violations() const override { return rules_.violations(); }
+  [[nodiscard]] std::uint32_t violation_count() const override { return rules_.violation_count(); }
+  void watch_rules(RuleWatch* watch) override { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }
 
   [[nodiscard]] const Settings& settings() const { return settings_; }
@@ -42,7 +44,6 @@ class VirtualNode final : public Device<CanFrame> {
   void send_by_itself(std::uint8_t readings_per_s, Time from);
   void answer(const CanFrame& frame, Time at);
   void wrote(bool changed, Time at);
-  void violate(std::string_view rule, Time at);
   [[nodiscard]] Time period() const;
 
   Format format_;
@@ -58,8 +59,7 @@ class VirtualNode final : public Device<CanFrame> {
   Buffer<Pending, 8> pending_;  // answers, the first due first
   CanFrame out_{};
   std::uint64_t answer_count_ = 0;
-  Buffer<Violation, 16> violations_;
-  std::uint32_t violation_count_ = 0;
+  HostRules rules_;
 };
 
 }  // namespace absenc::raa38::can

@@ -77,7 +77,7 @@ void VirtualEncoder::append_position(std::uint16_t registers, Time at, FrameByte
 void VirtualEncoder::set_address(Bytes body, Time at, FrameBytes& reply) {
   if (body.size() != 3) return;
   const std::uint8_t address = body[2];
-  if (!is_address(address)) return violate("an address was set that no slave can have", at);
+  if (!expect(is_address(address), "an address was set that no slave can have", at)) return;
   wrote(settings_.write(Settings::number_at, {&address, 1}), at);
   reply.push_back(address);
   reply.push_back(function::set_address);
@@ -85,8 +85,8 @@ void VirtualEncoder::set_address(Bytes body, Time at, FrameBytes& reply) {
 
 void VirtualEncoder::set_parameter(Bytes body, Time at, FrameBytes& reply) {
   if (body.size() != 3) return;
-  if (!apply(body[2], at)) return violate("a parameter was set that the document does not have", at);
-  reply.append(body);
+  const bool known = apply(body[2], at);
+  if (expect(known, "a parameter was set that the document does not have", at)) reply.append(body);
 }
 
 bool VirtualEncoder::apply(std::uint8_t value, Time at) {
@@ -107,14 +107,12 @@ bool VirtualEncoder::apply(std::uint8_t value, Time at) {
 }
 
 void VirtualEncoder::wrote(bool changed, Time now) {
-  if (!changed) violate("a setting was sent that the encoder has already: its memory wears out", now);
+  expect(changed, "a setting was sent that the encoder has already: its memory wears out", now);
   if (now - recent_since_ > settings_window) {
     recent_since_ = now;
     recent_settings_ = 0;
   }
-  if (++recent_settings_ == most_settings + 1) {
-    violate("settings are sent again and again: the memory wears out", now);
-  }
+  expect(++recent_settings_ != most_settings + 1, "settings are sent again and again: the memory wears out", now);
 }
 
 }  // namespace absenc::raa38::rtu

@@ -56,8 +56,8 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
     return;
   }
   if (format().mode != Mode::handshake) return;
-  if (event.width < trigger_width) return violate("pulse on CLK shorter than 10 us (T2)", event.at);
-  if (is_transmitting()) return violate("pulse on CLK before the last frame was out (T1)", event.at);
+  if (!expect(event.width >= trigger_width, "pulse on CLK shorter than 10 us (T2)", event.at)) return;
+  if (!expect(!is_transmitting(), "pulse on CLK before the last frame was out (T1)", event.at)) return;
   transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
@@ -66,7 +66,7 @@ void VirtualEncoder::hear_meanwhile(Bytes bytes, Time at) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
   for (const std::uint8_t byte : bytes) {
     meanwhile_ = (meanwhile_ << 8 | byte) & 0xFFFFFF;
-    if (meanwhile_ == own) violate("request during the encoder's transmission", at);
+    if (meanwhile_ == own) expect(false, "request during the encoder's transmission", at);
   }
 }
 

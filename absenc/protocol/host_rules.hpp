@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rules of the document that the host of a virtual encoder has to keep: which it broke, and for whoever asks, how
+// often each was looked at.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/protocol/conversation.hpp"
+
+namespace absenc {
+
+class HostRules {
+ public:
+  /// The host did what the rule is about. Returns `kept`.
+  bool expect(bool kept, std::string_view rule, Time at);
+
+  /// The same of what only who watches is told when it is broken: a host may do so, or have had to give up.
+  void note(bool kept, std::string_view rule) const;
+
+  [[nodiscard]] std::span<const Violation> violations() const { return violations_; }
+  [[nodiscard]] std::uint32_t violation_count() const { return count_; }
+  void watch(RuleWatch* watch) { watch_ = watch; }
+
+ private:
+  Buffer<Violation, 16> violations_;
+  std::uint32_t count_ = 0;
+  RuleWatch* watch_ = nullptr;
+};
+
+}  // namespace absenc
