@@ -185,6 +185,23 @@ TEST(CanZero, ALateAnswerIsNoZero) {
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
+// A carrier hands frames out some milliseconds late: how often the node sends is known by many of them.
+TEST(CanZero, SendsAgainAsOftenAlsoBehindASlowCarrier) {
+  unsigned left = 1000;
+  unsigned rate = 0;
+  Scripted node([&](const CanFrame& heard) {
+    const bool cyclic = order_of(heard)->order == Order::cyclic;
+    if (cyclic) rate = heard.data[info_of(Order::cyclic).value_at];
+    if (cyclic) left = rate == 0 ? 0 : 1000;
+    return obedient(heard, 0);
+  });
+  node.period = 10ms;
+  node.wobble = 4ms;
+  node.left = &left;
+  EXPECT_TRUE(ended(with(node, "zero"), Error::none));
+  EXPECT_NEAR(rate, 100, 1);
+}
+
 TEST(CanZero, ANodeThatNoLongerSendsIsTold) {
   unsigned left = 1000;
   Scripted exhausted([&](const CanFrame& heard) {
