@@ -4,7 +4,7 @@
 
 tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled at
 once, each behind a switch, and for each one the generic tests, as far as they concern its unit, the seeds of its fuzzer
-and its own tests run, the fastest first, until one fails. Mutants that cannot be switched (constants) and those that
+and its own tests run, the fastest first, until one fails. Mutants that cannot be switched (few constants) and those that
 survived are compiled one at a time, which tells what is checked at compile time. A mutant that survives shows a test
 that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their reason.
 """
