@@ -64,6 +64,7 @@ class Mutant(NamedTuple):
     after: str
     id: str
     switch: "Switch | None"
+    constant: "str | None" = None  # its name: it is switched where all that use it call a function (as_functions)
 
     def applied_to(self, text):
         return text[: self.start] + self.after + text[self.end :]
@@ -82,6 +83,26 @@ def with_switches(text, numbered):
         parts += [text[position : key[0]], words]
         position = key[0]
     return "".join(parts) + text[position:]
+
+
+def as_functions(text, names):
+    """`text` in which these constants of type Time, and whatever uses them, are functions; None where one of the names
+    means something else, too."""
+    source = Source(text)
+    inserted = []
+    for i, token in enumerate(source.tokens):
+        if token.text not in names or source[i - 1] in (".", "->"):
+            continue
+        if source[i - 2] == "constexpr" and source[i - 1] == "Time" and source[i + 1] == "=":
+            end = source.tokens[source.right(i + 2, {";"})].end
+            inserted += [(token.end, token.end, "()"), (*source.tokens[i + 1][2:], "{ return"), (end, end, " }")]
+        elif source.tokens[i - 1].kind == "word" and source[i - 1] not in ("return", "co_return", "case"):
+            return None
+        elif source[source.left(i, {";"})] != "using":
+            inserted.append((token.end, token.end, "()"))
+    for start, end, words in sorted(inserted, reverse=True):
+        text = text[:start] + words + text[end:]
+    return text
 
 
 def value_of(number):
@@ -139,7 +160,7 @@ class Finder:
         tokens = self.source.tokens
         return Switch(tokens[first].start, tokens[last - 1].end, before, behind)
 
-    def _change(self, rule, first, last, after, switch=None):
+    def _change(self, rule, first, last, after, switch=None, constant=None):
         """The tokens from `first` up to, without, `last` become `after`."""
         tokens = self.source.tokens
         start, end = tokens[first].start, tokens[last - 1].end
@@ -159,7 +180,8 @@ class Finder:
         seen = self._seen[told] = self._seen.get(told, 0) + 1
         digest = hashlib.sha256(f"{told}\n{seen}".encode()).hexdigest()[:8]
         name = f"{self.file}:{rule}:{digest}"
-        self.found.append(Mutant(self.file, rule, line, start, end, self.source.text[start:end], after, name, switch))
+        before = self.source.text[start:end]
+        self.found.append(Mutant(self.file, rule, line, start, end, before, after, name, switch, constant))
 
     # ---- Checks
 
@@ -298,7 +320,7 @@ class Finder:
             # A constant, or a member with the value it has unless told otherwise: not what a function computes.
             is_member = source[i - 1] in (";", "{", "}") and source.tokens[i + 3].kind == "number" and end == i + 4
             if source[i - 1] == "constexpr" or is_member:
-                self._times(i + 3, end, is_constant=True)
+                self._times(i + 3, end, "" if is_member or self._is_local(i) else source[i + 1])
                 for j in range(i, end):
                     self.left_alone[j] = True
 
@@ -320,7 +342,15 @@ class Finder:
                     for k in range(j, end):
                         self.left_alone[k] = True
 
-    def _times(self, first, last, is_constant=False):
+    def _is_local(self, index):
+        """Whether what is declared there is a function's."""
+        source = self.source
+        outer = self._around(index)
+        begin = source.left(outer, {";", "}"})
+        return source[outer] == "{" and not {"namespace", "class", "struct"} & {source[i] for i in range(begin, outer)}
+
+    def _times(self, first, last, constant=None):
+        """`constant`: its name; empty: what cannot be switched."""
         before = f"Time({self.source.span(first, last)})"
         if self.file.endswith(".hpp"):
             changes = {"half": f"{before} / 2", "twice": f"{before} * 2"}
@@ -328,8 +358,8 @@ class Finder:
             changes = {"zero": "Time{}", "ten": f"{before} * 10"}
         is_operand = last == first + 1 and self.source[first - 1] != "="
         for rule, after in changes.items():
-            switch = None if is_constant else self._switch(first, last, f"(IS ? Time({after}) : Time(", "))")
-            self._change(rule, first, last, f"({after})" if is_operand else after, switch)
+            switch = None if constant == "" else self._switch(first, last, f"(IS ? Time({after}) : Time(", "))")
+            self._change(rule, first, last, f"({after})" if is_operand else after, switch, constant)
 
     def _number(self, index):
         source = self.source

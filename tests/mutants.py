@@ -4,7 +4,7 @@
 
 tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled at
 once, each behind a switch, and for each one the generic tests, as far as they concern its unit, the seeds of its fuzzer
-and its own tests run, the fastest first, until one fails. Mutants that cannot be switched (constants) and those that
+and its own tests run, the fastest first, until one fails. Mutants that cannot be switched (few constants) and those that
 survived are compiled one at a time, which tells what is checked at compile time. A mutant that survives shows a test
 that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their reason.
 """
@@ -114,6 +114,7 @@ class Tree:
         self.limits = {}
         self.last_own = None
         self.lock = None
+        self.switched = {}
         self.environment = {**os.environ, "CCACHE_BASEDIR": str(folder), "GTEST_FAIL_FAST": "1", "GTEST_BRIEF": "1"}
 
     def prepare(self):
@@ -165,13 +166,35 @@ class Tree:
         return None if done.returncode == 0 else done.stdout + done.stderr
 
     def switch_in(self, numbered):
-        """All of these mutants, given by their numbers."""
+        """These mutants, given by their numbers. Those of constants that cannot be switched are taken out of them."""
         self.write(self.source / SWITCH_HEADER, SWITCH.encode())
-        texts = {path: text for _, path, text in numbered.values()}
-        for path, text in texts.items():
-            here = [(number, one[0]) for number, one in numbered.items() if one[1] == path]
-            switched = f'#include "{SWITCH_HEADER}"\n#line 1\n{mutant_rules.with_switches(text, here)}'
-            self.write(self.source / path.relative_to(ROOT), switched.encode())
+        functions = self.constants_as_functions(numbered)
+        for number, (mutant, path, _) in list(numbered.items()):
+            if mutant.constant and mutant.constant not in functions.get(path, ()):
+                del numbered[number]
+        self.switched = {path: path.read_text(encoding="utf-8") for path in functions}
+        self.switched.update({path: text for _, path, text in numbered.values()})
+        for path in self.switched:
+            here = [(number, mutant) for number, (mutant, of, _) in numbered.items() if of == path]
+            switched = mutant_rules.with_switches(self.switched[path], here)
+            switched = mutant_rules.as_functions(switched, functions.get(path, set()))
+            self.write(self.source / path.relative_to(ROOT), f'#include "{SWITCH_HEADER}"\n#line 1\n{switched}'.encode())
+
+    @staticmethod
+    def constants_as_functions(numbered):
+        """Of each source the constants that are functions in it: all of a folder that use one must be able to."""
+        functions = {}
+        for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
+            users = [*path.parent.rglob("*.hpp"), *path.parent.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
+            users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]
+            if all(mutant_rules.as_functions(user.read_text(encoding="utf-8"), {name}) is not None for user in users):
+                for user in users:
+                    functions.setdefault(user, set()).add(name)
+        return functions
+
+    def restore_switched(self):
+        for path, text in self.switched.items():
+            self.write(self.source / path.relative_to(ROOT), text.encode())
 
     def restore(self, mutants):
         for path, text in {path: text for _, path, text in mutants}.items():
@@ -316,10 +339,9 @@ class Campaign:
     def switch(self, tree, unit, mutants):
         """Those that are left."""
         numbered = dict(enumerate([one for one in mutants if one[0].switch], start=1))
-        left = [one for one in mutants if not one[0].switch]
+        left = []
         if numbered:
-            tree.switch_in(numbered)
-            programs = self.programs(tree, unit)
+            programs = self.switched_programs(tree, unit, numbered)
             for number, one in numbered.items():
                 began = time.monotonic()
                 result = tree.switched_outcome(number, programs)
@@ -331,8 +353,22 @@ class Campaign:
                         print(f"left to be compiled alone: {one[0].id}", flush=True)
                 else:
                     self.note(unit, one, result, time.monotonic() - began)
-            tree.restore(mutants)
+            tree.restore_switched()
+        left += [one for one in mutants if one not in numbered.values()]
         return sorted(left, key=lambda one: (one[1], one[0].start))
+
+    def switched_programs(self, tree, unit, numbered):
+        """With the constants among them, if the compiler takes them as functions: those that it does not are left."""
+        try:
+            tree.switch_in(numbered)
+            return self.programs(tree, unit)
+        except SystemExit as refused:
+            print(f"{unit}: its constants are compiled alone: {refused}", flush=True)
+        tree.restore_switched()
+        for number in [number for number, one in numbered.items() if one[0].constant]:
+            del numbered[number]
+        tree.switch_in(numbered)
+        return self.programs(tree, unit)
 
     def compile_alone(self, tree, unit, mutants):
         if not mutants or self.stopping:

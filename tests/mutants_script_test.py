@@ -129,15 +129,27 @@ class Rules(unittest.TestCase):
             ("co_await dialog.ask();", "if (chosen_mutant(1)) {} else co_await dialog.ask();"),
             ("rest(10ms);", "rest((chosen_mutant(1) ? Time(Time(10ms) / 2) : Time((chosen_mutant(2) ? "
              "Time(Time(10ms) * 2) : Time(10ms)))));"),
-            ("constexpr Time pause = 40us;", None),
+            ("constexpr Time pause = 40us;", None),  # a function's
         )
         for line, expected in lines:
-            text = f"void f() {{ {line} }}" if expected else line
+            text = f"void f() {{ {line} }}"
             found = [one for one in mutant_rules.find("toy.hpp", text) if one.rule in mutant_rules.COARSE]
             self.assertEqual(any(one.switch for one in found), expected is not None, line)
             if expected:
                 switched = mutant_rules.with_switches(text, list(enumerate(found, start=1)))
                 self.assertEqual(switched, f"void f() {{ {expected} }}")
+
+    def test_constants_become_functions(self):
+        text = "constexpr Time a = 40us;\nconstexpr Time b = 2 * a;\nTime f(X x) { return x.a + n::a; }\nusing n::a;"
+        found = [one for one in mutant_rules.find("toy.cpp", text) if one.constant == "a"]
+        switched = mutant_rules.as_functions(mutant_rules.with_switches(text, list(enumerate(found, start=1))), {"a"})
+        declared = (
+            "constexpr Time a() { return (chosen_mutant(1) ? Time(Time{}) : Time((chosen_mutant(2) ? "
+            "Time(Time(40us) * 10) : Time(40us)))); }"
+        )
+        used = ["constexpr Time b = 2 * a();", "Time f(X x) { return x.a + n::a(); }", "using n::a;"]
+        self.assertEqual(switched.splitlines(), [declared, *used])
+        self.assertIsNone(mutant_rules.as_functions("constexpr Time a = 40us; void f(Time a);", {"a"}))
 
     def test_only_the_place_changes(self):
         for found in mutant_rules.find("toy.hpp", TOY):

@@ -8,7 +8,7 @@ namespace absenc::host {
 namespace {
 
 Frame to_frame(Bytes bytes) { return {.bytes = bytes}; }
-Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.empty() ? nullptr : &frames.front()}; }
+Frame to_frame(std::span<const CanFrame> frames) { return {.can = frames.data()}; }
 
 }  // namespace
 

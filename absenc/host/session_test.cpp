@@ -17,6 +17,7 @@
 namespace absenc::host {
 namespace {
 
+using namespace std::chrono_literals;
 using Wire = std::vector<std::uint8_t>;
 
 struct Still final : Shaft {
@@ -53,6 +54,38 @@ sim::FaultRates always(sim::FaultKind kind) {
   sim::FaultRates rates;
   rates[kind] = 1;
   return rates;
+}
+
+TEST(Session, WithoutAConversationThereIsNoResult) {
+  Bench bench(EchoMode::off);
+  Session<std::uint8_t> session(bench.unit, bench.options, *bench.port, {}, EchoMode::off);
+  EXPECT_EQ(session.run(*find_command(bench.unit, Verb::read)), nullptr) << "its storage is too small";
+}
+
+// ---- What waits behind ReplyGuard
+
+TEST(ReplyGuard, ARequestWaitsAndWhatIsNoneDoesNot) {
+  struct Asks final : Machine<std::uint8_t> {
+    void feed(const Event<std::uint8_t>&) override {}
+    Step<std::uint8_t> next(Time) override { return step; }
+    Step<std::uint8_t> step;
+  };
+  using Kind = Step<std::uint8_t>::Kind;
+  const Bench bench(EchoMode::off);
+  const Wire bytes(17, 0x02);
+  const auto first = [&](std::size_t size, Time at) {
+    Asks asks;
+    asks.step = {.kind = Kind::transfer, .out = Bytes(bytes).first(size), .at = at};
+    ReplyGuard<std::uint8_t> guard;
+    guard.attach(asks, bench.unit, bench.options, true);
+    return guard.next(1s);
+  };
+  EXPECT_EQ(first(0, {}).kind, Kind::transfer) << "clocks only";
+  EXPECT_EQ(first(17, {}).kind, Kind::transfer) << "more than is kept of a request";
+  EXPECT_EQ(first(1, {}).kind, Kind::wait);
+  EXPECT_EQ(first(1, {}).at, 1s + 1ns);
+  EXPECT_EQ(first(1, 1s + 1ms).at, 1s + 1ns) << "the port keeps a short pause more exactly";
+  EXPECT_EQ(first(1, 1s + 5ms).at, 1s + 5ms);
 }
 
 // ---- Echo

@@ -22,6 +22,28 @@ class Decoding {
     if (seen.reading) reading_shows(seen);
   }
 
+  // No reply is no evidence: without one nothing more speaks against its own options.
+  void unanswered() {
+    if (unit_.probe == nullptr) return;
+    struct Against final : EvidenceSink {
+      void put(const OptionEvidence& one) override {
+        if (!one.possible && one.value == own.values[one.option]) why = one.why;
+      }
+      Options own;
+      std::string_view why;
+    };
+    const auto against = [&](Bytes reply) {
+      Against found;
+      Options options = found.own = options_;
+      const Capture capture{vector_.request, reply};
+      unit_.probe(options, {&capture, 1}, found);
+      return found.why;
+    };
+    const std::string_view why = against({});
+    require(why.empty() || why == against(vector_.reply),
+            [&] { return "its request alone speaks against its options: " + std::string(why); });
+  }
+
   // Of a request that stops early, or goes on, nothing is told either.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
@@ -144,6 +166,7 @@ Findings check_decoding(const Unit& unit) {
     Decoding decoding(unit, vector, *options, findings);
     decoding.whole();
     if (vector.error != Error::none) continue;
+    decoding.unanswered();
     decoding.good_request();
     if (!vector.reply.empty()) decoding.good_reply();
   }

@@ -56,6 +56,8 @@ struct Found {
 };
 using Wire = std::vector<std::uint8_t>;
 
+constexpr std::uint8_t damaged = 0x55;  // what comes back as a character that cannot be used
+
 /// Runs a conversation in virtual time; `encoder` gives what comes back for the nth request, nothing at all: silence.
 struct Bench {
   using Encoder = std::function<Wire(std::uint8_t, unsigned)>;
@@ -81,7 +83,11 @@ struct Bench {
           host.feed({.kind = Kind::sent, .at = now});
           for (const std::uint8_t byte : encoder(request, static_cast<unsigned>(sent.size()))) {
             now += 10us;
-            host.feed({.kind = Kind::received, .at = now, .items = {&byte, 1}});
+            if (byte == damaged) {
+              host.feed({.kind = Kind::line_error, .at = now});
+            } else {
+              host.feed({.kind = Kind::received, .at = now, .items = {&byte, 1}});
+            }
           }
           break;
         }
@@ -140,6 +146,12 @@ TEST(Procedures, EndWhereNoGoodReplyComes) {
   ASSERT_EQ(bad.bench.sent.size(), 4u);                               // three attempts, each after its pause
   EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);  // the silence is part of the pause
   EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);                  // held
+}
+
+TEST(Procedures, DamagedCharactersAreNoSilence) {
+  Case<two_questions> bad([](std::uint8_t, unsigned) { return Wire{damaged}; });
+  EXPECT_EQ(bad.host.error(), Error::bad_framing);
+  EXPECT_EQ(bad.bench.sent.size(), 3u);
 }
 
 TEST(Procedures, RepeatWhatWasDamagedWhenTheLineIsSilent) {

@@ -93,9 +93,10 @@ struct Scripted final : Machine<CanFrame> {
       return {.kind = Step<CanFrame>::Kind::configure, .settings = {.rate = rate}};
     }
     if (sending) return {.at = never};
-    const bool by_itself = queue.empty() && period != Time{} && (silent == nullptr || !*silent);
+    const bool by_itself = queue.empty() && period != Time{} && (left == nullptr || *left != 0);
     if (queue.empty() && (!by_itself || now < due)) return {.at = by_itself ? due : never};
-    if (by_itself) due = now + period;
+    if (by_itself) due = now + period + (wobble = -wobble);
+    if (by_itself && left != nullptr) --*left;
     out = by_itself ? unasked : queue.front();
     if (!by_itself) queue.erase(queue.begin());
     sending = true;
@@ -104,8 +105,9 @@ struct Scripted final : Machine<CanFrame> {
 
   Script script;
   CanFrame unasked = encode_position(0x20, 49);
-  Time period{};                 // 0: it sends nothing by itself
-  const bool* silent = nullptr;  // when it no longer does
+  Time period{};             // 0: it sends nothing by itself
+  Time wobble{};             // each second one comes so much later
+  unsigned* left = nullptr;  // how many frames it still sends by itself; null: it goes on
   std::uint32_t rate = 250'000;
   bool tell_rate = true;
 

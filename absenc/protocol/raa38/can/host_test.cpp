@@ -185,17 +185,52 @@ TEST(CanZero, ALateAnswerIsNoZero) {
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
+// A carrier hands frames out some milliseconds late: how often the node sends is known by many of them.
+TEST(CanZero, SendsAgainAsOftenAlsoBehindASlowCarrier) {
+  unsigned left = 1000;
+  unsigned rate = 0;
+  Scripted node([&](const CanFrame& heard) {
+    const bool cyclic = order_of(heard)->order == Order::cyclic;
+    if (cyclic) rate = heard.data[info_of(Order::cyclic).value_at];
+    if (cyclic) left = rate == 0 ? 0 : 1000;
+    return obedient(heard, 0);
+  });
+  node.period = 10ms;
+  node.wobble = 4ms;
+  node.left = &left;
+  EXPECT_TRUE(ended(with(node, "zero"), Error::none));
+  EXPECT_NEAR(rate, 100, 1);
+}
+
 TEST(CanZero, ANodeThatNoLongerSendsIsTold) {
-  bool silent = false;
+  unsigned left = 1000;
   Scripted exhausted([&](const CanFrame& heard) {
     if (order_of(heard)->order == Order::read) return obedient(heard, 0);
-    silent = true;
+    left = 0;
     return Frames{};
   });
   exhausted.unasked = encode_position(0x20, 0);
   exhausted.period = 100ms;
-  exhausted.silent = &silent;
+  exhausted.left = &left;
   EXPECT_TRUE(ended(with(exhausted, "zero"), Error::cross_check_failed, "no longer sends"));
+}
+
+// It stops one frame later than it was told: its position is 32, as the answer to 20 would be.
+TEST(CanZero, WhatItStillSentByItselfIsNoAnswer) {
+  for (const Time period : {80ms, 100ms}) {
+    unsigned left = 1000;
+    std::uint64_t counts = 32;
+    Scripted slow([&](const CanFrame& heard) {
+      const Order order = order_of(heard)->order;
+      if (order == Order::cyclic) left = heard == encode(order, 0x20, 0) ? 1 : 1000;
+      if (order == Order::zero) counts = 0;
+      return order == Order::zero ? Frames{} : obedient(heard, counts);
+    });
+    slow.unasked = encode_position(0x20, 32);
+    slow.period = period;
+    slow.left = &left;
+    EXPECT_TRUE(with(slow, "zero").has("answered=0"));
+  }
 }
 
 // ---- The direction
@@ -222,6 +257,16 @@ TEST(CanDirection, AnotherPositionIsNoDirection) {
     return obedient(heard, counts);
   });
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
+}
+
+// The position 32 may be a late answer to 22.
+TEST(CanDirection, APositionThatIsNotThereAgainIsNone) {
+  unsigned looks = 0;
+  Scripted late([&](const CanFrame& heard) {
+    const bool third = order_of(heard)->order == Order::read && ++looks == 3;
+    return obedient(heard, third ? 32u : 1000u);
+  });
+  EXPECT_TRUE(ended(with(late, "direction", {0}), Error::cross_check_failed, "mirror image"));
 }
 
 TEST(CanDirection, OtherValues) {

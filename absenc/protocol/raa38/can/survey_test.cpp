@@ -81,6 +81,23 @@ TEST(CanFindNode, AnswersThatComeWhileItIsSendingAreHeard) {
   }
 }
 
+TEST(CanFindNode, TheLastAnswersAreWaitedFor) {
+  Talk find("node");
+  Time now{};
+  for (;;) {
+    const Step<CanFrame> step = find->next(now);
+    if (step.kind == Step<CanFrame>::Kind::done) break;
+    if (step.kind == Step<CanFrame>::Kind::transfer) {
+      find->feed({.kind = Event<CanFrame>::Kind::sent, .at = now});
+    } else if (step.at >= now + 50ms) {  // every number was asked
+      const CanFrame late = encode_position(0xFF, 5);
+      find->feed({.kind = Event<CanFrame>::Kind::received, .at = now, .items = {&late, 1}});
+    }
+    now = std::max(now, step.at);
+  }
+  EXPECT_EQ(raa38::testing::end_of<CanFrame>(*find).fields, "node=255 ");
+}
+
 // ---- Settings
 
 TEST(CanSetNode, AnswersUnderTheNewNumber) {
@@ -109,6 +126,8 @@ TEST(CanSetNode, NotWithOthersOnTheBus) {
   EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::invalid_argument, "7E5"));
   EXPECT_TRUE(ended(bench.does(Format{.node = 0x77}, "set-node", {0x42}), Error::unexpected_reply, "not this one"));
   EXPECT_EQ(bench.encoder().settings().writes() + other.settings().writes(), 0u);
+  for (VirtualNode& node : bench.encoders) node.power_off(bench.line.now());
+  EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::timeout, "no node answers"));
 }
 
 /// A node that may answer a setting, but does not do it.

@@ -49,6 +49,15 @@ TEST(RaaHandshake, AFrameTakesAsLongAsOrdered) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
+TEST(RaaHandshake, NoCharacterAt1200BaudIsAGap) {
+  using Event = absenc::Event<std::uint8_t>;
+  Talk read(handshake, "position");
+  ASSERT_EQ(read->next(Time{}).kind, Step<std::uint8_t>::Kind::pulse);
+  read->feed({.kind = Event::Kind::sent, .at = trigger_width});
+  read->feed({.kind = Event::Kind::received, .at = 1ms, .items = {&header, 1}});
+  EXPECT_GT(read->next(1ms).gap, LineSettings{.rate = 1200}.character());
+}
+
 TEST(RaaHandshake, TheWholeFrameMayComeDuringThePulse) {
   using Event = absenc::Event<std::uint8_t>;
   const FrameBytes frame = encode_position(handshake, {383});

@@ -91,6 +91,16 @@ TEST(RaaStream, BeginsInTheMiddleOfAFrameWithTheHeaderInItsData) {
   }
 }
 
+TEST(RaaStream, FramesOfAnotherNumberAreNone) {
+  for (const SecondByte form : {SecondByte::automatic, SecondByte::echo}) {
+    const Format format{.second_byte = form, .unit = 1};
+    Wire wire;
+    for (std::uint32_t value = 1; value < 5; ++value) append(wire, encode_position(format, {value, 0xB2}));
+    StreamDecoder decoder(format);
+    EXPECT_TRUE(hear(decoder, wire).positions.empty());
+  }
+}
+
 // Two bytes were lost: FF 81 02 .. .. FF 81 02 09 8B. What stands there has a right sum and fits into 10 bits.
 TEST(RaaStream, AHeaderThatSlippedIntoAFrameIsNoPosition) {
   const Format format{.bits = 10};

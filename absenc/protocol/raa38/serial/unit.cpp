@@ -86,14 +86,12 @@ std::string_view against_second_byte(SecondByte form, const Capture& capture) {
 
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   constexpr std::string_view fits = "every frame fits";
-  const bool any_bits =
-      judge(sink, bits_option, least_bits, most_bits, captures.size(), values.values[bits_option], fits,
-            [&](std::int64_t bits, std::size_t i) { return against_bits(bits, captures[i].reply); });
-  const bool any_form = judge(sink, second_byte_option, 0, second_byte_choices.size() - 1, captures.size(),
-                              values.values[second_byte_option], fits, [&](std::int64_t form, std::size_t i) {
-                                return against_second_byte(static_cast<SecondByte>(form), captures[i]);
-                              });
-  if (!any_bits || !any_form) return false;
+  judge(sink, bits_option, least_bits, most_bits, captures.size(), values.values[bits_option], fits,
+        [&](std::int64_t bits, std::size_t i) { return against_bits(bits, captures[i].reply); });
+  judge(sink, second_byte_option, 0, second_byte_choices.size() - 1, captures.size(), values.values[second_byte_option],
+        fits, [&](std::int64_t form, std::size_t i) {
+          return against_second_byte(static_cast<SecondByte>(form), captures[i]);
+        });
   const Format format = options.format(values);
   return std::all_of(captures.begin(), captures.end(), [&](const Capture& capture) {
     return capture.reply.empty() || decode_position(format, capture.reply, unit_of(capture)).has_value();
@@ -104,11 +102,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
 
 constexpr bool listens(const Format& format) { return format.mode == Mode::timing; }
 
-// No byte asks an encoder in the other modes.
-constexpr Result<Request> to_scan(const Format& format, Arguments) {
-  if (format.mode != Mode::bus) return Error::unsupported;
-  return Request{};
-}
+constexpr Request to_scan(const Format&, Arguments) { return {}; }
 constexpr Request to_zero(const Format& format, Arguments) {
   return {format.zeroing == Zeroing::line ? Request::Kind::clear : Request::Kind::zero_clear, format.zeroed_unit()};
 }
