@@ -6,30 +6,34 @@ find_package(Python3 REQUIRED COMPONENTS Interpreter)
 set(firmware_folder "${CMAKE_CURRENT_BINARY_DIR}/firmware")
 set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)  # behind those of the toolchain, which they replace
 
+# What each machine has in firmware/machine, and where its program and its RAM begin.
+set(microbit_machine cortex_m microbit)
+set(mps2_machine cortex_m mps2)
+set(virt_machine virt)
+set(begin_of_microbit 0 0x20000000)
+set(begin_of_mps2 0 0x20000000)
+set(begin_of_virt 0x80000000 0x80400000)
+
 # firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]): NAME.elf
 function(firmware_program name machine rom ram)
   cmake_parse_arguments(one "" "LIBRARY" "SOURCES;FLAGS" ${ARGN})
-  add_executable(firmware_${name} EXCLUDE_FROM_ALL ${one_SOURCES} "${PROJECT_SOURCE_DIR}/firmware/machine/start.cpp"
-                 "${PROJECT_SOURCE_DIR}/firmware/machine/machine.cpp"
-                 "${PROJECT_SOURCE_DIR}/firmware/machine/${machine}.cpp")
+  set(machine_sources start machine ${${machine}_machine})
+  list(TRANSFORM machine_sources REPLACE "(.+)" "${PROJECT_SOURCE_DIR}/firmware/machine/\\1.cpp")
+  list(GET begin_of_${machine} 0 rom_begin)
+  list(GET begin_of_${machine} 1 ram_begin)
+  add_executable(firmware_${name} EXCLUDE_FROM_ALL ${one_SOURCES} ${machine_sources})
   absenc_settings(firmware_${name})
   target_include_directories(firmware_${name} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_options(firmware_${name} PRIVATE ${one_FLAGS})
   set(script "${PROJECT_SOURCE_DIR}/firmware/machine/machine.ld")
-  target_link_options(firmware_${name} PRIVATE ${one_FLAGS} --specs=nano.specs -nostartfiles
+  target_link_options(firmware_${name} PRIVATE ${one_FLAGS} -nostartfiles
                       "-T${script}" -Wl,--gc-sections,--no-warn-rwx-segments
-                      -Wl,--defsym=rom_size=${rom},--defsym=ram_size=${ram})
+                      -Wl,--defsym=rom_begin=${rom_begin},--defsym=rom_size=${rom}
+                      -Wl,--defsym=ram_begin=${ram_begin},--defsym=ram_size=${ram})
   target_link_libraries(firmware_${name} PRIVATE ${one_LIBRARY})
   set_target_properties(firmware_${name} PROPERTIES OUTPUT_NAME "${name}.elf" LINK_DEPENDS "${script}"
                         RUNTIME_OUTPUT_DIRECTORY "${firmware_folder}")
 endfunction()
-
-# All of the library for a Cortex-M4 with its FPU.
-absenc_sources(m4f_sources ${absenc_firmware_folders})
-add_library(absenc-m4f STATIC EXCLUDE_FROM_ALL ${m4f_sources})
-absenc_settings(absenc-m4f)
-target_include_directories(absenc-m4f PUBLIC "${PROJECT_SOURCE_DIR}")
-target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
 
 # The vectors of the reference.
 file(GLOB vector_files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/vectors*.json")
@@ -39,6 +43,19 @@ add_custom_command(OUTPUT "${vector_tables}" DEPENDS "${vector_script}" ${vector
                    COMMAND ${CMAKE_COMMAND} -E make_directory "${firmware_folder}"
                    COMMAND "${Python3_EXECUTABLE}" -B "${vector_script}" "${vector_tables}" ${vector_files} VERBATIM)
 set(vector_sources "${PROJECT_SOURCE_DIR}/firmware/vectors.cpp" "${vector_tables}")
+
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)  # a compiler and a tree of its own, and none but these
+  firmware_program(vectors-rv32 virt 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
+  add_custom_target(firmware-all DEPENDS firmware_vectors-rv32)
+  return()
+endif()
+
+# All of the library for a Cortex-M4 with its FPU.
+absenc_sources(m4f_sources ${absenc_firmware_folders})
+add_library(absenc-m4f STATIC EXCLUDE_FROM_ALL ${m4f_sources})
+absenc_settings(absenc-m4f)
+target_include_directories(absenc-m4f PUBLIC "${PROJECT_SOURCE_DIR}")
+target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
 
 firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
 firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})

@@ -21,5 +21,3 @@ add_custom_command(
 add_custom_target(freestanding-check ALL DEPENDS "${linked}.checked")
 add_custom_target(freestanding-headers ALL)
 add_dependencies(freestanding-headers all_verify_interface_header_sets)
-
-include(firmware)

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plugin of QEMU: prints how many instructions ran between each call of count_begin and the next of count_end, whose
-// addresses are its arguments begin=ADDRESS and end=ADDRESS. Debian's QEMU has plugins but no header for them: what is
-// used of its interface (version 1) is declared here.
+// A plugin of QEMU: prints how many instructions ran between each call of count_begin and that of count_end which
+// belongs to it, and in how many other such pairs that was. Their addresses are its arguments begin=ADDRESS and
+// end=ADDRESS. Debian's QEMU has plugins but no header for them: what is used of its interface (version 1) is declared
+// here.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <vector>
 
 extern "C" {
 using PluginId = std::uint64_t;
@@ -28,11 +30,14 @@ const int qemu_plugin_version = 1;
 namespace {
 
 std::uint64_t begin_address = 0, end_address = 0, count = 0;
+std::vector<std::uint64_t> begun;  // counts
 
 void one(unsigned, void*) { ++count; }
-void begin(unsigned, void*) { count = 0; }
+void begin(unsigned, void*) { begun.push_back(count); }
 void end(unsigned, void*) {
-  std::printf("count %llu\n", static_cast<unsigned long long>(count));
+  const unsigned long long counted = count - begun.back();
+  begun.pop_back();
+  std::printf("count %zu %llu\n", begun.size(), counted);
   std::fflush(stdout);
 }
 

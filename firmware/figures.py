@@ -14,7 +14,7 @@ import tempfile
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PAGE = os.path.join(ROOT, "docs/firmware.md")
 MACHINES = {"m0plus": "mps2-an385", "m4f": "mps2-an386"}
-FIGURES = ("text", "rodata", "data", "bss", "stack", "reading", "character")
+FIGURES = ("text", "rodata", "data", "bss", "stack", "reading", "reply", "character")
 TOLERANCE = 0.03
 SECTIONS = {"text": (".vectors", ".text"), "rodata": (".rodata", ".ARM.exidx", ".init_array"), "data": (".data",),
             "bss": (".bss",)}
@@ -43,10 +43,12 @@ def run(plugin, program, machine):
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=120, text=True, check=False)
     if result.returncode != 0:
         sys.exit(f"{program} read no position: {result.stdout}{result.stderr}")
-    counts = [int(count) for count in re.findall(r"^count (\d+)", result.stdout, re.MULTILINE)]
+    counts, replies = ([int(count) for count in re.findall(rf"^count {depth} (\d+)", result.stdout, re.MULTILINE)]
+                       for depth in (0, 1))
     # What it says itself comes on another stream.
     stack = int(re.search(r"\d+", result.stderr)[0])
-    return {"stack": stack, "reading": counts[0], "character": counts[1] if len(counts) > 1 else None}
+    return {"stack": stack, "reading": counts[0], "reply": replies[-1] if replies else None,
+            "character": counts[1] if len(counts) > 1 else None}
 
 
 def measured(folder):
@@ -61,7 +63,7 @@ def measured(folder):
                 program = os.path.join(folder, f"reader-{reader}-{cpu}.elf")
                 every[reader] = sizes(program) | run(plugin, program, machine)
             base = every.pop("base")
-            base["character"] = base["reading"]  # what a pair of marks costs itself
+            base["character"] = base["reply"] = base["reading"]  # what a pair of marks costs itself
             for reader, figures in every.items():
                 above = {name: None if figures[name] is None else figures[name] - base[name] for name in FIGURES}
                 table.setdefault(reader, {})[cpu] = above
@@ -70,8 +72,8 @@ def measured(folder):
 
 def page(table):
     lines = [f"Compiler: `{table['compiler']}`, `-Os`, newlib-nano.", "",
-             "| reader | core | text | rodata | data | bss | stack | a reading | a character |",
-             "|---|---|--:|--:|--:|--:|--:|--:|--:|"]
+             "| reader | core | text | rodata | data | bss | stack | a reading | a reply | a character |",
+             "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|"]
     for reader, cores in table["figures"].items():
         for cpu, figures in cores.items():
             cells = ["" if figures[name] is None else str(figures[name]) for name in FIGURES]

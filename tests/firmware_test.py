@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The programs of firmware/ on machines that QEMU emulates. ABSENC_FIRMWARE is the folder they were
-built in; ABSENC_FIRMWARE_POSITIONS how many the drive reads, ABSENC_FIRMWARE_ALL whether all programs were built (./dev firmware)."""
+built in, ABSENC_FIRMWARE_RISCV that of those for RISC-V; ABSENC_FIRMWARE_POSITIONS how many the drive reads, ABSENC_FIRMWARE_ALL whether all programs were built (./dev firmware)."""
 import json
 import os
 import re
@@ -14,21 +14,25 @@ import unittest
 from command_support import Emulator, absenc, end, read_line
 
 FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE", "build/arm/firmware"))
+RISCV_FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE_RISCV", "build/riscv/firmware"))
 SOURCES = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 POSITIONS = int(os.environ.get("ABSENC_FIRMWARE_POSITIONS", "1000"))
 PATIENCE = 120 + POSITIONS / 20  # seconds
-CORES = ("m0plus", "m4f") if os.environ.get("ABSENC_FIRMWARE_ALL") else ("m0plus",)
-MACHINES = {"microbit": "microbit", "m0plus": "mps2-an385", "m4f": "mps2-an386"}
+ALL = bool(os.environ.get("ABSENC_FIRMWARE_ALL"))
+CORES = ("m0plus", "m4f") if ALL else ("m0plus",)
+MACHINES = {"microbit": "microbit", "m0plus": "mps2-an385", "m4f": "mps2-an386", "rv32": "virt"}
 SINGLETURN, MULTITURN = 74565, 4660
 LATENCY = 250  # ms: a reply that a busy machine delays longer would be a fault that nobody injected
 
 
 def emulator_of(program, machine, *arguments, serial="null"):
     """The command that runs a program."""
-    path = os.path.join(FOLDER, program + ".elf")
+    riscv = machine == MACHINES["rv32"]
+    path = os.path.join(RISCV_FOLDER if riscv else FOLDER, program + ".elf")
+    emulator = ["qemu-system-riscv32", "-bios", "none"] if riscv else ["qemu-system-arm"]
     semihosting = ",".join(["enable=on,target=native", f"arg={program}", *(f"arg={one}" for one in arguments)])
     serial = ["-serial", "null"] if serial == "null" else ["-chardev", serial, "-serial", "chardev:line"]
-    return ["qemu-system-arm", "-M", machine, "-display", "none", "-monitor", "none", *serial,
+    return [*emulator, "-M", machine, "-display", "none", "-monitor", "none", *serial,
             "-semihosting-config", semihosting, "-kernel", path]
 
 
@@ -42,7 +46,7 @@ def emulated(program, machine, *arguments, serial="null"):
 
 class Vectors(unittest.TestCase):
     def test_all_are_decoded(self):
-        for cpu in CORES:
+        for cpu in (*CORES, "rv32") if ALL else CORES:
             with self.subTest(cpu):
                 status, said = emulated(f"vectors-{cpu}", MACHINES[cpu])
                 self.assertEqual(status, 0, said)

@@ -293,7 +293,7 @@ TEST(Trigger, PulseBeforeEachFrame) {
       self.send({0xFF}, event.at + microseconds(30));
   });
   const auto pulse = [](ByteToy& toy, Time at, Time width) {
-    toy.push({.kind = Step<Byte>::Kind::pulse, .at = at, .width = width, .wire = ExtraWire::trigger});
+    toy.push({.kind = Step<Byte>::Kind::pulse, .wire = ExtraWire::trigger, .at = at, .width = width});
   };
   ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));  // too short
@@ -317,7 +317,7 @@ struct BaudChange : testing::Test {
     if (event.kind == Kind::line_error) self.send({0xEE}, event.at + microseconds(5));
     if (event.kind == Kind::sent && !std::exchange(changed, true)) configure(self);
   }};
-  static void configure(ByteToy& toy) { toy.push({.kind = Step<Byte>::Kind::configure, .settings = fast}); }
+  static void configure(ByteToy& toy) { toy.push({.kind = Step<Byte>::Kind::configure, .rate = fast.rate}); }
 
   std::string talk(bool host_follows) {
     ByteToy host([=](ByteToy& self, const Event<Byte>& event) {

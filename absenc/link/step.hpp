@@ -27,22 +27,22 @@ struct Step {
     wait,       // until the next event
     transfer,   // not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
     pulse,      // not before `at`: drive `wire` active for `width`
-    configure,  // switch this end of the line to the rate of `settings`; all else stays as it is
+    configure,  // switch this end of the line to `rate`; all else stays as it is
     emit,       // a result is ready to be looked at; ask again
     done,       // the conversation is over
   };
 
   Kind kind = Kind::wait;
+  ExtraWire wire{};             // pulse
+  bool hold_low = false;        // transfer on a clocked link: until `at` the clock line, which idles high, is held low
   std::span<const Item> out{};  // valid until the next feed
   std::size_t expect = 0;       // transfer, wait: items still due; 0: unknown, or none
   std::size_t bits = 0;         // transfer on a clocked link: number of clocks
+  std::uint32_t rate = 0;       // configure: bits a second
   Time at{};                    // transfer, pulse: not before; wait: a `timer` event is due then, if that lies ahead
   Time answer{};                // transfer, wait: `silence` when nothing has come this long after `sent`; 0: no limit
-  Time gap{};               // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
-  Time width{};             // pulse
-  ExtraWire wire{};         // pulse
-  bool hold_low = false;    // transfer on a clocked link: until `at` the clock line, which idles high, is held low
-  LineSettings settings{};  // configure: `rate`
+  Time gap{};    // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
+  Time width{};  // pulse
 };
 
 /// What happened. `at` is the time at which it was complete: the end of the last bit.

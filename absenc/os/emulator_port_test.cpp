@@ -60,7 +60,7 @@ TEST(EmulatorPort, ADeviceWithARateHearsOnlyThat) {
   SerialPort at_9600(device.path(), {.rate = 9600});
   TcpPort without_rate("127.0.0.1", device.tcp_port());
   const auto set = [](StreamPort& port, std::uint32_t rate) {
-    port.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = rate}});
+    port.begin({.kind = ByteStep::Kind::configure, .rate = rate});
   };
   at_9600.begin(transfer(request));
   EXPECT_EQ(receive(device), request) << "it has not said which";
@@ -79,7 +79,7 @@ TEST(EmulatorPort, ADeviceWithARateHearsOnlyThat) {
 
 TEST(EmulatorPort, ATerminalThatNobodySetIsHeardAtEveryRate) {
   EmulatorPort device;
-  device.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 19'200}});
+  device.begin({.kind = ByteStep::Kind::configure, .rate = 19'200});
   const Descriptor plain(::open(device.path().c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
   ASSERT_EQ(::write(plain.get(), request.data(), request.size()), static_cast<ssize_t>(request.size()));
   EXPECT_EQ(receive(device), request);
@@ -220,7 +220,7 @@ TEST(EmulatorPort, EndsInTime) {
 
 TEST(EmulatorPort, IgnoresRatesAndWires) {
   EmulatorPort device;
-  device.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 9600}});
+  device.begin({.kind = ByteStep::Kind::configure, .rate = 9600});
   device.begin({.kind = ByteStep::Kind::pulse});
   EXPECT_EQ(device.wait({}).kind, Kind::sent);
 }

@@ -39,7 +39,7 @@ void FramePort::begin(const Step<CanFrame>& step) {
     case StepKind::pulse:
       throw Failure(Failure::Kind::unsupported, "a CAN bus has no trigger and clear wires");
     case StepKind::configure:
-      apply(step.settings);
+      apply({.rate = step.rate});
       break;
     case StepKind::wait:
     case StepKind::emit:

@@ -68,8 +68,8 @@ class FakeWires final : public WireKernel {
 };
 
 constexpr LineSettings settings{.rate = 9600};
-constexpr ByteStep trigger{.kind = ByteStep::Kind::pulse, .width = 10us, .wire = ExtraWire::trigger};
-constexpr ByteStep clear_step{.kind = ByteStep::Kind::pulse, .width = 10us, .wire = ExtraWire::clear};
+constexpr ByteStep trigger{.kind = ByteStep::Kind::pulse, .wire = ExtraWire::trigger, .width = 10us};
+constexpr ByteStep clear_step{.kind = ByteStep::Kind::pulse, .wire = ExtraWire::clear, .width = 10us};
 
 class PulseWireTest : public ::testing::Test {
  protected:

@@ -63,7 +63,7 @@ TEST(SerialPort, SetsAnyRateAndPutsEverythingBack) {
 TEST(SerialPort, ChangesTheRate) {
   const PseudoTerminal terminal;
   SerialPort port(terminal.path, fast);
-  port.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 123'456}});
+  port.begin({.kind = ByteStep::Kind::configure, .rate = 123'456});
   EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), 123'456u);
   const auto zero = [&] { port.begin({.kind = ByteStep::Kind::configure}); };
   EXPECT_EQ(failure_of(zero).kind(), Kind::bad_rate);
@@ -79,7 +79,7 @@ TEST(SerialPort, AChangeOfTheRateLeavesParityAndStopBits) {
     return state.c_cflag & (PARODD | CSTOPB);
   };
   ASSERT_EQ(flags(), static_cast<tcflag_t>(PARODD | CSTOPB));
-  port.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 9600}});
+  port.begin({.kind = ByteStep::Kind::configure, .rate = 9600});
   EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), 9600u);
   EXPECT_EQ(flags(), static_cast<tcflag_t>(PARODD | CSTOPB));
 }

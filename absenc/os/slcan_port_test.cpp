@@ -117,7 +117,7 @@ TEST(SlcanPort, ChangesItsBitRate) {
   const auto adapter = std::make_shared<FakeAdapter>();
   SlcanPort port(adapter, "X", bus);
   adapter->written.clear();
-  port.begin({.kind = FrameStep::Kind::configure, .settings = {.rate = 500'000}});
+  port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000});
   EXPECT_EQ(adapter->written, "C\rS6\rO\r");
 }
 
@@ -183,7 +183,7 @@ TEST_F(Adapter, NothingPassesAtAnotherBitRate) {
   EXPECT_EQ(host->written, "\r\r");
   EXPECT_EQ(say("t22088020000000000000\r"), "z\r");
   EXPECT_TRUE(heard.empty());
-  port.begin({.kind = FrameStep::Kind::configure, .settings = {.rate = 500'000}});
+  port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000});
   say("t22088020000000000000\r");
   EXPECT_EQ(heard.size(), 1u);
   EXPECT_EQ(port.lost(), 2u);

@@ -70,7 +70,7 @@ TEST(SocketCan, AVirtualInterfaceHasNoBitRate) {
   FakeCan kernel;
   kernel.interface = "vcan0";
   SocketCan port("vcan0", line, kernel);
-  port.begin({.kind = FrameStep::Kind::configure, .settings = {.rate = 500'000}});
+  port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000});
   kernel.flags = 0;
   EXPECT_NE(sentence(kernel, "vcan0").find("`sudo ip link set vcan0 up`"), std::string::npos);
 }
@@ -180,9 +180,8 @@ TEST(SocketCan, AnInterfaceThatGoesAway) {
 TEST(SocketCan, ItsBitRateIsNotOurs) {
   FakeCan kernel;
   SocketCan port("can0", line, kernel);
-  port.begin({.kind = FrameStep::Kind::configure, .settings = line});  // as it is
-  const Failure other =
-      failure_of([&] { port.begin({.kind = FrameStep::Kind::configure, .settings = {.rate = 500'000}}); });
+  port.begin({.kind = FrameStep::Kind::configure, .rate = line.rate});  // as it is
+  const Failure other = failure_of([&] { port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000}); });
   EXPECT_EQ(other.kind(), Failure::Kind::unsupported);
   EXPECT_NE(std::string(other.what()).find("bitrate 500000"), std::string::npos);
   EXPECT_EQ(failure_of([&] { port.begin({.kind = FrameStep::Kind::pulse}); }).kind(), Failure::Kind::unsupported);

@@ -116,7 +116,7 @@ void SpiPort::begin(const ByteStep& step) {
     case ByteStep::Kind::pulse:
       throw Failure(Kind::unsupported, "an SPI controller has no trigger and clear wires: use a serial port");
     case ByteStep::Kind::configure:
-      change_rate(step.settings.rate);
+      change_rate(step.rate);
       break;
     case ByteStep::Kind::wait:
     case ByteStep::Kind::emit:

@@ -68,7 +68,7 @@ TEST_F(SpiPortTest, WhatTheUserSaysGoesBeforeTheProtocol) {
   kernel.log.clear();
   LineSettings other = biss_settings;
   other.rate = 2'000'000;
-  port.begin({.kind = ByteStep::Kind::configure, .settings = other});
+  port.begin({.kind = ByteStep::Kind::configure, .rate = other.rate});
   EXPECT_EQ(kernel.log, "");
 }
 
@@ -76,9 +76,9 @@ TEST_F(SpiPortTest, ConfigureSetsTheSpeedOnlyAndWhenItChanges) {
   SpiPort port = open();
   kernel.log.clear();
   LineSettings other = encoder_settings;
-  port.begin({.kind = ByteStep::Kind::configure, .settings = other});
+  port.begin({.kind = ByteStep::Kind::configure, .rate = other.rate});
   EXPECT_EQ(kernel.log, "");
-  port.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 1'000'000}});
+  port.begin({.kind = ByteStep::Kind::configure, .rate = 1'000'000});
   EXPECT_EQ(kernel.log, "speed 1000000, ") << "the mode is not the conversation's";
   EXPECT_EQ(port.settings().spi_mode, encoder_settings.spi_mode);
   EXPECT_EQ(port.settings().select_lead, encoder_settings.select_lead);

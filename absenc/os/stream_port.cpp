@@ -33,7 +33,7 @@ void StreamPort::begin(const ByteStep& step) {
       break;
     case ByteStep::Kind::configure:
       reach(sent_at_);  // what is on its way leaves with the old settings
-      change_rate(step.settings.rate);
+      change_rate(step.rate);
       break;
     case ByteStep::Kind::wait:
     case ByteStep::Kind::emit:

@@ -254,7 +254,7 @@ class PulsePort : public DescriptorPort {
 TEST_F(StreamPortTest, DrivesAPulse) {
   PulsePort port(std::move(peer_), "the line");
   const Time at = now() + 1ms;
-  port.begin({.kind = ByteStep::Kind::pulse, .at = at, .width = 50us, .wire = ExtraWire::clear});
+  port.begin({.kind = ByteStep::Kind::pulse, .wire = ExtraWire::clear, .at = at, .width = 50us});
   ASSERT_EQ(port.edges.size(), 2u);
   EXPECT_GE(port.edges[0], at);
   EXPECT_GE(port.edges[1], port.edges[0] + 50us);
@@ -266,7 +266,7 @@ TEST_F(StreamPortTest, DrivesAPulse) {
 TEST_F(StreamPortTest, ReleasesTheWireOfAPulseThatIsCutShort) {
   PulsePort port(std::move(peer_), "the line");
   port.set_end(now() + 3ms);
-  EXPECT_THROW(port.begin({.kind = ByteStep::Kind::pulse, .width = 1h, .wire = ExtraWire::clear}), Ended);
+  EXPECT_THROW(port.begin({.kind = ByteStep::Kind::pulse, .wire = ExtraWire::clear, .width = 1h}), Ended);
   EXPECT_EQ(port.edges.size(), 2u);
 }
 
@@ -275,7 +275,7 @@ TEST_F(StreamPortTest, ChangesTheRateAfterTheLastCharacter) {
   port.set_character_time(1ms);
   port.begin(transfer(request_));
   const Time sent = port.wait({}).at;
-  port.begin({.kind = ByteStep::Kind::configure, .settings = {.rate = 9600}});
+  port.begin({.kind = ByteStep::Kind::configure, .rate = 9600});
   EXPECT_GE(port.applied, sent);
 }
 

@@ -23,13 +23,13 @@ class Noise {
 
   /// A new exchange begins.
   constexpr void clear() {
-    since_ = never;
+    until_ = never;
     endless_ = false;
   }
   /// Something came, good or damaged.
   constexpr void heard(Time at) {
-    if (since_ == never) since_ = at;
-    endless_ = at - since_ >= limit_;
+    if (until_ == never) until_ = at + limit_;
+    endless_ = at >= until_;
   }
   /// Whether things still came `limit` after the first one.
   [[nodiscard]] constexpr bool is_endless() const { return endless_; }
@@ -37,7 +37,7 @@ class Noise {
 
  private:
   Time limit_;
-  Time since_ = never;
+  Time until_ = never;
   bool endless_ = false;
 };
 

@@ -63,7 +63,7 @@ void FrameBus::serve(Node& node, Time now) {
         node.out.assign(step.out.begin(), step.out.end());
         break;
       case FrameStep::Kind::configure:
-        node.rate = step.settings.rate;
+        node.rate = step.rate;
         // A bus has the rate of those on it: it changes when the last of them has.
         if (std::all_of(nodes_.begin(), nodes_.end(), [&](const Node& one) { return one.rate == node.rate; })) {
           rate_ = node.rate;
@@ -96,7 +96,7 @@ FrameStep FrameBus::next(Time now) {
     for (Node& node : nodes_) serve(node, now);
   }
   if (std::exchange(configuring_, false)) {
-    return {.kind = FrameStep::Kind::configure, .settings = {.rate = rate_}};
+    return {.kind = FrameStep::Kind::configure, .rate = rate_};
   }
   FrameStep step{.at = never};
   Node* const first = sender_ == nullptr ? first_to_send() : nullptr;

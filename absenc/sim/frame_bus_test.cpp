@@ -20,7 +20,7 @@ std::string sent_by(FrameBus& bus, Time now) {
   std::string sent;
   for (auto step = bus.next(now); step.kind != StepKind::wait; step = bus.next(now)) {
     if (step.kind == StepKind::configure) {
-      sent += "rate " + std::to_string(step.settings.rate) + ' ';
+      sent += "rate " + std::to_string(step.rate) + ' ';
       continue;
     }
     sent += toy::text_of(step.out[0]) + ' ';
@@ -69,7 +69,7 @@ TEST(FrameBus, TimersOfEachNode) {
 
 TEST(FrameBus, ANodeAtAnotherBitRateIsAlone) {
   Toy moved;
-  moved.push({.kind = StepKind::configure, .settings = {.rate = 500'000}});
+  moved.push({.kind = StepKind::configure, .rate = 500'000});
   moved.send({frame(0x120, 1)});
   Toy other;
   FrameBus bus({&moved, &other}, 250'000);
@@ -78,7 +78,7 @@ TEST(FrameBus, ANodeAtAnotherBitRateIsAlone) {
   bus.feed({.kind = Kind::received, .at = 1ms, .items = {&request, 1}});
   EXPECT_EQ(moved.log, "");
   EXPECT_EQ(other.log, "1000000 received 200:09");
-  other.push({.kind = StepKind::configure, .settings = {.rate = 500'000}});
+  other.push({.kind = StepKind::configure, .rate = 500'000});
   EXPECT_EQ(sent_by(bus, 2ms), "rate 500000 120:01 ");
 }
 

@@ -198,7 +198,7 @@ void Line<Item>::serve(Node node) {
         state.done = true;
         break;
       case Kind::configure:
-        state.settings.rate = step.settings.rate;
+        state.settings.rate = step.rate;
         break;
       case Kind::transfer:
       case Kind::pulse:

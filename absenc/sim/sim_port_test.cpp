@@ -112,7 +112,7 @@ TEST(SimPort, SilenceAndTimers) {
 TEST(SimPort, ConfigureChangesTheHostsEnd) {
   Answerer device;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device);
-  port.begin({.kind = StepKind::configure, .settings = {.rate = 2'000'000}});
+  port.begin({.kind = StepKind::configure, .rate = 2'000'000});
   const std::array<std::uint8_t, 1> out{1};
   port.begin({.kind = StepKind::transfer, .out = out});
   EXPECT_EQ(port.wait({}).at, microseconds(5));

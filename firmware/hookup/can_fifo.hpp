@@ -39,7 +39,7 @@ class CanFifo {
   // ---- The line of the carrier
 
   void begin(const Step<CanFrame>& step) {
-    if (step.kind == Step<CanFrame>::Kind::configure) return hardware_->set_rate(step.settings.rate);
+    if (step.kind == Step<CanFrame>::Kind::configure) return hardware_->set_rate(step.rate);
     going_ = step.out;
     if (!going_.empty()) hardware_->transmit(going_[0]);
   }

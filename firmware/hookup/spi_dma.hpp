@@ -40,7 +40,7 @@ class SpiDma {
   // ---- The line of the carrier
 
   void begin(const ByteStep& step) {
-    if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.settings.rate);
+    if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.rate);
     bits_ = std::min(step.bits, 8 * buffer_.size() - idle_clocks_);
     hardware_->clock(MutableBytes(buffer_).first((idle_clocks_ + bits_ + 7) / 8));
   }

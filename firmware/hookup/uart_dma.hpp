@@ -53,7 +53,7 @@ class UartDma {
   // ---- The line of the carrier
 
   void begin(const ByteStep& step) {
-    if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.settings.rate);
+    if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.rate);
     expected_ = step.expect;
     static_cast<void>(hardware_->stop_receiving());
     hardware_->drive(true);

@@ -51,7 +51,10 @@ void on_received(std::uint8_t byte);
 /// The last bit of what was sent is out.
 void on_sent();
 
-// ---- What each machine has: microbit.cpp, mps2.cpp
+// ---- What each machine has: cortex_m.cpp with microbit.cpp or mps2.cpp; virt.cpp, which has the first alone
+
+/// Semihosting: asks the emulator for its service `number`.
+std::uint32_t call_emulator(std::uint32_t number, const void* parameter);
 
 /// Of the clock that SysTick counts.
 struct Frequency {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// From reset to main, and the interrupts: the same on every Cortex-M. A part's own start-up takes its place.
-#include <array>
-
+// From reset to main, as soon as there is a stack. A part's own start-up takes its place.
 #include "firmware/machine/machine.hpp"
 
 int main();
 
 extern "C" {
-extern std::uint32_t data_load, data_begin, data_end, bss_begin, bss_end, stack_top;
+extern std::uint32_t data_load, data_begin, data_end, bss_begin, bss_end;
 using Constructor = void (*)();
 extern const Constructor constructors_begin[], constructors_end[];
 
@@ -31,35 +29,15 @@ extern const Constructor constructors_begin[], constructors_end[];
   absenc::machine::end(false);
 }
 
-void tick();
-void uart() { absenc::machine::handle_uart(); }
-
 // A program without an exit has no destructors of static objects.
+#ifdef __riscv
+int __cxa_atexit(void (*)(void*), void*, void*) { return 0; }
+#else
 int __aeabi_atexit(void*, void (*)(void*), void*) { return 0; }
+#endif
 void* __dso_handle = nullptr;
 [[noreturn]] void __cxa_pure_virtual() { fault(); }
 }
-
-namespace {
-
-struct Vectors {
-  std::uint32_t* stack;
-  void (*reset)();
-  std::array<void (*)(), 13> faults;
-  void (*tick)();
-  std::array<void (*)(), 32> devices;
-};
-
-constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all, void (*with)()) {
-  for (auto& one : all) one = with;
-  return all;
-};
-
-// Of the devices nothing but the UART is asked for interrupts.
-[[gnu::section(".vectors"), gnu::used]] const Vectors vectors{
-    &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, filled(std::array<void (*)(), 32>{}, uart)};
-
-}  // namespace
 
 // Programs without interrupts have none of these.
 namespace absenc::machine {

@@ -20,8 +20,8 @@ extern "C" {
 
 namespace absenc::firmware {
 
-/// How a reply comes: in one event, as by DMA, or character by character, where the second is counted with what is
-/// asked after it.
+/// How a reply comes: in one event, as by DMA, which is counted; or character by character, where the second is counted
+/// with what is asked after it.
 enum class Comes : std::uint8_t { whole, by_character };
 
 template <class Item, class Reader>
@@ -45,13 +45,12 @@ bool converse(Reader& reader, std::span<const Item> reply, Comes comes) {
       event.kind = Kind::timer;
       now = event.at = step.at;
     }
+    const bool is_reply = comes == Comes::whole && event.kind == Kind::received;
     const bool is_second = comes == Comes::by_character && coming.size() + 2 == reply.size();
-    if (is_second) count_begin();
+    if (is_reply || is_second) count_begin();
     reader.feed(event);
-    if (is_second) {
-      static_cast<void>(reader.next(now));
-      count_end();
-    }
+    if (is_second) static_cast<void>(reader.next(now));
+    if (is_reply || is_second) count_end();
   }
   return false;
 }

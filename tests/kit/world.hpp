@@ -161,7 +161,7 @@ class World {
     void feed(const Event<Item>&) override {}
     Step<Item> next(Time) override {
       using Kind = typename Step<Item>::Kind;
-      return {.kind = std::exchange(done_, true) ? Kind::done : Kind::configure, .settings = line_};
+      return {.kind = std::exchange(done_, true) ? Kind::done : Kind::configure, .rate = line_.rate};
     }
 
    private:

@@ -29,7 +29,7 @@ class Movable final : public Machine<Item> {
   Step<Item> next(Time now) override {
     const Step<Item> step = inner_->next(now);
     if (step.kind == Step<Item>::Kind::transfer) sending_ = true;
-    if (step.kind == Step<Item>::Kind::configure) rate_ = step.settings.rate;
+    if (step.kind == Step<Item>::Kind::configure) rate_ = step.rate;
     return step;
   }
 
@@ -60,7 +60,7 @@ template <class Item, class Open, class Wait, class Told>
       if (was_open) {
         movable.left(port->now());
         if (movable.rate() != 0) {
-          port->begin({.kind = Step<Item>::Kind::configure, .settings = {.rate = movable.rate()}});
+          port->begin({.kind = Step<Item>::Kind::configure, .rate = movable.rate()});
         }
       }
       told(was_open ? Served::back : Served::opened, {});

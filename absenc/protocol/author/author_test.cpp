@@ -74,7 +74,7 @@ struct Bench {
           log += "emit ";
           break;
         case Step<std::uint8_t>::Kind::configure:
-          log += "rate=" + std::to_string(step.settings.rate) + " ";
+          log += "rate=" + std::to_string(step.rate) + " ";
           break;
         case Step<std::uint8_t>::Kind::transfer: {
           now = std::max(now, step.at);

@@ -109,7 +109,7 @@ FrameStep CanEngine::next(Time now) {
     case State::configuring:
       listen(duration_);
       step.kind = FrameStep::Kind::configure;
-      step.settings = {.rate = rate_};
+      step.rate = rate_;
       break;
     case State::over:
       step.kind = FrameStep::Kind::done;

@@ -26,7 +26,7 @@ ByteStep ClockedEngine::next(Time now) {
   if (!begun_) {
     begun_ = true;
     rested_at_ = now + times_.rest;  // somebody may have clocked just before
-    if (times_.rate != 0) return {.kind = ByteStep::Kind::configure, .settings = {.rate = times_.rate}};
+    if (times_.rate != 0) return {.kind = ByteStep::Kind::configure, .rate = times_.rate};
   }
   ByteStep step{.expect = (count_ + 7) / 8, .bits = count_, .at = never};
   if (state_ == State::ready) {

@@ -64,17 +64,21 @@ class ClockedHostOf : public ClockedEngine {
   /// This is the last good reply, whose position was taken at the first edge of the clock.
   void keep(const Reply& reply) {
     found_ = reply;
-    reading_ = P::reading(format_, found_);
-    reading_.latched = begun_at();
-    reading_.received = received_at();
+    keep();
   }
   /// Ends it, with no error by the last good reply.
   void conclude(Error error) {
-    if (error == Error::none) keep(found_);
+    if (error == Error::none) keep();
     finish({.error = error});
   }
 
  private:
+  void keep() {
+    reading_ = P::reading(format_, found_);
+    reading_.latched = begun_at();
+    reading_.received = received_at();
+  }
+
   Format format_;
   Reply found_{};
   Reading reading_{};

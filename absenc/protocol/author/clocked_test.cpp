@@ -53,7 +53,7 @@ std::string run(Host& host, const std::vector<std::vector<std::uint8_t>>& transf
   for (int steps = 0; steps < 20; ++steps) {
     const ByteStep step = host.next(now);
     if (step.kind == ByteStep::Kind::done) return log + "done";
-    if (step.kind == ByteStep::Kind::configure) log += "rate=" + std::to_string(step.settings.rate) + " ";
+    if (step.kind == ByteStep::Kind::configure) log += "rate=" + std::to_string(step.rate) + " ";
     if (step.kind == ByteStep::Kind::wait) return log + "waits";
     if (step.kind != ByteStep::Kind::transfer) continue;
     log += std::to_string(step.bits) + " at " + std::to_string(step.at / 1us) + " ";

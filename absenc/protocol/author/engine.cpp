@@ -48,22 +48,37 @@ ByteStep Engine::next(Time now) {
   // What was on the line before this conversation is not known.
   if (!begun_) received_at_ = now;
   begun_ = true;
-  if (rate_ != 0) return {.kind = ByteStep::Kind::configure, .settings = {.rate = std::exchange(rate_, 0)}};
+  wake(now);
+  if (rate_ != 0) return {.kind = ByteStep::Kind::configure, .rate = std::exchange(rate_, 0)};
   if (std::exchange(emitting_, false)) return {.kind = ByteStep::Kind::emit};
-  if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
-  if (state_ == State::sleeping || state_ == State::listening) {
-    if (now < earliest_) return {.at = earliest_};
+  if (const Time rest = rest_end(); now < rest) return {.at = rest};
+  return exchange_step(now);
+}
+
+// The subclass may rest again. What it has told before comes first.
+void Engine::wake(Time now) {
+  while ((state_ == State::sleeping || state_ == State::listening) && rate_ == 0 && !emitting_) {
+    if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
+    if (now < earliest_) return;
     if (state_ == State::listening) received_at_ = earliest_;
     state_ = State::over;  // unless the subclass goes on
     woken();
-    return next(now);
   }
-  if (state_ == State::ending && now < earliest_) return {.at = earliest_};
-  if (state_ == State::ready && times_.silence != Time{}) {
-    const Time quiet = std::max(received_at_ + times_.silence, earliest_);
-    if (now < quiet) return {.at = quiet};
+}
+
+// Before it nothing is done.
+Time Engine::rest_end() const {
+  switch (state_) {
+    case State::sleeping:
+    case State::listening:
+    case State::ending:
+      return earliest_;
+    case State::ready:
+      if (times_.silence != Time{}) return std::max(received_at_ + times_.silence, earliest_);
+      [[fallthrough]];
+    default:
+      return Time::min();
   }
-  return exchange_step(now);
 }
 
 ByteStep Engine::waiting_step() const {
@@ -77,31 +92,21 @@ ByteStep Engine::waiting_step() const {
 ByteStep Engine::exchange_step(Time now) {
   ByteStep step = waiting_step();
   step.expect = 0;
-  switch (state_) {
-    case State::ready:
-      state_ = State::sending;
-      disturbed_ = false;
-      noise_.clear();
-      size_ = 0;
-      step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
-      step.width = manner_.pulse;
-      step.wire = manner_.wire;
-      step.out = out_;
-      step.expect = manner_.expects_reply ? expected({}) : 0;
-      step.at = std::max(earliest_, times_.silence != Time{} ? now : Time{});
-      begun_at_ = std::max(now, earliest_);
-      break;
-    case State::sending:
-    case State::receiving:
-    case State::settling:
-    case State::sleeping:
-    case State::listening:
-      break;
-    case State::ending:
-    case State::over:
-      state_ = State::over;
-      step.kind = ByteStep::Kind::done;
-      break;
+  if (state_ == State::ready) {
+    state_ = State::sending;
+    disturbed_ = false;
+    noise_.clear();
+    size_ = 0;
+    begun_at_ = std::max(now, earliest_);
+    step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
+    step.width = manner_.pulse;
+    step.wire = manner_.wire;
+    step.out = out_;
+    step.expect = manner_.expects_reply ? expected({}) : 0;
+    step.at = times_.silence != Time{} ? begun_at_ : std::max(earliest_, Time{});
+  } else if (state_ == State::ending || state_ == State::over) {
+    state_ = State::over;
+    step.kind = ByteStep::Kind::done;
   }
   return step;
 }
@@ -155,9 +160,10 @@ void Engine::sent(Time at) {
 
 // What no longer fits changes nothing: it is too long already.
 void Engine::keep(Bytes bytes) {
-  for (const std::uint8_t byte : bytes) {
-    if (size_ < storage_.size()) storage_[size_++] = byte;
-  }
+  const MutableBytes room = storage_.subspan(size_);
+  const std::size_t fitting = std::min(bytes.size(), room.size());
+  for (std::size_t i = 0; i < fitting; ++i) room[i] = bytes[i];
+  size_ += fitting;
 }
 
 void Engine::received(Bytes bytes) {

@@ -29,7 +29,7 @@ class RawHost final : public Machine<std::uint8_t> {
     using Kind = Step<std::uint8_t>::Kind;
     switch (step_++) {
       case 0:
-        return {.kind = Kind::configure, .settings = {.rate = rate_}};
+        return {.kind = Kind::configure, .rate = rate_};
       case 1:
         return {.kind = Kind::transfer, .bits = bits_, .at = at_};
       default:

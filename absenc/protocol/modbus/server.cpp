@@ -30,7 +30,7 @@ ByteStep Server::next(Time) {
   if (setting_rate_ && !transmitting_) {
     setting_rate_ = false;
     line_.rate = next_rate_;
-    return {.kind = ByteStep::Kind::configure, .settings = {.rate = line_.rate}};
+    return {.kind = ByteStep::Kind::configure, .rate = line_.rate};
   }
   if (reply_pending_) {
     reply_pending_ = false;

@@ -97,7 +97,7 @@ TEST(TformatDevice, ADamagedCharacterIsADelimiterError) {
     void feed(const Event<std::uint8_t>&) override {}
     Step<std::uint8_t> next(Time) override {
       using Kind = Step<std::uint8_t>::Kind;
-      if (step == 0) return ++step, Step<std::uint8_t>{.kind = Kind::configure, .settings = settings};
+      if (step == 0) return ++step, Step<std::uint8_t>{.kind = Kind::configure, .rate = settings.rate};
       if (step == 1) return ++step, Step<std::uint8_t>{.kind = Kind::transfer, .out = byte};
       return {.at = never};
     }

@@ -90,7 +90,7 @@ struct Scripted final : Machine<CanFrame> {
   }
   Step<CanFrame> next(Time now) override {
     if (std::exchange(tell_rate, false)) {
-      return {.kind = Step<CanFrame>::Kind::configure, .settings = {.rate = rate}};
+      return {.kind = Step<CanFrame>::Kind::configure, .rate = rate};
     }
     if (sending) return {.at = never};
     const bool by_itself = queue.empty() && period != Time{} && (left == nullptr || *left != 0);

@@ -48,7 +48,7 @@ void VirtualNode::power_off(Time) {
 FrameStep VirtualNode::next(Time now) {
   FrameStep step{.at = never};
   if (sending_) return step;
-  if (std::exchange(tell_rate_, false)) return {.kind = FrameStep::Kind::configure, .settings = {.rate = rate()}};
+  if (std::exchange(tell_rate_, false)) return {.kind = FrameStep::Kind::configure, .rate = rate()};
   if (!pending_.empty()) {
     out_ = pending_[0].frame;
     step.at = pending_[0].at;

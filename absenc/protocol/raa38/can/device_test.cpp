@@ -52,7 +52,7 @@ TEST(CanDevice, SettingsSurvivePowerOff) {
   EXPECT_EQ(again.settings().writes(), 4u);
   const Step<CanFrame> step = again.next(Time{});
   EXPECT_EQ(step.kind, Step<CanFrame>::Kind::configure);
-  EXPECT_EQ(step.settings.rate, 500'000u);
+  EXPECT_EQ(step.rate, 500'000u);
   // What a file of another encoder may have brought.
   std::fill(again.memory().begin(), again.memory().end(), std::uint8_t{0});
   again.memory()[1] = 9;

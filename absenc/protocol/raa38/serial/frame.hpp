@@ -176,10 +176,13 @@ struct Request {
 
 /// Whether a shaft can have turned so far in that time, with a little for noise.
 [[nodiscard]] constexpr bool is_possible(const Format& format, std::uint32_t from, std::uint32_t to, Time between) {
+  constexpr std::int64_t turn = Time(1min).count();
+  constexpr std::int64_t noise = 4;  // counts
+  // In turns of one a minute. Half a turn is as far as any position is; less than it has room in 64 bits.
+  const std::int64_t turned = format.maximum_rpm * std::min(between, Time(1min)).count();
+  if (turned >= turn / 2) return true;
   const std::int64_t moved = wrapped_difference(to, from, format.bits);
-  const double revolutions = format.maximum_rpm * static_cast<double>(between.count()) / 60e9;
-  const double allowed = 4 + revolutions * static_cast<double>(std::uint64_t{1} << format.bits);
-  return static_cast<double>(moved < 0 ? -moved : moved) <= allowed;
+  return ((moved < 0 ? -moved : moved) - noise) * turn <= turned << format.bits;
 }
 
 /// What frames and commands are shown as, in this order.

@@ -30,6 +30,9 @@ TEST(RaaFrame, OnlyTheSpeedTellsSwappedBytes) {
   EXPECT_TRUE(is_possible(settings, 383, 383 + 6553, 1ms));
   EXPECT_FALSE(is_possible(settings, 383, 383 + 6560, 1ms));
   EXPECT_TRUE(is_possible(settings, 2, 65534, Time(1))) << "over the zero";
+  EXPECT_FALSE(is_possible(settings, 0, 32768, 4999us)) << "less than half a turn";
+  EXPECT_TRUE(is_possible(settings, 0, 32768, 5ms));
+  EXPECT_TRUE(is_possible({.bits = 21, .maximum_rpm = 1'000'000}, 0, 1 << 20, never)) << "whatever the time";
 }
 
 // A standing shaft repeats its frame. With the sizes that the encoders have, no other place in the repetition gives

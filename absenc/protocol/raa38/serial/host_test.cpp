@@ -261,7 +261,7 @@ struct Twice final : Machine<std::uint8_t> {
     if (count == 2 || (count == 1 && now < due)) return {.at = count == 1 ? due : never};
     ++count;
     if (!request.empty()) return {.kind = Kind::transfer, .out = request};
-    return {.kind = Kind::pulse, .width = width, .wire = ExtraWire::trigger};
+    return {.kind = Kind::pulse, .wire = ExtraWire::trigger, .width = width};
   }
   Time width;
   Time due;

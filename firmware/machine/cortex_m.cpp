@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every Cortex-M has: vectors, SysTick, and a breakpoint that the emulator takes for a call.
+#include <array>
+
+#include "firmware/machine/machine.hpp"
+
+extern "C" {
+extern std::uint32_t stack_top;
+[[noreturn]] void start();
+[[noreturn]] void fault();
+void tick();
+void uart() { absenc::machine::handle_uart(); }
+}
+
+namespace {
+
+struct Vectors {
+  std::uint32_t* stack;
+  void (*reset)();
+  std::array<void (*)(), 13> faults;
+  void (*tick)();
+  std::array<void (*)(), 32> devices;
+};
+
+constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all, void (*with)()) {
+  for (auto& one : all) one = with;
+  return all;
+};
+
+// Of the devices nothing but the UART is asked for interrupts.
+[[gnu::section(".vectors"), gnu::used]] const Vectors vectors{
+    &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, filled(std::array<void (*)(), 32>{}, uart)};
+
+}  // namespace
+
+namespace absenc::machine {
+
+std::uint32_t call_emulator(std::uint32_t number, const void* parameter) {
+  register std::uint32_t r0 asm("r0") = number;
+  register const void* r1 asm("r1") = parameter;
+  asm volatile("bkpt 0xAB" : "+r"(r0) : "r"(r1) : "memory");
+  return r0;
+}
+
+// ---- SysTick
+
+namespace {
+constexpr std::uint32_t control = 0xE000'E010, reload = 0xE000'E014, value = 0xE000'E018, interrupts = 0xE000'ED04;
+constexpr std::uint32_t tick_is_pending = 1u << 26;
+
+std::uint32_t counts_of_period = 0;
+Time period_of_ticks{};
+Time begin_of_tick{};  // the begin of this period; written by the tick alone
+}  // namespace
+
+void start_clock(Time period) {
+  period_of_ticks = period;
+  counts_of_period = static_cast<std::uint32_t>(period.count()) / frequency.nanoseconds * frequency.counts;
+  at(reload) = counts_of_period - 1;
+  at(value) = 0;
+  at(control) = 7;  // the processor's clock, with interrupts
+}
+
+Time now() {
+  std::uint32_t masked;
+  asm volatile("mrs %0, primask\ncpsid i" : "=r"(masked) : : "memory");
+  std::uint32_t left = at(value);
+  Time begin = begin_of_tick;
+  if ((at(interrupts) & tick_is_pending) != 0) {  // it has begun anew, and nobody has counted it yet
+    left = at(value);
+    begin += period_of_ticks;
+  }
+  asm volatile("msr primask, %0" : : "r"(masked) : "memory");
+  return begin + Time((counts_of_period - 1 - left) * frequency.nanoseconds / frequency.counts);
+}
+
+extern "C" void tick() {
+  begin_of_tick += period_of_ticks;
+  on_tick();
+}
+
+}  // namespace absenc::machine
