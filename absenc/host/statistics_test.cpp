@@ -46,11 +46,11 @@ TEST(Latencies, AreCountedWithinLimits) {
   constexpr std::array<Time, 4> limits{10us, 20us, 1ms, 1s};
   Latencies latencies;
   EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{}));
-  for (const Time latency : {Time(9us), Time(10'400ns), Time(15us), Time(999us), Time(1001us), Time(2s)}) {
+  for (const Time latency : {Time(9us), Time(10'400ns), Time(15us), Time(999'900ns), Time(1001us), Time(2s)}) {
     latencies.add(latency);
   }
-  EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));  // 999 us: in the last 32nd
-  EXPECT_EQ(latencies.sum(), 2s + 2'034'400ns);
+  EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));  // 999.9 us: in the last 32nd
+  EXPECT_EQ(latencies.sum(), 2s + 2'035'300ns);
 }
 
 TEST(Latencies, AreNeverCountedWithinWhatTheyExceed) {
