@@ -181,6 +181,17 @@ class Page(ServeCase):
         self.shot_whole("figures-phone")
         self.assert_no_errors()
 
+    def test_a_loss_is_marked_in_the_history(self):
+        self.open("#encoder=" + self.name)
+        self.wait_for("readings come", "table")
+        self.wait_for("live", ".state")
+        self.emulator.process.kill()
+        past = "[aria-label*='marked: lost']"
+        wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, past), "the plot of the past says it")
+        wait_until(lambda: self.canvas_has(past, [0x8a, 0x5a, 0x00]), "it is marked although nothing is read after it")
+        self.shot_whole("figures-lost")
+        self.assert_no_errors()
+
     def shot_whole(self, name):
         if SCREENSHOTS:
             width, height = self.browser.execute_script(

@@ -34,6 +34,20 @@ function latencyRows(buckets) {
     .map(({at_most: limit, count}) => [limit === null ? "longer" : `to ${limitText(limit)}`, count]);
 }
 
+// Where nothing was read there is a gap, up to now: a loss must not lie beyond the end of the plot.
+function pastRows({rows, step_s: step}) {
+  const list = [];
+  const gap = (at) => list.push([new Date(at * 1000), [NaN, NaN, NaN]]);
+  let before = null;
+  for (const [at, least, mean, greatest] of rows.filter((row) => row[2] !== null)) {
+    if (before !== null && at - before > 2 * step) gap(before + step);
+    list.push([new Date(at * 1000), [least, mean, greatest]]);
+    before = at;
+  }
+  if (before !== null) gap(Math.max(before + step, Date.now() / 1000));
+  return list;
+}
+
 // What the plot of the past marks, with its word: an alarm has its name before its meaning.
 const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
 const markText = (event) => (event.kind === "alarm" ? event.text.split(":")[0] : event.kind);
@@ -45,7 +59,7 @@ function drawMarks(canvas, area, graph, marks) {
   canvas.font = "12px system-ui, sans-serif";
   const free = [area.x, area.x, area.x];  // where each of three lines of words ends
   for (const {at_ms: at, kind, ...event} of marks) {
-    const x = graph.toDomXCoord(at);
+    const x = Math.round(graph.toDomXCoord(at)) + .5;
     if (x < area.x || x > area.x + area.w) continue;
     canvas.fillStyle = canvas.strokeStyle = style.getPropertyValue(kind === "alarm" ? "--bad" : "--warn");
     canvas.setLineDash(kind === "alarm" ? [] : [4, 3]);
@@ -261,7 +275,7 @@ export class One {
       if (this.closed) return;
       setText(this.past, past.body.error ?? "");
       if (past.status !== 200) return;
-      const list = past.body.rows.filter((row) => row[2] !== null).map((row) => [new Date(row[0] * 1000), [row[1], row[2], row[3]]]);
+      const list = pastRows(past.body);
       const events = (await request("api/events", {...this.range(), rows: MOST_EVENTS})).body.events;
       if (this.closed) return;
       this.marks = events.filter((event) => MARKED.includes(event.kind)).reverse();
