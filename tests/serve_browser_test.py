@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of `absenc serve` in Debian's chromium: what somebody sees, does by keyboard and is told."""
 import os
+import re
 import sys
 import time
 import unittest
+import urllib.parse
 
 SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's python3-selenium is for
 
@@ -81,8 +83,7 @@ class Page(ServeCase):
         first, turned = moving.text, needle.get_attribute("transform")
         wait_until(lambda: moving.text != first and needle.get_attribute("transform") != turned, "it moves")
         self.shot("light")
-        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia",
-                                     {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
+        self.dark(True)
         paper = self.browser.execute_script("return getComputedStyle(document.body).backgroundColor")
         self.assertEqual(paper, "rgb(16, 19, 22)")
         self.shot("dark")
@@ -139,6 +140,74 @@ class Page(ServeCase):
         wait_until(lambda: "readings come" in self.text() or "back" in self.text("table"), "there are events")
         self.shot("one")
         self.assert_no_errors()
+
+    def canvas_has(self, selector, color):
+        """Whether a plot has points of this [red, green, blue]."""
+        return self.browser.execute_script("""
+            const [selector, [red, green, blue]] = arguments;
+            return [...document.querySelectorAll(selector + " canvas")].some((canvas) => {
+              const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+              for (let i = 0; i < data.length; i += 4) {
+                if (data[i] === red && data[i + 1] === green && data[i + 2] === blue && data[i + 3] > 200) return true;
+              }
+              return false;
+            });""", selector, color)
+
+    def dark(self, on):
+        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
+            {"name": "prefers-color-scheme", "value": "dark" if on else "light"}]})
+
+    def test_figures_of_one_in_trouble(self):
+        self.open("#encoder=" + urllib.parse.quote("sim:tformat?alarm=over_heat&fault=corrupt=0.2"))
+        self.wait_for("bad_checksum", ".histogram")
+        tables = self.browser.find_elements(By.CSS_SELECTOR, ".histogram")
+        self.assertEqual([table.get_attribute("aria-label") for table in tables],
+                         ["replies by latency", "failed attempts by kind"])
+        wait_until(lambda: re.search(r"to \d+ (µs|ms) \d+", self.text(".histogram")), "latencies are counted")
+        widest = "return Math.max(...[...document.querySelectorAll('.bar')].map((bar) => bar.offsetWidth))"
+        wait_until(lambda: self.browser.execute_script(widest) > 100, "there are bars")
+        past = "[aria-label*='over_heat']"
+        wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, past), "the plot of the past says its marks")
+        wait_until(lambda: self.canvas_has(past, [0xb3, 0x16, 0x1c]), "the alarm is marked")
+        self.shot_whole("figures-light")
+        self.dark(True)
+        label = "return getComputedStyle(document.querySelector('.dygraph-axis-label')).color"
+        wait_until(lambda: self.browser.execute_script(label) == "rgb(232, 235, 238)", "numbers are light")
+        wait_until(lambda: self.canvas_has(past, [0xff, 0x7b, 0x7b]), "marks too")
+        self.shot_whole("figures-dark")
+        self.browser.set_window_size(500, 800)
+        wide = self.browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
+        self.assertLessEqual(wide, 0)
+        self.shot_whole("figures-phone")
+        self.assert_no_errors()
+
+    def test_a_loss_is_marked_in_the_history(self):
+        self.open("#encoder=" + self.name)
+        self.wait_for("readings come", "table")
+        self.wait_for("live", ".state")
+        self.emulator.process.kill()
+        past = "[aria-label*='marked: lost']"
+        wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, past), "the plot of the past says it")
+        wait_until(lambda: self.canvas_has(past, [0x8a, 0x5a, 0x00]), "it is marked although nothing is read after it")
+        self.shot_whole("figures-lost")
+        self.assert_no_errors()
+
+    def shot_whole(self, name):
+        if SCREENSHOTS:
+            width, height = self.browser.execute_script(
+                "return [innerWidth, document.documentElement.scrollHeight]")
+            size = self.browser.get_window_size()
+            self.browser.set_window_size(width, height + 200)
+            self.shot(name)
+            self.browser.set_window_size(size["width"], size["height"])
+
+    def test_figures_go_with_the_server(self):
+        self.open("#encoder=" + urllib.parse.quote("sim:tformat?alarm=over_heat&fault=corrupt=0.2"))
+        self.wait_for("bad_checksum", "[aria-label='last bad exchanges']")
+        self.served.process.kill()
+        self.wait_for("not known", ".state")
+        shown = "dd, .histogram td, [aria-label='last bad exchanges'] td"
+        self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, shown), [])
 
     def test_zero_is_asked_twice_and_needs_a_token(self):
         self.open("#encoder=" + self.name)

@@ -97,7 +97,7 @@ class Dashboard(ServeCase):
         used = set(re.findall(r"\babsenc_\w+", text))
         server = self.without_history(ONE, "--mqtt", f"mqtt://127.0.0.1:{free_port()}", "--mqtt-spool",
                                       os.path.join(self.directory, "spool"))
-        wait_until(lambda: 'error="' in server.ask("/metrics")[1], "something has failed")
+        wait_until(lambda: 'alarm="' in server.ask("/metrics")[1], "it is live")
         page = server.ask("/metrics")[1]
         there = set(re.findall(r"^(absenc_\w+)\{", page, re.MULTILINE))
         self.assertEqual(used - there, set())
@@ -130,7 +130,9 @@ class Prometheus(ServeCase):
                 self.assertEqual(refused.code, 503)  # it is not ready yet
                 return []
         wait_until(lambda: [one for one in ask('up{job="absenc"}') if one["value"][1] == "1"], "it is scraped")
-        for query in ("absenc_up == 1", 'absenc_alarm{alarm="over_heat"}', "absenc_readings_total > 10",
+        for query in ("absenc_up == 1", 'absenc_alarm{alarm="over_heat"} == 1', 'absenc_alarm{alarm="over_speed"} == 0',
+                      "absenc_readings_total > 10", 'absenc_errors_total{error="unsupported"} == 0',
+                      "histogram_quantile(0.99, absenc_latency_seconds_bucket) > 0",
                       "absenc_errors_total > 0", "absenc_mqtt_connected == 0"):
             wait_until(lambda q=query: ask(q), query)
         self.assertEqual(ask("absenc_up")[0]["metric"]["encoder"], ONE)

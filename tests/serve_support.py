@@ -75,13 +75,18 @@ class Server:
         self.url = line.strip()
         self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
 
-    def ask(self, path, method="GET", headers=None, **values):
+    def answer(self, path, method="GET", headers=None, **values):
+        """(status, type, text)"""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
         with contextlib.closing(connection):
             query = "?" + urllib.parse.urlencode(values, doseq=True) if values else ""
             connection.request(method, path + query, headers=headers or {})
             answer = connection.getresponse()
-            return answer.status, answer.read().decode()
+            return answer.status, answer.getheader("Content-Type"), answer.read().decode()
+
+    def ask(self, path, method="GET", headers=None, **values):
+        status, _, text = self.answer(path, method, headers, **values)
+        return status, text
 
     def json(self, path, **values):
         status, body = self.ask(path, **values)

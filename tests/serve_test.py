@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import resource
 import signal
 import sqlite3
@@ -10,6 +11,8 @@ import subprocess
 import threading
 import time
 import unittest
+
+import jsonschema
 
 from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
 from serve_support import BUSY, TOKEN, ServeCase, Server, SilentLine, wait_until
@@ -43,7 +46,42 @@ class Values(ServeCase):
         alarm = encoder["alarms"][0]
         self.assertEqual(alarm["name"], "over_heat")
         self.assertTrue(alarm["meaning"] and alarm["action"], alarm)
-        self.assertIn('alarm="over_heat"} 1\n', server.ask("/metrics")[1])
+        page = server.ask("/metrics")[1]
+        self.assertIn('alarm="over_heat"} 1\n', page)
+        self.assertIn('alarm="over_speed"} 0\n', page)
+
+    def test_an_alarm_that_has_cleared_is_told_as_none(self):
+        emulator = Emulator(self.directory, "--alarm", "over_heat")
+        self.addCleanup(emulator.end)
+        name = f"tformat:{emulator.path}"
+        server = self.without_history(name, "--token-file", self.tokens())
+        wait_until(lambda: 'alarm="over_heat"} 1\n' in server.ask("/metrics")[1], "it has an alarm")
+        status, body = server.command(name, "clear-alarms", {"Authorization": f"Bearer {TOKEN}"})
+        self.assertEqual(status, 200, body)
+        wait_until(lambda: 'alarm="over_heat"} 0\n' in server.ask("/metrics")[1], "it is over")
+        emulator.process.kill()
+        wait_until(lambda: "absenc_alarm{" not in server.ask("/metrics")[1], "it is not known any more")
+
+    def test_latencies(self):
+        name = "sim:tformat"
+        server = self.without_history(name)
+        latency = wait_until(lambda: (told := server.json("/api/encoder", name=name)["latency_us"])["p50"] and told,
+                             "it was read")
+        buckets = latency["buckets"]
+        self.assertEqual([one["at_most"] for one in buckets[:4] + buckets[-2:]], [10, 20, 50, 100, 1e6, None])
+        filled = [one["at_most"] or float("inf") for one in buckets if one["count"]]
+        self.assertLessEqual(latency["max"], filled[-1] * 33 / 32)
+        page = server.ask("/metrics")[1]
+        self.assertIn("# TYPE absenc_latency_seconds histogram\n", page)
+        counts = [int(count) for count in re.findall(r"^absenc_latency_seconds_bucket\{.*,le=.*\} (\d+)$", page, re.M)]
+        self.assertEqual(counts, sorted(counts))
+        self.assertEqual(len(counts), len(buckets))
+        total = int(re.search(r"^absenc_latency_seconds_count\{.*\} (\d+)$", page, re.M)[1])
+        mean = float(re.search(r"^absenc_latency_seconds_sum\{.*\} (\S+)$", page, re.M)[1]) / total
+        self.assertGreater(total, 0)
+        self.assertEqual(counts[-1], total)
+        self.assertTrue(0 < mean <= float(re.search(r"^absenc_latency_longest_seconds\{.*\} (\S+)$", page, re.M)[1]))
+        self.assertIn('error="bad_checksum"} 0\n', page)
 
     def test_everything_about_one(self):
         name = "sim:tformat?fault=corrupt=0.3&seed=1"
@@ -75,6 +113,52 @@ class Values(ServeCase):
         self.assertEqual(server.ask("/api/encoders", "PUT")[0], 405)
         for line in server.ask("/metrics")[1].splitlines():
             self.assertRegex(line, r'^(# (HELP|TYPE) absenc_\w+ .+|absenc_\w+\{.*\} [-+.e\d]+)$')
+
+
+class Described(ServeCase):
+    """openapi.json against what is answered."""
+    NAME = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.1&seed=1"
+    # What a route must be asked with.
+    VALUES = {"/api/encoder": {"name": NAME}, "/api/history": {"encoder": NAME}, "/api/history.csv": {"encoder": NAME},
+              "/api/command": {"encoder": NAME, "command": "position"}}
+
+    def schema(self, schema, components):
+        """As jsonschema takes it: OpenAPI 3.0 has a word of its own for null."""
+        if isinstance(schema, list):
+            return [self.schema(one, components) for one in schema]
+        if not isinstance(schema, dict):
+            return schema
+        if "$ref" in schema:
+            return self.schema(components[schema["$ref"].rsplit("/", 1)[1]], components)
+        made = {key: self.schema(value, components) for key, value in schema.items() if key != "nullable"}
+        return {"anyOf": [made, {"type": "null"}]} if schema.get("nullable") is True else made
+
+    def test_every_route(self):
+        server = self.server(self.NAME, "--history", self.file("history"), "--token-file", self.tokens())
+        wait_until(lambda: server.json("/api/history", encoder=self.NAME)["rows"], "it has a second")
+        wait_until(lambda: server.json("/api/events")["events"], "something has happened")
+        wait_until(lambda: server.json("/api/encoder", name=self.NAME)["bad_exchanges"], "an exchange has failed")
+        described = server.json("/openapi.json")
+        for path, methods in described["paths"].items():
+            for method, told in methods.items():
+                with self.subTest(route=f"{method} {path}"):
+                    (kind, content), = told["responses"]["200"]["content"].items()
+                    values = self.VALUES.get(path, {})
+                    needed = [one.get("name") or one["$ref"].rsplit("/", 1)[1] for one in told.get("parameters", [])
+                              if one.get("required") or one.get("$ref", "").endswith("/encoder")]
+                    self.assertEqual(set(needed), set(values))
+                    self.check(server, method.upper(), path, values, kind,
+                               self.schema(content["schema"], described["components"]["schemas"]))
+
+    def check(self, server, method, path, values, kind, schema):
+        if kind == "text/event-stream":
+            event, data = self.stream(server).next()
+            self.assertEqual(event, "state")
+            self.assertTrue(data["encoders"])
+            return
+        status, got, body = server.answer(path, method, {"Authorization": f"Bearer {TOKEN}"}, **values)
+        self.assertEqual((status, got.split(";")[0]), (200, kind), body)
+        jsonschema.validate(json.loads(body) if kind == "application/json" else body, schema)
 
 
 class Losses(ServeCase):

@@ -22,11 +22,25 @@ class Latencies {
     const std::int64_t nanoseconds = std::clamp<std::int64_t>(latency.count(), 0, most);
     ++counts_[bucket(static_cast<std::uint64_t>(nanoseconds))];
     ++count_;
+    sum_ += Time(nanoseconds);
     longest_ = std::max(longest_, latency);
   }
 
   [[nodiscard]] constexpr std::uint64_t count() const { return count_; }
   [[nodiscard]] constexpr Time longest() const { return longest_; }
+  [[nodiscard]] constexpr Time sum() const { return sum_; }
+
+  /// For each of the rising limits, how many latencies surely do not exceed it: those of the last 1/32 below it may be
+  /// missing, and stand with the next limit.
+  template <std::size_t Size>
+  [[nodiscard]] constexpr std::array<std::uint64_t, Size> within(const std::array<Time, Size>& limits) const {
+    std::array<std::uint64_t, Size> counts{};
+    std::uint64_t below = 0;
+    for (std::size_t limit = 0, i = 0; limit < Size; counts[limit++] = below) {
+      for (; i < counts_.size() && last_of(i) <= limits[limit]; ++i) below += counts_[i];
+    }
+    return counts;
+  }
 
   /// What `share` (0 to 1) of the latencies do not exceed; 0 when there are none.
   [[nodiscard]] constexpr Time percentile(double share) const {
@@ -60,6 +74,7 @@ class Latencies {
 
   std::array<std::uint32_t, std::size_t{most_bits - fine_bits + 1} << fine_bits> counts_{};
   std::uint64_t count_ = 0;
+  Time sum_{};
   Time longest_{};
 };
 

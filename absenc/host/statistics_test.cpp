@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <vector>
 
 namespace absenc::host {
@@ -39,6 +40,26 @@ TEST(Latencies, TellTheLongestExactly) {
   EXPECT_EQ(latencies.percentile(0), 0ns);
   EXPECT_EQ(latencies.percentile(0.99), std::min<Time>(1000s, Time((std::int64_t{1} << 36) - 1)));
   EXPECT_EQ(latencies.longest(), 1000s);
+}
+
+TEST(Latencies, AreCountedWithinLimits) {
+  constexpr std::array<Time, 4> limits{10us, 20us, 1ms, 1s};
+  Latencies latencies;
+  EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{}));
+  for (const Time latency : {Time(9us), Time(10'400ns), Time(15us), Time(999'900ns), Time(1001us), Time(2s)}) {
+    latencies.add(latency);
+  }
+  EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));  // 999.9 us: in the last 32nd
+  EXPECT_EQ(latencies.sum(), 2s + 2'035'300ns);
+}
+
+TEST(Latencies, AreNeverCountedWithinWhatTheyExceed) {
+  for (std::int64_t value = 1; value < 68'000'000'000; value += value / 7 + 1) {
+    Latencies latencies;
+    latencies.add(Time(value));
+    ASSERT_EQ(latencies.within(std::array{Time(value - 1), Time(value + value / 32)}),
+              (std::array<std::uint64_t, 2>{0, 1}));
+  }
 }
 
 TEST(Rate, IsThatOfTheLastSeconds) {

@@ -72,7 +72,7 @@ std::vector<std::int64_t> arguments_in(const Request& request, const Command& co
 
 Json state_json(const Fleet& fleet, const Chronicler* chronicler) {
   Json encoders = Json::array();
-  for (const auto& watch : fleet.all()) encoders.append(overview(*watch, watch->snapshot(false)));
+  for (const auto& watch : fleet.all()) encoders.append(overview(*watch, watch->snapshot()));
   Json history;
   if (chronicler != nullptr) {
     const Chronicler::Health health = chronicler->health();
@@ -145,7 +145,7 @@ void Api::post(const Request& request, const Reply& reply) {
 Response Api::health() const {
   std::size_t live = 0;
   const Fleet::Watches watches = fleet_->all();
-  for (const auto& watch : watches) live += watch->snapshot(false).state == State::live ? 1 : 0;
+  for (const auto& watch : watches) live += watch->snapshot().state == State::live ? 1 : 0;
   const Chronicler::Health history = chronicler_ != nullptr ? chronicler_->health() : Chronicler::Health{};
   return json_response(Json::object()
                            .set("ok", history.trouble.empty())

@@ -13,6 +13,8 @@ using namespace client;
 
 namespace {
 
+double in_seconds(Time time) { return std::chrono::duration<double>(time).count(); }
+
 /// As the format has them: backslash, quote and line end are written with a backslash.
 std::string label(std::string_view text) {
   std::string written;
@@ -47,21 +49,28 @@ struct Seen {
   Snapshot snapshot;
 };
 
+// All that the encoder can report: a series that ends with its alarm could not be told from one that is not known.
 void add_alarms(Page& page, const Seen& seen) {
   if (seen.snapshot.state != State::live) return;
   for (const Flags& flags : alarms_of(*seen.unit, seen.snapshot.last.reading)) {
-    for (const std::string_view name : flag_names(*flags.field, flags.bits)) {
-      page.line("absenc_alarm", fmt::format("{},channel=\"{}\",alarm=\"{}\"", seen.label, flags.field->name, name), 1);
+    for (std::size_t bit = 0; bit < flags.field->flags.size(); ++bit) {
+      const std::string_view name = flags.field->flags[bit].name;
+      if (name.empty()) continue;
+      page.line("absenc_alarm", fmt::format("{},channel=\"{}\",alarm=\"{}\"", seen.label, flags.field->name, name),
+                flags.bits >> bit & 1);
     }
   }
 }
 
 void add_latencies(Page& page, const Seen& seen) {
-  const auto seconds = [](Time time) { return std::chrono::duration<double>(time).count(); };
-  const Snapshot& snapshot = seen.snapshot;
-  page.line("absenc_latency_seconds", seen.label + ",quantile=\"0.5\"", seconds(snapshot.median));
-  page.line("absenc_latency_seconds", seen.label + ",quantile=\"0.99\"", seconds(snapshot.percentile_99));
-  page.line("absenc_latency_seconds", seen.label + ",quantile=\"1\"", seconds(snapshot.longest));
+  const LatencyFigures& latency = seen.snapshot.latency;
+  for (std::size_t i = 0; i < latency_limits.size(); ++i) {
+    page.line("absenc_latency_seconds_bucket", fmt::format("{},le=\"{}\"", seen.label, in_seconds(latency_limits[i])),
+              latency.within[i]);
+  }
+  page.line("absenc_latency_seconds_bucket", seen.label + ",le=\"+Inf\"", latency.count);
+  page.line("absenc_latency_seconds_sum", seen.label, in_seconds(latency.sum));
+  page.line("absenc_latency_seconds_count", seen.label, latency.count);
 }
 
 }  // namespace
@@ -70,7 +79,7 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   std::vector<Seen> all;
   for (const auto& watch : watches) {
     all.push_back({fmt::format("encoder=\"{}\",protocol=\"{}\"", label(watch->name()), watch->address().unit->id),
-                   watch->address().unit, watch->snapshot(false)});
+                   watch->address().unit, watch->snapshot()});
   }
   Page page;
   const auto each = [&](std::string_view name, std::string_view kind, std::string_view help, auto value) {
@@ -83,19 +92,20 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   each("absenc_repeated_total", "counter", "requests that were sent again",
        [](const Snapshot& s) { return s.counters.repeated; });
   each("absenc_age_seconds", "gauge", "age of the last reading, or of what is known instead",
-       [](const Snapshot& s) { return std::chrono::duration<double>(s.age).count(); });
+       [](const Snapshot& s) { return in_seconds(s.age); });
   each("absenc_rate_hertz", "gauge", "good readings a second", [](const Snapshot& s) { return s.rate; });
   page.metric("absenc_errors_total", "counter", "failed attempts by kind, repeated ones too");
   for (const Seen& seen : all) {
     for (std::size_t i = 1; i < error_texts.size(); ++i) {
-      const std::uint64_t count = seen.snapshot.counters.errors[i];
-      if (count == 0) continue;
-      page.line("absenc_errors_total", fmt::format("{},error=\"{}\"", seen.label, error_texts[i].name), count);
+      page.line("absenc_errors_total", fmt::format("{},error=\"{}\"", seen.label, error_texts[i].name),
+                seen.snapshot.counters.errors[i]);
     }
   }
-  page.metric("absenc_latency_seconds", "gauge", "from the end of a request to the end of its reply, by quantile");
+  page.metric("absenc_latency_seconds", "histogram", "from the end of a request to the end of its reply");
   for (const Seen& seen : all) add_latencies(page, seen);
-  page.metric("absenc_alarm", "gauge", "1 while the encoder reports this alarm");
+  each("absenc_latency_longest_seconds", "gauge", "the longest of them",
+       [](const Snapshot& s) { return in_seconds(s.latency.longest); });
+  page.metric("absenc_alarm", "gauge", "1 while the encoder reports this alarm, else 0; none while it is not live");
   for (const Seen& seen : all) add_alarms(page, seen);
   page.metric("absenc_streams", "gauge", "open event streams");
   page.line("absenc_streams", "", figures.streams);

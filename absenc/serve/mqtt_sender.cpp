@@ -172,7 +172,7 @@ void MqttSender::send_states(MqttClient& client) {
         !retained_.contains(topic_of(settings_->prefix, watch->name(), "state"))) {
       for (const Retained& one : home_assistant_entities(*settings_, *watch)) send_retained(client, one);
     }
-    send_retained(client, encoder_state(settings_->prefix, *watch, watch->snapshot(false)));
+    send_retained(client, encoder_state(settings_->prefix, *watch, watch->snapshot()));
   }
 }
 
@@ -197,7 +197,7 @@ void MqttSender::clear_gone(MqttClient& client, const Fleet::Watches& watches) {
 
 void MqttSender::send_values(MqttClient& client) {
   for (const auto& watch : fleet_->all()) {
-    const Snapshot snapshot = watch->snapshot(false);
+    const Snapshot snapshot = watch->snapshot();
     if (snapshot.state != State::live) continue;
     const std::string text = overview(*watch, snapshot).line();
     if (!client.publish(topic_of(settings_->prefix, watch->name(), "value"), text, 0, false)) {

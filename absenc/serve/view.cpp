@@ -82,10 +82,29 @@ Json errors_json(const host::Counters& counters) {
   return json;
 }
 
-Json bad_json(const Snapshot& snapshot) {
+// Each bucket alone, the last without a limit.
+Json latency_json(const LatencyFigures& latency) {
+  Json buckets = Json::array();
+  std::uint64_t below = 0;
+  for (std::size_t i = 0; i <= latency_limits.size(); ++i) {
+    const bool limited = i < latency_limits.size();
+    const std::uint64_t within = limited ? latency.within[i] : latency.count;
+    buckets.append(Json::object()
+                       .set("at_most", limited ? Json(microseconds_of(latency_limits[i])) : Json())
+                       .set("count", within - below));
+    below = within;
+  }
+  return Json::object()
+      .set("p50", microseconds_of(latency.median))
+      .set("p99", microseconds_of(latency.percentile_99))
+      .set("max", microseconds_of(latency.longest))
+      .set("buckets", buckets);
+}
+
+Json bad_json(const Details& details) {
   Json all = Json::array();
   const Time now = os::now();
-  for (const BadExchangeText& bad : snapshot.bad) {
+  for (const BadExchangeText& bad : details.bad) {
     all.append(Json::object()
                    .set("age_s", seconds_of(now - bad.at))
                    .set("error", text_of(bad.error).name)
@@ -127,17 +146,15 @@ Json overview(const Watch& watch, const Snapshot& snapshot) {
 }
 
 Json details(const Watch& watch) {
-  const Snapshot snapshot = watch.snapshot(true);
+  const Snapshot snapshot = watch.snapshot();
+  const Details more = watch.details();
   Json json = overview(watch, snapshot);
   json.set("protocol_name", watch.address().unit->name);
   json.set("readings", snapshot.readings).set("losses", snapshot.losses).set("restarts", snapshot.restarts);
   json.set("repeated", snapshot.counters.repeated).set("errors", errors_json(snapshot.counters));
-  json.set("latency_us", Json::object()
-                             .set("p50", microseconds_of(snapshot.median))
-                             .set("p99", microseconds_of(snapshot.percentile_99))
-                             .set("max", microseconds_of(snapshot.longest)));
-  json.set("fields", snapshot.state == State::live ? snapshot.fields : Json());
-  json.set("bad_exchanges", bad_json(snapshot));
+  json.set("latency_us", latency_json(snapshot.latency));
+  json.set("fields", snapshot.state == State::live ? more.fields : Json());
+  json.set("bad_exchanges", bad_json(more));
   json.set("readable", readable_json(*watch.address().unit));
   return json.set("commands", commands_json(*watch.address().unit));
 }

@@ -98,7 +98,7 @@ State Watch::state_now(Time age) const {
   return known_.state == State::live && old ? State::silent : known_.state;
 }
 
-Snapshot Watch::snapshot(bool details) const {
+Snapshot Watch::snapshot() const {
   const std::int64_t now_s = calendar_ms() / 1000;
   const std::lock_guard lock(mutex_);
   Snapshot snapshot = known_;
@@ -107,8 +107,12 @@ Snapshot Watch::snapshot(bool details) const {
   for (std::size_t i = 0; i < minute_.errors.size(); ++i) {
     if (now_s - minute_.at_s[i] < 60) snapshot.errors_last_minute += minute_.errors[i];
   }
-  if (!details) snapshot.bad.clear();
   return snapshot;
+}
+
+Details Watch::details() const {
+  const std::lock_guard lock(mutex_);
+  return details_;
 }
 
 void Watch::trace(bool on) {
@@ -270,7 +274,7 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const std::uint64_t errors = bad < before ? bad : bad - before;  // anew after it had ended
   count_second(sample, errors);
   pass_on(sample);
-  if (errors != 0) known_.bad = live.bad_exchanges();
+  if (errors != 0) details_.bad = live.bad_exchanges();
   known_.counters = encoder.counters();
   known_.losses = live.losses();
   known_.restarts = live.restarts();
@@ -279,12 +283,12 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   if (sample.kind == Sample::Kind::reading) {
     AnswerSink sink;
     encoder.report(sink);
-    known_.fields = to_json(sink.answer.row());
+    details_.fields = to_json(sink.answer.row());
   }
   known_.rate = live.rate();
-  known_.median = encoder.latencies().percentile(0.5);
-  known_.percentile_99 = encoder.latencies().percentile(0.99);
-  known_.longest = encoder.latencies().longest();
+  const host::Latencies& latencies = encoder.latencies();
+  known_.latency = {latencies.percentile(0.5),        latencies.percentile(0.99), latencies.longest(),
+                    latencies.within(latency_limits), latencies.count(),          latencies.sum()};
 }
 
 void Watch::count_second(const Sample& sample, std::uint64_t errors) {

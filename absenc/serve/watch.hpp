@@ -34,6 +34,27 @@ enum class State : std::uint8_t {
 };
 [[nodiscard]] std::string_view name_of(State state);
 
+/// Up to which latencies are counted, by 1, 2 and 5 from 10 us to 1 s.
+inline constexpr std::array<Time, 16> latency_limits = [] {
+  std::array<Time, 16> limits{};
+  std::int64_t decade = 10'000;
+  for (std::size_t i = 0; i < limits.size(); ++i) {
+    constexpr std::array<std::int64_t, 3> steps{1, 2, 5};
+    limits[i] = Time(decade * steps[i % 3]);
+    if (i % 3 == 2) decade *= 10;
+  }
+  return limits;
+}();
+
+struct LatencyFigures {
+  Time median{};
+  Time percentile_99{};
+  Time longest{};
+  std::array<std::uint64_t, latency_limits.size()> within{};  // how many do not exceed each limit
+  std::uint64_t count = 0;
+  Time sum{};
+};
+
 /// What is known of an encoder at a moment.
 struct Snapshot {
   State state = State::opening;
@@ -46,10 +67,12 @@ struct Snapshot {
   std::uint64_t losses = 0;
   std::uint64_t restarts = 0;  // of the position
   std::uint64_t errors_last_minute = 0;
-  double rate = 0;  // readings a second
-  Time median{};    // of the latencies
-  Time percentile_99{};
-  Time longest{};
+  double rate = 0;           // readings a second
+  LatencyFigures latency{};  // at most a second old
+};
+
+/// What only those ask for who look at one encoder.
+struct Details {
   std::vector<client::BadExchangeText> bad{};  // the newest first
   client::Json fields{};                       // of the last reply, at most a second old
 };
@@ -92,7 +115,8 @@ class Watch {
   /// Until it has ended; the destructor does both.
   void wait();
 
-  [[nodiscard]] Snapshot snapshot(bool details) const;
+  [[nodiscard]] Snapshot snapshot() const;
+  [[nodiscard]] Details details() const;
   /// From now on points are kept until they are taken, the newest `most_points` of them.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
@@ -137,6 +161,7 @@ class Watch {
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;
   Snapshot known_;
+  Details details_;
   Time known_at_{};  // of the last reading, or of the last change of state
   std::optional<Order> order_;
   bool over_ = false;      // nobody takes orders any more

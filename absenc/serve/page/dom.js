@@ -45,6 +45,28 @@ export function dial() {
   };
 }
 
+/** `cells` makes the texts or elements of a row. */
+function narrowTable(head, list, cells, caption) {
+  const line = (one) => element("tr", {}, ...cells(one).map((cell) => element("td", {}, cell)));
+  return element("table", {"aria-label": caption},
+                 element("thead", {}, element("tr", {}, ...head.map((text) => element("th", {scope: "col"}, text)))),
+                 element("tbody", {}, ...list.map(line)));
+}
+
+/** One that may be wider than the page. */
+export function table(head, list, cells, caption) {
+  return element("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": caption}, narrowTable(head, list, cells, caption));
+}
+
+/** A table of [name, count], with bars beside the counts for those who see them. */
+export function histogram(head, list, caption) {
+  const most = Math.max(1, ...list.map(([, count]) => count));
+  const bar = (count) => element("span", {class: "bar", style: `width: ${100 * count / most}%`, "aria-hidden": "true"});
+  const made = narrowTable([...head, ""], list, ([name, count]) => [name, String(count), bar(count)], caption);
+  made.className = "histogram";
+  return made;
+}
+
 export const NOTHING = "–";
 
 export function duration(seconds) {

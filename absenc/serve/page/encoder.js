@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Everything about one encoder: live trace, history, errors, commands.
 /* global Dygraph */
-import {NOTHING, alarmText, ask, dial, duration, element, fieldText, positionText, rows, setText, speedText, stateText, table} from "./dom.js";
+import {NOTHING, alarmText, ask, dial, duration, element, fieldText, histogram, positionText, rows, setText, speedText, stateText, table} from "./dom.js";
 import {Examine} from "./examine.js";
 import {download, hasToken, request, setToken} from "./server.js";
 
@@ -10,6 +10,7 @@ const MOST_POINTS = 2000;
 const REFRESH_MS = 1000;
 const WRITTEN_MS = 1500;  // then what has happened stands in the history
 const PAST_MS = 10000;
+const MOST_EVENTS = 100;
 
 const ink = () => getComputedStyle(document.body).color;
 
@@ -22,13 +23,70 @@ function plot(node, title, options) {
   });
 }
 
+function limitText(us) {
+  if (us >= 1e6) return `${us / 1e6} s`;
+  return us >= 1e3 ? `${us / 1e3} ms` : `${us} µs`;
+}
+
+// From the first bucket with something in it to the last.
+function latencyRows(buckets) {
+  const filled = buckets.map(({count}) => count !== 0);
+  return buckets.slice(Math.max(0, filled.indexOf(true)), filled.lastIndexOf(true) + 1)
+    .map(({at_most: limit, count}) => [limit === null ? "longer" : `to ${limitText(limit)}`, count]);
+}
+
+// Where nothing was read there is a gap, up to now: a loss must not lie beyond the end of the plot.
+function pastRows({rows, step_s: step}) {
+  const list = [];
+  const gap = (at) => list.push([new Date(at * 1000), [NaN, NaN, NaN]]);
+  let before = null;
+  for (const [at, least, mean, greatest] of rows.filter((row) => row[2] !== null)) {
+    if (before !== null && at - before > 2 * step) gap(before + step);
+    list.push([new Date(at * 1000), [least, mean, greatest]]);
+    before = at;
+  }
+  if (before !== null) gap(Math.max(before + step, Date.now() / 1000));
+  return list;
+}
+
+// What the plot of the past marks, with its word: an alarm has its name before its meaning.
+const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
+const markText = (event) => (event.kind === "alarm" ? event.text.split(":")[0] : event.kind);
+
+// Words that would stand on others are left out: the table below the plot has them all.
+function drawMarks(canvas, area, graph, marks) {
+  const style = getComputedStyle(document.body);
+  canvas.save();
+  canvas.font = "12px system-ui, sans-serif";
+  const free = [area.x, area.x, area.x];  // where each of three lines of words ends
+  for (const {at_ms: at, kind, ...event} of marks) {
+    const x = Math.round(graph.toDomXCoord(at)) + .5;
+    if (x < area.x || x > area.x + area.w) continue;
+    canvas.fillStyle = canvas.strokeStyle = style.getPropertyValue(kind === "alarm" ? "--bad" : "--warn");
+    canvas.setLineDash(kind === "alarm" ? [] : [4, 3]);
+    canvas.beginPath();
+    canvas.moveTo(x, area.y);
+    canvas.lineTo(x, area.y + area.h);
+    canvas.stroke();
+    const words = markText({kind, ...event});
+    const width = canvas.measureText(words).width;
+    const left = Math.min(x + 3, area.x + area.w - width);
+    const line = free.findIndex((end) => end <= left);
+    if (line < 0) continue;
+    canvas.fillText(words, left, area.y + 12 + 14 * line);
+    free[line] = left + width + 6;
+  }
+  canvas.restore();
+}
+
 export class One {
   constructor(main, name) {
     this.name = name;
     this.trace = name;
     this.points = [];
+    this.marks = [];
+    this.word = null;  // a new one each time that the server is there again
     this.build(main);
-    this.refresh();
     this.timer = setInterval(() => this.refresh(), REFRESH_MS);
     this.loadHistory();
     this.pastTimer = setInterval(() => this.loadHistory(), PAST_MS);
@@ -48,6 +106,8 @@ export class One {
     this.placePlot = element("div", {class: "plot", role: "img", "aria-label": "position over the last 20 seconds"});
     this.speedPlot = element("div", {class: "plot", role: "img", "aria-label": "speed over the last 20 seconds"});
     this.fields = element("dl");
+    this.latencies = element("div");
+    this.errors = element("div");
     this.bad = element("div");
     this.command = element("select", {"aria-label": "command", onchange: () => this.showArguments()});
     this.arguments = element("div");
@@ -64,6 +124,7 @@ export class One {
       box(this.name, element("div", {class: "card"}, this.dial.svg, element("div", {}, this.state, this.facts)), this.words),
       box("Live", this.placePlot, this.speedPlot),
       box("Last reply", this.fields),
+      box("Latencies and errors", element("div", {class: "figures"}, this.latencies, this.errors)),
       box("Last bad exchanges", this.bad),
       box("Commands", element("p", {}, this.command, " ", element("button", {type: "button", onclick: () => this.run()}, "Run")),
           this.arguments, this.outcome),
@@ -74,11 +135,20 @@ export class One {
     const zoom = {interactionModel: {}};
     this.placeGraph = plot(this.placePlot, "position", zoom);
     this.speedGraph = plot(this.speedPlot, "speed", zoom);
+    this.dark = matchMedia("(prefers-color-scheme: dark)");
+    this.recolor = () => {
+      for (const graph of [this.placeGraph, this.speedGraph, this.pastGraph]) graph?.updateOptions({axisLabelColor: ink(), axisLineColor: ink()});
+    };
+    this.dark.addEventListener("change", this.recolor);
   }
 
   show(state) {
     const one = state.encoders.find((other) => other.encoder === this.name);
     if (one === undefined) return this.lose("it is no longer served");
+    if (this.word === null) {
+      this.word = {};
+      this.refresh();
+    }
     this.dial.svg.toggleAttribute("hidden", one.linear);
     this.dial.turn(one.angle_deg);
     this.state.className = `state ${one.state}`;
@@ -98,12 +168,12 @@ export class One {
 
   lose(why = "no connection to the server") {
     this.live = false;
+    this.word = null;
     this.dial.turn(null);
     this.state.className = "state unknown";
     setText(this.state, `not known: ${why}`);
     this.facts.replaceChildren();
-    this.fields.replaceChildren();
-    this.words.replaceChildren();
+    for (const node of [this.fields, this.latencies, this.errors, this.bad, this.words]) node.replaceChildren();
     for (const node of [this.placePlot, this.speedPlot]) node.classList.add("stale");
     this.examine.lose(why);
   }
@@ -133,24 +203,29 @@ export class One {
   }
 
   async refresh() {
+    const word = this.word;
+    if (word === null) return;
     let answer;
     try {
       answer = await request("api/encoder", {name: this.name});
     } catch {
       return;  // the stream tells that the server is away
     }
-    if (this.closed || answer.status !== 200) return;
+    if (this.closed || this.word !== word || answer.status !== 200) return;  // not what was before a loss
     const one = answer.body;
     const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, fieldText(value)]);
     this.examine.describe(one.readable);
     const latency = one.latency_us;
     fields.push(["latency", `50 % ${latency.p50.toFixed(0)} µs, 99 % ${latency.p99.toFixed(0)} µs, longest ${latency.max.toFixed(0)} µs`]);
     fields.push(["readings", `${one.readings}; port lost ${one.losses} times; repeated ${one.repeated}`]);
-    fields.push(["errors", Object.entries(one.errors).map(([kind, count]) => `${count} ${kind}`).join(", ") || "none"]);
     this.fields.replaceChildren(...fields.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+    const errors = Object.entries(one.errors).sort(([, a], [, b]) => b - a);
+    this.latencies.replaceChildren(histogram(["latency", "replies"], latencyRows(latency.buckets), "replies by latency"));
+    this.errors.replaceChildren(errors.length === 0 ? element("p", {}, "no errors") :
+      histogram(["error", "attempts"], errors, "failed attempts by kind"));
     this.bad.replaceChildren(one.bad_exchanges.length === 0 ? element("p", {}, "no exchange has failed") : table(
       ["ago", "what", "sent", "received"],
-      rows(one.bad_exchanges, (bad) => [duration(bad.age_s), `${bad.error}: ${bad.meaning}`, element("code", {}, bad.sent), element("code", {}, bad.received || "nothing")]),
+      one.bad_exchanges, (bad) => [duration(bad.age_s), `${bad.error}: ${bad.meaning}`, element("code", {}, bad.sent), element("code", {}, bad.received || "nothing")],
       "last bad exchanges"));
     if (this.commands === undefined) {
       this.commands = one.commands;
@@ -206,13 +281,17 @@ export class One {
       if (this.closed) return;
       setText(this.past, past.body.error ?? "");
       if (past.status !== 200) return;
-      const list = past.body.rows.filter((row) => row[2] !== null).map((row) => [new Date(row[0] * 1000), [row[1], row[2], row[3]]]);
-      this.pastGraph ??= plot(this.pastPlot, "position: least, mean, greatest", {customBars: true});
-      if (list.length !== 0) this.pastGraph.updateOptions({file: list});
-      const events = (await request("api/events", {...this.range(), rows: 100})).body.events;
+      const list = pastRows(past.body);
+      const events = (await request("api/events", {...this.range(), rows: MOST_EVENTS})).body.events;
+      if (this.closed) return;
+      this.marks = events.filter((event) => MARKED.includes(event.kind)).reverse();
+      this.pastPlot.setAttribute("aria-label", `least, mean and greatest position; marked: ${[...new Set(this.marks.map(markText))].join(", ") || "nothing"}`);
+      this.pastGraph ??= plot(this.pastPlot, "position: least, mean, greatest", {
+        customBars: true, underlayCallback: (canvas, area, graph) => drawMarks(canvas, area, graph, this.marks)});
+      this.pastGraph.updateOptions(list.length === 0 ? {} : {file: list});
       this.events.replaceChildren(events.length === 0 ? element("p", {}, "nothing has happened") : table(
         ["when", "what", "", "who"],
-        rows(events, (event) => [new Date(event.at_ms).toLocaleString(), event.kind, event.text, event.who]), "events"));
+        events, (event) => [new Date(event.at_ms).toLocaleString(), event.kind, event.text, event.who], "events"));
     } catch {
       // the stream tells that the server is away
     } finally {
@@ -233,6 +312,7 @@ export class One {
     clearInterval(this.timer);
     clearInterval(this.pastTimer);
     clearTimeout(this.soon);
+    this.dark.removeEventListener("change", this.recolor);
     for (const graph of [this.placeGraph, this.speedGraph, this.pastGraph]) graph?.destroy();
   }
 }
