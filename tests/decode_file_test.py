@@ -137,6 +137,11 @@ class Invalid(Case):
         self.assert_good(absenc("wave", f"tformat?alarm={alarm}", path, "--count", "5", "--force"))
         return absenc("decode", "tformat", path, *arguments)
 
+    def test_the_other_way_round(self):
+        result = absenc("decode", "drive.sr", "tformat")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("the protocol comes first, then the capture: absenc decode tformat drive.sr", result.stderr)
+
     def test_of_one_frame(self):
         [line] = json_lines(self.alarm("full_absolute_status", "--json").stdout)[:1]
         frames = ["--request", line["request"], "--hex", line["reply"]]

@@ -148,6 +148,11 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
 }
 
 int run_decode(const Invocation& invocation) {
+  if (invocation.has("file") && find_unit(invocation.text("file")) != nullptr &&
+      find_unit(invocation.text("protocol")) == nullptr) {
+    throw UsageError(fmt::format("the protocol comes first, then the capture: absenc decode {} {}",
+                                 invocation.text("file"), invocation.text("protocol")));
+  }
   const Unit& unit = require_unit(invocation.text("protocol"));
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
   const bool one = invocation.has("--hex") || invocation.has("--request");
