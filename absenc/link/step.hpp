@@ -68,6 +68,7 @@ struct Event {
   std::size_t bits = 0;           // sent, device side of a clocked link: number of clocks seen
   ExtraWire wire{};               // triggered
   bool held_low = false;          // selected on a clocked link: the clock line was held low before it, not idle
+  bool idle_low = false;          // received on a clocked link: the data line was low before the first bit, too
   Time width{};                   // triggered: how long the pulse lasts; device side, selected on a clocked link and
                                   // sent on an SPI link: the period of the clock; 0: not known
   Time lead{};                    // sent, device side of an SPI link: from chip select to the first clock

@@ -68,7 +68,8 @@ class FakeSpi final : public SpiKernel {
   int open_error = 0;
   std::uint32_t mode_mask = ~0u;  // the others are taken, but not done
   std::uint32_t highest_speed = ~0u;
-  int missing = 0;  // bytes that a message falls short of
+  int missing = 0;       // bytes that a message falls short of
+  bool shorted = false;  // the data line, to low
   std::string log;
 
  private:
@@ -98,6 +99,7 @@ class FakeSpi final : public SpiKernel {
       out = reply.out;
     }
     reach(reply.at);
+    if (shorted && _IOC_NR(request) == 0) std::fill(reply.bytes.begin(), reply.bytes.end(), std::uint8_t{0});
     std::size_t done = 0;
     for (const UserMemory& one : out) {
       std::memcpy(at(one), reply.bytes.data() + done, one.size);

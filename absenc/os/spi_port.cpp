@@ -130,7 +130,7 @@ ByteEvent SpiPort::wait(const ByteStep& step) {
   armed_ = step.at > told_ || step.at == armed_ ? step.at : never;
   if (std::exchange(sent_pending_, false)) return tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
   if (std::exchange(heard_pending_, false)) {
-    return tell({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_});
+    return tell({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_, .idle_low = idle_low_});
   }
   const Time limit = heard_ ? step.gap : step.answer;
   const Time quiet_end = limit > 0ns && !silence_told_ ? sent_at_ + limit : never;
@@ -188,9 +188,10 @@ void SpiPort::send_message(bool with_output) {
   throw Failure(Kind::system, what + ": try another speed=HZ, and see what the kernel says in dmesg");
 }
 
-// What the idle line showed and what the controller clocked beyond the last bit goes.
+// Of what the idle line showed stays its level; what the controller clocked beyond the last bit goes.
 void SpiPort::keep_bits(std::size_t bits) {
   const BitView clocked{in_, in_.size() * 8};
+  idle_low_ = settings_.idle_clocks > 0 && clocked.load(0, settings_.idle_clocks) == 0;
   std::vector<std::uint8_t> kept((bits + 7) / 8);
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const auto count = static_cast<unsigned>(std::min<std::size_t>(8, bits - 8 * i));

@@ -81,6 +81,7 @@ class SpiPort final : public Port<std::uint8_t> {
   Time sent_at_{};              // end of the last transfer
   bool sent_pending_ = false;   // `sent` is to be reported,
   bool heard_pending_ = false;  // and then `received`
+  bool idle_low_ = false;       // the data line, before the first bit of a clocked transfer
   bool heard_ = false;          // by the last transfer
   bool silence_told_ = false;   // one `silence` for each transfer
 };

@@ -126,6 +126,19 @@ TEST_F(SpiPortTest, ClocksOnceMoreForTheIdleLine) {
   EXPECT_EQ(kernel.log, "2 bytes in, 3 bytes in, ");
 }
 
+TEST_F(SpiPortTest, TellsThatTheIdleLineWasLow) {
+  const auto idle_low = [&](const LineSettings& settings) {
+    SpiPort port = open(LinkKind::clocked, settings);
+    port.begin(clocks(13));
+    EXPECT_EQ(port.wait({.at = never}).kind, ByteEvent::Kind::sent);
+    return port.wait({.at = never}).idle_low;
+  };
+  EXPECT_FALSE(idle_low(ssi_settings));
+  kernel.shorted = true;
+  EXPECT_TRUE(idle_low(ssi_settings));
+  EXPECT_FALSE(idle_low(biss_settings));  // none of its clocks shows the idle line
+}
+
 TEST_F(SpiPortTest, BeginsNotBeforeItsTimeAndStampsTheEnd) {
   SpiPort port = open();
   const Time at = port.now() + 3ms;

@@ -51,14 +51,19 @@ void ClockedEngine::feed(const ByteEvent& event) {
   if (event.kind != ByteEvent::Kind::received) return;
   received_at_ = event.at;
   rested_at_ = event.at + times_.rest;
-  received(event.items);
+  received(event);
 }
 
-void ClockedEngine::received(Bytes bytes) {
+void ClockedEngine::received(const ByteEvent& event) {
   const std::size_t whole = (count_ + 7) / 8;
-  size_ = std::min(bytes.size(), whole);
-  std::copy_n(bytes.begin(), size_, storage_.begin());
+  size_ = std::min(event.items.size(), whole);
+  std::copy_n(event.items.begin(), size_, storage_.begin());
   if (size_ < whole) return finish({.error = Error::wrong_length});
+  // Zeros alone behind an idle line that was high are a position; a line that was low all the time is shorted.
+  const auto is_zero = [](std::uint8_t byte) { return byte == 0; };
+  if (event.idle_low && std::all_of(storage_.begin(), storage_.begin() + static_cast<std::ptrdiff_t>(size_), is_zero)) {
+    return finish({.error = Error::line_stuck});
+  }
   state_ = State::over;  // unless the subclass goes on
   clocked({Bytes(storage_).first(size_), count_});
 }

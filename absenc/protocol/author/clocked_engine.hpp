@@ -58,7 +58,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
 
  private:
   enum class State : std::uint8_t { ready, clocking, over };
-  void received(Bytes bytes);
+  void received(const Event<std::uint8_t>& event);
 
   ClockedHostTimes times_;
   MutableBytes storage_;

@@ -2,6 +2,7 @@
 // The engine and the device of clocked lines, with a protocol of a counter: the first byte says how many more follow.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -75,6 +76,20 @@ TEST(ClockedEngine, ClocksWhenTheClockHasRested) {
   EXPECT_EQ(host.reading()->received, 1130us);
   EXPECT_EQ(host.exchange().received.size(), 1u);
   EXPECT_EQ(host.exchange().sent_at, 1130us);
+}
+
+TEST(ClockedEngine, ALineThatIsLowAllTheTimeIsNoPosition) {
+  const auto error_of = [](std::uint8_t byte, bool idle_low) {
+    Host host({});
+    (void)host.next(1ms);
+    const std::array bytes{byte};
+    host.feed({.kind = Kind::sent, .at = 2ms});
+    host.feed({.kind = Kind::received, .at = 2ms, .items = bytes, .idle_low = idle_low});
+    return host.error();
+  };
+  EXPECT_EQ(error_of(0, false), Error::none);
+  EXPECT_EQ(error_of(0, true), Error::line_stuck);
+  EXPECT_EQ(error_of(0x01, true), Error::none);  // low because it was clocked early: what came has changed
 }
 
 TEST(ClockedEngine, OfAKnownRateTheEndTellsTheBegin) {
