@@ -215,7 +215,8 @@ class Arduino(Case):
                            "int main() { setup(); for (int i = 0; i < 20000; ++i) loop(); }\n")
         exported = self.library / "src"
         run("c++", "-std=gnu++20", "-Wall", "-Werror", "-I", ROOT / "tests/arduino", "-I", exported, "-o",
-            self.folder / "sketch", program, *sorted((exported / "absenc/protocol/author").rglob("*.cpp")))
+            self.folder / "sketch", program, exported / "absenc/protocol/host_rules.cpp",
+            *sorted((exported / "absenc/protocol/author").rglob("*.cpp")))
         said = run(self.folder / "sketch").splitlines()
         # Every third reply is damaged, and the first behind it only confirms the next.
         self.assertEqual(said[:6], ["4660 74565", "bad_checksum"] * 3)

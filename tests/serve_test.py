@@ -120,7 +120,8 @@ class Described(ServeCase):
     NAME = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.1&seed=1"
     # What a route must be asked with.
     VALUES = {"/api/encoder": {"name": NAME}, "/api/history": {"encoder": NAME}, "/api/history.csv": {"encoder": NAME},
-              "/api/command": {"encoder": NAME, "command": "position"}}
+              "/api/command": {"encoder": NAME, "command": "position"}, "/api/settings": {"encoder": NAME},
+              "/api/memory": {"encoder": NAME}, "/api/doctor": {"encoder": NAME}}
 
     def schema(self, schema, components):
         """As jsonschema takes it: OpenAPI 3.0 has a word of its own for null."""

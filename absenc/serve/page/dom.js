@@ -101,17 +101,6 @@ export function fieldText(value) {
   return Array.isArray(value) ? value.join(" ") || "none" : String(value);
 }
 
-/** A row for each of the list; cells(one) are texts or elements. */
-export function rows(list, cells) {
-  return element("tbody", {}, ...list.map((one) => element("tr", {}, ...cells(one).map((cell) => element("td", {}, cell)))));
-}
-
-/** One that scrolls by itself where it is too wide. */
-export function table(head, body, caption) {
-  return element("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": caption},
-                 element("table", {}, element("thead", {}, element("tr", {}, ...head.map((text) => element("th", {scope: "col"}, text)))), body));
-}
-
 const dialog = document.getElementById("dialog");
 
 /** True when it was answered with yes; with `field`, what was written, or null. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Everything about one encoder: live trace, history, errors, commands.
 /* global Dygraph */
-import {NOTHING, alarmText, ask, dial, duration, element, fieldText, histogram, positionText, rows, setText, speedText, stateText, table} from "./dom.js";
+import {NOTHING, alarmText, ask, dial, duration, element, fieldText, histogram, positionText, setText, speedText, stateText, table} from "./dom.js";
 import {Examine} from "./examine.js";
 import {download, hasToken, request, setToken} from "./server.js";
 

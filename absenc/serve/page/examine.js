@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is asked of one encoder on a button: an examination, its settings, its memory. Each answer says of when it is.
-import {element, rows, setText, table} from "./dom.js";
+import {element, setText, table} from "./dom.js";
 import {request} from "./server.js";
 
 const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
@@ -111,7 +111,7 @@ class Settings extends Asked {
     this.result.replaceChildren(...names.flatMap((name) => {
       const own = found.rows.filter((row) => row.setting === name);
       return [element("h3", {}, name), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${own[0].range}`),
-              table(["field", "value", "meaning"], rows(own, (row) => [row.field, element("strong", {}, row.value ?? "INVALID"), row.meaning]), name)];
+              table(["field", "value", "meaning"], own, (row) => [row.field, element("strong", {}, row.value ?? "INVALID"), row.meaning], name)];
     }), ...failures(found.failed));
   }
 }
@@ -136,8 +136,8 @@ class Memory extends Asked {
     const registers = found.registers;
     this.tell(`${registers ? `${registers.length} registers` : `${found.bytes} bytes`} read at ${clock()}`);
     const body = registers
-      ? table(["register", "address", "value"], rows(registers, (one) => [one.name, "0x" + hex(one.address, 2), one.value]), "registers")
-      : table(["page", "address", "bytes", ""], rows(found.memory.flatMap(dumpLines), (line) => line), "memory");
+      ? table(["register", "address", "value"], registers, (one) => [one.name, "0x" + hex(one.address, 2), one.value], "registers")
+      : table(["page", "address", "bytes", ""], found.memory.flatMap(dumpLines), (line) => line, "memory");
     body.classList.add("dump");
     this.result.replaceChildren(body, ...failures(found.failed));
   }
