@@ -121,7 +121,7 @@ void MqttSender::begin() {
   {
     const std::lock_guard lock(mutex_);
     figures_.connected = true;
-    figures_.trouble.clear();
+    figures_.trouble = refusal_;
   }
   const bool old = version_ == MqttClient::Version::v3_1_1;
   happenings_->add(
@@ -244,17 +244,20 @@ void MqttSender::settle(MqttClient& client) {
   if (!arrived.empty()) {
     spool_->remove(arrived);
     has_taken_ = true;
+    refusal_.clear();
     const std::lock_guard lock(mutex_);
     figures_.sent += arrived.size();
   }
-  if (!refused.empty()) throw Failure("the broker refuses a message: " + refused);
+  if (refused.empty()) return;
+  refusal_ = "the broker refuses a message: " + refused;
+  throw Failure(refusal_);
 }
 
 void MqttSender::become_lost(const std::string& why) {
   {
     const std::lock_guard lock(mutex_);
     figures_.connected = false;
-    figures_.trouble = why;
+    figures_.trouble = refusal_.empty() ? why : refusal_;
   }
   if (std::exchange(told_lost_, true)) return;
   happenings_->add(

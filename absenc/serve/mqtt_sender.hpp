@@ -68,6 +68,7 @@ class MqttSender {
   Time next_values_{};
   bool has_taken_ = false;  // the broker, a message on this connection
   bool told_lost_ = false;
+  std::string refusal_;  // of the last message that was refused, until one is taken: brokers then also just hang up
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;
