@@ -6,6 +6,7 @@ bench/serve_load.py [SECONDS [ENCODERS...]]
 Each encoder is an `absenc emulate` of its own behind TCP, read 100 times a second; 200 event streams are open, each
 with the trace of one encoder. Late is what comes later after the reading before it than the period, by the server's
 times."""
+import contextlib
 import json
 import os
 import pathlib
@@ -118,33 +119,31 @@ class Streams:
 
 
 def measure(count, seconds):
-    emulators = Emulators(count)
-    try:
-        measure_with(emulators, count, seconds)
-    finally:
-        emulators.end()
-
-
-def measure_with(emulators, count, seconds):
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as running:
+        emulators = Emulators(count)
+        running.callback(emulators.end)
         server = Server(folder, emulators.ports)
-        streams = Streams(server, count)
-        streams.read(5)
-        for times in streams.times.values():
-            times.clear()
-        readings, cpu, memory, start = server.metric("absenc_readings_total"), server.cpu(), [], time.monotonic()
-        while (left := seconds - (time.monotonic() - start)) > 0:
-            streams.read(min(1, left))
-            memory.append(server.memory_mb())
-        cpu, took = server.cpu() - cpu, time.monotonic() - start
-        readings = server.metric("absenc_readings_total") - readings
-        late = streams.late_ms()
-        print(f"{count} encoders, {STREAMS} streams, {took:.0f} s: {readings / took:.0f} of {count * RATE} readings a "
-              f"second, {1e6 * cpu / readings:.0f} us of CPU for each; of {len(late)} readings 99 % are late by at "
-              f"most {late[len(late) * 99 // 100]} ms, one by {late[-1]} ms, {sum(one > 100 for one in late)} by more than "
-              f"100 ms; memory {memory[0]:.0f} MB, at most {max(memory):.0f}, at the end {memory[-1]:.0f}", flush=True)
-        streams.close()
-        server.end()
+        running.callback(server.end)
+        measure_served(server, count, seconds)
+
+
+def measure_served(server, count, seconds):
+    streams = Streams(server, count)
+    streams.read(5)
+    for times in streams.times.values():
+        times.clear()
+    readings, cpu, memory, start = server.metric("absenc_readings_total"), server.cpu(), [], time.monotonic()
+    while (left := seconds - (time.monotonic() - start)) > 0:
+        streams.read(min(1, left))
+        memory.append(server.memory_mb())
+    cpu, took = server.cpu() - cpu, time.monotonic() - start
+    readings = server.metric("absenc_readings_total") - readings
+    late = streams.late_ms()
+    print(f"{count} encoders, {STREAMS} streams, {took:.0f} s: {readings / took:.0f} of {count * RATE} readings a "
+          f"second, {1e6 * cpu / readings:.0f} us of CPU for each; of {len(late)} readings 99 % are late by at "
+          f"most {late[len(late) * 99 // 100]} ms, one by {late[-1]} ms, {sum(one > 100 for one in late)} by more than "
+          f"100 ms; memory {memory[0]:.0f} MB, at most {max(memory):.0f}, at the end {memory[-1]:.0f}", flush=True)
+    streams.close()
 
 
 def main():

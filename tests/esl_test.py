@@ -444,8 +444,8 @@ class TwoChannels(EslCase):
 
 
 class OneLine(EslCase):
-    def lines(self, *arguments):
-        result = absenc("monitor", *arguments, "--for", "2", "--interval", "0.5", "--json")
+    def lines(self, *arguments, seconds=2):
+        result = absenc("monitor", *arguments, "--for", str(seconds), "--interval", "0.5", "--json")
         last = {line["encoder"]: line for line in json_lines(result.stdout)}
         return result, [last[name] for name in arguments if name in last]
 
@@ -453,14 +453,14 @@ class OneLine(EslCase):
         line = self.encoder("--also", "address=3&singleturn=70000", "--also", "address=6&singleturn=0x5555", "--also",
                             "address=6&singleturn=0xAAAA", latency=20)
         names = [line, f"{line}&address=3", f"{line}&address=6", f"{line}&address=7"]
-        result, last = self.lines(*names, "--rate", "0")
+        result, last = self.lines(*names, "--rate", "0", seconds=6)
         self.assertEqual(result.returncode, 1)  # two were never read
         self.assertEqual([one["state"] for one in last], ["live", "live", "failing", "failing"])
         self.assertEqual([one["reading"]["singleturn"] for one in last[:2]], [0, 70000])
         self.assertEqual([one["errors"] for one in last[:2]], [{}, {}])
         self.assertEqual(set(last[3]["errors"]), {"timeout"})
         least, most = sorted(one["readings"] for one in last[:2])
-        self.assertGreater(least, 2)  # those that do not answer take their time, and so does a busy machine
+        self.assertGreater(least, 10)  # those that do not answer take their time
         self.assertLess(most, 2 * least + 10)
 
     def test_names_of_one_bus(self):

@@ -13,8 +13,6 @@ using namespace client;
 
 namespace {
 
-double in_seconds(Time time) { return std::chrono::duration<double>(time).count(); }
-
 /// As the format has them: backslash, quote and line end are written with a backslash.
 std::string label(std::string_view text) {
   std::string written;
@@ -65,11 +63,11 @@ void add_alarms(Page& page, const Seen& seen) {
 void add_latencies(Page& page, const Seen& seen) {
   const LatencyFigures& latency = seen.snapshot.latency;
   for (std::size_t i = 0; i < latency_limits.size(); ++i) {
-    page.line("absenc_latency_seconds_bucket", fmt::format("{},le=\"{}\"", seen.label, in_seconds(latency_limits[i])),
+    page.line("absenc_latency_seconds_bucket", fmt::format("{},le=\"{}\"", seen.label, seconds_of(latency_limits[i])),
               latency.within[i]);
   }
   page.line("absenc_latency_seconds_bucket", seen.label + ",le=\"+Inf\"", latency.count);
-  page.line("absenc_latency_seconds_sum", seen.label, in_seconds(latency.sum));
+  page.line("absenc_latency_seconds_sum", seen.label, seconds_of(latency.sum));
   page.line("absenc_latency_seconds_count", seen.label, latency.count);
 }
 
@@ -92,7 +90,7 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   each("absenc_repeated_total", "counter", "requests that were sent again",
        [](const Snapshot& s) { return s.counters.repeated; });
   each("absenc_age_seconds", "gauge", "age of the last reading, or of what is known instead",
-       [](const Snapshot& s) { return in_seconds(s.age); });
+       [](const Snapshot& s) { return seconds_of(s.age); });
   each("absenc_rate_hertz", "gauge", "good readings a second", [](const Snapshot& s) { return s.rate; });
   page.metric("absenc_errors_total", "counter", "failed attempts by kind, repeated ones too");
   for (const Seen& seen : all) {
@@ -104,7 +102,7 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   page.metric("absenc_latency_seconds", "histogram", "from the end of a request to the end of its reply");
   for (const Seen& seen : all) add_latencies(page, seen);
   each("absenc_latency_longest_seconds", "gauge", "the longest of them",
-       [](const Snapshot& s) { return in_seconds(s.latency.longest); });
+       [](const Snapshot& s) { return seconds_of(s.latency.longest); });
   page.metric("absenc_alarm", "gauge", "1 while the encoder reports this alarm, else 0; none while it is not live");
   for (const Seen& seen : all) add_alarms(page, seen);
   page.metric("absenc_streams", "gauge", "open event streams");

@@ -11,7 +11,6 @@ using namespace client;
 
 namespace {
 
-double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
 Json alarms_json(const Unit& unit, const Reading& reading) {

@@ -12,6 +12,8 @@
 
 namespace absenc::serve {
 
+[[nodiscard]] inline double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
+
 /// At a glance: state, age_s, position, turns, speed, alarms in words, errors of the last minute. Values are null
 /// unless the encoder is live and they hold.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);

@@ -6,24 +6,9 @@
 #include <algorithm>
 
 #include "absenc/client/conform/changes.hpp"
+#include "absenc/client/emulation/rule_counter.hpp"
 
 namespace absenc::client {
-
-namespace {
-
-std::vector<RuleCount>::iterator entry_of(std::vector<RuleCount>& counts, std::string_view rule) {
-  const auto same = [&](const RuleCount& one) { return one.rule == rule; };
-  const auto found = std::find_if(counts.begin(), counts.end(), same);
-  return found != counts.end() ? found : counts.insert(found, {.rule = rule});
-}
-
-RuleCount count_of(std::span<const RuleCount> counts, std::string_view rule) {
-  const auto same = [&](const RuleCount& one) { return one.rule == rule; };
-  const auto found = std::find_if(counts.begin(), counts.end(), same);
-  return found != counts.end() ? *found : RuleCount{};
-}
-
-}  // namespace
 
 std::uint64_t HostTrial::length() const {
   if (phase_ == Phase::silence || phase_ == Phase::damage) return asked_again;
@@ -40,8 +25,8 @@ bool HostTrial::is_calm() const {
 HostTrial::Fault HostTrial::look(std::uint64_t answered, std::span<const RuleCount> rules) {
   if (is_calm()) {
     for (const RuleCount& now : rules) {
-      const RuleCount before = count_of(rules_, now.rule);
-      RuleCount& calm = *entry_of(calm_, now.rule);
+      const RuleCount& before = count_of(rules_, now.rule);
+      RuleCount& calm = count_of(calm_, now.rule);
       calm.looked += now.looked - before.looked;
       calm.broken += now.broken - before.broken;
     }
@@ -90,11 +75,12 @@ void HostTrial::judge_one(const HostClause& clause, ClauseResult& result) const 
     case HostDemand::row: {
       result.need_not_come = true;
       if (answered_ == 0) return;
-      const RuleCount count = count_of(clause.demand == HostDemand::rule ? rules_ : calm_, clause.rule);
+      const std::vector<RuleCount>& counts = clause.demand == HostDemand::rule ? rules_ : calm_;
+      const auto count = std::ranges::find(counts, clause.rule, &RuleCount::rule);
       result.evidence = "the host did nothing that it is about";
-      if (count.looked == 0) return;
-      return conclude(result, count.broken == 0,
-                      fmt::format("looked at {} times, broken {} times", count.looked, count.broken));
+      if (count == counts.end() || count->looked == 0) return;
+      return conclude(result, count->broken == 0,
+                      fmt::format("looked at {} times, broken {} times", count->looked, count->broken));
     }
   }
 }

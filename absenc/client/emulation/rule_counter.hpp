@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts how often a virtual encoder looked at each rule of its host.
+// How often a virtual encoder looked at each rule of its host.
 #pragma once
 
 #include <algorithm>
@@ -11,13 +11,18 @@
 
 namespace absenc::client {
 
+/// That of this rule: a new one where there is none yet.
+[[nodiscard]] inline RuleCount& count_of(std::vector<RuleCount>& counts, std::string_view rule) {
+  const auto found = std::ranges::find(counts, rule, &RuleCount::rule);
+  return found != counts.end() ? *found : *counts.insert(found, {.rule = rule});
+}
+
 class RuleCounter final : public RuleWatch {
  public:
   void looked(std::string_view rule, bool kept) override {
-    auto found = std::find_if(counts_.begin(), counts_.end(), [&](const RuleCount& one) { return one.rule == rule; });
-    if (found == counts_.end()) found = counts_.insert(found, {.rule = rule});
-    ++found->looked;
-    found->broken += kept ? 0 : 1;
+    RuleCount& count = count_of(counts_, rule);
+    ++count.looked;
+    count.broken += kept ? 0 : 1;
   }
   [[nodiscard]] const std::vector<RuleCount>& counts() const { return counts_; }
 
