@@ -165,6 +165,36 @@ TEST(ClientSamples, AreRowsOfNamedValues) {
   EXPECT_EQ(rows.of_gap(Time{}, 12).get<std::uint64_t>("missed"), 12u);
 }
 
+// The checksum of T-format is an XOR: two flipped bits of one weight pass it.
+TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
+  Encoder encoder = open("sim:tformat?singleturn=1000&fault=corrupt=0.6");
+  const std::uint64_t& refused = encoder.counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];
+  const auto is_refusal = [](const BadExchangeText& bad) { return bad.error == Error::cross_check_failed; };
+  std::uint64_t seen = 0;
+  for (const Sample& sample : encoder.samples({.count = 3000})) {
+    EXPECT_FALSE(sample.restarted) << sample.message;
+    if (sample.position_valid) {
+      EXPECT_LT(std::abs(sample.position - 1000), 1 << 17) << "a turn";
+    }
+    if (refused == seen) continue;
+    seen = refused;
+    EXPECT_TRUE(std::ranges::any_of(encoder.bad_exchanges(), is_refusal));
+  }
+  EXPECT_GT(refused, 0u);
+}
+
+TEST(ClientEncoder, AZeroThatWasMovedIsAJump) {
+  Encoder encoder = open("sim:tformat?multiturn=9");
+  EXPECT_EQ(encoder.next().position, 9 << 17);
+  static_cast<void>(encoder.run("reset-multiturn"));
+  const Sample sample = encoder.next();
+  EXPECT_TRUE(sample.restarted);
+  EXPECT_THAT(sample.message, HasSubstr("jumped"));
+  EXPECT_EQ(sample.position, 0);
+  EXPECT_EQ(encoder.counters().bad(), 0u);
+  EXPECT_FALSE(encoder.next().restarted);
+}
+
 TEST(ClientEncoder, AFailureHasWhatWasSentAndWhatToTry) {
   Encoder encoder = open("sim:tformat?fault=silence=1");
   try {

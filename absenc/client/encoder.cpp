@@ -155,7 +155,12 @@ void Encoder::forget_position() {
 Sample Encoder::next() {
   if (!connection_->connected()) return search();
   try {
-    const Outcome outcome = connection_->read(period_ == Time{} ? host::Take::every : host::Take::newest);
+    const auto is_possible = [this](Reading reading) {
+      reading.latched += offset_;
+      return !unwrapper_.jumps(reading);
+    };
+    const host::Take which = period_ == Time{} ? host::Take::every : host::Take::newest;
+    const Outcome outcome = connection_->read(which, is_possible);
     if (outcome.error != Error::none) {
       return {.kind = Sample::Kind::failed, .at = os::now(), .trouble = connection_->trouble(outcome)};
     }
@@ -202,10 +207,12 @@ Sample Encoder::take(Reading reading) {
   Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = connection_->confirmed()};
   sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
   sample.reading = reading = checked(reading, sample.confirmed);
+  const bool jumped = unwrapper_.jumps(reading);
+  if (jumped) forget_position();
   const host::Unwrapper::Joined joined = unwrapper_.add(reading);
   if (joined == host::Unwrapper::Joined::ignored) return sample;
   if (joined != host::Unwrapper::Joined::continued) velocity_.restart();
-  if (joined == host::Unwrapper::Joined::restarted) note_restart(sample, reading);
+  if (jumped || joined == host::Unwrapper::Joined::restarted) note_restart(sample, jumped);
   unwrapped_at_ = reading.latched;
   velocity_.add(unwrapper_.position(), reading.latched);
   sample.position_valid = true;
@@ -216,14 +223,23 @@ Sample Encoder::take(Reading reading) {
   return sample;
 }
 
-void Encoder::note_restart(Sample& sample, const Reading& reading) {
+void Encoder::note_restart(Sample& sample, bool jumped) {
   ++restarts_;
   sample.restarted = true;
+  const std::string limit = limit_text(connection_->uri(), sample.reading);
+  const bool rotates = sample.reading.unit_um == 0;
+  if (jumped) {
+    sample.message = fmt::format(
+        "the position jumped farther than at {} and stayed there, as if somebody moved its zero: it starts again from "
+        "the encoder's own{}",
+        limit, rotates ? ". If the shaft is faster, say so with max_rpm=RPM" : "");
+    return;
+  }
   sample.message = fmt::format(
       "{} between two readings are too long to know how far it went meanwhile, at up to {}: the position starts again "
       "from the encoder's own{}",
-      to_text(reading.latched - unwrapped_at_), limit_text(connection_->uri(), reading),
-      reading.unit_um > 0 ? "" : ". If the shaft is slower, say so with max_rpm=RPM");
+      to_text(sample.reading.latched - unwrapped_at_), limit,
+      rotates ? ". If the shaft is slower, say so with max_rpm=RPM" : "");
 }
 
 std::string_view event_name(const Sample& sample) {

@@ -42,7 +42,7 @@ struct Sample {
   bool doubtful = false;   // it looked valid, but none agreed with it: it is marked invalid
   bool position_valid = false;
   std::int64_t position = 0;  // counts, continued past the end of the counter
-  bool restarted = false;     // how far it went since the reading before is not known: `position` starts again
+  bool restarted = false;     // it jumped, or how far it went meanwhile is not known: `position` starts again
   bool speed_valid = false;
   double speed = 0;  // `speed_delay` before `at`: rpm, of linear encoders mm/s
   Time speed_delay{};
@@ -124,7 +124,8 @@ class Encoder {
   [[nodiscard]] std::uint64_t readings() const { return readings_; }
   /// How often the port went away.
   [[nodiscard]] std::uint64_t losses() const { return losses_; }
-  /// How often the position started again, because a pause was too long to know how often the shaft turned.
+  /// How often the position started again, because a pause was too long to know how often the shaft turned, or because
+  /// it jumped.
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
   /// Good readings a second.
   [[nodiscard]] double rate() const;
@@ -143,7 +144,7 @@ class Encoder {
   void wait_until(Time time) const;
   Sample search();
   Sample take(Reading reading);
-  void note_restart(Sample& sample, const Reading& reading);
+  void note_restart(Sample& sample, bool jumped);
 
   std::unique_ptr<std::atomic<bool>> cancelled_;
   std::function<bool()> over_{};

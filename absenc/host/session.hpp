@@ -81,6 +81,27 @@ class Session {
     return conversation;
   }
 
+  /// The same for who knows the shaft: a position for which `is_possible(reading)` is false is read again until two in
+  /// a row agree, because no check sees all damage. If these are possible, the first was damaged and counts as an
+  /// error, cross_check_failed; if not, the position did jump.
+  template <class IsPossible>
+  const Conversation<Item>* read(const Command& command, Take take, IsPossible&& is_possible) {
+    const auto shows = [&](const Conversation<Item>* conversation) {
+      return confirmed_ && conversation->error() == Error::none && conversation->reading() != nullptr;
+    };
+    const Conversation<Item>* conversation = read(command, take);
+    if (!shows(conversation) || is_possible(*conversation->reading())) return conversation;
+    const BadExchange<Item> suspect(Error::cross_check_failed, conversation->exchange());
+    doubt();
+    conversation = read(command, take);
+    if (!shows(conversation) || !is_possible(*conversation->reading())) return conversation;
+    --counters_.good;
+    ++counters_.repeated;
+    ++counters_.errors[static_cast<std::size_t>(suspect.error)];
+    if (statistics_ != nullptr) statistics_->add(suspect);
+    return conversation;
+  }
+
   /// Asks the conversation that is running to end early; see Conversation::abort.
   bool abort() { return current_ != nullptr && current_->abort(); }
   /// What the last conversation leaves changed when its port threw; see Conversation::report_left.

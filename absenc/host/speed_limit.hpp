@@ -25,6 +25,13 @@ struct SpeedLimit {
   return limit;
 }
 
+/// How many counts the fastest goes in a second.
+[[nodiscard]] constexpr double counts_per_second(const Resolution& resolution, const SpeedLimit& limit) {
+  if (resolution.unit_um > 0) return limit.mm_s * 1000 / resolution.unit_um;
+  const unsigned bits = resolution.singleturn_bits;
+  return limit.rpm / 60.0 * (bits >= 63 ? 9.2e18 : static_cast<double>(std::uint64_t{1} << bits));
+}
+
 /// Readings must be nearer to each other than this: how long the fastest takes for half of what the encoder counts,
 /// less a sixteenth for noise and for not knowing to the microsecond when a position was taken. With a limit of 0 it
 /// stands still: `never`.

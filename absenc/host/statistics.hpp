@@ -115,6 +115,12 @@ class Rate {
 /// An exchange that failed, as it was. What is longer than the buffers is cut.
 template <class Item>
 struct BadExchange {
+  BadExchange() = default;
+  BadExchange(Error why, const Exchange<Item>& exchange) : error(why), at(exchange.received_at) {
+    sent.append(exchange.sent.first(std::min(exchange.sent.size(), sent.capacity())));
+    received.append(exchange.received.first(std::min(exchange.received.size(), received.capacity())));
+  }
+
   Error error = Error::none;
   Time at{};  // when the last item was received, or sent
   Buffer<Item, 64 / sizeof(Item)> sent{};
@@ -131,16 +137,11 @@ class Statistics {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {
       latencies_.add(exchange.received_at - exchange.sent_at);
-      return;
+    } else {
+      add({conversation.error(), exchange});
     }
-    BadExchange<Item>& bad = bad_[bad_count_++ % most_kept];
-    bad = {.error = conversation.error(), .at = exchange.received_at};
-    const auto cut = [](std::span<const Item> items, std::size_t size) {
-      return items.first(std::min(items.size(), size));
-    };
-    bad.sent.append(cut(exchange.sent, bad.sent.capacity()));
-    bad.received.append(cut(exchange.received, bad.received.capacity()));
   }
+  void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_kept] = bad; }
 
   /// From the end of the request to the end of the reply, of what ended well.
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }

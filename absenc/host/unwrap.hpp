@@ -28,19 +28,35 @@ class Unwrapper {
       : limit_(limit), times_(times) {}
 
   constexpr Joined add(const Reading& reading) {
-    if (!reading.ready || !reading.singleturn_valid()) return Joined::ignored;
+    if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
     const bool joins = !first && is_near(reading);
     position_ = joins ? position_ + static_cast<std::uint64_t>(way(reading)) : absolute(reading);
+    if (!first) keep_wait(reading);
     last_ = reading;
     started_ = true;
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
+  }
+
+  /// Whether it is farther from the one before than any shaft turns in that time: by twice the limit, for one that is
+  /// too fast is no jump. It was damaged in a way that its check does not see, or somebody moved the zero.
+  [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
+    if (!started_ || !has_position(reading) || !is_near(reading)) return false;
+    constexpr Time vague{1'000'000};  // when it was latched: not known better where others make us wait
+    constexpr double noise = 4;       // counts
+    const double seconds = static_cast<double>((apart(reading) + vague).count()) / 1e9;
+    const auto moved = static_cast<double>(way(reading));
+    return (moved < 0 ? -moved : moved) > 2 * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
   }
 
   /// Counts of the single-turn resolution; at the start the encoder's own turns and counts.
   [[nodiscard]] constexpr std::int64_t position() const { return static_cast<std::int64_t>(position_); }
 
  private:
+  [[nodiscard]] static constexpr bool has_position(const Reading& reading) {
+    return reading.ready && reading.singleturn_valid();
+  }
+
   [[nodiscard]] static constexpr unsigned turn_bits(const Reading& reading) {
     return reading.multiturn_valid && reading.singleturn_bits + reading.multiturn_bits <= 64 ? reading.multiturn_bits
                                                                                              : 0;
@@ -55,21 +71,27 @@ class Unwrapper {
     return turn_bits(reading) != 0 && turn_bits(last_) != 0;
   }
 
-  [[nodiscard]] constexpr bool is_near(const Reading& reading) {
-    const unsigned turns = have_turns(reading) ? reading.multiturn_bits : 0;
-    return apart(reading) < longest_gap({reading.singleturn_bits, turns, reading.unit_um}, limit_);
+  // With the turns that both have.
+  [[nodiscard]] constexpr Resolution resolution_of(const Reading& reading) const {
+    return {reading.singleturn_bits, have_turns(reading) ? reading.multiturn_bits : 0, reading.unit_um};
+  }
+  [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
+    return apart(reading) < longest_gap(resolution_of(reading), limit_);
   }
 
   // How long the two can have been apart at most. What came together after a wait was taken during that wait, or while
   // it was handed over, which takes less long.
-  [[nodiscard]] constexpr Time apart(const Reading& reading) {
+  [[nodiscard]] constexpr Time apart(const Reading& reading) const {
+    return has_waited(reading) ? reading.latched - last_.latched : wait_;
+  }
+  [[nodiscard]] constexpr bool has_waited(const Reading& reading) const {
     const Time apart = reading.latched - last_.latched;
-    if (times_ == Times::latched) return apart;
-    if (apart >= wait_ || reading.latched >= wait_counts_until_) {
-      wait_ = apart;
-      wait_counts_until_ = reading.latched + apart;
-    }
-    return wait_;
+    return times_ == Times::latched || apart >= wait_ || reading.latched >= wait_counts_until_;
+  }
+  constexpr void keep_wait(const Reading& reading) {
+    if (!has_waited(reading)) return;
+    wait_ = reading.latched - last_.latched;
+    wait_counts_until_ = reading.latched + wait_;
   }
 
   [[nodiscard]] constexpr std::int64_t way(const Reading& reading) const {

@@ -123,6 +123,34 @@ TEST(Unwrapper, ReadingsThatCameTogetherMayHaveBeenApart) {
   EXPECT_EQ(unwrapper.add(singleturn(70, 225ms)), Joined::continued);
 }
 
+TEST(Unwrapper, KnowsWhatNoShaftTurns) {
+  // A tenth of a turn in 1 ms, and 1 ms more because times are vague.
+  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
+  EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
+  unwrapper.add(multiturn(5, 0, 0ms));
+  EXPECT_FALSE(unwrapper.jumps(multiturn(5, 413, 1ms))) << "too fast, but no jump";
+  EXPECT_TRUE(unwrapper.jumps(multiturn(5, 414, 1ms)));
+  EXPECT_TRUE(unwrapper.jumps(multiturn(4, 610, 1ms)));
+  EXPECT_TRUE(unwrapper.jumps(multiturn(6, 0, 1ms)));
+  EXPECT_FALSE(unwrapper.jumps(multiturn(6, 0, 5ms)));
+  Reading damaged = multiturn(6, 0, 1ms);
+  damaged.singleturn_valid_bits = 5;
+  EXPECT_FALSE(unwrapper.jumps(damaged)) << "no position";
+  EXPECT_FALSE(unwrapper.jumps(multiturn(13, 0, 10min))) << "nobody knows";
+}
+
+TEST(Unwrapper, KnowsWhatNoCarriageDoes) {
+  Unwrapper unwrapper(SpeedLimit{.mm_s = 1000});
+  Reading reading = singleturn(0, 0ms, 30);
+  reading.unit_um = 1;
+  unwrapper.add(reading);
+  reading.latched = 9ms;
+  for (const std::uint64_t counts : {20'004u, 20'005u}) {
+    reading.singleturn = counts;
+    EXPECT_EQ(unwrapper.jumps(reading), counts == 20'005u);
+  }
+}
+
 TEST(Unwrapper, TakesPositionsOf64Bits) {
   Unwrapper unwrapper;
   unwrapper.add(singleturn(~std::uint64_t{0}, 0ms, 64));

@@ -66,7 +66,7 @@ class Sample:
         """Two readings in a row agreed."""
     @property
     def restarted(self) -> bool:
-        """How far it went since the reading before is not known: `position` starts again."""
+        """It jumped, or how far it went since the reading before is not known: `position` starts again."""
     @property
     def text(self) -> str:
         """Why there is no reading, or what happened; "" of a reading that goes on."""

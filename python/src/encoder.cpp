@@ -364,7 +364,7 @@ void bind_values(py::module_& module) {
           "confirmed", [](const PySample& one) { return one.sample.confirmed; }, "Two readings in a row agreed.")
       .def_property_readonly(
           "restarted", [](const PySample& one) { return one.sample.restarted; },
-          "How far it went since the reading before is not known: `position` starts again.")
+          "It jumped, or how far it went since the reading before is not known: `position` starts again.")
       .def_property_readonly(
           "text", [](const PySample& one) { return one.sample.text(); },
           "Why there is no reading, or what happened; \"\" of a reading that goes on.")

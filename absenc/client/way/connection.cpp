@@ -47,10 +47,10 @@ class ConnectionOn final : public Connection {
   bool connected() const override { return link_ != nullptr; }
   const std::vector<std::string>& notes() const override { return link_->link().notes; }
 
-  Outcome read(host::Take take) override {
+  Outcome read(host::Take take, const IsPossible& is_possible) override {
     const Command* command = find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
-    return outcome(*command, link_->take_turn([&] { return session_.read(*command, take); }));
+    return outcome(*command, link_->take_turn([&] { return session_.read(*command, take, is_possible); }));
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {

@@ -40,9 +40,12 @@ class Connection {
 
   // All of the following only while it is connected, but for counters and statistics.
 
+  /// Whether a position can be, to those who know where it was before.
+  using IsPossible = std::function<bool(const Reading&)>;
+  static bool all_are_possible(const Reading&) { return true; }
   /// The position, with all the alarms the unit can tell; of those that an encoder transmits by itself, which. Throws
   /// UsageError when the unit has none.
-  virtual Outcome read(host::Take take = host::Take::newest) = 0;
+  virtual Outcome read(host::Take take = host::Take::newest, const IsPossible& is_possible = all_are_possible) = 0;
   /// `on_emit` is called for each result but the last; `report` then tells of it.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// The fields of the last outcome, and its reading.
