@@ -128,9 +128,9 @@ TEST(Unwrapper, KnowsWhatNoShaftTurns) {
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));
-  EXPECT_FALSE(unwrapper.jumps(multiturn(5, 413, 1ms))) << "too fast, but no jump";
-  EXPECT_TRUE(unwrapper.jumps(multiturn(5, 414, 1ms)));
-  EXPECT_TRUE(unwrapper.jumps(multiturn(4, 610, 1ms)));
+  EXPECT_FALSE(unwrapper.jumps(multiturn(5, 823, 1ms))) << "too fast, but no jump";
+  EXPECT_TRUE(unwrapper.jumps(multiturn(5, 824, 1ms)));
+  EXPECT_TRUE(unwrapper.jumps(multiturn(4, 200, 1ms)));
   EXPECT_TRUE(unwrapper.jumps(multiturn(6, 0, 1ms)));
   EXPECT_FALSE(unwrapper.jumps(multiturn(6, 0, 5ms)));
   Reading damaged = multiturn(6, 0, 1ms);
@@ -145,9 +145,9 @@ TEST(Unwrapper, KnowsWhatNoCarriageDoes) {
   reading.unit_um = 1;
   unwrapper.add(reading);
   reading.latched = 9ms;
-  for (const std::uint64_t counts : {20'004u, 20'005u}) {
+  for (const std::uint64_t counts : {40'004u, 40'005u}) {
     reading.singleturn = counts;
-    EXPECT_EQ(unwrapper.jumps(reading), counts == 20'005u);
+    EXPECT_EQ(unwrapper.jumps(reading), counts == 40'005u);
   }
 }
 
