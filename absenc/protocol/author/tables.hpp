@@ -44,9 +44,9 @@ struct TablesOf {
     Buffer<OptionValue, maximum_options> made;
     const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {
       const std::size_t option = Definition::options.find(name);
-      std::int64_t value = 0;
-      return option < Definition::options.infos.size() && to_value(Definition::options.infos[option], text, value) &&
-             made.push_back({option, value});
+      if (option == Definition::options.infos.size()) return false;
+      const Result<std::int64_t> value = parse_value(Definition::options.infos[option], text);
+      return value && made.push_back({option, *value});
     });
     if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
     return made;

@@ -36,31 +36,13 @@ void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t equals = text.find('=');
-    if (equals == std::string_view::npos) return false;
+    const std::size_t equals = text.find('=');  // or behind every end
     const std::size_t next = text.find('=', equals + 1);
     const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
     if (end < equals || end > text.size()) return false;
     if (!take(text.substr(0, equals), text.substr(equals + 1, end - equals - 1))) return false;
     text.remove_prefix(end < text.size() ? end + 1 : end);
   }
-  return true;
-}
-
-/// A whole number, decimal or 0x hexadecimal.
-constexpr bool to_number(std::string_view text, std::int64_t& number) {
-  const bool negative = text.starts_with('-');
-  if (negative) text.remove_prefix(1);
-  const bool hex = text.starts_with("0x");
-  if (hex) text.remove_prefix(2);
-  if (text.empty()) return false;
-  number = 0;
-  for (const char c : text) {
-    const int digit = hex_digit(c);
-    if (digit < 0 || (!hex && digit > 9)) return false;
-    number = number * (hex ? 16 : 10) + digit;
-  }
-  if (negative) number = -number;
   return true;
 }
 
@@ -85,33 +67,6 @@ constexpr bool to_real(std::string_view text, double& number) {
   return true;
 }
 
-/// A decimal number, with a point or without, in units of its `decimals`th digit behind the point.
-constexpr bool to_decimal(std::string_view text, unsigned decimals, std::int64_t& number) {
-  const std::size_t point = text.find('.') < text.size() ? text.find('.') : text.size();
-  const std::string_view fraction = point < text.size() ? text.substr(point + 1) : std::string_view{};
-  if (fraction.size() > decimals || !to_number(text.substr(0, point), number)) return false;
-  for (unsigned i = 0; i < decimals; ++i) {
-    const char digit = i < fraction.size() ? fraction[i] : '0';
-    if (digit < '0' || digit > '9') return false;
-    number = number * 10 + (digit - '0');
-  }
-  return true;
-}
-
-/// The value of an option: a number, or one of its choices.
-constexpr bool to_value(const Option& option, std::string_view text, std::int64_t& value) {
-  if (option.choices.empty()) {
-    return to_decimal(text, option.decimals, value) && value >= option.minimum && value <= option.maximum &&
-           (value - option.minimum) % option.step == 0;
-  }
-  for (std::size_t i = 0; i < option.choices.size(); ++i) {
-    if (option.choices[i] != text) continue;
-    value = static_cast<std::int64_t>(i);
-    return true;
-  }
-  return false;
-}
-
 /// What a VectorText says, where a Vector can point to. When it says nothing that can be understood, it does not
 /// compile.
 struct VectorParts {
@@ -124,9 +79,8 @@ struct VectorParts {
     }
     if (error != Error::none) return;
     const bool good = for_each_value(text.fields, [&](std::string_view name, std::string_view value) {
-      std::int64_t number = 0;
       double real = 0;
-      if (to_number(value, number)) return fields.push_back({.field = name, .number = number});
+      if (const auto number = parse_number(value)) return fields.push_back({.field = name, .number = *number});
       if (to_real(value, real)) return fields.push_back({.field = name, .real = real});
       return fields.push_back({.field = name, .text = value});
     });

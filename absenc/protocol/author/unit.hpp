@@ -272,8 +272,10 @@ struct UnitOf {
     for (const OptionValue& one : model) values.values[one.option] = one.value;
     return for_each_value(text, [&](std::string_view name, std::string_view value) {
       const std::size_t option = Definition::options.find(name);
-      return option < Definition::options.infos.size() &&
-             to_value(Definition::options.infos[option], value, values.values[option]);
+      if (option == Definition::options.infos.size()) return false;
+      const Result<std::int64_t> parsed = parse_value(Definition::options.infos[option], value);
+      if (parsed) values.values[option] = *parsed;
+      return parsed.error() == Error::none;
     });
   }
   static constexpr bool agrees(const Model& model, const Options& values) {
