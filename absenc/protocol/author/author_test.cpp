@@ -10,6 +10,7 @@
 #include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/scan.hpp"
 #include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/author/text.hpp"
 
 namespace absenc::author {
 namespace {
@@ -279,6 +280,31 @@ TEST(Scan, AsksEachAddress) {
   silent.run(alone);
   EXPECT_EQ(alone.error(), Error::timeout);
 }
+
+TEST(Text, ValuesAreNamed) {
+  const auto told = [](std::string_view text) {
+    std::string all;
+    const bool good = for_each_value(text, [&all](std::string_view name, std::string_view value) {
+      all += std::string(name) + "=" + std::string(value) + ";";
+      return name != "last";
+    });
+    return all + (good ? "good" : "bad");
+  };
+  EXPECT_EQ(told(""), "good");
+  EXPECT_EQ(told("a=1 name=two words b="), "a=1;name=two words;b=;good");
+  EXPECT_EQ(told("a=1 last=2 b=3"), "a=1;last=2;bad");
+  for (const std::string_view none : {"a", "a=b=c", "a b=c=d"}) EXPECT_EQ(told(none), "bad") << none;
+}
+
+TEST(Text, RealNumbersHaveAPoint) {
+  double number = 0;
+  EXPECT_TRUE(to_real("-12.25", number));
+  EXPECT_EQ(number, -12.25);
+  for (const std::string_view none : {"", "12", "1.2.3", "1.5x"}) EXPECT_FALSE(to_real(none, number)) << none;
+}
+
+// 0.02 degrees in the time between two looks are 0.33 rpm.
+TEST(Standstill, ShowsAThirdOfARevolutionAMinute) { EXPECT_EQ(standstill_millidegrees * (1s / between_looks), 2000); }
 
 static_assert(is_near(0, 1, 14) && is_near(16383, 0, 14) && !is_near(0, 2, 14));
 static_assert(is_near(0, 466, 23) && !is_near(0, 467, 23));  // 0.02 degrees

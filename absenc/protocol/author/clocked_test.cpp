@@ -41,6 +41,7 @@ class Host final : public ClockedHostOf<Toy> {
   void clocked(BitView bits) override {
     seen.push_back(bits.size);
     const Error error = take(bits);
+    if (error == Error::none) keep(found());
     if (error != Error::none || seen.size() > found()) return conclude(error);
     clock(16 + found());
   }
@@ -69,6 +70,7 @@ std::string run(Host& host, const std::vector<std::vector<std::uint8_t>>& transf
 
 TEST(ClockedEngine, ClocksWhenTheClockHasRested) {
   Host host({});
+  EXPECT_EQ(host.reading(), nullptr);
   EXPECT_EQ(run(host, {{0, 7, 7, 7}}), "8 at 1030 done");  // what was not asked for is not kept
   EXPECT_EQ(host.error(), Error::none);
   ASSERT_NE(host.reading(), nullptr);
