@@ -185,7 +185,8 @@ class Tree:
         """Of each source the constants that are functions in it: all of a folder that use one must be able to."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
-            users = [*path.parent.rglob("*.hpp"), *path.parent.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
+            folder = path.parent.parent if path.parent.name == "author" else path.parent  # all units stand on it
+            users = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
             users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]
             if all(mutant_rules.as_functions(user.read_text(encoding="utf-8"), {name}) is not None for user in users):
                 for user in users:
