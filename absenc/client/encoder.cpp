@@ -102,9 +102,10 @@ Answer Encoder::run(std::string_view name, std::span<const std::int64_t> argumen
   return std::move(sink.answer);
 }
 
-void Encoder::end_when(std::function<bool()> over) {
-  over_ = std::move(over);
-  connection_->end_when([cancelled = cancelled_.get(), over = over_] { return cancelled->load() || (over && over()); });
+std::function<bool()> Encoder::end_when(std::function<bool()> over) {
+  over_.swap(over);
+  connection_->end_when([cancelled = cancelled_.get(), now = over_] { return cancelled->load() || (now && now()); });
+  return over;
 }
 
 void Encoder::wait_until(Time time) const {

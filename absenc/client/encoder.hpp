@@ -104,8 +104,8 @@ class Encoder {
   void cancel();
 
   /// Waiting, also for the time of the next sample, ends with Cancelled also from the moment on in which `over` is
-  /// true. Empty: never.
-  void end_when(std::function<bool()> over);
+  /// true. Empty: never. Returns what was so before.
+  std::function<bool()> end_when(std::function<bool()> over);
 
   /// The position starts again from the next reading: after a command that moves the zero.
   void forget_position();

@@ -32,6 +32,21 @@ std::string date_and_time() {
                      milliseconds);
 }
 
+// Lets what waits for an encoder end at a time too.
+class EndAt {
+ public:
+  EndAt(Encoder& encoder, Time end) : encoder_(encoder), before_(encoder.end_when({})) {
+    encoder.end_when([end, this] { return os::now() >= end || (before_ && before_()); });
+  }
+  EndAt(const EndAt&) = delete;
+  EndAt& operator=(const EndAt&) = delete;
+  ~EndAt() { encoder_.end_when(std::move(before_)); }
+
+ private:
+  Encoder& encoder_;
+  std::function<bool()> before_;
+};
+
 }  // namespace
 
 Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
@@ -56,8 +71,9 @@ RecordCounts Recording::counts() const {
 
 bool Recording::run(const std::function<void(const Sample&)>& heard) {
   const Time end = settings_.duration ? start_ + *settings_.duration : never;
-  encoder_.end_when([end] { return os::now() >= end; });
+  const EndAt end_at(encoder_, end);
   Pace pace(settings_.rate_hz);
+  encoder_.period_ = pace.period();
   pace.start_at(start_);
   Sample sample;
   const auto tell_missed = [&] {
@@ -80,7 +96,6 @@ bool Recording::run(const std::function<void(const Sample&)>& heard) {
   } catch (const os::Interrupted&) {
   } catch (const Cancelled&) {
   }
-  encoder_.end_when({});
   if (!has_all) pace.leave_out(end);  // the end may have come while a reading was taken
   tell_missed();
   write_gap();
@@ -166,6 +181,12 @@ void Recording::take(const Sample& sample) {
   const std::uint64_t is_failure = sample.kind == Sample::Kind::failed ? 1 : 0;
   file_->append(rows_.of(sample), {.readings = is_reading, .failures = is_failure});
   taken_ += is_reading;
+}
+
+std::vector<std::string> Recording::paths() const {
+  std::vector<std::string> paths;
+  for (unsigned part = 1; part <= part_; ++part) paths.push_back(part_path(part));
+  return paths;
 }
 
 std::string Recording::names() const {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/record_counts.hpp"
@@ -38,9 +39,9 @@ class Recording {
   Recording(const RecordingSettings& settings, Encoder& encoder);
   ~Recording();
 
-  /// Reads and writes until the settings end it, or Encoder::cancel, or an interrupt does; then waits for the disk.
-  /// `heard` is called with each sample once it is written. When the port is lost it waits for it to come back; both
-  /// are lines, and so are readings that were due and could not be taken. Returns whether the last sample was a
+  /// Reads and writes until the settings end it, or Encoder::cancel, end_when, or an interrupt does; then waits for the
+  /// disk. `heard` is called with each sample once it is written. When the port is lost it waits for it to come back;
+  /// both are lines, and so are readings that were due and could not be taken. Returns whether the last sample was a
   /// reading. Throws os::Failure: the disk, and `lost` when the file was removed or replaced; UsageError, Failure.
   bool run(const std::function<void(const Sample&)>& heard = {});
 
@@ -48,6 +49,8 @@ class Recording {
   [[nodiscard]] RecordCounts counts() const;
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] Time start() const { return start_; }  // of os::now
+  /// The file, or its parts so far in their order.
+  [[nodiscard]] std::vector<std::string> paths() const;
   /// "log.csv", or "log-0001.csv to log-0003.csv"
   [[nodiscard]] std::string names() const;
 

@@ -24,10 +24,10 @@ SampleRows::SampleRows(const Unit& unit, const Options& options, Time start, Wit
   confirmed_ = add({"confirmed", "", Type::boolean, "two readings in a row agreed", detail});
   ok_ = add({"ok", "", Type::boolean, "whether it is a reading", detail});
   if (with == With::motion) add_motion();
-  event_ =
-      add({"event", "", Type::text,
-           "empty for a reading; restarted: it jumped, or came so long after the one before that the way between them is "
-           "not known: position starts again; lost or back: the port; gap; otherwise the error that came in its place"});
+  event_ = add(
+      {"event", "", Type::text,
+       "empty for a reading; restarted: it jumped, or came so long after the one before that the way between them is "
+       "not known: position starts again; lost or back: the port; gap; otherwise the error that came in its place"});
   message_ = add({"message", "", Type::text, "the event in words", detail});
   sent_ = add({"sent", "", Type::text, "of a reading that failed", detail});
   received_ = add({"received", "", Type::text, "of a reading that failed", detail});

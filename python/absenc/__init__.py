@@ -7,6 +7,7 @@
         print(encoder.read().angle_deg)
         for sample in encoder.samples(rate=100, count=1000):
             print(sample.time_s, sample.position, sample.speed)
+        encoder.record("log.h5", seconds=60)   # also .csv and .jsonl
 
     with absenc.emulate("tformat", motion="rpm=60") as virtual:
         virtual.raise_alarm("over_heat")       # the drive under test opens virtual.path
@@ -14,7 +15,7 @@
 
     capture = absenc.decode("drive.sr", "tformat", channel="D0")
     capture["angle_deg"].mean()                # NumPy, masked where nothing was told or it does not hold
-    recording = absenc.load("log.csv")         # of `absenc record`: columns as of a capture
+    recording = absenc.load("log.h5")          # also of `absenc record`: columns as of a capture
     recording["speed_rpm"][recording.good()]
 
 Encoders are written as for the command: "tformat:/dev/ttyUSB0?model=23-bit", "raa38-can:can0", "sim:esl", or a name of
@@ -27,7 +28,7 @@ from . import errors
 from ._absenc import Reading, Sample, __version__
 from .captures import Capture, Column, decode, decode_batches
 from .emulation import Emulation, emulate
-from .encoder import Alarm, Config, Encoder, Info, Memory, Samples, open, scan
+from .encoder import Alarm, Config, Encoder, Info, Memory, Recorded, Samples, open, scan
 from .errors import AbsencError, EncoderError, Failure, PortError, UsageError
 from .identification import Found, Identified, identify
 from .protocols import Command, Flag, Protocol, crc, protocol
@@ -52,6 +53,7 @@ __all__ = [
     "PortError",
     "Protocol",
     "Reading",
+    "Recorded",
     "Recording",
     "Sample",
     "Samples",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import NamedTuple, Optional
+from typing import NamedTuple, Optional, Union
 
 from . import _absenc
 from ._absenc import Reading, Sample
@@ -28,6 +29,17 @@ class Info(NamedTuple):
     options: list[str]  #: "name=value"
     answers: dict[str, dict[str, Field]]  #: what it answered, by command
     failures: dict[str, EncoderError]  #: which commands it did not answer
+
+
+class Recorded(NamedTuple):
+    """What a recording wrote."""
+
+    paths: list[str]  #: the file, or its parts in their order
+    readings: int
+    failures: int  #: attempts to read
+    gaps: int
+    missed: int  #: readings that were due and not taken, in these gaps
+    bytes: int
 
 
 class Samples:
@@ -143,6 +155,26 @@ class Encoder:
         """Readings with position beyond the end of the counter, and speed. `rate` in readings a second, 0: as fast as
         can be; `count` 0: without end."""
         return Samples(self._encoder, rate, count)
+
+    def record(
+        self,
+        path: Union[str, os.PathLike[str]],
+        *,
+        rate: float = 100,
+        every: int = 1,
+        count: int = 0,
+        seconds: Optional[float] = None,
+        part_bytes: Optional[int] = None,
+        part_seconds: Optional[float] = None,
+    ) -> Recorded:
+        """Writes readings to a new file for `load`: "log.csv", "log.jsonl" (JSON lines), "log.h5" (HDF5). `rate`
+        readings a second, 0: as fast as can be; of `every` so many one is written, and each with other alarms than the
+        one before. Ends after `count` of them or `seconds`, by `close` in another thread, or by Ctrl-C, which is raised
+        once all is on the disk. Losses of the port and readings that could not be taken are rows. After `part_bytes` or
+        `part_seconds` another file is begun: "log-0001.csv", "log-0002.csv". Raises UsageError, PortError."""
+        return Recorded(
+            *self._encoder.record(os.fspath(path), rate, every, count, seconds, part_bytes, part_seconds)
+        )
 
     def run(self, command: str, *values: int, **arguments: int) -> dict[str, Field]:
         """A command of the unit (`commands`), what it told by field. Nobody is asked, even if it changes the encoder;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absenc/client/error.hpp"
+#include "absenc/client/recording.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
 #include "absenc/client/way/connection.hpp"
@@ -307,6 +308,34 @@ std::size_t memory_write(PyEncoder& encoder, std::uint32_t address, const py::by
   });
 }
 
+std::optional<Time> time_of(std::optional<double> seconds) {
+  if (!seconds) return {};
+  if (!(*seconds > 0 && *seconds < 1e9)) throw client::UsageError("a time to record for is seconds above 0, below 1e9");
+  return Time(static_cast<std::int64_t>(1e9 * *seconds));
+}
+
+py::tuple record(PyEncoder& encoder, const std::string& path, double rate_hz, std::uint64_t every, std::uint64_t count,
+                 std::optional<double> duration, std::optional<std::uint64_t> part_bytes,
+                 std::optional<double> part_duration) {
+  if (!(rate_hz >= 0 && rate_hz <= 1e6)) throw client::UsageError("rate is 0 to 1e6 readings a second");
+  if (every == 0) throw client::UsageError("every is 1 or more: of so many readings one is written");
+  const client::RecordingSettings settings{.path = path,
+                                           .encoder = client::address_of(encoder.encoder().connection().uri()),
+                                           .rate_hz = rate_hz,
+                                           .every = every,
+                                           .count = count,
+                                           .duration = time_of(duration),
+                                           .part_bytes = part_bytes,
+                                           .part_time = time_of(part_duration)};
+  const auto [paths, counts, bytes] = encoder.use([&](client::Encoder& one) {
+    client::Recording recording(settings, one);
+    recording.run();
+    return std::tuple(recording.paths(), recording.counts(), recording.bytes());
+  });
+  encoder.check();
+  return py::make_tuple(paths, counts.readings, counts.failures, counts.gaps, counts.missed, bytes);
+}
+
 py::dict counters_of(const PyEncoder& encoder) {
   py::dict counts;
   const host::Counters& counters = encoder.encoder().counters();
@@ -402,6 +431,7 @@ void bind_encoder(py::module_& module) {
       .def("memory_read", &memory_read)
       .def("memory_dump", &memory_dump)
       .def("memory_write", &memory_write)
+      .def("record", &record)
       .def("counters", &counters_of)
       .def_property_readonly("unit", [](const PyEncoder& one) { return std::string(one.unit().id); })
       .def_property_readonly("model",

@@ -3,7 +3,9 @@
 import csv
 import json
 import os
+import signal
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 
 import absenc
 import numpy as np
@@ -89,3 +91,51 @@ def test_files_that_are_no_recordings(tmp_path):
     damaged.write_text(damaged.read_text() + "0.1,x\n")
     with pytest.raises(absenc.Failure, match="damaged"):
         absenc.load(damaged)
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
+def test_recorded_here(tmp_path, name):
+    with absenc.open("sim:tformat", motion="rpm=60") as encoder:
+        recorded = encoder.record(tmp_path / name, rate=1000, count=20)
+        assert recorded.paths == [str(tmp_path / name)]
+        assert (recorded.readings, recorded.failures) == (20, 0)
+        assert recorded.bytes == (tmp_path / name).stat().st_size
+        assert next(encoder.samples(count=1)).kind == "reading"  # it goes on
+    recording = absenc.load(tmp_path / name)
+    assert recording.good().sum() == 20
+    assert recording.header["rate_hz"] == "1000"
+    assert (np.diff(recording["position"][recording.good()]) > 0).all()
+
+
+def test_a_recording_ends_in_time_by_close_and_by_ctrl_c(tmp_path):
+    with absenc.open("sim:tformat") as encoder:
+        timed = encoder.record(tmp_path / "timed.csv", rate=50, seconds=0.2)
+        assert timed.readings + timed.missed == 10
+        with pytest.raises(KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, 0.2)
+            signal.signal(signal.SIGALRM, signal.default_int_handler)
+            encoder.record(tmp_path / "stopped.csv", rate=50)
+        assert absenc.load(tmp_path / "stopped.csv").good().any()
+        with ThreadPoolExecutor(1) as other:
+            closed = other.submit(encoder.record, tmp_path / "closed.csv", rate=50)
+            while not (tmp_path / "closed.csv").exists():
+                assert not closed.done()
+            encoder.close()
+            assert closed.result().paths == [str(tmp_path / "closed.csv")]
+
+
+def test_parts_and_what_cannot_be(tmp_path):
+    with absenc.open("sim:tformat") as encoder:
+        recorded = encoder.record(tmp_path / "log.csv", rate=0, count=300, part_bytes=10_000)
+        assert len(recorded.paths) > 1
+        assert sum(len(absenc.load(path)) for path in recorded.paths) == 300
+        for path, choices, words in [
+                ("log.txt", {}, ".csv"), ("x.csv", {"every": 0}, "every"), ("x.csv", {"rate": -1}, "rate"),
+                ("x.csv", {"seconds": 0}, "seconds")]:
+            with pytest.raises(absenc.UsageError, match=words):
+                encoder.record(tmp_path / path, **choices)
+        (tmp_path / "there.csv").touch()
+        with pytest.raises(absenc.PortError, match="there.csv"):
+            encoder.record(tmp_path / "there.csv")
+        with pytest.raises(absenc.UsageError, match="another recording"):
+            encoder.record(tmp_path / "log.csv", part_bytes=10_000)
