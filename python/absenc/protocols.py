@@ -63,8 +63,8 @@ class Protocol:
         return f"<absenc.Protocol {self.id}: {self.name}>"
 
     def decode(self, reply: Frame, *, request: Frame = b"", model: str = "", **options: Value) -> dict[str, Field]:
-        """The fields of a reply, checked as a host checks it; an empty reply: those of the request, but not on CAN, where
-        a reply is needed. Raises EncoderError: the class says what is wrong. What does not hold is None."""
+        """The fields of a reply, checked as a host checks it; of an empty reply: those of the request. Raises
+        EncoderError: the class says what is wrong. What does not hold is None."""
         return _absenc.decode_frame(self.id, _plain(reply), _plain(request), model, texts(options))
 
     def encode(self, command: str, *values: int, model: str = "", **options: Value) -> Union[bytes, str]:

@@ -15,8 +15,9 @@ namespace absenc::python {
 
 namespace {
 
-/// Bytes as they are, text as people write frames.
+/// Bytes as they are, text as people write frames; an empty one is none.
 client::WireFrame frame_of(LinkKind link, const char* what, const py::object& object) {
+  if (py::len(object) == 0) return {};
   if (py::isinstance<py::str>(object)) return client::parse_wire_text(link, what, py::cast<std::string>(object));
   if (link == LinkKind::can || link == LinkKind::clocked) {
     throw client::UsageError(std::string(what) + " must be text: \"1FF:022B\" on CAN, \"0001\" on clocked links");
@@ -32,6 +33,9 @@ py::dict decode(const std::string& name, const py::object& reply, const py::obje
   const Options options = client::require_options(unit, model, settings);
   const client::WireFrame asked = frame_of(unit.link, "request", request);
   const client::WireFrame told = frame_of(unit.link, "reply", reply);
+  if (asked.frame().empty() && told.frame().empty()) {
+    throw client::UsageError("there is nothing to decode: reply and request are empty");
+  }
   client::AnswerSink sink;
   const Error error = unit.decode(options, asked.frame(), told.frame(), sink);
   if (error == Error::none) return to_python(sink.answer);

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each unit's virtual encoder, over a pseudo-terminal where its link goes over one."""
+import json
+import os
+import subprocess
+
 import absenc
 import pytest
 
@@ -60,10 +64,34 @@ def test_requests_are_encoded_and_decoded(unit):
     assert bool(requests) == (unit.link != "clocked")
     for request in requests:
         assert isinstance(request, str if unit.link == "can" else bytes)
-        if unit.link != "can":  # where a request alone is not decoded
-            unit.decode(b"", request=request)
-            with pytest.raises(absenc.EncoderError):
-                unit.decode(b"", request=b"\xff" + request[1:] + b"\xff")
+        unit.decode("", request=request)
+        other = "7" + request[1:] if unit.link == "can" else b"\xff" + request[1:] + b"\xff"
+        with pytest.raises(absenc.EncoderError):
+            unit.decode("", request=other)
+
+
+def told(value):
+    """As JSON has it."""
+    if isinstance(value, bytes):
+        return value.hex()
+    return list(value) if isinstance(value, tuple) else value
+
+
+def test_every_vector(unit):
+    done = subprocess.run([os.environ["ABSENC"], "vectors", unit.id, "--json"], check=True, capture_output=True)
+    for vector in map(json.loads, done.stdout.splitlines()):
+        is_text = unit.link in ("can", "clocked")
+        reply, request = (text if is_text else bytes.fromhex(text) for text in (vector["response"], vector["request"]))
+        options = dict(vector["options"])
+        model = options.pop("model", "")
+        try:
+            fields = unit.decode(reply, request=request, model=model, **options)
+        except absenc.EncoderError as error:
+            assert vector.get("error") == error.name, vector
+            continue
+        assert "error" not in vector, vector
+        for name, value in vector["fields"].items():
+            assert told(fields[name]) == value, (name, vector)
 
 
 def test_alarms_of_the_virtual_encoder(unit, absenc_emulate):
