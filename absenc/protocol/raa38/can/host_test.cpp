@@ -133,6 +133,15 @@ TEST(CanCyclic, ANodeThatDoesNotObey) {
   }
 }
 
+TEST(CanCyclic, WhatWasStillUnderWayIsGoneAtTheNextLook) {
+  unsigned left = 3;
+  Scripted node([&](const CanFrame&) { return Frames{}; });
+  node.period = 400ms;
+  node.left = &left;
+  EXPECT_TRUE(ended(with(node, "stop"), Error::none));
+  EXPECT_EQ(left, 0u);
+}
+
 // ---- Zero
 
 TEST(CanZero, IsZeroAndSendsAgainAsBefore) {
