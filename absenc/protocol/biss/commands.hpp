@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <type_traits>
 
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/biss/procedures.hpp"
@@ -34,6 +35,11 @@ template <class Definition, class F>
 [[nodiscard]] constexpr auto commands_of(bool (*is_readable)(const F&)) {
   using P = ProtocolOf<F>;
   constexpr auto request = no_request<F>;
+  const auto setting = [is_readable](auto address, std::string_view name, std::string_view meaning) {
+    return author::command<Definition, P, Found, read_setting<F>, request, decltype(address)::value>(
+               {name, Verb::config_get, 0, meaning})
+        .only_if(is_readable);
+  };
   return std::array{
       author::clocked_reading<Definition, P, FindPosition<F>>(
           {"position", Verb::read, 0, "position, turns, error and warning"})
@@ -48,12 +54,16 @@ template <class Definition, class F>
                                                                        "write a register; the bank stays selected",
                                                                        write_arguments, true, false})
           .only_if(is_readable),
-      author::command<Definition, P, Found, read_bank<F>, request>(
-          {"bank", Verb::config_get, 0, "which bank addresses 0 to 63 mean"})
-          .only_if(is_readable),
+      setting(std::integral_constant<unsigned, registers::bank_select>{}, "bank", "which bank addresses 0 to 63 mean"),
       author::command<Definition, P, Found, write_bank<F>, request>(
           {"set-bank", Verb::config_set, 0, "select a bank", select_arguments, true, false, "bank"})
           .only_if(is_readable),
+      setting(std::integral_constant<unsigned, registers::eds_bank>{}, "eds-bank",
+              "the bank of its electronic data sheet; 0: none"),
+      setting(std::integral_constant<unsigned, registers::profile>{}, "profile", "the profile that it keeps to"),
+      setting(std::integral_constant<unsigned, registers::serial_number>{}, "serial-number", "its serial number"),
+      setting(std::integral_constant<unsigned, registers::device_id>{}, "device-id", "which device it is"),
+      setting(std::integral_constant<unsigned, registers::manufacturer>{}, "manufacturer", "who made it"),
       author::command<Definition, P, Found, send_command<F>, request>(
           {"control-command", Verb::run, 0, "a command of control communication", command_arguments, true, false})
           .only_if(is_readable),

@@ -51,6 +51,7 @@ struct Found {
   std::optional<bool> executed{};
   // Of procedures.
   std::optional<bool> written{};  // false: it was there already
+  std::optional<bool> missing{};  // true: it was refused; else not told
   std::optional<std::uint8_t> eds_bank{};
   std::optional<std::uint16_t> profile{};
   std::optional<std::uint64_t> serial_number{};
@@ -91,12 +92,37 @@ inline constexpr auto register_fields = author::fields_of<Found>(
     author::field<shown::acknowledged>("acknowledged", "", "who has acknowledged it"),
     author::field<&Found::executed>("executed", "", "whether the host had it executed"),
     author::field<&Found::written>("written", "", "whether it was written: what is there already is not"),
+    author::field<&Found::missing>("missing", "", "the encoder refuses to show this register: it does not have it"),
     author::field<&Found::eds_bank>("eds_bank", "", "bank of the electronic data sheet; 0: none"),
     author::field<&Found::profile>("profile", "", "of the encoder", Role::identity),
     author::field<&Found::serial_number>("serial_number", "", "of the encoder", Role::identity),
     author::field<shown::device_id>("device_id", "", "of the encoder", Role::identity),
     author::field<shown::manufacturer>("manufacturer", "", "two letters, which the BiSS Association gives",
                                        Role::identity));
+
+/// Registers that have a name, the first of them at this address.
+constexpr void tell(Found& found, RegisterOrder order, unsigned address, Bytes bytes) {
+  const std::uint64_t number = order == RegisterOrder::big ? load_big_endian(bytes) : load_little_endian(bytes);
+  switch (address) {
+    case registers::bank_select:
+      found.bank = bytes[0];
+      break;
+    case registers::eds_bank:
+      found.eds_bank = bytes[0];
+      break;
+    case registers::profile:
+      found.profile = static_cast<std::uint16_t>(number);
+      break;
+    case registers::serial_number:
+      found.serial_number = number;
+      break;
+    case registers::device_id:
+      found.device_id.append(bytes);
+      break;
+    default:
+      found.manufacturer.append(bytes);
+  }
+}
 
 /// A control frame as fields; of a request alone what it asks.
 [[nodiscard]] constexpr Found shown_by(const ControlFrame& frame, bool answered) {

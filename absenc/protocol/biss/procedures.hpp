@@ -176,14 +176,19 @@ Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments argumen
   co_return done;
 }
 
+// One that is refused is not there: that is an answer, too.
 template <class F>
-Procedure read_bank(ControlDialog<F>& dialog, Found& found) {
+Procedure read_setting(ControlDialog<F>& dialog, Found& found, unsigned address) {
   ControlMaster master;
-  ByteBuffer<control_most> selected;
-  const Error error = co_await read_registers(dialog, master, selected, registers::bank_select, 1);
-  if (error != Error::none) co_return failure_of(error);
+  ByteBuffer<control_most> bytes;
+  const Error error = co_await read_registers(dialog, master, bytes, address, registers::size_of(address));
+  if (error != Error::none && error != Error::request_rejected) co_return failure_of(error);
   found.slave_id = dialog.format().slave;
-  found.bank = selected[0];
+  if (error == Error::none) {
+    tell(found, dialog.format().register_order, address, bytes);
+  } else {
+    found.missing = true;
+  }
   co_return done;
 }
 
@@ -210,15 +215,11 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   found.slave_id = dialog.format().slave;
   found.slaves = master.frame().slaves;
   found.more_slaves = master.frame().more_slaves;
+  const RegisterOrder order = dialog.format().register_order;
   if (error == Error::none) {
-    found.eds_bank = sheet[0];
-    const auto number = [&](unsigned address, std::size_t size) {
-      const Bytes bytes = sheet.view().subspan(address - registers::eds_bank, size);
-      const bool big = dialog.format().register_order == RegisterOrder::big;
-      return big ? load_big_endian(bytes) : load_little_endian(bytes);
-    };
-    found.profile = static_cast<std::uint16_t>(number(registers::profile, 2));
-    found.serial_number = number(registers::serial_number, 4);
+    for (const unsigned address : {registers::eds_bank, registers::profile, registers::serial_number}) {
+      tell(found, order, address, sheet.view().subspan(address - registers::eds_bank, registers::size_of(address)));
+    }
   }
   ByteBuffer<control_most> names;
   error = co_await read_registers(dialog, master, names, registers::device_id, registers::end - registers::device_id);
@@ -227,8 +228,9 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
     co_return only(error, "the encoder has none of the registers that say who it is");
   }
   if (error == Error::none) {
-    found.device_id.append(names.view().first(6));
-    found.manufacturer.append(names.view().subspan(6));
+    for (const unsigned address : {registers::device_id, registers::manufacturer}) {
+      tell(found, order, address, names.view().subspan(address - registers::device_id, registers::size_of(address)));
+    }
   }
   co_return done;
 }

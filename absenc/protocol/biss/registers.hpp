@@ -21,6 +21,21 @@ inline constexpr unsigned device_id = 0x78;      // six
 inline constexpr unsigned manufacturer = 0x7E;
 inline constexpr unsigned end = 0x80;
 
+/// Of what has a name: its bytes, from this address on.
+[[nodiscard]] constexpr unsigned size_of(unsigned address) {
+  switch (address) {
+    case profile:
+    case manufacturer:
+      return 2;
+    case serial_number:
+      return 4;
+    case device_id:
+      return 6;
+    default:
+      return 1;
+  }
+}
+
 inline constexpr unsigned known_banks = 4;  // that are listed; an encoder may have up to 256, or none
 
 /// Pages are banks; what is behind the banks is on page 0. A copy of the memory is the bank that the user may write:

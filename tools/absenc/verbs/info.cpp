@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 
 #include "absenc/client/reading_columns.hpp"
 #include "absenc/client/text/row_text.hpp"
@@ -100,11 +101,12 @@ class Survey {
     answers.set(command.name, Json::object().set("ok", true).set("fields", fields.fields));
     FieldTable table;
     encoder_->report(table);
+    for (std::vector<std::string>& row : table.rows) row.front().insert(0, "  ");
+    // A setting that the identity has shown already is not shown again.
+    const auto is_shown = [&](const auto& row) { return std::find(rows.begin(), rows.end(), row) != rows.end(); };
+    if (command.verb == Verb::config_get && std::all_of(table.rows.begin(), table.rows.end(), is_shown)) return;
     add_heading(command);
-    for (std::vector<std::string>& row : table.rows) {
-      row.front().insert(0, "  ");
-      rows.push_back(std::move(row));
-    }
+    std::move(table.rows.begin(), table.rows.end(), std::back_inserter(rows));
   }
 
   void read() {
@@ -165,8 +167,11 @@ class Survey {
 
   void fail(const Command& command, const Trouble& trouble) {
     answers.set(command.name, to_json(trouble));
-    rows.push_back(
-        {std::string(command.name), "FAILED", fmt::format("{}: {}", text_of(trouble.error).name, trouble.message)});
+    const std::string why = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
+    // Nor is the same reason of one setting after the other.
+    const auto says_so = [&](const auto& row) { return row[1] == "FAILED" && row[2] == why; };
+    if (command.verb == Verb::config_get && std::any_of(rows.begin(), rows.end(), says_so)) return;
+    rows.push_back({std::string(command.name), "FAILED", why});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),
                                       [&](const Trouble& other) { return other.error == trouble.error; });
     if (!is_known) troubles.push_back(trouble);
