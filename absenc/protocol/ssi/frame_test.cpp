@@ -74,6 +74,15 @@ TEST(SsiFrame, AfterTheWord) {
   EXPECT_TRUE(decode(zero, "00000000000000"));  // position 0
 }
 
+TEST(SsiFrame, WhatHasNoRoomIsNotEncoded) {
+  BitBuffer<64> room;
+  EXPECT_TRUE(encode({}, {.position = 495}, 24, room));
+  EXPECT_FALSE(encode({}, {.position = 495}, 41, room));
+  EXPECT_EQ(room.size(), 24u);
+  EXPECT_TRUE(encode({}, {.position = 495}, 40, room));
+  EXPECT_EQ(room.size(), 64u);
+}
+
 // Good words, damaged and cut ones: a format known at compile time says the same as at run time.
 template <const Format& format>
 void agree() {

@@ -2,10 +2,15 @@
 // The host conversation and the virtual encoder against each other in virtual time.
 #include "absenc/protocol/ssi/host.hpp"
 
+#include <gmock/gmock-matchers.h>
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "absenc/protocol/biss/bench_test.hpp"
+#include "absenc/protocol/options.hpp"
 #include "absenc/protocol/ssi/device.hpp"
+#include "absenc/protocol/ssi/unit.hpp"
 
 namespace absenc::ssi {
 namespace {
@@ -98,6 +103,28 @@ TEST(SsiHost, AWordReadOnceMoreMustBeNear) {
   EXPECT_EQ(bench.run(read).error(), Error::none);
   EXPECT_NE(read.reading(), nullptr);
   EXPECT_EQ(bench.encoder.answer_count(), 2u);
+
+  // Half a turn between the two words, as of a line that is noisy.
+  bench.line.observe_transfers([&](const auto&) { bench.shaft.state.position += std::int64_t{1} << 31; });
+  ConfirmPosition jumped(format);
+  EXPECT_EQ(bench.run(jumped).error(), Error::cross_check_failed);
+  EXPECT_EQ(jumped.reading(), nullptr);
+}
+
+TEST(SsiHost, SaysWhatToDo) {
+  const auto said = [](Error error, std::vector<OptionText> texts) {
+    Options options;
+    EXPECT_EQ(resolve_options(unit, {}, texts, options).kind, OptionError::Kind::none);
+    return unit.explain(options, error, {}, {}).detail;
+  };
+  using ::testing::HasSubstr;
+  EXPECT_THAT(said(Error::cross_check_failed, {}), HasSubstr("number of bits may be wrong"));
+  EXPECT_THAT(said(Error::cross_check_failed, {{"confirm_rpm", "6000"}}), HasSubstr("cannot have reached"));
+  EXPECT_THAT(said(Error::bad_checksum, {}), HasSubstr("parity"));
+  EXPECT_THAT(said(Error::out_of_range, {{"tree_turns", "12"}, {"tree_steps", "13"}}), HasSubstr("fills the word up"));
+  // Of these there is nothing that only SSI knows.
+  for (const Error error : {Error::line_stuck, Error::wrong_length, Error::out_of_range})
+    EXPECT_EQ(said(error, {}), "");
 }
 
 TEST(SsiHost, AnErrorThatTheParityTellsIsNoPosition) {
