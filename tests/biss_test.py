@@ -222,6 +222,26 @@ class Registers(Case):
         self.assertEqual(positions, [row["fields"]["singleturn"] for row in rows if row["kind"] == "reply"])
 
 
+class Start(Case):
+    def test_an_encoder_that_waits_for_its_start_is_started(self):
+        for encoder in ("sim:biss?start_sequence=true", "sim:biss-safety?start_sequence=true",
+                        "sim:biss-chain?slaves=8&start_sequence=true"):
+            with self.subTest(encoder):
+                self.assert_good(absenc("read", encoder, "--count", "3", "--json"))
+                self.assert_good(absenc("config", "get", encoder, "serial-number"))
+
+    def test_a_capture_shows_two_pulses_and_then_frames(self):
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, "start.vcd")
+            self.assert_good(absenc("wave", "biss?start_sequence=true", path, "--count", "2"))
+            rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+        self.assertEqual([(len(row["reply"]), row["ok"]) for row in rows],
+                         [(41, False), (2, False), (41, True), (41, True)])
+        # 40 us before the pulses, and behind them: SLO is sampled at the end of half a clock.
+        for before, after in zip(rows[:2], rows[1:]):
+            self.assertAlmostEqual(after["time_s"] - before["end_s"], 40.5e-6, delta=0.1e-6)
+
+
 class ChangedRegisters(Case):
     def test_a_dump_is_loaded_and_verified(self):
         with tempfile.TemporaryDirectory(prefix="absenc-test-") as folder:
@@ -244,6 +264,31 @@ class ChangedRegisters(Case):
     def test_the_bank_is_a_setting(self):
         answer = json.loads(absenc("config", "set", "sim:biss", "bank", "2", "--yes", "--json").stdout)
         self.assertEqual((answer["old"]["bank"], answer["new"]["bank"]), (0, 2))
+
+    def test_registers_that_have_a_name_are_settings(self):
+        for chain, slave in (("sim:biss", 0), ("sim:biss-chain?slaves=3&slave=2", 2), ("sim:biss-safety?slave=1", 1)):
+            result = absenc("config", "get", chain, "--json")
+            self.assert_good(result)
+            settings = json.loads(result.stdout)["settings"]
+            self.assertEqual({name: fields[name.replace("-", "_")] for name, fields in settings.items()},
+                             {"bank": 0, "eds-bank": 3, "profile": 0, "serial-number": slave + 1,
+                              "device-id": b"Absenc".hex(), "manufacturer": b"ve".hex()})
+            self.assertEqual({fields["slave_id"] for fields in settings.values()}, {slave})
+
+    def test_those_that_say_who_it_is_can_only_be_read(self):
+        for name in ("eds-bank", "profile", "serial-number", "device-id", "manufacturer"):
+            refused = absenc("config", "set", "sim:biss", name, "1", "--yes")
+            self.assert_wrong_usage(refused, f"{name} of biss can only be read")
+
+    def test_info_shows_them_once(self):
+        shown = absenc("info", "sim:biss").stdout
+        for name in ("serial_number", "eds_bank", "device_id", "manufacturer", "profile"):
+            self.assertEqual(shown.count(f"  {name} "), 1, shown)
+        self.assertNotIn("serial-number", shown)
+        self.assertIn("\n  bank ", shown)
+        silent = absenc("info", "sim:biss?slave=3")
+        self.assertEqual((silent.returncode, silent.stdout.count("FAILED")), (1, 2), silent.stdout)
+        self.assertIn("say slave=N", silent.stderr)
 
     def test_a_command_is_acknowledged(self):
         answer = json.loads(absenc("run", "sim:biss", "control-command", "1", "0", "--yes", "--json").stdout)

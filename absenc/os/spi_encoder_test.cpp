@@ -70,7 +70,7 @@ TEST_F(SpiEncoder, Biss) {
   for (const std::uint32_t rate : {200'000u, 1'000'000u, 4'000'000u}) {
     shaft.state.position += 0x1'8673'2468;
     biss::Format clocked = format;
-    clocked.ma_khz = rate / 1000;
+    clocked.ma_khz = static_cast<std::uint16_t>(rate / 1000);
     biss::ReadPosition read(clocked);
     ASSERT_TRUE(run(read, port));
     ASSERT_EQ(read.error(), Error::none) << rate;

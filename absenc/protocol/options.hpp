@@ -50,7 +50,7 @@ struct Model {
   std::span<const OptionValue> values;
 };
 
-inline constexpr std::size_t maximum_options = 64;
+inline constexpr std::size_t maximum_options = 65;  // nine of biss-chain, and seven of each of its eight words
 
 /// What a word format is given as, beside the options of units that take one.
 inline constexpr std::string_view word_option_name = "word";

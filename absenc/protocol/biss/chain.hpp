@@ -17,6 +17,7 @@ struct ChainFormat {
   std::uint8_t slave = 0;  // whose position a reading shows, and whose registers are meant
   RegisterOrder register_order = RegisterOrder::big;
   std::uint16_t register_delay_us = 0;
+  bool start_sequence = false;
   // As in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;

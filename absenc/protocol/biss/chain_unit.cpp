@@ -110,6 +110,8 @@ constexpr auto options_of_chain = std::apply(
             option<&ChainSettings::register_delay_us>(
                 "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
                 65'535),
+            option<&ChainSettings::start_sequence>(
+                "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence"),
         },
         options_of_channels(EveryChannel{})));
 

@@ -18,7 +18,8 @@ struct Behaviour {
   Time line_delay{};       // there and back; SLO is sampled one period of MA after the edge that drives it
   Time edge_noise = 20ns;  // a sample so near to a delayed edge is the old bit or the new one
   Time timeout = 20us;
-  Time register_delay{};  // from what asks for a register to its start bit
+  Time register_delay{};        // from what asks for a register to its start bit
+  bool start_sequence = false;  // without it after power on SLO stays idle
 };
 
 using Samples = author::DrivenBits;
@@ -127,7 +128,8 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       : VirtualEncoderOf(format, shaft,
                          {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
                           .line_delay = format.line_delay,
-                          .register_delay = std::chrono::microseconds(format.register_delay_us)}) {}
+                          .register_delay = std::chrono::microseconds(format.register_delay_us),
+                          .start_sequence = format.start_sequence}) {}
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour),
         slaves_(slaves_of(format)),
@@ -147,6 +149,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       return;
     }
     expect(period / 2 < behaviour.timeout, "MA slower than the BiSS timeout allows", at);
+    if (behaviour.start_sequence && !woken_) return;
     registers_.set_time(at, behaviour.register_delay);
     const std::uint32_t written = registers_.written();
     if (clocked_before_) slaves_.take(held_low, registers_);
@@ -156,7 +159,10 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     needed_ = clocks(encoder_.format(), behaviour.latency, period);
   }
   void clocked(Time at, std::size_t clocks) override {
-    if (needed_ > 0) {
+    // Nobody tells a host whether it is needed.
+    if (is_start_sequence(clocks)) {
+      woken_ = true;
+    } else if (needed_ > 0) {
       expect(clocks >= needed_, "fewer clocks than the frame has bits", at);
       count_answer();
     }
@@ -167,7 +173,10 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     registers_.power_on();
     slaves_.reset();
     clocked_before_ = false;
+    woken_ = false;
   }
+  // An SPI controller clocks whole bytes.
+  static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
 
   EncoderOf<F> encoder_;
   ControlSlaves slaves_;
@@ -175,6 +184,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   unsigned needed_ = 0;  // clocks of this frame; 0: there is none
   Time free_at_{};       // the timeout after the last clock
   bool clocked_before_ = false;
+  bool woken_ = false;  // by the start sequence
 };
 using VirtualEncoder = VirtualEncoderOf<Format>;
 

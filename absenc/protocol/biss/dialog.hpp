@@ -58,8 +58,10 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     this->clock(extended_ ? ProtocolOf<F>::all_clocks(format) : ProtocolOf<F>::clocks(format), cdm_);
   }
   void clocked(BitView samples) final {
-    ++frames_;
+    if (start_.was_given()) return go_on();
     last_ = detail::decoded(this->format(), samples, Cds::any);
+    if (start_.is_due(last_.error())) return this->clock(start_pulses);
+    ++frames_;
     if (!extended_ && needs_more(last_.error(), samples)) extended_ = true;
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
@@ -85,6 +87,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
 
   Result<Reply> last_ = Error::timeout;
   LateFrames late_;
+  StartSequence start_;
   std::uint32_t frames_ = 0;
   std::uint32_t bad_frames_ = 0;
   int life_counter_ = -1;

@@ -25,6 +25,7 @@ inline constexpr unsigned idle_bits = 2;  // SLO goes low on the second rising e
 inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
 inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
+inline constexpr unsigned start_pulses = 2;     // of MA after power on, with 40 us before and behind them
 
 /// Of registers that are one number.
 enum class RegisterOrder : std::uint8_t { big, little };
@@ -34,18 +35,19 @@ struct Format {
   WordFormat word = "position:19 error:1! warning:1!"_word;
   Check check{};
   Scale scale{};
-  std::uint32_t ma_khz = 1000;  // 10 to 10 000
-  // Of registers, in no more memory than a reader of positions has without them.
+  std::uint16_t ma_khz = 1000;  // 10 to 10 000
+  // Of registers and the start, in no more memory than a reader of positions has without them.
   std::uint8_t slave = 0;  // whose are meant: 0 to 7, counted from the end of the chain
   RegisterOrder register_order = RegisterOrder::big;
   std::uint16_t register_delay_us = 0;  // of the virtual encoder: until a register that was asked for is there
+  bool start_sequence = false;          // of the virtual encoder: it shows nothing before it
   Time latency = 10us;                  // the longest that the encoder needs, up to 1 ms: makes the number of clocks
   // Of the virtual encoder.
   Time ready{};  // what it needs itself; 0: as `latency`, but at most 10 us
   Time line_delay{};
 
   /// Of MA.
-  [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
+  [[nodiscard]] constexpr Time period() const { return Time((1'000'000u + ma_khz / 2u) / ma_khz); }
 };
 
 /// Turns and position, nError, nWarning.

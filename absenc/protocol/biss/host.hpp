@@ -36,7 +36,7 @@ struct ProtocolOf {
   static constexpr unsigned most_clocks = 512;
 
   static constexpr author::ClockedHostTimes host_times(const F& format) {
-    return {format.ma_khz * 1000, timeout_maximum};
+    return {std::uint32_t{format.ma_khz} * 1000, timeout_maximum};
   }
   static constexpr unsigned clocks(const F& format) { return biss::clocks(format, format.latency, format.period()); }
   /// Of a frame whose delay is not known.
@@ -68,8 +68,25 @@ class LateFrames {
   unsigned seen_ = 0;
 };
 
+/// After power on an encoder may wait for two pulses of MA, with 40 us before and behind them, and show nothing until
+/// then. Nobody tells a host when that was: it gives them where its first frame brings nothing, once.
+class StartSequence {
+ public:
+  /// What came of a frame was this.
+  [[nodiscard]] bool is_due(Error error) {
+    given_ = std::exchange(first_, false) && error == Error::line_stuck;
+    return given_;
+  }
+  /// Whether this transfer were the pulses, behind which the frame is clocked anew.
+  [[nodiscard]] bool was_given() { return std::exchange(given_, false); }
+
+ private:
+  bool first_ = true;
+  bool given_ = false;
+};
+
 /// One frame; where there are life counters two, which must follow each other (sequence_mismatch). With `finds`, more
-/// clocks are given where the line, or the encoder, takes longer than was thought.
+/// clocks are given where the line, or the encoder, takes longer than was thought, and the start sequence.
 template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
@@ -81,9 +98,13 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
 
  private:
   void clocked(BitView samples) final {
+    if constexpr (finds) {
+      if (start_.was_given()) return this->ask();
+    }
     const int before = life_counter_of(this->format(), this->found());
     const Error error = this->take(samples);
     if constexpr (finds) {
+      if (start_.is_due(error)) return this->clock(start_pulses);
       const unsigned head = this->found().delay_bits + this->found().ack_bits;
       const bool expected = tries_ == 0 && head <= ack_bits(this->format().latency, this->format().period());
       const bool late = error == Error::none ? !expected && !late_.is_again(head) : needs_more(error, samples);
@@ -103,6 +124,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   bool second_ = false;
   std::uint8_t tries_ = 0;
   [[no_unique_address]] std::conditional_t<finds, LateFrames, author::Later> late_{};
+  [[no_unique_address]] std::conditional_t<finds, StartSequence, author::NoRequest> start_{};
 };
 /// What a drive that knows its line repeats.
 using ReadPosition = PositionReader<Format, false>;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <vector>
 
 #include "absenc/protocol/biss/bench_test.hpp"
@@ -34,12 +35,12 @@ TEST(BissHost, ReadsAtTheFirstFallingEdge) {
 }
 
 TEST(BissHost, AckFollowsTheClock) {
-  for (const std::uint32_t khz : {100u, 1'000u, 4'400u, 6'000u, 10'000u}) {
+  for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 6'000, 10'000})) {
     const Format format{.word = turns_19.word, .ma_khz = khz};
     Bench bench(line_settings, format);
     ReadPosition read(format);
     ASSERT_EQ(bench.run(read).error(), Error::none) << khz;
-    EXPECT_EQ(read.found().ack_bits, ack_bits(10us, LineSettings{.rate = khz * 1000}.bits(1)));
+    EXPECT_EQ(read.found().ack_bits, ack_bits(10us, LineSettings{.rate = khz * 1000u}.bits(1)));
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
   }
 }
@@ -89,6 +90,61 @@ TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
     EXPECT_EQ(read.found().ack_bits, 30u);
     EXPECT_EQ(read.found().delay_bits, delay / 1us);
   }
+}
+
+// README, timing: a host that nobody told otherwise gives the clocks of an encoder that needs 10 us.
+template <class F>
+void expect_ten_microseconds() {
+  testing::ClockedBench<VirtualEncoderOf<F>> bench(line_settings, F{}, Behaviour{.latency = 10us});
+  PositionReader<F, false> read(F{});
+  EXPECT_EQ(bench.run(read).error(), Error::none);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+}
+TEST(BissHost, TenMicrosecondsAreAssumed) {
+  expect_ten_microseconds<Format>();
+  expect_ten_microseconds<SafetyFormat>();
+  expect_ten_microseconds<ChainFormat>();
+}
+
+// After power on: 40 us, two pulses, 40 us, and only then a frame.
+TEST(BissHost, GivesTheStartSequenceWhereNothingComes) {
+  Format format = turns_19;
+  format.start_sequence = true;
+  Bench bench(line_settings, format);
+  std::vector<sim::Line<std::uint8_t>::Transfer> seen;
+  std::vector<std::size_t> clocks;
+  bench.line.observe_transfers([&](const sim::Line<std::uint8_t>::Transfer& one) {
+    seen.push_back(one);
+    clocks.push_back(one.bits);
+  });
+  const std::size_t frame = ProtocolOf<Format>::clocks(format);
+  FindPosition<Format> first(format);
+  ASSERT_EQ(bench.run(first).error(), Error::none);
+  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame}));
+  ASSERT_EQ(seen.size(), 3u);
+  for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_EQ(seen[i].start - seen[i - 1].end, 40us);
+  EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  EXPECT_EQ(bench.encoder.answer_count(), 1u);
+
+  clocks.clear();
+  FindPosition<Format> again(format);
+  ASSERT_EQ(bench.run(again).error(), Error::none);
+  EXPECT_EQ(clocks, std::vector<std::size_t>{frame});
+
+  bench.encoder.power_off(bench.line.now());
+  bench.encoder.power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::skip);
+  clocks.clear();
+  ReadPosition plain(format);
+  EXPECT_EQ(bench.run(plain).error(), Error::line_stuck);
+  FindPosition<Format> found(format);
+  EXPECT_EQ(bench.run(found).error(), Error::none);
+  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, frame, start_pulses, frame}));
+
+  bench.encoder.power_off(bench.line.now());
+  clocks.clear();
+  FindPosition<Format> nobody(format);
+  EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
+  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame}));  // once
 }
 
 TEST(BissHost, SaysWhatToDo) {

@@ -47,7 +47,7 @@ Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
 }
 
 [[nodiscard]] constexpr Outcome failure_of(Error error) {
-  if (error == Error::timeout) return only(error, no_registers);
+  if (error == Error::timeout) return only(error, no_registers, "read positions without them, or say slave=N");
   if (error == Error::request_rejected) return only(error, refused);
   if (error == Error::busy) return only(error, "the encoder does not begin to answer within 40 ms");
   return {.error = error, .detail = "the registers were not read"};

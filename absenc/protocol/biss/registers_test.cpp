@@ -247,10 +247,76 @@ TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
   EXPECT_EQ(host.machine.found().wrong, 0u);
 }
 
-struct Asked final : author::Run<Protocol, Found, read_info<Format>> {
-  using author::Run<Protocol, Found, read_info<Format>>::Run;
+template <auto procedure, auto... bound>
+struct Asking final : author::Run<Protocol, Found, procedure, bound...> {
+  using author::Run<Protocol, Found, procedure, bound...>::Run;
   void report(FieldSink&) const override {}
 };
+using Asked = Asking<read_info<Format>>;
+
+/// What a host asks one encoder after the other.
+struct Questions {
+  explicit Questions(const Format& of = bits_24) : format(of), encoder(of, motion) {
+    encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    line.attach(sim::Role::device, encoder);
+  }
+  template <auto procedure, auto... bound>
+  Found ask(std::initializer_list<std::int64_t> arguments = {}, Error expected = Error::none) {
+    std::vector<std::byte> storage(4096);
+    Asking<procedure, bound...> asking(format, {arguments.begin(), arguments.size()}, storage);
+    if (node == none) {
+      node = line.attach(sim::Role::host, asking);
+    } else {
+      line.replace(node, asking);
+    }
+    EXPECT_TRUE(line.run(node, line.now() + 10s));
+    EXPECT_EQ(asking.error(), expected);
+    return asking.found();
+  }
+
+  static constexpr std::size_t none = ~std::size_t{0};
+  Format format;
+  sim::Motion motion = sim::Motion::constant_speed(0, 600);
+  VirtualEncoder encoder;
+  sim::Line<std::uint8_t> line{LinkKind::clocked, line_settings};
+  std::size_t node = none;
+};
+
+TEST(BissRegisters, EachThatHasANameIsReadAlone) {
+  Questions one;
+  EXPECT_EQ((one.ask<read_setting<Format>, registers::eds_bank>().eds_bank), 3);
+  EXPECT_EQ((one.ask<read_setting<Format>, registers::profile>().profile), 0);
+  EXPECT_EQ((one.ask<read_setting<Format>, registers::serial_number>().serial_number), 1u);
+  EXPECT_EQ((one.ask<read_setting<Format>, registers::device_id>().device_id.size()), 6u);
+  EXPECT_EQ((one.ask<read_setting<Format>, registers::manufacturer>().manufacturer.size()), 2u);
+  EXPECT_EQ((one.ask<read_setting<Format>, registers::bank_select>().bank), 0);
+  one.ask<write_bank<Format>>({200});
+  const Found found = one.ask<read_setting<Format>, registers::bank_select>();
+  EXPECT_EQ(found.bank, 200);
+  EXPECT_FALSE(found.missing);
+}
+
+// The registers of a bank that is not there are refused, as others are that an encoder does not have.
+TEST(BissRegisters, OneThatIsRefusedIsMissing) {
+  Questions one;
+  one.ask<write_bank<Format>>({200});
+  const Found found = one.ask<read_setting<Format>, 0u>();
+  EXPECT_EQ(found.missing, true);
+  EXPECT_EQ(found.slave_id, 0);
+  one.format.slave = 3;
+  EXPECT_FALSE((one.ask<read_setting<Format>, registers::profile>({}, Error::timeout).missing));
+}
+
+TEST(BissRegisters, AnEncoderThatWaitsForItsStartHasRegisters) {
+  Format format = bits_24;
+  format.start_sequence = true;
+  Questions waiting(format);
+  EXPECT_EQ(waiting.ask<read_info<Format>>().serial_number, 1u);
+  EXPECT_EQ(waiting.encoder.violation_count(), 0u);
+  Questions off;
+  off.encoder.power_off(Time{});
+  off.ask<read_info<Format>>({}, Error::line_stuck);
+}
 
 TEST(BissRegisters, SomeMakersHaveTheLowByteFirst) {
   for (const RegisterOrder encoders : {RegisterOrder::big, RegisterOrder::little}) {

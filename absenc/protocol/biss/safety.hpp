@@ -37,6 +37,7 @@ struct SafetyFormat {
   Time ready{};
   Time line_delay{};
   std::uint16_t register_delay_us = 0;
+  bool start_sequence = false;
   std::uint8_t slave = 0;
   RegisterOrder register_order = RegisterOrder::big;
 

@@ -128,6 +128,8 @@ struct SafetyDefinition {
                                               register_order_choices),
       option<&SafetySettings::register_delay_us>(
           "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535),
+      option<&SafetySettings::start_sequence>(
+          "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence"),
   };
   static constexpr std::array models{
       ModelText{

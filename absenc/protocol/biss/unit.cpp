@@ -62,6 +62,8 @@ struct Definition {
                                         register_order_choices),
       option<&Settings::register_delay_us>(
           "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535),
+      option<&Settings::start_sequence>("start_sequence",
+                                        "virtual encoder: after power on it shows nothing before the start sequence"),
   };
   static constexpr auto models = position_models;
   static constexpr struct {

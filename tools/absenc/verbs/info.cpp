@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <utility>
 
 #include "absenc/client/reading_columns.hpp"
 #include "absenc/client/text/row_text.hpp"
@@ -169,8 +170,7 @@ class Survey {
     answers.set(command.name, to_json(trouble));
     const std::string why = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
     // Nor is the same reason of one setting after the other.
-    const auto says_so = [&](const auto& row) { return row[1] == "FAILED" && row[2] == why; };
-    if (command.verb == Verb::config_get && std::any_of(rows.begin(), rows.end(), says_so)) return;
+    if (command.verb == Verb::config_get && why == std::exchange(failed_setting_, why)) return;
     rows.push_back({std::string(command.name), "FAILED", why});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),
                                       [&](const Trouble& other) { return other.error == trouble.error; });
@@ -179,7 +179,8 @@ class Survey {
 
   std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
-  bool heard_ = false;  // from the encoder
+  bool heard_ = false;          // from the encoder
+  std::string failed_setting_;  // why the last one was not told
 };
 
 int run_info(const Invocation& invocation) {
@@ -218,7 +219,8 @@ const Subcommand info_subcommand{
     "info",
     "show who is there: the protocol, the model, and all that the encoder says of itself",
     "First what absenc was told or assumes, then what the encoder answers: its identity, temperature,\n"
-    "settings, position and alarms. What fails is shown in its place and the rest goes on.\n"
+    "settings, position and alarms. What fails is shown in its place and the rest goes on; of settings that\n"
+    "fail for the same reason the first is shown.\n"
     "Exit status 1 when anything failed.",
     info_parameters,
     info_examples,
