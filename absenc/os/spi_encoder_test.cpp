@@ -104,6 +104,20 @@ TEST_F(SpiEncoder, RegistersAreAskedForByTheLevelOfTheClock) {
   EXPECT_EQ(info.error(), Error::none);
 }
 
+// Two pulses are a byte of them here.
+TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
+  biss::Format format;
+  format.start_sequence = true;
+  biss::VirtualEncoder encoder(format, shaft);
+  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  kernel.connect(LinkKind::clocked, biss::line_settings, encoder);
+  SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
+  biss::FindPosition<biss::Format> read(format);
+  ASSERT_TRUE(run(read, port));
+  EXPECT_EQ(read.error(), Error::none);
+  EXPECT_EQ(encoder.violation_count(), 0u);
+}
+
 // Positions all the same: only who asks for registers is told, by what they can be read.
 TEST_F(SpiEncoder, AControllerThatOnlyIdlesHighReadsNoRegisters) {
   BissRegisters registers(kernel, shaft);
