@@ -351,7 +351,7 @@ class Inside(ServeCase):
         return wait_until(lambda: server.encoder(index)["state"] == "live", "it is live")
 
     def test_settings_are_those_of_config(self):
-        units = ("tformat", "encolink", "e201")
+        units = ("tformat", "encolink", "e201", "biss")
         server = self.without_history(*(f"sim:{unit}" for unit in units))
         for unit in units:
             wanted = json.loads(absenc("config", "get", f"sim:{unit}", "--json").stdout)["settings"]
