@@ -63,11 +63,14 @@ inline constexpr std::array<ErrorText, 16> error_texts{{
 
 [[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
-/// A value or an Error other than `none`. Reading the value of a failed result is undefined, as in std::expected.
+/// A value, at first that of T{}, or an Error other than `none`. Reading the value of a failed result is undefined, as
+/// in std::expected.
 template <class T>
 class [[nodiscard]] Result {
  public:
-  constexpr Result(T value) : value_(std::move(value)) {}
+  constexpr Result() = default;
+  constexpr Result(const T& value) : value_(value) {}
+  constexpr Result(T&& value) : value_(std::move(value)) {}
   constexpr Result(Error error) : error_(error) {}
 
   [[nodiscard]] constexpr bool has_value() const { return error_ == Error::none; }

@@ -265,16 +265,16 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
 
 /// An error bit makes position and turns invalid.
 [[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
-  Reading reading;
-  reading.singleturn = word.position;
-  reading.multiturn = word.multiturn;
-  reading.singleturn_bits = format.bits_of(Meaning::position);
-  reading.multiturn_bits = format.bits_of(Meaning::multiturn);
-  reading.singleturn_valid_bits = word.error ? 0 : reading.singleturn_bits;
-  reading.multiturn_valid = !word.error && reading.multiturn_bits != 0;
-  reading.unit_um = scale.linear ? scale.unit_um : 0;
-  reading.alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0);
-  return reading;
+  const unsigned bits = format.bits_of(Meaning::position);
+  const unsigned multiturn_bits = format.bits_of(Meaning::multiturn);
+  return {.singleturn = word.position,
+          .multiturn = word.multiturn,
+          .singleturn_bits = bits,
+          .multiturn_bits = multiturn_bits,
+          .singleturn_valid_bits = word.error ? 0 : bits,
+          .multiturn_valid = !word.error && multiturn_bits != 0,
+          .unit_um = scale.linear ? scale.unit_um : 0,
+          .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0)};
 }
 
 /// Every field of the word and its reading.

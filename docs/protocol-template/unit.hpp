@@ -44,7 +44,7 @@ struct Protocol {
   }
   /// What changes the encoder is never sent twice.
   static constexpr author::Manner manner(const Format&, const Request& request) {
-    return {.attempts = request.ask == Ask::position ? 3u : 1u};
+    return {.repeats = request.ask == Ask::position ? 2u : 0u};
   }
 
   // Request: code, address.

@@ -65,7 +65,7 @@ struct Protocol {
   /// One wrong reply in four passes the two parity bits: it must be one of two bytes, with silence behind it.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {
-        .attempts = request.is_answered() ? 3u : 1u, .expects_reply = request.is_answered(), .ends_by_silence = true};
+        .repeats = request.is_answered() ? 2u : 0u, .expects_reply = request.is_answered(), .ends_by_silence = true};
   }
   static constexpr std::size_t request_size(Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];

@@ -29,7 +29,7 @@ struct Toy {
     return {.answer_limit = 1ms, .gap_limit = 100us, .silence = format.silence};
   }
   static Manner manner(const Format& format, const Request& request) {
-    return {.attempts = 3,
+    return {.repeats = 2,
             .pause = 2ms,
             .expects_reply = request != 0x7F,
             .ends_by_silence = format.ends_by_silence,

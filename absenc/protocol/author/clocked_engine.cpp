@@ -8,28 +8,33 @@ namespace absenc::author {
 // ---- For the subclass
 
 void ClockedEngine::clock(unsigned count, bool hold_low) {
-  if (count > 8 * storage_.size()) return finish({.error = Error::invalid_argument});
+  if (count > 8 * storage_.size()) return finish(Error::invalid_argument);
   count_ = count;
   hold_low_ = hold_low;
   state_ = State::ready;
 }
 
-void ClockedEngine::finish(const Outcome& outcome) {
-  outcome_ = outcome;
+void ClockedEngine::finish(Error error) {
+  error_ = error;
   state_ = State::over;
 }
 
 // ---- Steps
 
 ByteStep ClockedEngine::next(Time now) {
-  if (state_ == State::over) return {.kind = ByteStep::Kind::done};
-  if (!begun_) {
+  // Made by a function, as that of Engine.
+  ByteStep step = [this]() -> ByteStep { return {.expect = (count_ + 7) / 8, .bits = count_, .at = never}; }();
+  const bool begins = state_ != State::over && !begun_;
+  if (begins) {
     begun_ = true;
     rested_at_ = now + times_.rest;  // somebody may have clocked just before
-    if (times_.rate != 0) return {.kind = ByteStep::Kind::configure, .rate = times_.rate};
   }
-  ByteStep step{.expect = (count_ + 7) / 8, .bits = count_, .at = never};
-  if (state_ == State::ready) {
+  if (state_ == State::over) {
+    step.kind = ByteStep::Kind::done;
+  } else if (begins && times_.rate != 0) {
+    step.kind = ByteStep::Kind::configure;
+    step.rate = times_.rate;
+  } else if (state_ == State::ready) {
     state_ = State::clocking;
     begun_at_ = std::max(now, rested_at_);
     step.kind = ByteStep::Kind::transfer;
@@ -58,12 +63,12 @@ void ClockedEngine::received(const ByteEvent& event) {
   const std::size_t whole = (count_ + 7) / 8;
   size_ = std::min(event.items.size(), whole);
   std::copy_n(event.items.begin(), size_, storage_.begin());
-  if (size_ < whole) return finish({.error = Error::wrong_length});
+  if (size_ < whole) return finish(Error::wrong_length);
   // Zeros alone behind an idle line that was high are a position; a line that was low all the time is shorted.
   if (event.idle_low) {
     std::uint8_t any = 0;
     for (const std::uint8_t byte : storage_.first(size_)) any |= byte;
-    if (any == 0) return finish({.error = Error::line_stuck});
+    if (any == 0) return finish(Error::line_stuck);
   }
   state_ = State::over;  // unless the subclass goes on
   clocked({Bytes(storage_).first(size_), count_});

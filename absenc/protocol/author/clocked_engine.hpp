@@ -5,10 +5,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
 
 #include "absenc/core/bit_view.hpp"
-#include "absenc/protocol/author/routine.hpp"
 #include "absenc/protocol/conversation.hpp"
 
 namespace absenc::author {
@@ -26,9 +24,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) override;
-  [[nodiscard]] Error error() const final { return outcome_.error; }
-  [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
-  [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  [[nodiscard]] Error error() const final { return error_; }
   /// Nothing: see Engine.
   void report(FieldSink&) const override {}
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
@@ -49,9 +45,8 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Gives so many clocks, when the clock has rested: at its idle level, or held low. More than there is storage for
   /// end the conversation: invalid_argument.
   void clock(unsigned count, bool hold_low = false);
-  /// The conversation is over. Its texts must stay.
-  void finish(const Outcome& outcome);
-  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
+  /// The conversation is over.
+  void finish(Error error);
 
   /// All bits of the transfer are there. Calls `clock` or `finish`.
   virtual void clocked(BitView bits) = 0;
@@ -67,11 +62,11 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   State state_ = State::over;
   bool begun_ = false;
   bool hold_low_ = false;
+  Error error_ = Error::none;
   Time rested_at_{};
   Time begun_at_{};
   Time sent_at_{};
   Time received_at_{};
-  Outcome outcome_{};
 };
 
 }  // namespace absenc::author

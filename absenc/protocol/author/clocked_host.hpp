@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 
 #include "absenc/protocol/author/clocked_engine.hpp"
 #include "absenc/protocol/author/command.hpp"
@@ -48,6 +49,8 @@ class ClockedHostOf : public ClockedEngine {
   }
   /// The last that was good, whatever came after it.
   [[nodiscard]] const Reading& position() const { return reading_; }
+  /// See HostOf.
+  [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
@@ -69,12 +72,12 @@ class ClockedHostOf : public ClockedEngine {
   /// Ends it, with no error by the last good reply.
   void conclude(Error error) {
     if (error == Error::none) keep();
-    finish({.error = error});
+    finish(error);
   }
 
  private:
   void keep() {
-    reading_ = P::reading(format_, found_);
+    new (&reading_) Reading(P::reading(format_, found_));  // made there, not copied
     reading_.latched = begun_at();
     reading_.received = received_at();
   }

@@ -86,10 +86,10 @@ class Told final : public Base {
   }
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
-    if constexpr (requires { Definition::noise_advice; }) {
-      if (own == endless_noise.advice) return Definition::noise_advice;
-    }
-    return own.empty() ? explained().advice : own;
+    if (!own.empty()) return own;
+    if (!this->is_noisy()) return explained().advice;
+    if constexpr (requires { Definition::noise_advice; }) return Definition::noise_advice;
+    return endless_noise.advice;
   }
 
  private:

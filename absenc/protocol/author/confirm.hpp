@@ -31,8 +31,8 @@ class ReadConfirmed : public HostOf<P> {
       first_at_ = this->sent_at();
       return this->ask(this->request());
     }
-    if (error == Error::none) reading_ = this->last_reading();
-    this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
+    if (error == Error::none) new (&reading_) Reading(this->last_reading());
+    this->finish(error, error == Error::none ? Time{} : this->manner().hold);
   }
 
   std::optional<typename P::Reply> first_;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <span>
 #include <string_view>
 #include <type_traits>
@@ -53,6 +54,8 @@ class HostOf : public Engine {
     reading.received = received_at();
     return reading;
   }
+  /// Whether the texts of a procedure say all: it has none.
+  [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
   explicit HostOf(const Format& format) : Engine(P::host_times(format), storage_), format_(format) {}
@@ -68,15 +71,15 @@ class HostOf : public Engine {
   }
 
  private:
-  [[nodiscard]] std::size_t expected(Bytes reply) const final {
-    if constexpr (requires { P::expected(format_, request_, reply); }) {
-      return P::expected(format_, request_, reply);
+  [[nodiscard]] std::size_t expected() const final {
+    if constexpr (requires { P::expected(format_, request_, reply()); }) {
+      return P::expected(format_, request_, reply());
     } else {
       return P::reply_size(format_, request_);
     }
   }
-  [[nodiscard]] Error check(Bytes reply) final {
-    const Result<Reply> result = P::decode(format_, request_, reply);
+  [[nodiscard]] Error check() final {
+    const Result<Reply> result = P::decode(format_, request_, reply());
     if (result) last_ = *result;
     return result.error();
   }
@@ -113,8 +116,8 @@ class ReadPosition : public HostOf<P> {
 
  private:
   void concluded(Error error) final {
-    if (error == Error::none) reading_ = this->last_reading();
-    this->finish({.error = error, .hold = error == Error::none ? Time{} : this->manner().hold});
+    if (error == Error::none) new (&reading_) Reading(this->last_reading());  // made there, not copied
+    this->finish(error, error == Error::none ? Time{} : this->manner().hold);
   }
 
   Reading reading_{};
@@ -140,11 +143,12 @@ class DialogOf : public HostOf<P>, public Routine {
     }
     /// It is never sent again.
     Question& once() {
-      dialog_.asking_.attempts = 1;
+      dialog_.asking_.repeats = 0;
       return *this;
     }
+    /// It is sent up to `attempts` times, 1 at least.
     Question& repeated(unsigned attempts) {
-      dialog_.asking_.attempts = attempts;
+      dialog_.asking_.repeats = attempts - 1;
       return *this;
     }
     /// Its reply is taken only when silence follows, as Manner::ends_by_silence.
@@ -219,6 +223,9 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Hear{*this};
   }
+  [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
+  [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   /// From here on it leaves the encoder as it was when it is asked to end early; `is_aborted` tells.
   void restores(bool yes = true) { restores_ = yes; }
   [[nodiscard]] bool is_aborted() const { return aborted_; }
@@ -255,12 +262,16 @@ class DialogOf : public HostOf<P>, public Routine {
     heard_ = {bytes, false};
     resume();
   }
-  void ended(const Outcome& outcome) final { this->finish(outcome); }
+  void ended(const Outcome& outcome) final {
+    outcome_ = outcome;
+    this->finish(outcome.error, outcome.hold);
+  }
 
   Request next_{};
   Manner asking_{};
   Time earliest_{};
   std::string_view words_{};
+  Outcome outcome_{};
   Error failure_ = Error::none;
   Heard heard_{};
   bool must_ = false;

@@ -3,12 +3,11 @@
 // repeats, gives up. It knows no protocol, and is compiled once.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string_view>
 
-#include "absenc/protocol/author/routine.hpp"
 #include "absenc/protocol/conversation.hpp"
 #include "absenc/protocol/noise.hpp"
 
@@ -24,7 +23,7 @@ struct HostTimes {
 
 /// How one request is sent, and how its reply ends.
 struct Manner {
-  unsigned attempts = 1;         // how often it is sent before its error counts
+  unsigned repeats = 0;          // how often it is sent again before its error counts
   Time pause{};                  // before it is repeated: from what was last sent or heard
   bool expects_reply = true;     // false: no reply is due, and none is waited for
   bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
@@ -45,14 +44,9 @@ class Engine : public Conversation<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) final;
   Step<std::uint8_t> next(Time now) final;
-  [[nodiscard]] Error error() const final { return outcome_.error; }
-  [[nodiscard]] std::string_view detail() const override {
-    return outcome_.detail.empty() ? noise_.explanation().detail : outcome_.detail;
-  }
-  [[nodiscard]] std::string_view advice() const override {
-    return outcome_.advice.empty() ? noise_.explanation().advice : outcome_.advice;
-  }
-  /// Nothing: the names and texts of fields are not linked where nobody asks for them. Told (command.hpp) has them.
+  [[nodiscard]] Error error() const final { return error_; }
+  /// Nothing: the names and texts of fields are not linked where nobody asks for them. Told (command.hpp) has them, and
+  /// the words about a line that is never silent.
   void report(FieldSink&) const override {}
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
@@ -64,13 +58,13 @@ class Engine : public Conversation<std::uint8_t> {
   /// What came since the last request, good or bad.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
   /// Whether the last exchange was given up because the line is never silent: asking once more is of no use.
-  [[nodiscard]] bool is_noisy() const { return noise_.is_endless(); }
+  [[nodiscard]] bool is_noisy() const { return noisy_; }
   /// Whether characters of the last exchange were damaged, or came before its request was out.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
 
  protected:
   /// `storage`: for a reply, longer than the longest, so that one that is too long is noticed.
-  Engine(const HostTimes& times, MutableBytes storage) : storage_(storage), noise_(times.patience), times_(times) {}
+  Engine(const HostTimes& times, MutableBytes storage) : storage_(storage), times_(times) {}
   ~Engine() = default;
 
   /// Sends `request`, which must stay until it is answered, not before `earliest`.
@@ -88,14 +82,14 @@ class Engine : public Conversation<std::uint8_t> {
   void listen(Time duration);
   /// From within `heard`: goes on.
   void listen_on() { state_ = State::listening; }
-  /// The conversation is over. Its texts must stay.
-  void finish(const Outcome& outcome);
+  /// The conversation is over; so long after what was last sent or heard the encoder must not be disturbed.
+  void finish(Error error, Time hold = {});
   [[nodiscard]] const Manner& manner() const { return manner_; }
 
-  /// How many bytes the reply has that begins so; 0: that is not known yet, or silence alone tells.
-  [[nodiscard]] virtual std::size_t expected(Bytes reply) const = 0;
-  /// Judges a whole reply, and keeps what it says.
-  [[nodiscard]] virtual Error check(Bytes reply) = 0;
+  /// How many bytes the reply has that begins with `reply()`; 0: that is not known yet, or silence alone tells.
+  [[nodiscard]] virtual std::size_t expected() const = 0;
+  /// Judges the whole `reply()`, and keeps what it says.
+  [[nodiscard]] virtual Error check() = 0;
   /// Whether a reply with this error is whole all the same, as a refusal is: nothing follows it. After anything else
   /// that is wrong more may be coming, which must not meet the next request.
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
@@ -104,14 +98,13 @@ class Engine : public Conversation<std::uint8_t> {
   virtual void woken() {}
   /// While it listens; nothing: a damaged character.
   virtual void heard(Bytes) {}
-  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
  private:
   enum class State : std::uint8_t {
-    ready,      // the next request is to be sent
-    sending,    // until its last bit is out
     receiving,  // the reply is due
     settling,   // something is wrong: until the line is silent
+    ready,      // the next request is to be sent
+    sending,    // until its last bit is out
     sleeping,
     listening,
     ending,  // the result is known, but told only after a time the encoder needs
@@ -120,36 +113,44 @@ class Engine : public Conversation<std::uint8_t> {
 
   void wake(Time now);
   [[nodiscard]] Time rest_end() const;
-  [[nodiscard]] Step<std::uint8_t> waiting_step() const;
-  Step<std::uint8_t> exchange_step(Time now);
-  void keep(Bytes bytes);
-  void received(Bytes bytes);
+  void go_on(Step<std::uint8_t>& step, Time now);
+  // What no longer fits changes nothing: it is too long already.
+  void keep(Bytes bytes) {
+    const MutableBytes room = storage_.subspan(size_);
+    const std::size_t fitting = std::min(bytes.size(), room.size());
+    for (std::size_t i = 0; i < fitting; ++i) room[i] = bytes[i];
+    size_ += fitting;
+  }
+  [[nodiscard]] bool came_unasked(const Event<std::uint8_t>& event);
+  void end_noise(State before);
+  void look();
   void sent(Time at);
+  [[nodiscard]] bool is_awaited() const { return state_ <= State::settling; }
   void conclude();
   void conclude_with(Error error);
-  void end_noise(State before);
   void start(Time earliest);
 
   // First what every character needs: a Cortex-M0+ reaches the first 32 bytes of an object in one instruction.
   State state_ = State::over;
   bool disturbed_ = false;
-  bool emitting_ = false;
+  bool heard_ = false;  // something, in this exchange
+  bool noisy_ = false;  // things still come long after the first of them
   bool begun_ = false;
+  bool emitting_ = false;
+  Error error_ = Error::none;
   std::size_t size_ = 0;
   std::size_t due_ = 0;  // of the reply, while it is received
   MutableBytes storage_;
-  Noise noise_;
   HostTimes times_;
+  Time noise_end_{};  // what comes then makes the line a noisy one. No timer: otherwise silence is told
   Time received_at_{};
   Manner manner_{};
   Time earliest_{};
   Bytes out_{};
-  unsigned attempts_left_ = 0;
   std::uint32_t rate_ = 0;
   Time listening_{};
   Time begun_at_{};
   Time sent_at_{};
-  Outcome outcome_{};
 };
 
 }  // namespace absenc::author

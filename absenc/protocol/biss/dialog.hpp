@@ -32,6 +32,9 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
   [[nodiscard]] Time now() const { return this->received_at(); }
+  [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
+  [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   /// Each good position is handed out, before the next frame begins.
   void emit_positions() { emits_ = true; }
 
@@ -83,8 +86,12 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     }
     resume();
   }
-  void ended(const author::Outcome& outcome) final { this->finish(outcome); }
+  void ended(const author::Outcome& outcome) final {
+    outcome_ = outcome;
+    this->finish(outcome.error);
+  }
 
+  author::Outcome outcome_{};
   Result<Reply> last_ = Error::timeout;
   LateFrames late_;
   StartSequence start_;

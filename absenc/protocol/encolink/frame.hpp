@@ -47,7 +47,7 @@ inline constexpr Time listen_limit = 500ms;  // without a good frame of an encod
 /// "Inverted CRC, 0x97 polynom", in normal notation: x8 + x7 + x4 + x2 + x + 1.
 inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
 
-[[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters>::of(bytes); }
+[[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
 
 /// Whether the last byte is the checksum of those before it.
 [[nodiscard]] constexpr bool is_sealed(Bytes bytes) {

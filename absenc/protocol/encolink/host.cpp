@@ -69,11 +69,11 @@ ReadPosition::ReadPosition(const Format& format) : HostOf(format) {
 }
 
 void ReadPosition::concluded(Error error) {
-  if (error != Error::none) return finish({.error = error});
+  if (error != Error::none) return finish(error);
   if (request().ask == Ask::identify) return go_on(Ask::identity);
   if (request().ask == Ask::identity) {
     const Result<Format> known = complete(format(), *decode_identity(reply()));
-    if (!known) return finish({.error = known.error()});
+    if (!known) return finish(known.error());
     set_format(*known);
     return go_on(Ask::position);
   }
@@ -83,7 +83,7 @@ void ReadPosition::concluded(Error error) {
   const bool looks_closer = position.error || position.warning || is_all_zero(position);
   if (format().has_ch2 && looks_closer && !channels_.ended) return go_on(Ask::reset);
   if (channels_.ended && !channels_.in_step && is_all_zero(position)) channels_.reading.ready = false;
-  finish({});
+  finish(Error::none);
 }
 
 }  // namespace absenc::encolink

@@ -267,11 +267,10 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 }
 
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Profile& profile, const Request& request, Bytes bytes) {
-  if (bytes.empty()) return Error::timeout;
-  Reply reply;
-  const Check check = check_reply(profile, request, bytes, reply);
-  if (check != Check::passed) return error_of(check);
-  return reply;
+  Result<Reply> result;
+  const Error error = bytes.empty() ? Error::timeout : error_of(check_reply(profile, request, bytes, *result));
+  if (error != Error::none) result = error;
+  return result;
 }
 
 /// The position in a good reply and what of it holds, the flags of channel 2 above those of channel 1. IDs 4, 5 and 6

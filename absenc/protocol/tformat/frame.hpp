@@ -131,7 +131,8 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 /// Sync code 010, the id, its even parity (6.3.1).
 [[nodiscard]] constexpr std::uint8_t control_field(std::uint8_t id) {
-  return static_cast<std::uint8_t>(0x02 | (id & 0xF) << 3 | (odd_parity(id & 0xF) ? 0x80 : 0));
+  constexpr unsigned odd_parities = 0x6996;  // a bit for each id: a small core computes them in many steps
+  return static_cast<std::uint8_t>(0x02u | (id & 0xFu) << 3 | (odd_parities >> (id & 0xF) & 1) << 7);
 }
 [[nodiscard]] constexpr std::uint8_t control_field(DataId id) { return control_field(static_cast<std::uint8_t>(id)); }
 
@@ -184,16 +185,16 @@ struct Request {
   return request.id == DataId::write_memory && request.address == page_select_address;
 }
 
-/// Fields that the id does not carry are 0.
+/// Fields that the id does not carry are 0. In an order that makes it four words.
 struct Reply {
   DataId id = DataId::everything;
   std::uint8_t status = 0;
+  std::uint8_t address = 0;
+  bool busy = false;
   std::uint32_t singleturn = 0;
   std::uint32_t multiturn = 0;
   std::uint8_t encoder_id = 0;
   std::uint8_t alarms = 0;
-  std::uint8_t address = 0;
-  bool busy = false;
   std::uint8_t value = 0;
 };
 
@@ -255,14 +256,14 @@ struct Reply {
 
 namespace detail {
 
-// The fields of a reply of the right length and checksum, unchecked.
-[[nodiscard]] constexpr Reply split_reply(DataId id, Bytes bytes) {
-  Reply reply{.id = id};
+// The fields of a reply of the right length and checksum, unchecked, into one that has none.
+constexpr void split_reply(DataId id, Bytes bytes, Reply& reply) {
+  reply.id = id;
   if (is_memory_access(id)) {
     reply.address = bytes[1] & 0x7F;
     reply.busy = (bytes[1] & busy_bit) != 0;
     reply.value = bytes[2];
-    return reply;
+    return;
   }
   const auto load = [bytes](std::size_t at) {
     return static_cast<std::uint32_t>(bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16);
@@ -280,7 +281,6 @@ namespace detail {
     reply.multiturn = load(6);
     reply.alarms = bytes[9];
   }
-  return reply;
 }
 
 [[nodiscard]] constexpr Error check_memory_reply(const Format& format, const Request& request, const Reply& reply) {
@@ -296,8 +296,8 @@ namespace detail {
   if (format.strict && (reply.status & status::information) != 0) return Error::unexpected_reply;
   const bool has_id = reply.id == DataId::encoder_id || reply.id == DataId::everything;
   if (has_id && format.encoder_id >= 0 && reply.encoder_id != format.encoder_id) return Error::unexpected_reply;
-  if (reply.singleturn > low_mask(format.singleturn_bits)) return Error::out_of_range;
-  if (reply.multiturn > low_mask(format.multiturn_bits)) return Error::out_of_range;
+  if (reply.singleturn >> format.singleturn_bits != 0) return Error::out_of_range;
+  if (reply.multiturn >> format.multiturn_bits != 0) return Error::out_of_range;
   if (format.strict && reply.id == DataId::everything &&
       (reply.status & (status::counting_error | status::alarm)) != status_for(reply.alarms)) {
     return Error::cross_check_failed;
@@ -313,20 +313,28 @@ namespace detail {
   return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
 }
 
-/// Checks in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the first that fails
-/// names the error. A busy memory reply is no error: `busy` is set.
-[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+namespace detail {
+
+constexpr Error take_reply(const Format& format, const Request& request, Bytes bytes, Reply& reply) {
   if (bytes.empty()) return Error::timeout;
   const bool rejection = begins_rejection(request.id, bytes);
   if (bytes.size() != reply_length(rejection ? DataId::everything : request.id)) return Error::wrong_length;
   if (checksum(bytes) != 0) return Error::bad_checksum;
   if (rejection) return Error::request_rejected;
   if (bytes[0] != control_field(request.id)) return Error::unexpected_reply;
-  const Reply reply = detail::split_reply(request.id, bytes);
-  const Error error = is_memory_access(request.id) ? detail::check_memory_reply(format, request, reply)
-                                                   : detail::check_data_reply(format, reply);
-  if (error != Error::none) return error;
-  return reply;
+  split_reply(request.id, bytes, reply);
+  return is_memory_access(request.id) ? check_memory_reply(format, request, reply) : check_data_reply(format, reply);
+}
+
+}  // namespace detail
+
+/// Checks in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the first that fails
+/// names the error. A busy memory reply is no error: `busy` is set.
+[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+  Result<Reply> result;
+  const Error error = detail::take_reply(format, request, bytes, *result);
+  if (error != Error::none) result = error;
+  return result;
 }
 
 /// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. Other replies need what
@@ -342,26 +350,21 @@ namespace detail {
   const std::uint8_t almc = has_all ? reply.alarms : known_alarms.value_or(alarms::full_absolute_status);
   const bool counting_error = (reply.status & status::counting_error) != 0 || (almc & alarms::counting_error) != 0;
 
-  Reading reading;
-  reading.status = reply.status;
-  reading.alarms = alarms_known ? almc : 0;
-  if (has_position) {
-    reading.singleturn = reply.singleturn;
-    reading.singleturn_bits = format.singleturn_bits;
-    reading.singleturn_valid_bits = format.singleturn_bits;
-    if ((almc & alarms::full_absolute_status) != 0 && full_absolute_bits < format.singleturn_bits) {
-      reading.singleturn_valid_bits = full_absolute_bits;
-    }
-    if (counting_error) reading.singleturn_valid_bits = 0;
-  }
-  if (has_turns) {
-    reading.multiturn = reply.multiturn;
-    reading.multiturn_bits = format.multiturn_bits;
-    reading.multiturn_valid = format.multiturn_bits != 0 && alarms_known && (almc & alarms::turns_lost) == 0;
-    // SF may have got an alarm that `known_alarms` is too old to have.
-    if (!has_all && (reply.status & status::alarm) != 0) reading.multiturn_valid = false;
-  }
-  return reading;
+  const unsigned singleturn_bits = has_position ? format.singleturn_bits : 0;
+  const unsigned multiturn_bits = has_turns ? format.multiturn_bits : 0;
+  unsigned valid_bits = singleturn_bits;
+  if ((almc & alarms::full_absolute_status) != 0) valid_bits = std::min(valid_bits, full_absolute_bits);
+  if (counting_error) valid_bits = 0;
+  // SF may have got an alarm that `known_alarms` is too old to have.
+  const bool late_alarm = !has_all && (reply.status & status::alarm) != 0;
+  return {.singleturn = reply.singleturn,
+          .multiturn = reply.multiturn,
+          .singleturn_bits = singleturn_bits,
+          .multiturn_bits = multiturn_bits,
+          .singleturn_valid_bits = valid_bits,
+          .multiturn_valid = multiturn_bits != 0 && alarms_known && (almc & alarms::turns_lost) == 0 && !late_alarm,
+          .status = reply.status,
+          .alarms = alarms_known ? almc : 0u};
 }
 
 // ---- As the engine and the virtual encoder use it
@@ -378,8 +381,8 @@ struct Protocol {
   /// What reads or selects a page is repeated, resets and writes never. A page change that was not answered well may be
   /// going on all the same, and must not be disturbed.
   static constexpr author::Manner manner(const Format&, const Request& request) {
-    if (selects_page(request)) return {.attempts = 3, .pause = memory_time, .hold = memory_time};
-    return {.attempts = request.id == DataId::write_memory || is_reset(request.id) ? 1u : 3u};
+    if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
+    return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};
   }
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes so_far) {

@@ -30,7 +30,7 @@ class ReadPosition : public author::HostOf<Protocol> {
 
  private:
   void concluded(Error error) final {
-    if (error != Error::none) return finish({.error = error});
+    if (error != Error::none) return finish(error);
     if (reply().id == DataId::everything) {
       known_alarms_ = reply().alarms;
       if (id_ != DataId::everything && !part_read_) return ask_for(id_);
@@ -39,13 +39,13 @@ class ReadPosition : public author::HostOf<Protocol> {
       const int unknown = reply().status & ~status_for(known_alarms_.value_or(0));
       if (unknown != 0) return ask_for(DataId::everything);
     }
-    reading_ = to_reading(format(), reply(), known_alarms_);
+    new (&reading_) Reading(to_reading(format(), reply(), known_alarms_));  // made there, not copied
     // The document does not say when the position is taken; the end of the request is the latest it can be.
     reading_.latched = sent_at();
     reading_.received = received_at();
-    finish({});
+    finish(Error::none);
   }
-  void ask_for(DataId id) { ask({id}, {.attempts = 1}); }
+  void ask_for(DataId id) { ask({id}, author::Manner{}); }
 
   DataId id_;
   bool part_read_ = false;  // ID 0 or 1 has been answered
