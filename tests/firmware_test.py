@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The programs of firmware/ on machines that QEMU emulates. ABSENC_FIRMWARE is the folder they were
 built in, ABSENC_FIRMWARE_RISCV that of those for RISC-V; ABSENC_FIRMWARE_POSITIONS how many the drive reads, ABSENC_FIRMWARE_ALL whether all programs were built (./dev firmware)."""
+import copy
 import json
 import os
 import re
@@ -12,6 +13,9 @@ import time
 import unittest
 
 from command_support import Emulator, absenc, end, read_line
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "firmware"))
+import figures  # noqa: E402: it is beside the programs that it measures
 
 FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE", "build/arm/firmware"))
 RISCV_FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE_RISCV", "build/riscv/firmware"))
@@ -104,9 +108,10 @@ class Encoder(unittest.TestCase):
 
     PAGE, ADDRESS, VALUE = 2, 7, 0x5A
 
-    def start(self, cpu, rpm):
-        """The process, and the encoder's name. QEMU says where it waits for whoever connects first."""
-        command = emulator_of(f"encoder-{cpu}", MACHINES[cpu], SINGLETURN, MULTITURN, rpm, LATENCY,
+    def start(self, cpu, rpm, silence=LATENCY):
+        """The process, which takes so many ms without a character for a silence, and the encoder's name. QEMU says where
+        it waits for whoever connects first."""
+        command = emulator_of(f"encoder-{cpu}", MACHINES[cpu], SINGLETURN, MULTITURN, rpm, silence,
                               serial="socket,id=line,host=127.0.0.1,port=0,nodelay=on,server=on,wait=on")
         process = subprocess.Popen(command, bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE)
@@ -141,6 +146,13 @@ class Encoder(unittest.TestCase):
                 _, _, rules = end(process)
                 self.assertNotIn("memory access", rules)  # before its page is ready: both clocks go alike
 
+    def test_it_keeps_what_the_document_demands(self):
+        # A request that it must refuse ends by silence: that has to be over while the host still waits.
+        process, encoder = self.start("m0plus", 0, LATENCY // 5)
+        said = self.run_well("conform", encoder)
+        self.assertRegex(said, r"\b[1-9]\d* kept, 0 broken, 0 untested")
+        end(process)
+
     def test_a_shaft_that_turns(self):
         process, encoder = self.start("m0plus", 1)
         read = self.readings(encoder, 200)
@@ -151,11 +163,24 @@ class Encoder(unittest.TestCase):
 
 
 class Figures(unittest.TestCase):
+    TABLE = os.path.join(SOURCES, "docs/firmware-figures.json")
+
     def test_each_is_within_3_percent_of_the_table(self):
-        figures = [sys.executable, "-B", os.path.join(SOURCES, "firmware/figures.py"), FOLDER,
-                   os.path.join(SOURCES, "docs/firmware-figures.json"), "--check"]
-        result = subprocess.run(figures, capture_output=True, timeout=PATIENCE, text=True, check=False)
+        command = [sys.executable, "-B", os.path.join(SOURCES, "firmware/figures.py"), FOLDER, self.TABLE, "--check"]
+        result = subprocess.run(command, capture_output=True, timeout=PATIENCE, text=True, check=False)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
+    def test_one_that_grows_by_10_percent_is_told(self):
+        with open(self.TABLE, encoding="utf-8") as file:
+            table = json.load(file)
+        for reader, cores in table["figures"].items():
+            for cpu, values in cores.items():
+                for name, value in values.items():
+                    found = copy.deepcopy(table)
+                    found["figures"][reader][cpu][name] = value and value * 11 // 10
+                    told = figures.differences(table, found)
+                    self.assertEqual(len(told), 1 if value else 0, told)
+                    self.assertTrue(all(f"{reader} {cpu} {name}" in one for one in told), told)
 
 
 if __name__ == "__main__":

@@ -141,7 +141,7 @@ constexpr Error take_frame(const Source& source, BitView samples, Cds cds, Reply
 
 template <class Source>
 constexpr auto decode_by(const Source& source, BitView samples, Cds cds) {
-  Result<ReplyWith<typename Source::Word>> result;
+  Result result = ReplyWith<typename Source::Word>{};
   const Error error = take_frame(source, samples, cds, *result);
   if (error != Error::none) result = error;
   return result;
