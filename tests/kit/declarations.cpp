@@ -137,7 +137,9 @@ void request_of(const Unit& unit, const Configuration& way, const Command& comma
     const bool told = request.error() == Error::unsupported || request.error() == Error::invalid_argument;
     return findings.require(told, [&] { return what() + std::string(text_of(request.error()).name); });
   }
-  if (request->empty()) return;  // clocks only
+  if (request->empty()) {  // clocks only
+    return findings.require(unit.link == LinkKind::clocked, [&] { return what() + "is sent without a byte"; });
+  }
   Wire small(request->size() - 1);
   findings.require(unit.encode(way.options, command, values, small).error() == Error::buffer_too_small,
                    [&] { return what() + "fits into less than it has"; });
@@ -207,6 +209,9 @@ Findings check_requests(const Unit& unit, std::uint64_t seed) {
   Findings findings;
   sim::Random random(seed);
   for (const Configuration& way : configurations(unit)) {
+    Seen seen;
+    findings.require(unit.decode(way.options, {}, {}, seen) != Error::none,
+                     [&] { return way.text + ": nothing at all is a frame"; });
     for (const Command& command : unit.commands) {
       for (unsigned i = 0; i < (command.arguments.empty() ? 1 : 100); ++i) {
         request_of(unit, way, command, random_arguments(command, random), findings);

@@ -48,6 +48,8 @@ TEST(Amt21, TurnsAreLostWithoutABatteryAndCannotBeZeroed) {
   Bench bench(unit, with_turns);
   bench.shaft.put(-5, 100);
   EXPECT_EQ(bench.run("zero").error, Error::unsupported);
+  std::array<std::uint8_t, 2> request{};
+  EXPECT_EQ(unit.encode(bench.options, *find_command(unit, "zero"), {}, request).error(), Error::unsupported);
   EXPECT_TRUE(bench.raw({0x56, 0x5E}).reply.empty());
   EXPECT_EQ(bench.device.violation_count(), 1u);
   for (const std::int64_t battery : {1, 0}) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "absenc/protocol/author/dialog.hpp"
+#include "absenc/protocol/author/command.hpp"
 #include "absenc/protocol/author/scan.hpp"
 #include "absenc/protocol/author/standstill.hpp"
 #include "absenc/protocol/author/text.hpp"
@@ -279,6 +279,32 @@ TEST(Scan, AsksEachAddress) {
   Bench silent(nothing);
   silent.run(alone);
   EXPECT_EQ(alone.error(), Error::timeout);
+  Host anywhere({}, {}, arena);
+  Bench noise(echo);
+  noise.run(anywhere);
+  EXPECT_EQ(anywhere.error(), Error::wrong_length);
+}
+
+struct Explains {
+  static void put(FieldSink&, const Toy::Format&, const Found&) {}
+  static Explanation explain(const Toy::Format&, Error, Bytes, Bytes) { return {"document", "its advice"}; }
+};
+
+Procedure end_as_told(ToyDialog& dialog, Found&, Arguments arguments) {
+  co_await dialog.ask(1);
+  constexpr std::array ways{done, Outcome{Error::busy, "own"}, only(Error::busy, "own"),
+                            Outcome{Error::busy, "own", "own advice"}};
+  co_return ways[static_cast<std::size_t>(arguments[0])];
+}
+
+TEST(Told, TheDocumentExplainsWhatTheProcedureLeavesOpen) {
+  const std::array<std::string, 4> said{"/", "document; own/its advice", "own/", "own/own advice"};
+  for (std::int64_t way = 0; way < 4; ++way) {
+    alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+    Told<Explains, author::Run<Toy, Found, end_as_told>> host({}, {&way, 1}, arena);
+    Bench(echo).run(host);
+    EXPECT_EQ(std::string(host.detail()) + "/" + std::string(host.advice()), said[static_cast<std::size_t>(way)]);
+  }
 }
 
 TEST(Text, ValuesAreNamed) {

@@ -195,6 +195,9 @@ TEST(EslUnit, SaysNothingOfWhatIsNoFrame) {
   EXPECT_EQ(decode_request({}, {}).error(), Error::wrong_length);
   const Options values = author::testing::options_of(unit, "");
   const Bytes request = hex<"0875">;
+  EXPECT_EQ(unit.pause(values, {.bytes = request}), 0us);
+  const RequestBytes page = encode_request({}, {.id = DataId::write_memory, .memory_address = page_select_address});
+  EXPECT_EQ(unit.pause(values, {.bytes = page}), 18ms);
   EXPECT_EQ(unit.explain(values, Error::wrong_length, {.bytes = request}, {.bytes = request}).detail, "");
   for (unsigned byte = 0; byte < 256; ++byte) {
     const std::array reply{static_cast<std::uint8_t>(byte), std::uint8_t{0}, std::uint8_t{0}};
