@@ -198,6 +198,12 @@ Findings check_declarations(const Unit& unit) {
   const auto goes_over_spi = [](const Unit& one) { return one.link == LinkKind::spi || one.link == LinkKind::clocked; };
   findings.require(unit.over_spi == nullptr || (!goes_over_spi(unit) && goes_over_spi(*unit.over_spi)),
                    [] { return "its unit over SPI is none"; });
+  for (const FieldInfo* field : {unit.alarms, unit.second_alarms}) {
+    for (const FlagInfo& flag : field != nullptr ? field->flags : std::span<const FlagInfo>{}) {
+      findings.require(flag.name.empty() || !(flag.meaning.empty() || flag.action.empty()),
+                       [&] { return "alarm " + std::string(flag.name) + " lacks its words"; });
+    }
+  }
   declared_memory(unit, findings);
   declared_registers(unit, findings);
   declared_settings(unit, findings);

@@ -110,12 +110,6 @@ TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
   EXPECT_EQ(as_identified({.multiturn_bits = 0}, turns).multiturn_bits, 16);
 }
 
-TEST(EncolinkFrame, EveryAlarmHasItsWords) {
-  for (const FlagInfo& flag : alarm_flags) {
-    EXPECT_FALSE(flag.name.empty() || flag.meaning.empty() || flag.action.empty()) << flag.name;
-  }
-}
-
 TEST(EncolinkFrame, BadAccessesAreNamed) {
   EXPECT_EQ(decode_access({}).error(), Error::wrong_length);
   EXPECT_EQ(decode_access(hex<"00CDEF">).error(), Error::wrong_length);
