@@ -43,7 +43,7 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
     unsigned at = due;
     for (unsigned zeros = 0; !cds[at]; ++at) {
       zeros = cdm[at] ? 0 : zeros + 1;
-      if (zeros == control_pause || !cds.has(at)) return Error::timeout;
+      if (zeros == control_pause) return Error::timeout;
     }
     const bool first = due == direction_at + 3;
     if (first && write && at != due) return Error::bad_framing;  // the first byte that is written is not delayed
@@ -111,7 +111,6 @@ Result<ControlFrame> decode_control(BitView cdm, BitView cds) {
   if (error != Error::none) return error;
   if (cds.size == 0) return frame;
   const ControlBits answered{cds, start};
-  if (!answered.has(more_slaves_at)) return Error::truncated;
   put_locks(frame, answered);
   error = frame.request.is_command() ? take_command(asked, answered, frame) : take_register(asked, answered, frame);
   return error == Error::none ? Result(frame) : error;

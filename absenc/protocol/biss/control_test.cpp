@@ -223,6 +223,55 @@ TEST(BissControl, CommandsAreExecutedWhenAllAcknowledge) {
   EXPECT_EQ(master.frame().slaves, 3);
 }
 
+// Counted from the start bit, as the table counts.
+TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
+  const auto spoken = [](auto begin) {
+    Target target;
+    ControlSlaves slaves(3);
+    ControlMaster master;
+    begin(master);
+    const Talk talk = run(master, slaves, target);
+    return Talk{talk.cdm + std::string(14, '0'), talk.cds + std::string(14, '0')};
+  };
+  const auto written = [](std::uint8_t byte) {
+    return [byte](ControlMaster& master) { master.write(0, 0x20, std::array{byte}); };
+  };
+  const Talk read = spoken([](ControlMaster& master) { master.read(0, 0x44, 1); });
+  const Talk write = spoken(written(0x5A));
+  const Talk command = spoken([](ControlMaster& master) { master.command(0b101, 1); });
+  const auto flipped = [](std::string text, std::initializer_list<std::size_t> bits) {
+    for (const std::size_t bit : bits) text[14 + bit] ^= 1;
+    return text;
+  };
+  const auto begin = [](const std::string& text, std::size_t bits) { return text.substr(0, 14 + bits); };
+  const auto late = [](std::string text, std::size_t bits) { return text.insert(14 + 19, std::string(bits, '0')); };
+  const auto error = [](const std::string& cdm, const std::string& cds) { return decoded(cdm, cds).error(); };
+
+  EXPECT_EQ(error(begin(read.cdm, 10), ""), Error::truncated);
+  EXPECT_EQ(error(begin(read.cdm, 18), ""), Error::truncated);
+  EXPECT_EQ(error(begin(read.cdm, 19), ""), Error::none);
+  EXPECT_EQ(error(begin(command.cdm, 16), ""), Error::truncated);
+  EXPECT_EQ(error(begin(command.cdm, 17), ""), Error::none);
+
+  EXPECT_EQ(error(read.cdm, begin(read.cds, 5)), Error::truncated);
+  EXPECT_EQ(error(read.cdm, begin(read.cds, 18)), Error::truncated);
+  EXPECT_EQ(error(begin(read.cdm, 20), read.cds), Error::truncated);
+  EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);                          // no S of the master
+  EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);                        // S of the encoder
+  EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);                     // 14 zeros end it
+  EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);  // P
+  EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);                          // no delay there
+  EXPECT_EQ(error(write.cdm, flipped(write.cds, {20})), Error::bad_checksum);
+  EXPECT_EQ(error(flipped(write.cdm, {19}), write.cds), Error::bad_checksum);
+  EXPECT_EQ(error(spoken(written(0xA5)).cdm, write.cds), Error::unexpected_reply);
+
+  EXPECT_EQ(error(command.cdm, begin(command.cds, 24)), Error::truncated);
+  EXPECT_EQ(error(begin(command.cdm, 24), command.cds), Error::truncated);
+  EXPECT_EQ(error(flipped(command.cdm, {16}), command.cds), Error::bad_framing);
+  EXPECT_EQ(error(command.cdm, flipped(command.cds, {17})), Error::request_rejected);
+  EXPECT_EQ(error(command.cdm, flipped(command.cds, {18})), Error::unexpected_reply);
+}
+
 TEST(BissControl, AByteWhoseCrcIsWrongIsNotStored) {
   Target target;
   ControlSlaves slaves(1);
