@@ -419,7 +419,6 @@ bool ControlSlaves::command(bool cdm, ControlTarget& target) {
     if (cdm) target.execute(request_.slaves, request_.command);
     return end();
   }
-  if (broadcast) return false;
   const unsigned slave = at - direction_at;
   const bool mine = slave < std::min(count_, control_slaves) && (request_.slaves >> slave & 1) != 0;
   return mine && target.obeys(slave, request_.command);

@@ -270,6 +270,16 @@ TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
   EXPECT_EQ(error(flipped(command.cdm, {16}), command.cds), Error::bad_framing);
   EXPECT_EQ(error(command.cdm, flipped(command.cds, {17})), Error::request_rejected);
   EXPECT_EQ(error(command.cdm, flipped(command.cds, {18})), Error::unexpected_reply);
+
+  const auto answered = [](auto ask, const std::string& cds) {
+    ControlMaster master;
+    ask(master);
+    for (const char c : cds) static_cast<void>(master.next(c == '1'));
+    return master.error();
+  };
+  EXPECT_EQ(answered(written(0x5A), write.cds), Error::none);
+  EXPECT_EQ(answered(written(0xA5), write.cds), Error::unexpected_reply);
+  EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);  // nobody has been asked
 }
 
 TEST(BissControl, AByteWhoseCrcIsWrongIsNotStored) {
