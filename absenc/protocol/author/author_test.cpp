@@ -153,6 +153,8 @@ TEST(Procedures, DamagedCharactersAreNoSilence) {
   Case<two_questions> bad([](std::uint8_t, unsigned) { return Wire{damaged}; });
   EXPECT_EQ(bad.host.error(), Error::bad_framing);
   EXPECT_EQ(bad.bench.sent.size(), 3u);
+  Case<two_questions> beside([](std::uint8_t, unsigned) { return Wire{damaged, 0x81}; });
+  EXPECT_EQ(beside.host.error(), Error::wrong_length);
 }
 
 TEST(Procedures, RepeatWhatWasDamagedWhenTheLineIsSilent) {

@@ -110,8 +110,7 @@ class ReadPosition : public HostOf<P> {
     this->ask(request);
   }
   [[nodiscard]] const Reading* reading() const final {
-    return this->error() == Error::none && reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_
-                                                                                                   : nullptr;
+    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
   }
 
  private:
