@@ -74,7 +74,7 @@ class Capture(Table):
         self.notes = notes  #: what is damaged or missing in the file, and what was found out
 
     def good(self) -> npt.NDArray[np.bool_]:
-        """Which rows have no error."""
+        """Which rows have no error. What such a row does not tell, or what does not hold, is masked in them too."""
         return np.asarray(self.rows.data["error"] == "", np.bool_)
 
 
@@ -150,7 +150,10 @@ def decode_batches(
     **options: Value,
 ) -> Iterator[Capture]:
     """As `decode`, in captures of at most so many rows each, for files larger than memory. The last has the notes."""
-    source = _open(file, unit, channel, raw_channels, rate, baud, parity, model, options)
+    return _batches(_open(file, unit, channel, raw_channels, rate, baud, parity, model, options), rows)
+
+
+def _batches(source: _absenc.Rows, rows: int) -> Iterator[Capture]:
     columns = [Column(*column) for column in source.columns()]
     by_name = {column.name: column for column in columns}
     chunk = source.take(rows)

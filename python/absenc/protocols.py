@@ -50,8 +50,8 @@ class Protocol:
         self.fields: list[str] = told["fields"]
         self.conditions: list[str] = told["conditions"]  #: of its virtual encoder
         self.flags: list[Flag] = [Flag(*flag) for flag in told["flags"]]  #: of alarms and status
-        alarms = set(told["alarms"])
-        self.alarms: list[Flag] = [flag for flag in self.flags if flag.name in alarms]
+        named = {flag.name: flag for flag in reversed(self.flags)}  # a status flag may have the name of an alarm
+        self.alarms: list[Flag] = [named[name] for name in told["alarms"]]
         self.commands: dict[str, Command] = {
             one["name"]: Command(
                 one["name"], one["verb"], one["meaning"], one["changes_encoder"], tuple(one["arguments"])
@@ -77,7 +77,7 @@ class Protocol:
 
 
 def _plain(frame: Frame) -> Union[bytes, str]:
-    return frame if isinstance(frame, str) else bytes(frame)
+    return frame if isinstance(frame, str) else memoryview(frame).tobytes()
 
 
 class Protocols(Mapping[str, Protocol]):

@@ -90,10 +90,20 @@ struct PySample {
   [[nodiscard]] std::optional<T> when(bool valid, T value) const {
     return valid ? std::optional<T>(value) : std::nullopt;
   }
+  [[nodiscard]] py::str repr() const {
+    const py::object said = sample.kind == client::Sample::Kind::reading
+                                ? py::object(PyReading{unit, sample.reading}.text())
+                                : py::object(py::str(sample.text()));
+    return py::str("Sample({}, time_s={}, {})").format(kind(), seconds(sample.at), said);
+  }
   [[nodiscard]] py::object error() const {
     return sample.kind == client::Sample::Kind::failed ? error_object(sample.trouble) : py::none();
   }
 };
+
+void require_rate(double rate_hz) {
+  if (!(rate_hz >= 0 && rate_hz <= 1e6)) throw client::UsageError("rate is 0 to 1e6 readings a second");
+}
 
 struct Closed : client::UsageError {
   Closed() : UsageError("this encoder is closed: open it again") {}
@@ -317,7 +327,7 @@ std::optional<Time> time_of(std::optional<double> seconds) {
 py::tuple record(PyEncoder& encoder, const std::string& path, double rate_hz, std::uint64_t every, std::uint64_t count,
                  std::optional<double> duration, std::optional<std::uint64_t> part_bytes,
                  std::optional<double> part_duration) {
-  if (!(rate_hz >= 0 && rate_hz <= 1e6)) throw client::UsageError("rate is 0 to 1e6 readings a second");
+  require_rate(rate_hz);
   if (every == 0) throw client::UsageError("every is 1 or more: of so many readings one is written");
   const client::RecordingSettings settings{.path = path,
                                            .encoder = client::address_of(encoder.encoder().connection().uri()),
@@ -397,7 +407,8 @@ void bind_values(py::module_& module) {
       .def_property_readonly(
           "text", [](const PySample& one) { return one.sample.text(); },
           "Why there is no reading, or what happened; \"\" of a reading that goes on.")
-      .def_property_readonly("error", &PySample::error, "The absenc.errors.EncoderError of a failed attempt, or None.");
+      .def_property_readonly("error", &PySample::error, "The absenc.errors.EncoderError of a failed attempt, or None.")
+      .def("__repr__", &PySample::repr);
 }
 
 }  // namespace
@@ -416,6 +427,7 @@ void bind_encoder(py::module_& module) {
       .def(
           "samples",
           [](PyEncoder& one, double rate, std::uint64_t count) {
+            require_rate(rate);
             return std::make_unique<PySamples>(one, rate, count);
           },
           py::keep_alive<0, 1>())

@@ -2,6 +2,7 @@
 // What is known of each unit, its frames as plain functions, and CRCs.
 #include <pybind11/numpy.h>
 
+#include <algorithm>
 #include <array>
 
 #include "absenc/client/error.hpp"
@@ -137,6 +138,10 @@ py::array_t<std::uint16_t> crc(const py::array_t<std::uint8_t, py::array::c_styl
                                unsigned width, std::uint16_t poly, std::uint16_t init, bool refin, bool refout,
                                std::uint16_t xorout) {
   if (width < 3 || width > 16) throw client::UsageError("width must be 3 to 16 bits");
+  if (std::max({poly, init, xorout}) >> width != 0) {
+    throw client::UsageError("poly, init and xorout have at most as many bits as the CRC, which has " +
+                             std::to_string(width) + "; the highest term of poly is left out");
+  }
   if (rows.ndim() != 2) throw client::UsageError("a CRC is made of bytes, or of an array of rows of them");
   const CrcParameters parameters{width, poly, init, refin, refout, xorout};
   const auto count = static_cast<std::size_t>(rows.shape(0));

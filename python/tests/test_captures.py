@@ -70,6 +70,8 @@ def test_pandas(wave):
 def test_files_that_are_wrong(tmp_path):
     with pytest.raises(absenc.AbsencError):
         absenc.decode(tmp_path / "none.sr", "tformat")
+    with pytest.raises(absenc.AbsencError):
+        absenc.decode_batches(tmp_path / "none.sr", "tformat")  # before the first batch is asked for
     with pytest.raises(KeyError, match="angle_deg"):
         absenc.decode(TEXT, "tformat")["angel"]
 
@@ -83,9 +85,13 @@ def test_frames():
         tformat.decode(reply[:-1] + b"\x4b", request=b"\x1a")
     assert raised.value.sent == "1A"
     assert tformat.flag_names("alarms", 1 << 4) == ["over_heat"]
+    with pytest.raises(TypeError):
+        tformat.decode(3)  # and not three zeros
 
 
 def test_crc_of_arrays():
     assert absenc.crc(b"123456789", width=16, poly=0x1021, init=0xFFFF) == 0x29B1
     rows = np.frombuffer(b"123456789" * 3, np.uint8).reshape(3, 9)
     assert list(absenc.crc(rows, width=8, poly=0x07)) == [0xF4] * 3
+    with pytest.raises(absenc.UsageError, match="highest term"):
+        absenc.crc(b"123456789", width=8, poly=0x107)

@@ -68,6 +68,22 @@ def test_memory_is_written_and_read_back(absenc_emulate):
         assert encoder.run("memory-read", address=6)["value"] == 0x43
 
 
+def test_samples_say_what_they_are_and_refuse_impossible_rates():
+    with absenc.open("sim:tformat", singleturn=65536) as encoder:
+        assert "angle_deg=180" in repr(next(encoder.samples(count=1)))
+        for rate in (-1, float("nan")):
+            with pytest.raises(absenc.UsageError, match="rate"):
+                encoder.samples(rate=rate)
+
+
+def test_an_alarm_is_told_once(absenc_emulate):
+    """tformat has a status flag of the same name."""
+    virtual = absenc_emulate("tformat")
+    with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
+        virtual.raise_alarm("counting_error")
+        assert [(alarm.field, alarm.name) for alarm in encoder.alarms()] == [("alarms", "counting_error")]
+
+
 def test_scan():
     assert [one["clash"] for one in absenc.scan("sim:esl")] == [False]
     with absenc.open("sim:tformat") as encoder, pytest.raises(absenc.UsageError, match="no addresses"):
