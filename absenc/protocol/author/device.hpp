@@ -42,6 +42,9 @@ class Responder : public EncoderOn<std::uint8_t> {
   /// Sends what no request on a line of characters asks for: what a chip select does, or nobody.
   void transmit(Bytes bytes, Time at);
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
+  /// When what was heard at `at` may have come: earlier than that, where the carrier was kept from looking. What a host
+  /// must wait for counts from here.
+  [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
   /// How many bytes the request has that begins so, one at least; 0: none begins so.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;

@@ -235,7 +235,7 @@ class VirtualEncoder final : public author::Responder {
       byte_pending_ = reply.busy = !fetched || pending_address_ != address;
       if (reply.busy) {
         pending_address_ = address;
-        pending_at_ = at;
+        pending_at_ = earliest(at);
       }
     }
     if (address == page_select_address) {
@@ -248,17 +248,17 @@ class VirtualEncoder final : public author::Responder {
     byte_pending_ = false;
     if (address == page_select_address) {
       page_ = value;
-      page_ready_at_ = at + page_time;
+      page_ready_at_ = earliest(at) + page_time;
       page_changed_ = true;
       return;
     }
     *stored(page_, address) = value;
     if (is_immediate(page_, address)) return;
     change_memory();
-    busy_until_ = at + eeprom_write_time;
+    busy_until_ = earliest(at) + eeprom_write_time;
   }
   void count_reset(DataId id, Time at) {
-    last_reset_ = at;
+    last_reset_ = earliest(at);
     if (in_a_row_ < reset_requests) return;
     in_a_row_ = 0;
     const bool stands = magnitude(shaft_->at(at).speed_millirpm) <= standing_still;

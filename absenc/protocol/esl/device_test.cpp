@@ -211,6 +211,26 @@ TEST(EslDevice, APageChangeTakes18Milliseconds) {
   EXPECT_EQ(bench.raw(memory_read(page_select_address)), memory_reply(memory_read(page_select_address), false, 4));
 }
 
+// Heard so late, a request may have come so much earlier: its host need not wait again.
+TEST(EslDevice, ItsTimesBeginWhenARequestMayHaveCome) {
+  const auto rules = [](const Request& first, const Request& second, Time apart, Time late) {
+    Alone alone;
+    const Wire one = wire_of(first);
+    const Wire two = wire_of(second);
+    alone.encoder.feed({.kind = Alone::Happening::received, .at = 50ms, .items = one, .late = late});
+    alone.encoder.next(50ms);
+    alone.feed(Alone::Happening::sent, 50ms);
+    alone.feed(Alone::Happening::received, 50ms + apart, two);
+    return alone.encoder.violation_count();
+  };
+  const Request page = memory_write(page_select_address, 4);
+  EXPECT_EQ(rules(page, memory_read(0), 12ms, 5ms), 1u);
+  EXPECT_EQ(rules(page, memory_read(0), 12ms, 6ms), 0u);
+  const Request zero{DataId::zero};
+  EXPECT_EQ(rules(zero, zero, 20us, 14us), 1u);
+  EXPECT_EQ(rules(zero, zero, 20us, 15us), 0u);
+}
+
 TEST(EslDevice, MemorySurvivesPowerOffAndRegistersDoNot) {
   Bench bench;
   bench.raw(memory_write(0x05, 0x11));

@@ -23,7 +23,7 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
  private:
   void started(Time at) override { due_ = at; }
   void triggered(const Event<std::uint8_t>& event);
-  void hear_meanwhile(Bytes bytes, Time at);
+  void hear_meanwhile(const Event<std::uint8_t>& event);
   [[nodiscard]] Position position(Time at) const;
   [[nodiscard]] Step<std::uint8_t> character();
 

@@ -284,6 +284,20 @@ TEST(RaaDevice, ListsTheRulesThatTheHostBreaks) {
   EXPECT_EQ(violation(slow, {{}, 2ms, {0xBC, 0xAA, 0xB1}}), "request during the encoder's transmission");
 }
 
+TEST(RaaDevice, ARequestThatItHeardLateMayHaveWaitedForTheFrame) {
+  const Format slow = with(with(bus, &Format::acquisition, Time(5ms)), &Format::transmission, Time(2ms));
+  const Wire request{0xBC, 0xAA, 0xB1};
+  for (const auto& [late, rules] : {std::pair(7ms, 1u), {8ms, 0u}}) {
+    Shaft14 shaft;
+    VirtualEncoder encoder(slow, shaft);
+    encoder.power_on(Time{}, VirtualEncoder::PowerOn::skip);
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 20ms, .items = request});
+    encoder.next(20ms);
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 30ms, .items = request, .late = late});
+    EXPECT_EQ(encoder.violation_count(), rules) << late.count();
+  }
+}
+
 TEST(RaaDevice, AnswersNoRequestThatIsNotItsOwn) {
   const auto reply_to = [](const Wire& request) {
     Bench bench(bus);
