@@ -350,6 +350,19 @@ class ErrorFrames(OnABus):
                 self.assert_sentence(err.decode(), f"{interface} is bus-off", "Check the bit rate", "120 ohms",
                                      f"`sudo ip link set {interface} down` and {up}", "restart-ms 100")
 
+    def assert_found(self, *wanted):
+        result = absenc("doctor", HASTY, "--json")
+        self.assertEqual(result.returncode, 1, f"{result.stdout}{result.stderr}")
+        self.assertEqual([finding["id"] for finding in json.loads(result.stdout)["findings"]], list(wanted), result.stdout)
+
+    def test_doctor_names_them(self):
+        with AnotherNode(self.NO_ACKNOWLEDGE):
+            self.assert_found("can_errors")
+        with AnotherNode(frame(socket.CAN_ERR_FLAG | 0x40, bytes(8))):
+            self.assert_found("can_bus_off")
+        self.down()
+        self.assert_found("port_failed")
+
     def test_after_bus_off_it_goes_on(self):
         emulator = self.emulator("--singleturn", "1000")
         log = self.file("log.csv")

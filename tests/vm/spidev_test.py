@@ -241,6 +241,31 @@ class TheCommand(SpidevCase):
         self.assertIn("in use", self.failed("read", "encolink:spi:/dev/spidev9.0").stderr)
 
 
+class Doctor(SpidevCase):
+    """What `absenc doctor` says of a device of the kernel. A clock that is too fast is not among it: this device hears
+    every clock."""
+
+    def assert_found(self, encoder, *wanted):
+        result = absenc("doctor", encoder, "--json")
+        self.assertEqual(result.returncode, 1 if wanted else 0, f"{result.stdout}{result.stderr}")
+        found = json.loads(result.stdout)["findings"]
+        self.assertEqual([finding["id"] for finding in found], list(wanted), result.stdout)
+        return found
+
+    def test_good(self):
+        self.serve("encolink")
+        self.assert_found("encolink:spi:/dev/spidev9.0")
+
+    def test_a_wrong_mode(self):
+        self.serve("encolink", "--singleturn", "12345")
+        found = self.assert_found("encolink:spi:/dev/spidev9.0?spi_mode=0&resolution=20&multiturn_bits=16", "wrong_spi_mode")
+        self.assertEqual(found[0]["action"], "set spi_mode=1")
+
+    def test_a_data_line_that_stays(self):
+        self.serve("encolink", "--fault", "silence=1")
+        self.assert_found("encolink:spi:/dev/spidev9.0?resolution=20&multiturn_bits=16", "miso_stuck")
+
+
 class Beginnings(SpidevCase):
     def test_the_node(self):
         self.serve("ssi")
