@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An encoder that turns, read at 100 Hz; and what a program sees when its supply fails."""
+"""An encoder that turns, read at 100 Hz; a recording of it; and what a program sees when its supply fails."""
+import os
+import tempfile
+
 import absenc
 
 with absenc.emulate("tformat", motion="rpm=60") as virtual, absenc.open(virtual.address) as encoder:
@@ -8,6 +11,11 @@ with absenc.emulate("tformat", motion="rpm=60") as virtual, absenc.open(virtual.
             print(sample.text)
             continue
         print(f"{sample.time_s:.3f} s: {sample.reading.angle_deg:.3f} degrees, {sample.speed or 0:.1f} rpm")
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "log.h5")
+        recorded = encoder.record(path, rate=100, seconds=0.5)
+        speeds = absenc.load(path)["speed_rpm"]  # masked where it is not known yet
+        print(f"{recorded.readings} readings recorded, at up to {speeds.max():.1f} rpm")
     virtual.power_off()
     try:
         encoder.read()
