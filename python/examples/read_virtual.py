@@ -14,8 +14,8 @@ with absenc.emulate("tformat", motion="rpm=60") as virtual, absenc.open(virtual.
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "log.h5")
         recorded = encoder.record(path, rate=100, seconds=0.5)
-        speeds = absenc.load(path)["speed_rpm"]  # masked where it is not known yet
-        print(f"{recorded.readings} readings recorded, at up to {speeds.max():.1f} rpm")
+        recording = absenc.load(path)
+        print(f"{recorded.readings} readings recorded; columns: {', '.join(recording.columns)}")
     virtual.power_off()
     try:
         encoder.read()
