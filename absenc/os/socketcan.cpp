@@ -168,7 +168,7 @@ int SocketCan::find_interface() {
   request = request_for(interface_);
   if (kernel_->control(socket_.get(), SIOCGIFFLAGS, &request) < 0) fail("looking at " + interface_, errno);
   if ((request.ifr_flags & IFF_UP) == 0) {
-    throw Failure(Kind::unsupported, interface_ + " is down: " + up_command(settings_.rate) + " brings it up");
+    throw Failure(Kind::system, interface_ + " is down: " + up_command(settings_.rate) + " brings it up");
   }
   return index;
 }

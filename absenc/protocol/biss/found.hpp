@@ -9,6 +9,7 @@
 #include "absenc/core/angle.hpp"
 #include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/biss/control.hpp"
+#include "absenc/protocol/biss/frame.hpp"
 #include "absenc/protocol/biss/registers.hpp"
 
 namespace absenc::biss {
