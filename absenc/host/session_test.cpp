@@ -306,6 +306,28 @@ constexpr Reading reading_at(std::uint64_t singleturn, std::uint64_t multiturn, 
           .latched = latched};
 }
 
+TEST(Session, WhatCannotBeIsReadAgainUntilTwoAgree) {
+  Bench bench(EchoMode::off);
+  Statistics<std::uint8_t> statistics;
+  bench.session->observe(&statistics);
+  const Command& command = *find_command(bench.unit, Verb::read);
+  const std::uint64_t& refused = bench.session->counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];
+  bench.read();
+  unsigned asked = 0;
+  const auto not_the_first = [&](const Reading&) { return ++asked != 1; };
+  EXPECT_EQ(bench.session->read(command, Take::newest, not_the_first)->error(), Error::none);
+  EXPECT_EQ(bench.device->answer_count(), 2u + 3u);
+  EXPECT_EQ(refused, 1u);
+  EXPECT_EQ(bench.session->counters().good, 4u);
+  EXPECT_EQ(statistics.kept(), 1u);
+  EXPECT_EQ(statistics.bad(0).received.size(), 11u);
+  // It jumped, and stays there.
+  EXPECT_EQ(bench.session->read(command, Take::newest, [](const Reading&) { return false; })->error(), Error::none);
+  EXPECT_EQ(bench.device->answer_count(), 2u + 3u + 3u);
+  EXPECT_TRUE(bench.session->confirmed());
+  EXPECT_EQ(refused, 1u);
+}
+
 TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
   using std::chrono::microseconds;
   // 6000 rpm are 100 turns a second: 13 107 counts in 1 ms.

@@ -53,6 +53,7 @@ void register_exceptions();
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
+void bind_sample(py::module_& module);
 void bind_encoder(py::module_& module);
 void bind_emulation(py::module_& module);
 void bind_decode(py::module_& module);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An open encoder and its samples.
+// An open encoder.
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -12,12 +12,11 @@
 #include "absenc/client/way/address.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "python/src/bind.hpp"
+#include "python/src/sample.hpp"
 
 namespace absenc::python {
 
 namespace {
-
-double seconds(Time time) { return std::chrono::duration<double>(time).count(); }
 
 /// Who was found by a scan: each record begins with whom it is of.
 struct Records final : FieldSink {
@@ -29,76 +28,6 @@ struct Records final : FieldSink {
     if (!all.empty()) all.back().put_reading(reading);
   }
   std::vector<client::AnswerSink> all;
-};
-
-struct PyReading {
-  const Unit* unit;
-  Reading reading;
-
-  [[nodiscard]] bool holds() const { return reading.ready && reading.singleturn_valid(); }
-  [[nodiscard]] std::optional<double> angle_deg() const {
-    if (!holds() || reading.unit_um > 0) return {};
-    return degrees(reading.singleturn, reading.singleturn_bits);
-  }
-  [[nodiscard]] std::optional<double> position_mm() const {
-    if (!holds() || reading.unit_um <= 0) return {};
-    return micrometres(reading.singleturn, reading.unit_um) / 1000;
-  }
-  [[nodiscard]] std::optional<std::uint64_t> singleturn() const {
-    if (!holds()) return {};
-    return reading.singleturn;
-  }
-  [[nodiscard]] std::optional<std::uint64_t> multiturn() const {
-    if (!reading.ready || reading.multiturn_bits == 0 || !reading.multiturn_valid) return {};
-    return reading.multiturn;
-  }
-  [[nodiscard]] py::tuple alarms() const { return names_of(client::alarms_of(*unit, reading)); }
-  [[nodiscard]] py::tuple status() const { return names_of(client::status_of(*unit, reading)); }
-  [[nodiscard]] py::str text() const {
-    const auto position =
-        holds() ? py::object(py::cast(reading.unit_um > 0 ? position_mm() : angle_deg())) : py::none();
-    return py::str("Reading({}={}, multiturn={}, alarms={})")
-        .format(reading.unit_um > 0 ? "position_mm" : "angle_deg", position, py::cast(multiturn()), alarms());
-  }
-};
-
-struct PySample {
-  const Unit* unit;
-  client::Sample sample;
-
-  [[nodiscard]] std::string_view kind() const {
-    using Kind = client::Sample::Kind;
-    switch (sample.kind) {
-      case Kind::reading:
-        return "reading";
-      case Kind::failed:
-        return "failed";
-      case Kind::lost:
-        return "lost";
-      case Kind::back:
-        return "back";
-      case Kind::absent:
-        break;
-    }
-    return "absent";
-  }
-  [[nodiscard]] std::optional<PyReading> reading() const {
-    if (sample.kind != client::Sample::Kind::reading) return {};
-    return PyReading{unit, sample.reading};
-  }
-  template <class T>
-  [[nodiscard]] std::optional<T> when(bool valid, T value) const {
-    return valid ? std::optional<T>(value) : std::nullopt;
-  }
-  [[nodiscard]] py::str repr() const {
-    const py::object said = sample.kind == client::Sample::Kind::reading
-                                ? py::object(PyReading{unit, sample.reading}.text())
-                                : py::object(py::str(sample.text()));
-    return py::str("Sample({}, time_s={}, {})").format(kind(), seconds(sample.at), said);
-  }
-  [[nodiscard]] py::object error() const {
-    return sample.kind == client::Sample::Kind::failed ? error_object(sample.trouble) : py::none();
-  }
 };
 
 void require_rate(double rate_hz) {
@@ -357,64 +286,9 @@ py::dict counters_of(const PyEncoder& encoder) {
   return counts;
 }
 
-void bind_values(py::module_& module) {
-  py::class_<PyReading>(module, "Reading", "One position as an encoder reported it.")
-      .def_property_readonly("angle_deg", &PyReading::angle_deg,
-                             "Degrees, 0 to below 360; None: it does not hold, or the encoder is linear.")
-      .def_property_readonly("position_mm", &PyReading::position_mm,
-                             "Of linear encoders, millimetres; None: it does not hold.")
-      .def_property_readonly("singleturn", &PyReading::singleturn, "Counts; None: it does not hold.")
-      .def_property_readonly("multiturn", &PyReading::multiturn, "Revolutions; None: not told, or they do not hold.")
-      .def_property_readonly(
-          "singleturn_bits", [](const PyReading& one) { return one.reading.singleturn_bits; },
-          "0: the reply carries no position")
-      .def_property_readonly(
-          "multiturn_bits", [](const PyReading& one) { return one.reading.multiturn_bits; },
-          "0: the reply carries no revolutions")
-      .def_property_readonly(
-          "ready", [](const PyReading& one) { return one.reading.ready; },
-          "False while the encoder says that it is starting.")
-      .def_property_readonly("valid", &PyReading::holds, "Whether the position holds.")
-      .def_property_readonly("alarms", &PyReading::alarms, "The names of those that are raised.")
-      .def_property_readonly("status", &PyReading::status, "The names of the status flags that are set.")
-      .def_property_readonly(
-          "time_s", [](const PyReading& one) { return seconds(one.reading.latched); },
-          "When it was latched, seconds of time.monotonic().")
-      .def("__repr__", &PyReading::text);
-  py::class_<PySample>(module, "Sample", "What one attempt to read has brought.")
-      .def_property_readonly(
-          "kind", &PySample::kind,
-          "\"reading\"; \"failed\": see `error`; \"lost\": the port has just gone away, \"absent\", \"back\".")
-      .def_property_readonly(
-          "time_s", [](const PySample& one) { return seconds(one.sample.at); },
-          "Seconds of time.monotonic(); of a reading when it was latched.")
-      .def_property_readonly("reading", &PySample::reading, "None when there is none: see `kind`.")
-      .def_property_readonly(
-          "position", [](const PySample& one) { return one.when(one.sample.position_valid, one.sample.position); },
-          "Counts, continued past the end of the counter.")
-      .def_property_readonly(
-          "speed", [](const PySample& one) { return one.when(one.sample.speed_valid, one.sample.speed); },
-          "rpm, of linear encoders mm/s, as it was `speed_delay_s` before `time_s`.")
-      .def_property_readonly(
-          "speed_delay_s",
-          [](const PySample& one) { return one.when(one.sample.speed_valid, seconds(one.sample.speed_delay)); },
-          "Seconds.")
-      .def_property_readonly(
-          "confirmed", [](const PySample& one) { return one.sample.confirmed; }, "Two readings in a row agreed.")
-      .def_property_readonly(
-          "restarted", [](const PySample& one) { return one.sample.restarted; },
-          "It jumped, or how far it went since the reading before is not known: `position` starts again.")
-      .def_property_readonly(
-          "text", [](const PySample& one) { return one.sample.text(); },
-          "Why there is no reading, or what happened; \"\" of a reading that goes on.")
-      .def_property_readonly("error", &PySample::error, "The absenc.errors.EncoderError of a failed attempt, or None.")
-      .def("__repr__", &PySample::repr);
-}
-
 }  // namespace
 
 void bind_encoder(py::module_& module) {
-  bind_values(module);
   py::class_<PySamples>(module, "Samples").def("next", &PySamples::next);
   py::class_<PyEncoder>(module, "Encoder")
       .def(py::init<const std::string&, const std::vector<std::string>&>())

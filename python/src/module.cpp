@@ -5,6 +5,7 @@
 PYBIND11_MODULE(_absenc, module) {
   using namespace absenc::python;
   register_exceptions();
+  bind_sample(module);
   bind_encoder(module);
   bind_emulation(module);
   bind_identify(module);

@@ -35,7 +35,7 @@ py::dict decode(const std::string& name, const py::object& reply, const py::obje
   const client::WireFrame asked = frame_of(unit.link, "request", request);
   const client::WireFrame told = frame_of(unit.link, "reply", reply);
   if (asked.frame().empty() && told.frame().empty()) {
-    throw client::UsageError("there is nothing to decode: reply and request are empty");
+    throw client::UsageError("there is nothing to decode: reply and request are empty, and one of them is needed");
   }
   client::AnswerSink sink;
   const Error error = unit.decode(options, asked.frame(), told.frame(), sink);

@@ -111,10 +111,13 @@ def test_a_recording_ends_in_time_by_close_and_by_ctrl_c(tmp_path):
     with absenc.open("sim:tformat") as encoder:
         timed = encoder.record(tmp_path / "timed.csv", rate=50, seconds=0.2)
         assert timed.readings + timed.missed == 10
-        with pytest.raises(KeyboardInterrupt):
-            signal.setitimer(signal.ITIMER_REAL, 0.2)
-            signal.signal(signal.SIGALRM, signal.default_int_handler)
-            encoder.record(tmp_path / "stopped.csv", rate=50)
+        before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                signal.setitimer(signal.ITIMER_REAL, 0.2)
+                encoder.record(tmp_path / "stopped.csv", rate=50)
+        finally:
+            signal.signal(signal.SIGALRM, before)
         assert absenc.load(tmp_path / "stopped.csv").good().any()
         with ThreadPoolExecutor(1) as other:
             closed = other.submit(encoder.record, tmp_path / "closed.csv", rate=50)

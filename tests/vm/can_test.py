@@ -12,6 +12,7 @@ import threading
 import time
 
 from command_support import PATIENCE, Emulator, EncoderCase, absenc, end, json_lines, read_line
+from doctor_test import doctor, ids
 from record_test import read_csv, rows_so_far, wait_until
 
 BUS = "vcan0"
@@ -351,9 +352,9 @@ class ErrorFrames(OnABus):
                                      f"`sudo ip link set {interface} down` and {up}", "restart-ms 100")
 
     def assert_found(self, *wanted):
-        result = absenc("doctor", HASTY, "--json")
+        result, found = doctor(HASTY)
         self.assertEqual(result.returncode, 1, f"{result.stdout}{result.stderr}")
-        self.assertEqual([finding["id"] for finding in json.loads(result.stdout)["findings"]], list(wanted), result.stdout)
+        self.assertEqual(ids(found), list(wanted), result.stdout)
 
     def test_doctor_names_them(self):
         with AnotherNode(self.NO_ACKNOWLEDGE):

@@ -15,6 +15,7 @@ import time
 import unittest
 
 from command_support import ABSENC, PATIENCE, absenc, end, read_line
+from doctor_test import doctor, ids
 
 MAGIC = ord("k")
 CPHA, CPOL, CS_HIGH, LSB_FIRST = 1, 2, 4, 8
@@ -246,11 +247,10 @@ class Doctor(SpidevCase):
     every clock."""
 
     def assert_found(self, encoder, *wanted):
-        result = absenc("doctor", encoder, "--json")
+        result, found = doctor(encoder)
         self.assertEqual(result.returncode, 1 if wanted else 0, f"{result.stdout}{result.stderr}")
-        found = json.loads(result.stdout)["findings"]
-        self.assertEqual([finding["id"] for finding in found], list(wanted), result.stdout)
-        return found
+        self.assertEqual(ids(found), list(wanted), result.stdout)
+        return found["findings"]
 
     def test_good(self):
         self.serve("encolink")

@@ -104,14 +104,9 @@ constexpr auto options_of_chain = std::apply(
                 0, 1'000'000)),
             option<&ChainSettings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
                                                100'000),
-            option<&ChainSettings::register_order>("register_byte_order",
-                                                   "of profile and serial number: some makers have the low byte first",
-                                                   register_order_choices),
-            option<&ChainSettings::register_delay_us>(
-                "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0,
-                65'535),
-            option<&ChainSettings::start_sequence>(
-                "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence"),
+            register_order_option<&ChainSettings::register_order>,
+            register_delay_option<&ChainSettings::register_delay_us>,
+            start_sequence_option<&ChainSettings::start_sequence>,
         },
         options_of_channels(EveryChannel{})));
 

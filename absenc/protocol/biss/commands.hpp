@@ -30,6 +30,17 @@ constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
 }
 
+// The options about registers and the start that all units of BiSS have.
+template <auto member>
+inline constexpr auto register_order_option = author::option<member>(
+    "register_byte_order", "of profile and serial number: some makers have the low byte first", register_order_choices);
+template <auto member>
+inline constexpr auto register_delay_option = author::option<member>(
+    "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535);
+template <auto member>
+inline constexpr auto start_sequence_option = author::option<member>(
+    "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence");
+
 /// A position, and what the registers do.
 template <class Definition, class F>
 [[nodiscard]] constexpr auto commands_of(bool (*is_readable)(const F&)) {

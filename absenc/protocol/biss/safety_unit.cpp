@@ -123,13 +123,9 @@ struct SafetyDefinition {
                                           100'000),
       option<&SafetySettings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0,
                                      7),
-      option<&SafetySettings::register_order>("register_byte_order",
-                                              "of profile and serial number: some makers have the low byte first",
-                                              register_order_choices),
-      option<&SafetySettings::register_delay_us>(
-          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535),
-      option<&SafetySettings::start_sequence>(
-          "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence"),
+      register_order_option<&SafetySettings::register_order>,
+      register_delay_option<&SafetySettings::register_delay_us>,
+      start_sequence_option<&SafetySettings::start_sequence>,
   };
   static constexpr std::array models{
       ModelText{

@@ -57,13 +57,9 @@ struct Definition {
           "ready_us", "virtual encoder: the time that it needs itself, us; 0: as latency_us, but at most 10", 0,
           1'000'000)),
       option<&Settings::slave>("slave", "whose registers are meant: 0 is the encoder at the end of the line", 0, 7),
-      option<&Settings::register_order>("register_byte_order",
-                                        "of profile and serial number: some makers have the low byte first",
-                                        register_order_choices),
-      option<&Settings::register_delay_us>(
-          "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535),
-      option<&Settings::start_sequence>("start_sequence",
-                                        "virtual encoder: after power on it shows nothing before the start sequence"),
+      register_order_option<&Settings::register_order>,
+      register_delay_option<&Settings::register_delay_us>,
+      start_sequence_option<&Settings::start_sequence>,
   };
   static constexpr auto models = position_models;
   static constexpr struct {

@@ -191,7 +191,8 @@ Outcome judge_cyclic(Dialog& dialog, unsigned wanted, bool answered, const Caden
   if (heard.count == 0 && !answered) return {dialog.missing()};
   const unsigned rate = heard.per_second();
   if (heard.count >= 2 && 4 * rate >= 3 * wanted && 4 * rate <= 5 * wanted + 4) return done;
-  return only(Error::cross_check_failed, "the node sends more or fewer readings a second than it was told");
+  return only(Error::cross_check_failed, "the node sends more or fewer readings a second than it was told",
+              "try again, or fewer readings a second");
 }
 
 }  // namespace

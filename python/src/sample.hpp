@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an encoder said, as Python sees it: a reading, and a sample of many.
+#pragma once
+
+#include "absenc/client/reading.hpp"
+#include "python/src/bind.hpp"
+
+namespace absenc::python {
+
+[[nodiscard]] inline double seconds(Time time) { return std::chrono::duration<double>(time).count(); }
+
+struct PyReading {
+  const Unit* unit;
+  Reading reading;
+
+  [[nodiscard]] bool holds() const { return reading.ready && reading.singleturn_valid(); }
+  [[nodiscard]] std::optional<double> angle_deg() const {
+    if (!holds() || reading.unit_um > 0) return {};
+    return degrees(reading.singleturn, reading.singleturn_bits);
+  }
+  [[nodiscard]] std::optional<double> position_mm() const {
+    if (!holds() || reading.unit_um <= 0) return {};
+    return micrometres(reading.singleturn, reading.unit_um) / 1000;
+  }
+  [[nodiscard]] std::optional<std::uint64_t> singleturn() const {
+    if (!holds()) return {};
+    return reading.singleturn;
+  }
+  [[nodiscard]] std::optional<std::uint64_t> multiturn() const {
+    if (!reading.ready || reading.multiturn_bits == 0 || !reading.multiturn_valid) return {};
+    return reading.multiturn;
+  }
+  [[nodiscard]] py::tuple alarms() const { return names_of(client::alarms_of(*unit, reading)); }
+  [[nodiscard]] py::tuple status() const { return names_of(client::status_of(*unit, reading)); }
+  [[nodiscard]] py::str text() const {
+    const auto position =
+        holds() ? py::object(py::cast(reading.unit_um > 0 ? position_mm() : angle_deg())) : py::none();
+    return py::str("Reading({}={}, multiturn={}, alarms={})")
+        .format(reading.unit_um > 0 ? "position_mm" : "angle_deg", position, py::cast(multiturn()), alarms());
+  }
+};
+
+struct PySample {
+  const Unit* unit;
+  client::Sample sample;
+
+  [[nodiscard]] std::string_view kind() const {
+    using Kind = client::Sample::Kind;
+    switch (sample.kind) {
+      case Kind::reading:
+        return "reading";
+      case Kind::failed:
+        return "failed";
+      case Kind::lost:
+        return "lost";
+      case Kind::back:
+        return "back";
+      case Kind::absent:
+        break;
+    }
+    return "absent";
+  }
+  [[nodiscard]] std::optional<PyReading> reading() const {
+    if (sample.kind != client::Sample::Kind::reading) return {};
+    return PyReading{unit, sample.reading};
+  }
+  template <class T>
+  [[nodiscard]] std::optional<T> when(bool valid, T value) const {
+    return valid ? std::optional<T>(value) : std::nullopt;
+  }
+  [[nodiscard]] py::str repr() const {
+    const py::object said = sample.kind == client::Sample::Kind::reading
+                                ? py::object(PyReading{unit, sample.reading}.text())
+                                : py::object(py::str(sample.text()));
+    return py::str("Sample({}, time_s={}, {})").format(kind(), seconds(sample.at), said);
+  }
+  [[nodiscard]] py::object error() const {
+    return sample.kind == client::Sample::Kind::failed ? error_object(sample.trouble) : py::none();
+  }
+};
+
+}  // namespace absenc::python
