@@ -16,6 +16,7 @@
 #include "absenc/client/identify.hpp"
 #include "absenc/client/sample_rows.hpp"
 #include "absenc/client/test_support.hpp"
+#include "absenc/client/way/connection.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/protocol/all.hpp"
 
@@ -136,6 +137,51 @@ TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   const std::int64_t address[] = {7};
   EXPECT_THAT(encoder.settings().set("address", address).note, HasSubstr("address=7"));
   EXPECT_TRUE(encoder.read().singleturn_valid());
+}
+
+// Also when the port was lost and is opened again.
+TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
+  for (const bool by_name : {true, false}) {
+    Encoder encoder = open("sim:raa38-modbus");
+    if (by_name) {
+      encoder.run("set-baud", {57'600});
+    } else {
+      const std::int64_t baud[] = {57'600};
+      EXPECT_THAT(encoder.settings().set("baud", baud).note, HasSubstr("baud=57600"));
+    }
+    EXPECT_EQ(encoder.connection().uri().line.rate, 57'600u);
+    EXPECT_TRUE(encoder.read().singleturn_valid());
+  }
+}
+
+// Wherever a change of the rate is broken off, the port is not left at a rate that nobody knows of: an encoder that has
+// the old one is read, one that has the new one is not.
+TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
+  unsigned whole = 0;
+  unsigned there = 0;
+  unsigned elsewhere = 0;
+  for (unsigned end = 0; end == 0 || end < whole; end += 1 + whole / 12) {
+    Encoder encoder = open("sim:raa38-modbus");
+    unsigned waits = 0;
+    encoder.end_when([&] { return ++waits == end; });
+    try {
+      encoder.run("set-baud", {57'600});
+      whole = waits;
+    } catch (const Cancelled&) {
+    }
+    bool is_read = true;
+    try {
+      static_cast<void>(encoder.read());
+    } catch (const EncoderFailure&) {
+      is_read = false;
+    }
+    const bool is_there = encoder.run("baud")["baud"] == Value(std::int64_t{encoder.connection().uri().line.rate});
+    EXPECT_EQ(is_read, is_there) << end << " of " << whole;
+    EXPECT_FALSE(is_there && elsewhere != 0) << end << ": it had the new rate already";
+    (is_there ? there : elsewhere) += 1;
+  }
+  EXPECT_GT(there, 1u);
+  EXPECT_GT(elsewhere, 1u);
 }
 
 TEST(ClientSamples, AreRowsOfNamedValues) {

@@ -66,11 +66,9 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
   }
 }
 
-// What the encoder was set to may be what it is reached with. Returns what is to be said of it.
-std::string follow(Connection& encoder, const Command& setter, std::int64_t value) {
-  const Options changed = options_behind(encoder.unit(), encoder.uri().options, setter, value);
-  if (changed.values == encoder.uri().options.values) return {};
-  encoder.set_options(changed);
+// What the encoder was set to may be what it is reached with.
+std::string note_of(const Unit& unit, const Options& before, const Command& setter, std::int64_t value) {
+  if (options_behind(unit, before, setter, value).values == before.values) return {};
   return fmt::format("from now on it is reached with {}={}", setter.changes_option, value);
 }
 
@@ -113,10 +111,11 @@ Answer Settings::get(std::string_view name) {
 SettingChange Settings::set(std::string_view name, std::span<const std::int64_t> arguments) {
   const Setting setting = require_setting(connection_->unit(), name);
   const std::vector<std::int64_t> values = complete_arguments(*setting.setter, arguments);
+  const Options before = connection_->uri().options;
   Told told;
   write(*connection_, *setting.setter, values, told);
   const Answer& written = told.sink.answer;
-  SettingChange change{written, told.was_so, follow(*connection_, *setting.setter, values.front())};
+  SettingChange change{written, told.was_so, note_of(connection_->unit(), before, *setting.setter, values.front())};
   if (setting.getter == nullptr) return change;
   change.now = answer_to(*connection_, *setting.getter);
   require_same(change.now, written, setting.name());

@@ -24,7 +24,13 @@ void copy(std::span<const Item> items, std::vector<Item>& to) {
 
 template <class Item>
 RoughLine<Item>::RoughLine(LinkKind kind, LineSettings settings, Machine<Item>& device, std::uint64_t seed)
-    : kind_(kind), settings_(settings), device_(device), random_(seed), character_(settings.character()) {
+    : kind_(kind),
+      settings_(settings),
+      device_(device),
+      random_(seed),
+      character_(settings.character()),
+      host_rate_(settings.rate),
+      device_rate_(settings.rate) {
   const Step<Item> step = device_.next(time_);
   send(step);
 }
@@ -44,6 +50,7 @@ Time RoughLine<Item>::now() {
 template <class Item>
 void RoughLine<Item>::begin(const Step<Item>& step) {
   using Kind = typename Step<Item>::Kind;
+  if (step.kind == Kind::configure) set_rate(host_rate_, step.rate);
   if (step.kind != Kind::transfer && step.kind != Kind::pulse) return;
   ++counts_.requests;
   run_until(std::max(time_, step.at));
@@ -57,16 +64,30 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       for (const CanFrame& frame : request_) {
         run_until(time_ + settings_.bits(can_bits(frame).size() + can_intermission_bits));
-        feed({.kind = Event<Item>::Kind::received, .at = time_, .items = {&frame, 1}});
+        let_hear({&frame, 1});
       }
     } else if (!request_.empty()) {
       run_until(time_ + character_ * static_cast<std::int64_t>(request_.size()));
-      feed({.kind = Event<Item>::Kind::received, .at = time_, .items = request_});
+      let_hear(request_);
     }
   }
   sent_due_ = true;
   quiet_since_ = time_;
   heard_ = silence_told_ = false;
+}
+
+template <class Item>
+void RoughLine<Item>::set_rate(std::uint32_t& end, std::uint32_t rate) {
+  if (driven()) return;
+  end = settings_.rate = rate;
+  character_ = settings_.character();
+}
+
+template <class Item>
+void RoughLine<Item>::let_hear(std::span<const Item> request) {
+  using Kind = typename Event<Item>::Kind;
+  if (host_rate_ != device_rate_) return feed({.kind = Kind::line_error, .at = time_});
+  feed({.kind = Kind::received, .at = time_, .items = request});
 }
 
 // The host is the clock: what the device drives is there at the end.
@@ -218,6 +239,7 @@ void RoughLine<Item>::send(const Step<Item>& first) {
       side_.timer = step.at > time_ ? step.at : never;
       return;
     }
+    if (step.kind == Kind::configure) set_rate(device_rate_, step.rate);
     if (step.kind != Kind::transfer) continue;
     copy(step.out, out_);
     if (driven()) continue;
@@ -244,6 +266,7 @@ void RoughLine<Item>::hold(Time start, Time first, Time end, std::span<const Ite
   Held& held = held_[back_];
   copy(items, held.items);
   damage(held.items);
+  if (host_rate_ != device_rate_) held.items.clear();
   const Time late = driven() ? Time{} : lateness();
   // A line keeps the order.
   const Time before = back_ != front_ ? held_[back_ - 1].at : Time{};

@@ -28,9 +28,9 @@ struct RoughCounts {
   std::uint64_t late = 0;
 };
 
-/// Faster than a Line, which moves characters one by one: whoever needs collisions, rates or single characters takes
-/// that. A frame comes at its end, in one piece. On CAN the controllers check: a damaged frame is a `line_error`.
-/// Clocked and SPI links have no late frames.
+/// Faster than a Line, which moves characters one by one: whoever needs collisions or single characters takes that. A
+/// frame comes at its end, in one piece; between ends at different rates as a `line_error`. On CAN the controllers
+/// check: a damaged frame is a `line_error`. Clocked and SPI links have no late frames, and one rate.
 template <class Item>
 class RoughLine final : public Port<Item> {
  public:
@@ -81,6 +81,8 @@ class RoughLine final : public Port<Item> {
 
   [[nodiscard]] bool driven() const { return kind_ == LinkKind::spi || kind_ == LinkKind::clocked; }
   [[nodiscard]] Time due() const;
+  void set_rate(std::uint32_t& end, std::uint32_t rate);
+  void let_hear(std::span<const Item> request);
   void run_device();
   void run_until(Time limit);
   void feed(const Event<Item>& event);
@@ -109,6 +111,8 @@ class RoughLine final : public Port<Item> {
   Time time_{};
   Time told_{};
   Time character_;
+  std::uint32_t host_rate_;
+  std::uint32_t device_rate_;
   Side side_;
   std::vector<Item> request_;
   std::vector<Item> out_;  // of the device

@@ -8,6 +8,7 @@ namespace absenc::sim {
 
 template <class Item>
 void SimPort<Item>::Hand::feed(const Event<Item>& event) {
+  if (event.kind == Event<Item>::Kind::sent) sending = false;
   heard.push_back({event, {event.items.begin(), event.items.end()}});
 }
 
@@ -35,20 +36,31 @@ void SimPort<Item>::keep_pace() {
 template <class Item>
 Time SimPort<Item>::now() {
   keep_pace();
-  return line_.now();
+  told_ = line_.now();
+  return told_;
 }
 
 template <class Item>
 void SimPort<Item>::begin(const Step<Item>& step) {
   keep_pace();
+  using Kind = typename Step<Item>::Kind;
+  if (step.kind == Kind::transfer || step.kind == Kind::pulse) {
+    run_until([&] { return !hand_.sending; });
+    std::erase_if(hand_.heard, [](const Heard& heard) { return heard.event.kind == Event<Item>::Kind::sent; });
+    hand_.sending = true;
+  }
   hand_.beginning = &step;
   line_.wake(host_node_);
 }
 
 template <class Item>
 Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
+  // What keeps pace with a clock may have passed it meanwhile.
+  const bool is_past = step.at > told_ && step.at <= line_.now();
+  if (hand_.heard.empty() && is_past) hand_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
   if (hand_.heard.empty()) advance(step);
   Event<Item> event = hand_.heard.front().event;
+  told_ = event.at;
   items_ = std::move(hand_.heard.front().items);
   hand_.heard.pop_front();
   event.items = items_;
@@ -68,8 +80,14 @@ void SimPort<Item>::advance(const Step<Item>& step) {
   hand_.waiting = step;
   line_.wake(host_node_);
   const Disarm disarm{*this};
+  run_until([&] { return !hand_.heard.empty(); });
+}
+
+template <class Item>
+template <class Done>
+void SimPort<Item>::run_until(const Done& done) {
   constexpr Time idle = std::chrono::milliseconds(100);  // nothing will happen, but a sleep may be broken off
-  while (hand_.heard.empty()) {
+  while (!done()) {
     const Time due = line_.next_event();
     if (!real_time_.now) {
       if (!line_.step()) throw std::logic_error("a wait on a simulated line for what can never happen");

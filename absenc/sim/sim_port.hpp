@@ -27,7 +27,7 @@ class SimPort final : public Port<Item> {
   SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time = {});
 
   [[nodiscard]] Time now() override;
-  /// A transfer or pulse during another one is a std::logic_error.
+  /// A transfer or pulse during another one, which somebody broke off, waits until that has been sent.
   void begin(const Step<Item>& step) override;
   /// Without a RealTime, a wait for something that can never happen is a std::logic_error.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
@@ -38,6 +38,10 @@ class SimPort final : public Port<Item> {
   void set_echo(bool echo) { line_.set_echo(host_node_, echo); }
 
  private:
+  struct Heard {
+    Event<Item> event;
+    std::vector<Item> items;
+  };
   // The machine at the host's end: passes steps from the port's user and collects what happens.
   class Hand final : public Machine<Item> {
    public:
@@ -46,18 +50,18 @@ class SimPort final : public Port<Item> {
 
     Step<Item> waiting{};
     const Step<Item>* beginning = nullptr;
-    struct Heard {
-      Event<Item> event;
-      std::vector<Item> items;
-    };
+    bool sending = false;
     std::deque<Heard> heard;
   };
 
   void keep_pace();
   void advance(const Step<Item>& step);
+  template <class Done>
+  void run_until(const Done& done);
 
   RealTime real_time_;
   Time start_{};  // of virtual time, on the caller's clock
+  Time told_{};   // the last that was
   Line<Item> line_;
   Hand hand_;
   typename Line<Item>::Node host_node_;

@@ -87,16 +87,17 @@ TEST(SimPort, VirtualTimeJumpsAndIsExact) {
   EXPECT_EQ(times, (std::vector<std::int64_t>{33'000, 133'000, 233'000}));
 }
 
+class Mute final : public Machine<std::uint8_t> {
+  void feed(const Event<std::uint8_t>&) override {}
+  Step<std::uint8_t> next(Time) override { return {}; }
+};
+
 TEST(SimPort, SilenceAndTimers) {
-  class Mute final : public Machine<std::uint8_t> {
-    void feed(const Event<std::uint8_t>&) override {}
-    Step<std::uint8_t> next(Time) override { return {}; }
-  } mute;
+  Mute mute;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, mute);
   EXPECT_THROW((void)port.wait({}), std::logic_error);
   const std::array<std::uint8_t, 2> out{1, 2};
   port.begin({.kind = StepKind::transfer, .out = out, .at = microseconds(5)});
-  EXPECT_THROW(port.begin({.kind = StepKind::transfer, .out = out}), std::logic_error);
   const Step<std::uint8_t> patient{.at = microseconds(40), .answer = microseconds(50)};
   const auto expect = [&](Kind kind, Time at) {
     const Event<std::uint8_t> event = port.wait(patient);
@@ -107,6 +108,17 @@ TEST(SimPort, SilenceAndTimers) {
   expect(Kind::sent, microseconds(25));
   expect(Kind::timer, microseconds(40));
   expect(Kind::silence, microseconds(75));
+}
+
+TEST(SimPort, WhatIsSentBehindATransferThatWasBrokenOffWaitsForIt) {
+  Mute mute;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, mute);
+  const std::array<std::uint8_t, 2> out{1, 2};
+  port.begin({.kind = StepKind::transfer, .out = out, .at = microseconds(5)});
+  port.begin({.kind = StepKind::transfer, .out = std::span(out).first(1)});
+  const Event<std::uint8_t> event = port.wait({.at = microseconds(100)});
+  EXPECT_EQ(event.kind, Kind::sent);
+  EXPECT_EQ(event.at, microseconds(35));
 }
 
 TEST(SimPort, ConfigureChangesTheHostsEnd) {
@@ -168,6 +180,19 @@ TEST(SimPort, LimitsDoNotRunWhileNobodyWaits) {
     (void)port.now();
   }
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
+}
+
+// A configuration is carried out at the time that it is now, not at that of the last event.
+TEST(SimPort, ATimerThatPassedMeanwhileIsTold) {
+  SlowWorld world;
+  Mute mute;
+  SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, mute, world.real_time());
+  const Time start = port.now();
+  world.clock += microseconds(1000);
+  port.begin({.kind = StepKind::configure, .rate = 2'000'000});
+  const Event<std::uint8_t> event = port.wait({.at = start + microseconds(5)});
+  EXPECT_EQ(event.kind, Kind::timer);
+  EXPECT_EQ(event.at, start + microseconds(5));
 }
 
 TEST(SimPort, BrokenOffSleepLeavesThePortUsable) {

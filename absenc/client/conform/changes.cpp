@@ -12,6 +12,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/error.hpp"
 
 namespace absenc::client {
 
@@ -71,6 +72,9 @@ void Changes::test_one(const Clause& clause, ClauseResult& result) {
     }
   } catch (const Refused& refused) {
     conclude(result, false, refused.evidence);
+  } catch (const os::Failure& failure) {
+    if (failure.kind() != os::Failure::Kind::unsupported) throw;
+    result.evidence = failure.what();  // of the port, before the encoder was changed
   }
 }
 

@@ -76,8 +76,11 @@ class Tester {
   [[nodiscard]] ChangesLine line() {
     return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments); },
             .rest = [this](Time time) { port_.listen(time); },
-            .follow = [this](const Command& setter,
-                             std::int64_t value) { options_ = options_behind(unit_, options_, setter, value); }};
+            .follow =
+                [this](const Command& setter, std::int64_t value) {
+                  options_ = options_behind(unit_, options_, setter, value);
+                  watched_.return_to(line_settings(unit_, options_).rate);
+                }};
   }
 
   void test(const Clause& clause, ClauseResult& result) {
@@ -108,6 +111,7 @@ class Tester {
   Ran run(const Command& command, Arguments arguments) {
     host::Session<Item> session(unit_, options_, watched_, storage_, echo_);
     session_ = &session;
+    watched_.return_to(line_settings(unit_, options_).rate);
     struct Forget {
       host::Session<Item>*& session;
       ~Forget() { session = nullptr; }

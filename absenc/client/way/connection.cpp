@@ -50,18 +50,26 @@ class ConnectionOn final : public Connection {
   Outcome read(host::Take take, const IsPossible& is_possible) override {
     const Command* command = find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
-    return outcome(*command, link_->take_turn([&] { return session_.read(*command, take, is_possible); }));
+    return outcome(*command, link_->take_turn([&] {
+      return_to_rate();
+      return session_.read(*command, take, is_possible);
+    }));
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
     if (link_.use_count() > 1) tell_of_company();
-    return outcome(command, link_->take_turn([&] {
+    const Outcome ended = outcome(command, link_->take_turn([&] {
+      return_to_rate();
       return session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
         last_ = &conversation;
         if (on_emit) on_emit();
         return true;
       });
     }));
+    if (ended.error == Error::none && !ended.aborted && !command.changes_option.empty()) {
+      set_options(options_behind(unit(), uri().options, command, arguments.front()));
+    }
+    return ended;
   }
 
   void set_options(const Options& options) override {
@@ -126,6 +134,8 @@ class ConnectionOn final : public Connection {
   }
 
  private:
+  void return_to_rate() { port_.return_to(line_settings(unit(), uri().options).rate); }
+
   // Others have the same line open.
   void tell_of_company() {
     Options options = uri().options;
@@ -248,6 +258,13 @@ std::string Trouble::text() const {
   if (!exchange.empty()) lines += fmt::format("\n  {}", exchange);
   if (!advice.empty()) lines += fmt::format("\n  Try: {}", advice);
   return lines;
+}
+
+// What the user said of the line stays, but where the encoder has another rate now.
+void Connection::set_options(const Options& options) {
+  const std::uint32_t rate = line_settings(unit(), options).rate;
+  if (rate != line_settings(unit(), uri_.options).rate) uri_.line.rate = rate;
+  uri_.options = options;
 }
 
 std::unique_ptr<Connection> Connection::make(const EncoderAddress& uri) {

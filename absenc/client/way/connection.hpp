@@ -46,7 +46,8 @@ class Connection {
   /// The position, with all the alarms the unit can tell; of those that an encoder transmits by itself, which. Throws
   /// UsageError when the unit has none.
   virtual Outcome read(host::Take take = host::Take::newest, const IsPossible& is_possible = all_are_possible) = 0;
-  /// `on_emit` is called for each result but the last; `report` then tells of it.
+  /// `on_emit` is called for each result but the last; `report` then tells of it. What reaches the encoder by what the
+  /// command sets reaches it by the new value from now on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// The fields of the last outcome, and its reading.
   virtual void report(FieldSink& sink) const = 0;
@@ -72,7 +73,7 @@ class Connection {
   virtual void end_when(std::function<bool()> over) = 0;
 
   /// From now on, without opening it again: it was set to something else itself.
-  virtual void set_options(const Options& options) { uri_.options = options; }
+  virtual void set_options(const Options& options);
 
   [[nodiscard]] const EncoderAddress& uri() const { return uri_; }
   [[nodiscard]] const Unit& unit() const { return *uri_.unit; }

@@ -33,7 +33,14 @@ template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
   /// The port to use from now on.
-  void attach(Port<Item>& port) { port_ = &port; }
+  void attach(Port<Item>& port) {
+    port_ = &port;
+    rate_ = 0;
+  }
+  /// Before a conversation: one that was broken off may have left the port at another rate than that of its encoder.
+  void return_to(std::uint32_t rate) {
+    if (rate_ != 0 && rate_ != rate) begin({.kind = Step<Item>::Kind::configure, .rate = rate});
+  }
 
   Time now() override { return port_->now(); }
 
@@ -50,6 +57,7 @@ class WatchedPort final : public Port<Item> {
       received.clear();
     }
     port_->begin(step);
+    if (step.kind == Step<Item>::Kind::configure) rate_ = step.rate;
   }
 
   Event<Item> wait(const Step<Item>& step) override {
@@ -96,6 +104,7 @@ class WatchedPort final : public Port<Item> {
 
   static constexpr std::size_t most_kept = 1024;
   Port<Item>* port_ = nullptr;
+  std::uint32_t rate_ = 0;  // to which a conversation brought the port; 0: none did
   bool aborted_ = false;
 };
 

@@ -13,7 +13,7 @@ inline constexpr std::array<Clause, 2> serial_clauses{{
     {"sum", "3.1.1", "a frame ends with the sum of its bytes", Demand::checked},
 }};
 
-inline constexpr std::array<Clause, 7> modbus_clauses{{
+inline constexpr std::array<Clause, 8> modbus_clauses{{
     {"answer", "3.1.7", "function 03 is answered", Demand::answered},
     {"length", "3.1.7 (5)", "an answer has as many bytes as its registers need", Demand::whole},
     {"crc", "3.1.7", "an answer ends with its CRC", Demand::checked},
@@ -29,6 +29,14 @@ inline constexpr std::array<Clause, 7> modbus_clauses{{
      .setting = "address",
      .field = "address",
      .other = 0x21},
+    {.id = "set-baud",
+     .paragraph = "3.1.7 (5)",
+     .words = "the encoder answers at the baud rate that it was given",
+     .demand = Demand::set,
+     .value = 57'600,
+     .setting = "baud",
+     .field = "baud",
+     .other = 9'600},
 }};
 
 inline constexpr std::array<Clause, 2> can_clauses{{
