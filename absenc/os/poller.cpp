@@ -44,9 +44,11 @@ std::span<const int> Poller::wait(Time deadline) {
   // A deadline that is over only asks what is there: that needs no timer.
   const bool over = deadline < armed_ && now() >= deadline;
   if (!over && deadline < armed_) arm(deadline);
+  const Time patience = EndQuestion::patience();
+  const int look = over ? 0 : patience == never ? -1 : static_cast<int>(patience / std::chrono::milliseconds(1));
   for (;;) {
     std::array<epoll_event, most_ready> events;
-    const int count = ::epoll_wait(epoll_.get(), events.data(), most_ready, over ? 0 : -1);
+    const int count = ::epoll_wait(epoll_.get(), events.data(), most_ready, look);
     if (count < 0 && errno != EINTR) throw system_failure("epoll_wait", errno);
     std::size_t ready = 0;
     bool rang = false;
@@ -67,6 +69,7 @@ std::span<const int> Poller::wait(Time deadline) {
     }
     if (ready > 0) return {ready_.data(), ready};
     if (over) return {};
+    if (count == 0) EndQuestion::ask();
     if (!rang) continue;
     if (now() >= deadline) return {};
     if (deadline != never) arm(deadline);

@@ -25,7 +25,7 @@ class Poller {
   void remove(int descriptor);
 
   /// Blocks until there is something to read and returns where; empty when `deadline` came first (`never`: none).
-  /// What is ready at once is seen even after the deadline. Throws Interrupted and Failure.
+  /// What is ready at once is seen even after the deadline. Throws Interrupted, Ended and Failure.
   [[nodiscard]] std::span<const int> wait(Time deadline);
 
  private:

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>
 
+#include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
@@ -35,6 +36,15 @@ TEST(Poller, TellsWhereThereIsSomethingToRead) {
   EXPECT_EQ(ready[0], second.get());
   poller.remove(second.get());
   EXPECT_TRUE(poller.wait(now() + 1ms).empty());
+}
+
+TEST(Poller, AsksWhetherItIsOver) {
+  int asked = 0;
+  const std::function<bool()> over = [&] { return ++asked == 3; };
+  const EndQuestion question(over);
+  Poller poller;
+  EXPECT_THROW(static_cast<void>(poller.wait(never)), Ended);
+  EXPECT_EQ(asked, 3);
 }
 
 TEST(Poller, SeesWhatIsReadyEvenAfterTheDeadline) {

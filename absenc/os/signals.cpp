@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <ctime>
 #include <stdexcept>
+#include <utility>
 
 #include "absenc/os/error.hpp"
 
@@ -68,6 +69,20 @@ bool take_interrupt() {
   return ::read(wake, &count, sizeof count) > 0;
 }
 
+namespace {
+thread_local const std::function<bool()>* is_over = nullptr;
+}  // namespace
+
+EndQuestion::EndQuestion(const std::function<bool()>& over) : outer_(std::exchange(is_over, over ? &over : nullptr)) {}
+
+EndQuestion::~EndQuestion() { is_over = outer_; }
+
+Time EndQuestion::patience() { return is_over == nullptr ? never : std::chrono::milliseconds(20); }
+
+void EndQuestion::ask() {
+  if (is_over != nullptr && (*is_over)()) throw Ended{};
+}
+
 Time now() {
   timespec time{};
   ::clock_gettime(CLOCK_MONOTONIC, &time);
@@ -81,15 +96,21 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
   pollfd& signal = all[watched.size()];
   signal = {interrupt_descriptor(), POLLIN, 0};  // -1: not looked at
   for (;;) {
+    const Time patience = EndQuestion::patience();
+    const Time look = patience == never ? deadline : std::min(deadline, now() + patience);
     timespec timeout{};
-    if (deadline != never) timeout = time_left(deadline);
-    const int ready = ::ppoll(all.data(), watched.size() + 1, deadline == never ? nullptr : &timeout, nullptr);
+    if (look != never) timeout = time_left(look);
+    const int ready = ::ppoll(all.data(), watched.size() + 1, look == never ? nullptr : &timeout, nullptr);
     if (ready < 0) {
       if (errno == EINTR) continue;  // ours is readable now, any other is none of our business
       throw system_failure("ppoll", errno);
     }
     if (signal.revents != 0) {
       if (take_interrupt()) throw Interrupted{};
+      continue;
+    }
+    if (ready == 0 && look < deadline) {
+      EndQuestion::ask();
       continue;
     }
     std::copy_n(all.begin(), watched.size(), watched.begin());

@@ -5,6 +5,7 @@
 #include <poll.h>
 
 #include <cstddef>
+#include <functional>
 #include <span>
 
 #include "absenc/core/time.hpp"
@@ -23,6 +24,26 @@ void catch_interrupts();
 /// Takes the signal out of it; false when another thread was faster.
 bool take_interrupt();
 
+/// While one lives, every wait of this thread that takes longer asks `over` each 20 ms, and where it is true ends with
+/// Ended: for what no descriptor tells, such as a signal that somebody else handles (an interpreter), or another
+/// thread.
+class EndQuestion {
+ public:
+  /// `over` must outlive it; empty: nothing is asked.
+  explicit EndQuestion(const std::function<bool()>& over);
+  ~EndQuestion();
+  EndQuestion(const EndQuestion&) = delete;
+  EndQuestion& operator=(const EndQuestion&) = delete;
+
+  /// How long a wait may take until it calls `ask`; `never`: nobody asks.
+  [[nodiscard]] static Time patience();
+  /// Throws Ended.
+  static void ask();
+
+ private:
+  const std::function<bool()>* outer_;
+};
+
 /// CLOCK_MONOTONIC.
 [[nodiscard]] Time now();
 
@@ -31,7 +52,7 @@ inline constexpr std::size_t most_watched = 32;
 /// Blocks until one of `watched` (at most `most_watched`) has an event, then sets `revents` of all and returns true;
 /// false when `deadline` came first (`never`: no deadline). What is ready at once is seen even after the deadline.
 /// Throws Interrupted once for each signal, or for several that came together, so that unwinding may wait again;
-/// throws Failure.
+/// throws Ended (EndQuestion) and Failure.
 bool wait_for(std::span<pollfd> watched, Time deadline);
 
 /// Throws as `wait_for` does. Late by the kernel's timer slack (50 us) and scheduling, never early.

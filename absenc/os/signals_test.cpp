@@ -89,6 +89,21 @@ TEST_F(Signals, OfOtherKindsDoNotEndAWait) {
   ::sigaction(SIGALRM, &before, nullptr);
 }
 
+TEST(EndQuestion, EndsAWaitThatNothingElseEnds) {
+  int asked = 0;
+  const std::function<bool()> over = [&] { return ++asked == 3; };
+  const EndQuestion question(over);
+  {
+    const EndQuestion none({});
+    EXPECT_FALSE(wait_for({}, now() + 50ms));
+    EXPECT_EQ(asked, 0);
+  }
+  EXPECT_THROW(wait_for({}, never), Ended);
+  EXPECT_EQ(asked, 3);
+  EXPECT_FALSE(wait_for({}, now() + 50ms));
+  EXPECT_GT(asked, 3);
+}
+
 TEST(WaitFor, SeesWhatIsReadyAfterTheDeadline) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::pipe(ends.data()), 0);

@@ -20,8 +20,7 @@
 
 Encoders are written as for the command: "tformat:/dev/ttyUSB0?model=23-bit", "raa38-can:can0", "sim:esl", or a name of
 absenc.toml. Options may be given as keywords. A position that does not hold is None, or masked: never a number.
-Every wait releases the GIL and ends at Ctrl-C, one for an answer when its time (`latency`) is over. What goes wrong is
-an exception of `absenc.errors`.
+Every wait releases the GIL and ends at Ctrl-C. What goes wrong is an exception of `absenc.errors`.
 """
 from __future__ import annotations
 

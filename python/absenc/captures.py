@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _absenc
-from ._values import Value, texts
+from ._values import Value, natural, texts
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import]
@@ -105,10 +105,10 @@ def _open(
     model: str,
     options: dict[str, Value],
 ) -> _absenc.Rows:
-    channels = [channel] if isinstance(channel, str) else list(channel)
-    return _absenc.Rows(
-        os.fspath(file), unit, [one for one in channels if one], raw_channels, rate, baud, parity, model, texts(options)
-    )
+    named = [one for one in ([channel] if isinstance(channel, str) else channel) if one]
+    channels = natural("raw_channels", raw_channels)
+    samples = natural("rate", rate, most=2**63 - 1)
+    return _absenc.Rows(os.fspath(file), unit, named, channels, samples, baud, parity, model, texts(options))
 
 
 def decode(
@@ -150,7 +150,8 @@ def decode_batches(
     **options: Value,
 ) -> Iterator[Capture]:
     """As `decode`, in captures of at most so many rows each, for files larger than memory. The last has the notes."""
-    return _batches(_open(file, unit, channel, raw_channels, rate, baud, parity, model, options), rows)
+    most = natural("rows", rows, least=1)
+    return _batches(_open(file, unit, channel, raw_channels, rate, baud, parity, model, options), most)
 
 
 def _batches(source: _absenc.Rows, rows: int) -> Iterator[Capture]:

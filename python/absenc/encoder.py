@@ -11,7 +11,7 @@ from typing import NamedTuple, Optional, Union
 
 from . import _absenc
 from ._absenc import Reading, Sample
-from ._values import Field, Value, texts
+from ._values import Field, Value, natural, texts
 from .errors import EncoderError
 from .protocols import Command, Flag, Protocol, protocol
 
@@ -91,12 +91,14 @@ class Memory:
 
     def read(self, address: int, count: int = 1, *, page: int = 0) -> bytes:
         """`count` bytes from `address` on."""
-        return self._encoder.memory_read(address, count, page)
+        return self._encoder.memory_read(
+            natural("address", address), natural("count", count), natural("page", page)
+        )
 
     def write(self, address: int, data: bytes, *, page: int = 0, force: bool = False) -> int:
         """Writes those bytes that differ, each read back, and all of them once more at the end; returns how many
         differed. `force` writes also what is protected."""
-        return self._encoder.memory_write(address, data, page, force)
+        return self._encoder.memory_write(natural("address", address), data, natural("page", page), force)
 
     def dump(self) -> dict[tuple[int, int], int]:
         """All that a copy of the memory has: (page, address) to value."""
@@ -154,7 +156,7 @@ class Encoder:
     def samples(self, *, rate: float = 0, count: int = 0) -> Samples:
         """Readings with position beyond the end of the counter, and speed. `rate` in readings a second, 0: as fast as
         can be; `count` 0: without end."""
-        return Samples(self._encoder, rate, count)
+        return Samples(self._encoder, rate, natural("count", count))
 
     def record(
         self,
@@ -172,9 +174,11 @@ class Encoder:
         one before. Ends after `count` of them or `seconds`, by `close` in another thread, or by Ctrl-C, which is raised
         once all is on the disk. Losses of the port and readings that could not be taken are rows. After `part_bytes` or
         `part_seconds` another file is begun: "log-0001.csv", "log-0002.csv". Raises UsageError, PortError."""
-        return Recorded(
-            *self._encoder.record(os.fspath(path), rate, every, count, seconds, part_bytes, part_seconds)
+        size = None if part_bytes is None else natural("part_bytes", part_bytes, most=2**63 - 1)
+        recorded = self._encoder.record(
+            os.fspath(path), rate, natural("every", every, least=1), natural("count", count), seconds, size, part_seconds
         )
+        return Recorded(*recorded)
 
     def run(self, command: str, *values: int, **arguments: int) -> dict[str, Field]:
         """A command of the unit (`commands`), what it told by field. Nobody is asked, even if it changes the encoder;

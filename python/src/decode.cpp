@@ -205,6 +205,7 @@ void bind_decode(py::module_& module) {
                                       .parity = parity_of(parity),
                                       .model = model,
                                       .options = std::move(options)};
+        const py::gil_scoped_release released;
         return std::make_unique<Rows>(path, unit, choices);
       }))
       .def("columns", &Rows::columns)

@@ -257,7 +257,6 @@ py::tuple record(PyEncoder& encoder, const std::string& path, double rate_hz, st
                  std::optional<double> duration, std::optional<std::uint64_t> part_bytes,
                  std::optional<double> part_duration) {
   require_rate(rate_hz);
-  if (every == 0) throw client::UsageError("every is 1 or more: of so many readings one is written");
   const client::RecordingSettings settings{.path = path,
                                            .encoder = client::address_of(encoder.encoder().connection().uri()),
                                            .rate_hz = rate_hz,

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 import asyncio
 import os
+import select
 import signal
 import subprocess
 import sys
 import threading
+import tty
 
 import absenc
 import pytest
@@ -74,6 +76,16 @@ def test_samples_say_what_they_are_and_refuse_impossible_rates():
         for rate in (-1, float("nan")):
             with pytest.raises(absenc.UsageError, match="rate"):
                 encoder.samples(rate=rate)
+        for count in (-1, 1.5, float("nan"), "3", 2**40):
+            with pytest.raises(absenc.UsageError, match="count is a whole number from 0"):
+                encoder.samples(count=count)
+        with pytest.raises(absenc.UsageError, match="address is a whole number"):
+            encoder.memory.read(-1)
+        with pytest.raises(absenc.UsageError, match="every is a whole number from 1 "):
+            encoder.record("never.csv", every=0)
+        assert next(encoder.samples(count=1.0)).kind == "reading"
+    with pytest.raises(absenc.UsageError, match="rows is a whole number from 1 "):
+        absenc.decode_batches("drive.sr", "tformat", rows=0)
 
 
 def test_an_alarm_is_told_once(absenc_emulate):
@@ -145,6 +157,52 @@ def test_close_ends_what_waits_in_another_thread(absenc_emulate):
     assert not thread.is_alive()
     with pytest.raises(absenc.UsageError, match="closed"):
         encoder.read()
+
+
+def test_ctrl_c_ends_the_wait_for_an_answer():
+    """Long before the limit of the answer, which is 50 s."""
+    master, slave = os.openpty()
+    program = f"""
+import absenc
+with absenc.open("tformat:{os.ttyname(slave)}?latency=50000") as encoder:
+    try:
+        encoder.read()
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+"""
+    tty.setraw(slave)
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert select.select([master], [], [], 40)[0]  # the request
+            os.kill(process.pid, signal.SIGINT)
+            assert process.communicate(timeout=40)[0] == "interrupted\n"
+        finally:
+            process.kill()
+            os.close(master)
+            os.close(slave)
+
+
+def test_close_ends_the_wait_for_an_answer():
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    ended = []
+
+    def read(encoder):
+        with pytest.raises(absenc.errors.Cancelled):
+            encoder.read()
+        ended.append(True)
+
+    try:
+        encoder = absenc.open(f"tformat:{os.ttyname(slave)}?latency=50000")
+        thread = threading.Thread(target=read, args=(encoder,))
+        thread.start()
+        assert select.select([master], [], [], 40)[0]
+        encoder.close()
+        thread.join(40)
+        assert ended
+    finally:
+        os.close(master)
+        os.close(slave)
 
 
 @pytest.mark.parametrize("wait", ["list(encoder.samples(rate=0.001))", "list(encoder.samples(rate=1000))"])

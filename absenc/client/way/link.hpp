@@ -11,6 +11,7 @@
 #include "absenc/client/way/address.hpp"
 #include "absenc/link/port.hpp"
 #include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
 
 namespace absenc::client {
 
@@ -62,6 +63,7 @@ class WatchedPort final : public Port<Item> {
 
   Event<Item> wait(const Step<Item>& step) override {
     if (over && over()) throw os::Ended{};
+    const os::EndQuestion question(over);
     const Event<Item> event = wait_or_abort(step);
     if (event.kind == Event<Item>::Kind::sent) sent_at = event.at;
     if (event.kind == Event<Item>::Kind::line_error) ++line_errors;
