@@ -4,6 +4,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -25,6 +27,7 @@ class Carrier {
   /// Begins a conversation, which must live until it is over. The one before is given up.
   void start(Machine<Item>& machine, Time now) {
     machine_ = &machine;
+    expected_ = gathered_ = 0;
     sending_ = held_ = heard_ = false;
     quiet_told_ = true;  // until something was sent
     go_on(now);
@@ -38,17 +41,24 @@ class Carrier {
     quiet_since_ = now;
     tell({.kind = Event<Item>::Kind::sent, .at = now});
   }
-  /// What comes while no conversation runs is nobody's.
+  /// What comes while no conversation runs is nobody's. Single characters are kept until as many are there as the
+  /// machine waits for, or the line is quiet, as a DMA channel does: one that others follow takes little time.
   void received(std::span<const Item> items, Time now) {
-    came({.kind = Event<Item>::Kind::received, .at = now, .items = items});
+    if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
+    come(items, now);
   }
   /// A character with a wrong stop or parity bit came.
-  void line_error(Time now) { came({.kind = Event<Item>::Kind::line_error, .at = now}); }
+  void line_error(Time now) {
+    tell_gathered();
+    came({.kind = Event<Item>::Kind::line_error, .at = now});
+  }
 
   /// To be called when `due()` has come; oftener does no harm. A tick slower than the encoder's limits makes silences
   /// longer, never wrong.
   void tick(Time now) {
-    if (!is_busy() || now < due()) return;
+    if (now < due()) return;
+    tell_gathered();
+    if (now < due()) return;
     if (held_) {
       held_ = false;
       sending_ = true;
@@ -73,6 +83,26 @@ class Carrier {
  private:
   using Kind = typename Step<Item>::Kind;
 
+  void gather(Item item, Time now) {
+    items_[gathered_++] = item;
+    heard_ = true;
+    quiet_told_ = false;
+    quiet_since_ = now;
+  }
+  void come(std::span<const Item> items, Time now) {
+    if (gathered_ != 0 && items.size() == 1) {
+      gather(items.front(), now);
+      return tell_gathered();
+    }
+    tell_gathered();
+    came({.kind = Event<Item>::Kind::received, .at = now, .items = items});
+  }
+  void tell_gathered() {
+    if (gathered_ == 0) return;
+    const std::span<const Item> items(items_.data(), gathered_);
+    gathered_ = 0;
+    tell({.kind = Event<Item>::Kind::received, .at = quiet_since_, .items = items});
+  }
   void came(const Event<Item>& event) {
     if (!is_busy()) return;
     heard_ = true;
@@ -96,6 +126,7 @@ class Carrier {
       switch (step.kind) {
         case Kind::done:
           machine_ = nullptr;
+          expected_ = 0;
           return line_->result(true);
         case Kind::emit:
           line_->result(false);
@@ -108,6 +139,7 @@ class Carrier {
           held_ = step.at > now;
           sending_ = !held_;
           quiet_told_ = true;
+          expected_ = 0;
           if (held_) {
             step_ = step;
           } else {
@@ -118,24 +150,33 @@ class Carrier {
           answer_ = step.answer;
           gap_ = step.gap;
           at_ = step.at > now ? step.at : never;
+          // Where no pause ends what has begun, characters that are kept would never be told.
+          expected_ = gap_ == Time{} ? 0 : static_cast<std::uint8_t>(std::min(step.expect, room));
           return;
       }
     }
   }
 
+  // As many as most replies have; longer ones are told in pieces. Of frames each.
+  static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
+
+  // First what every character needs.
+  std::uint8_t expected_ = 0;  // characters that may be kept, or one more; 0: none
+  std::uint8_t gathered_ = 0;
+  bool held_ = false;
+  bool sending_ = false;
+  bool heard_ = false;  // since the last transfer
+  bool quiet_told_ = true;
+  Time quiet_since_{};
+  std::array<Item, room> items_;  // gathered
   Line* line_;
   Machine<Item>* machine_ = nullptr;
   Time latency_;
-  Time quiet_since_{};
   Time answer_{};
   Time gap_{};
   Time at_ = never;
   Step<Item> step_{};  // held until its time
   std::uint32_t silences_ = 0;
-  bool held_ = false;
-  bool sending_ = false;
-  bool heard_ = false;  // since the last transfer
-  bool quiet_told_ = true;
 };
 
 }  // namespace absenc::host

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <string>
 #include <vector>
 
 #include "absenc/protocol/tformat/host.hpp"
@@ -43,6 +45,104 @@ TEST_F(CarrierTest, CarriesAConversationByteByByte) {
   EXPECT_EQ(read.reading()->singleturn, 0x12345u);
   EXPECT_EQ(read.reading()->latched, 10us);
   EXPECT_EQ(carrier.silences(), 0u);
+}
+
+// What a machine was fed, in words.
+struct Fed final : Machine<std::uint8_t> {
+  void feed(const ByteEvent& event) override {
+    if (event.kind == ByteEvent::Kind::sent) receiving = true;
+    if (event.kind == ByteEvent::Kind::received) {
+      all += std::to_string(event.items.size()) + " at " + std::to_string(event.at.count()) + "; ";
+      due -= std::min(due, event.items.size());
+    }
+    if (event.kind == ByteEvent::Kind::line_error) all += "error; ";
+    if (event.kind == ByteEvent::Kind::silence) all += "silence; ";
+  }
+  ByteStep next(Time) override {
+    if (!asked) {
+      asked = true;
+      return {.kind = ByteStep::Kind::transfer, .out = reply, .expect = due};
+    }
+    if (receiving && due == 0) return {.kind = ByteStep::Kind::done};
+    return {.expect = receiving ? due : 0, .at = never, .answer = 1us, .gap = gap};
+  }
+  bool asked = false, receiving = false;
+  std::size_t due = 5;
+  Time gap = 1us;
+  std::string all{};
+};
+
+TEST_F(CarrierTest, CharactersAreToldWhenAllAreThere) {
+  const auto fed_by = [](const auto& play, Time gap = 1us, std::size_t due = 5) {
+    Line out;
+    Carrier<std::uint8_t, Line> carried{out};
+    Fed fed;
+    fed.gap = gap;
+    fed.due = due;
+    carried.start(fed, 0ns);
+    play(carried);
+    return fed.all;
+  };
+  const auto characters = [](auto& carried, unsigned count, Time first) {
+    for (unsigned i = 0; i < count; ++i) carried.received(std::span(reply).first(1), first + i * 1ns);
+  };
+  EXPECT_EQ(fed_by([&](auto& one) {
+              one.sent(10ns);
+              characters(one, 4, 11ns);
+              EXPECT_EQ(one.due(), 14ns + 1us);
+              characters(one, 2, 15ns);  // the sixth is nobody's
+            }),
+            "5 at 15; ");
+  EXPECT_EQ(fed_by([&](auto& one) {
+              one.sent(10ns);
+              characters(one, 3, 11ns);
+              one.tick(20ns);  // not due
+              one.tick(2us);
+            }),
+            "3 at 13; silence; ");
+  EXPECT_EQ(fed_by([&](auto& one) {
+              one.sent(10ns);
+              characters(one, 2, 11ns);
+              one.line_error(13ns);
+              one.received(std::span(reply).first(2), 15ns);
+            }),
+            "2 at 12; error; 2 at 15; ");
+  EXPECT_EQ(fed_by([&](auto& one) {
+              characters(one, 1, 5ns);  // before the request is out
+              one.sent(10ns);
+              characters(one, 2, 11ns);
+              one.received(std::span(reply).first(3), 15ns);
+            }),
+            "1 at 5; 2 at 12; 3 at 15; ");
+  EXPECT_EQ(fed_by(
+                [&](auto& one) {
+                  one.sent(10ns);
+                  characters(one, 2, 11ns);
+                },
+                0us),
+            "1 at 11; 1 at 12; ");  // nothing would end what is kept
+  EXPECT_EQ(fed_by(
+                [&](auto& one) {
+                  one.sent(10ns);
+                  characters(one, 20, 11ns);
+                },
+                1us, 20),
+            "16 at 26; 4 at 30; ");
+}
+
+// The next conversation has nothing of what is given up.
+TEST_F(CarrierTest, WhatWasKeptIsForgottenWithItsConversation) {
+  Fed fed;
+  carrier.start(fed, 0us);
+  carrier.sent(1us);
+  carrier.received(std::span(reply).first(1), 2us);
+  carrier.start(read, 5us);
+  carrier.sent(10us);
+  Time now = 20us;
+  for (const std::uint8_t& byte : reply) carrier.received({&byte, 1}, now += 4us);
+  ASSERT_NE(read.reading(), nullptr);
+  EXPECT_EQ(read.reading()->received, now);
+  EXPECT_EQ(fed.all, "");
 }
 
 TEST_F(CarrierTest, TellsSilenceWithTheLatencyOfTheWay) {
