@@ -119,7 +119,10 @@ class ConformHost(EncoderCase):
         judge = self.start("conform-host", "tformat", "--pty", self.file("encoder"))
         self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
         self.assertEqual(end(judge, signal.SIGINT)[:2], (1, ""))
-        self.assert_wrong_usage(absenc("conform-host", "ssi"), "pseudo-terminal")
+        self.assert_wrong_usage(absenc("conform-host", "ssi"), "--spidev NAME")
+        self.assert_wrong_usage(absenc("conform-host", "ssi", "--spidev", "spidev9.0", "--pty", self.file("other")),
+                                "--spidev NAME alone")
+        self.assert_wrong_usage(absenc("conform-host", "tformat", "--spidev", "spidev9.0"), "SPI controller")
         self.assert_wrong_usage(absenc("conform-host", "raa38", "--pty", self.file("other")), "asked nothing")
 
 

@@ -35,10 +35,12 @@ Time SpiDevice::message(std::span<const SpiTransfer> transfers, Time start) {
   const bool chip_select = kind_ == LinkKind::spi;
   Time at = start;
   bool suited = true;
+  bool clocked = false;
   if (chip_select && !selected_) select(at, {});
   for (const SpiTransfer& transfer : transfers) {
     const bool clocks = transfer.size > 0 && !(transfer.out.empty() && transfer.in.empty());
     if (clocks) {
+      clocked = true;
       suited = suited && suits(transfer.mode);
       at = clock(transfer, at);
     }
@@ -51,6 +53,7 @@ Time SpiDevice::message(std::span<const SpiTransfer> transfers, Time start) {
     if (chip_select) select(at, {});
   }
   if (!chip_select || transfers.empty() || !transfers.back().deselect) deselect(at);
+  if (clocked) ++messages_;
   if (!suited) ++wrong_modes_;
   return at;
 }

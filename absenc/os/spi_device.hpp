@@ -47,7 +47,9 @@ class SpiDevice {
   void wake(Time now);
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
-  /// Messages whose clock or sampling did not suit the device.
+  /// Messages in which something was clocked.
+  [[nodiscard]] std::uint64_t messages() const { return messages_; }
+  /// Those whose clock or sampling did not suit the device.
   [[nodiscard]] std::uint64_t wrong_modes() const { return wrong_modes_; }
 
  private:
@@ -64,6 +66,7 @@ class SpiDevice {
   LineSettings settings_;
   Machine<std::uint8_t>* device_;
   Time timer_ = never;
+  std::uint64_t messages_ = 0;
   std::uint64_t wrong_modes_ = 0;
   bool held_low_ = false;  // since the last message
 

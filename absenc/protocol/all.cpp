@@ -36,16 +36,16 @@ constexpr std::array listed{
     Listed{&tformat::unit, tformat::clauses, tformat::host_clauses},
     Listed{&esl::unit, esl::clauses, esl::host_clauses},
     Listed{&encolink::unit, encolink::clauses, encolink::host_clauses},
-    Listed{&encolink::spi_unit, encolink::spi_clauses},
-    Listed{&biss::unit, biss::clauses},
-    Listed{&ssi::unit, ssi::clauses},
+    Listed{&encolink::spi_unit, encolink::spi_clauses, encolink::spi_host_clauses},
+    Listed{&biss::unit, biss::clauses, biss::host_clauses},
+    Listed{&ssi::unit, ssi::clauses, ssi::host_clauses},
     Listed{&e201::unit, e201::clauses, e201::host_clauses},
     Listed{&raa38::serial_unit, raa38::serial_clauses, raa38::serial_host_clauses},
     Listed{&raa38::modbus_unit, raa38::modbus_clauses, raa38::modbus_host_clauses},
     Listed{&raa38::can_unit, raa38::can_clauses, raa38::can_host_clauses},
     Listed{&amt21::unit, amt21::clauses, amt21::host_clauses},
-    Listed{&biss::safety_unit, biss::safety_clauses},
-    Listed{&biss::chain_unit, biss::chain_clauses},
+    Listed{&biss::safety_unit, biss::safety_clauses, biss::host_clauses},
+    Listed{&biss::chain_unit, biss::chain_clauses, biss::host_clauses},
 };
 
 constexpr auto units = [] {

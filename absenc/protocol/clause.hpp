@@ -67,6 +67,10 @@ struct HostClause {
   std::string_view rule{};  // as the virtual encoder calls it when it is broken; untested until it looked at it
 };
 
+/// Which edges a controller clocks and samples at shows in front of the virtual encoder: whoever plays the controller
+/// looks at this one.
+inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
+
 /// Those of this unit, in the order in which they are tested; empty: none are known. Defined with the list of units.
 [[nodiscard]] std::span<const Clause> clauses_of(const Unit& unit);
 [[nodiscard]] std::span<const HostClause> host_clauses_of(const Unit& unit);

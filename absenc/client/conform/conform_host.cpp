@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "absenc/client/conform/host_trial.hpp"
+#include "absenc/client/conform/host_stage.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/os/signals.hpp"
 
@@ -13,42 +13,62 @@ namespace {
 
 constexpr Time between_looks = std::chrono::milliseconds(5);
 
-void set_fault(Emulation& encoder, HostTrial::Fault fault) {
-  encoder.clear_faults();
-  if (fault != HostTrial::Fault::none) encoder.set_fault(name_of(fault), 1);
-}
+class EmulationStage final : public HostStage {
+ public:
+  explicit EmulationStage(Emulation& encoder) : encoder_(encoder) {}
+
+  std::uint64_t answer_count() override { return encoder_.answer_count(); }
+  std::vector<RuleCount> rule_counts() override { return encoder_.rule_counts(); }
+  void set_fault(HostTrial::Fault fault) override {
+    encoder_.clear_faults();
+    if (fault != HostTrial::Fault::none) encoder_.set_fault(name_of(fault), 1);
+  }
+  void play(Time until) override { os::sleep_until(until); }
+
+ private:
+  Emulation& encoder_;
+};
 
 }  // namespace
 
-Conformance conform_host(std::string_view text, const EmulateChoices& place, const ConformHostChoices& choices) {
-  Emulation encoder(text, place);
-  if (host_clauses_of(encoder.unit()).empty()) {
-    throw UsageError(fmt::format("no clauses are known of a host of {}", encoder.unit().id));
+void require_host(const Unit& unit, const Options& options) {
+  if (host_clauses_of(unit).empty()) {
+    throw UsageError(fmt::format("no clauses are known of a host of {}", unit.id));
   }
-  if (encoder.unit().streams != nullptr && encoder.unit().streams(encoder.options())) {
+  if (unit.streams != nullptr && unit.streams(options)) {
     throw UsageError(
         fmt::format("{} is asked nothing with these options, so there is no host to judge: choose others "
                     "(absenc list {} has them)",
-                    encoder.unit().id, encoder.unit().id));
+                    unit.id, unit.id));
   }
-  if (choices.ready) choices.ready(encoder);
+}
+
+Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices) {
   HostTrial trial(choices.answers);
   HostTrial::Fault fault = HostTrial::Fault::none;
   std::uint64_t answered = 0;
   Time heard_at = os::now();
   while (!trial.over() && !(choices.over && choices.over())) {
-    const std::uint64_t now_answered = encoder.answer_count();
+    const std::uint64_t now_answered = stage.answer_count();
     // Nobody is impatient with a host that has not come yet.
     if (now_answered != answered || answered == 0) heard_at = os::now();
     answered = now_answered;
     if (os::now() - heard_at > choices.patience) break;
-    const HostTrial::Fault wanted = trial.look(answered, encoder.rule_counts());
-    if (wanted != fault) set_fault(encoder, wanted);
+    const HostTrial::Fault wanted = trial.look(answered, stage.rule_counts());
+    if (wanted != fault) stage.set_fault(wanted);
     fault = wanted;
-    os::sleep_until(os::now() + between_looks);
+    stage.play(os::now() + between_looks);
   }
-  trial.look(encoder.answer_count(), encoder.rule_counts());
-  return trial.judge(encoder.unit());
+  trial.look(stage.answer_count(), stage.rule_counts());
+  return trial.judge(unit);
+}
+
+Conformance conform_host(std::string_view text, const EmulateChoices& place, const ConformHostChoices& choices) {
+  Emulation encoder(text, place);
+  require_host(encoder.unit(), encoder.options());
+  if (choices.ready) choices.ready(encoder);
+  EmulationStage stage(encoder);
+  return judge_host(encoder.unit(), stage, choices);
 }
 
 }  // namespace absenc::client

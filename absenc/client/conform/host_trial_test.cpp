@@ -9,9 +9,13 @@
 #include <array>
 #include <climits>
 #include <cstdio>
+#include <deque>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "absenc/client/conform/host_stage.hpp"
 #include "absenc/client/emulation/rule_counter.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
@@ -37,6 +41,12 @@ struct Flaws {
   bool stops_at_damage = false;
   Time hasty{};  // waits of up to so long are left out
   std::vector<Sent> sends{};
+  // Of an SPI controller:
+  Time early{};            // transfers begin so much too early
+  std::uint32_t rate = 0;  // Hz; 0: as it is told
+  int bytes = 0;           // more than it is told, at least one
+  bool other_mode = false;
+  bool without_lead = false;
 };
 
 struct Stopped {};
@@ -70,6 +80,63 @@ class HastyPort final : public Port<Item> {
   bool sending_ = false;
 };
 
+/// An SPI controller in virtual time, with what is wrong with it.
+class ControllerPort final : public Port<std::uint8_t> {
+ public:
+  ControllerPort(LinkKind kind, const LineSettings& line, Machine<std::uint8_t>& device, const Flaws& flaws)
+      : line_(line), flaws_(flaws), rate_(line.rate), device_(kind, line, device) {
+    device_.begin(now_);
+  }
+
+  Time now() override { return now_; }
+  void begin(const ByteStep& step) override {
+    if (step.kind == ByteStep::Kind::configure) rate_ = step.rate;
+    if (step.kind != ByteStep::Kind::transfer) return;
+    now_ = std::max(now_, step.at - flaws_.early);
+    if (device_.timer() <= now_) device_.wake(now_);
+    if (step.hold_low) device_.rest(line_.spi_mode & 1u);
+    const std::size_t told =
+        step.bits > 0 ? (step.bits + line_.idle_clocks + 7) / 8 : std::max(step.out.size(), step.expect);
+    const std::size_t size = static_cast<std::size_t>(std::max(static_cast<int>(told) + flaws_.bytes, 1));
+    std::vector<std::uint8_t> out(step.out.begin(), step.out.end());
+    out.resize(size);
+    std::vector<std::uint8_t> in(size);
+    const auto mode = static_cast<std::uint8_t>(line_.spi_mode ^ (flaws_.other_mode ? 2u : 0u));
+    const std::array<os::SpiTransfer, 2> message{
+        {{.mode = mode, .delay = flaws_.without_lead ? Time{} : line_.select_lead},
+         {.size = size, .out = out, .in = in, .rate = flaws_.rate != 0 ? flaws_.rate : rate_, .mode = mode}}};
+    now_ = device_.message(message, now_);
+    in.resize(told, 0xFF);
+    const bool idle_low = line_.idle_clocks > 0 && (in[0] & 0x80) == 0;
+    for (std::size_t i = 0; i < told && line_.idle_clocks == 1; ++i) {
+      in[i] = static_cast<std::uint8_t>(in[i] << 1 | (i + 1 < told ? in[i + 1] >> 7 : 0));
+    }
+    came_ = in;
+    events_.push_back({.kind = ByteEvent::Kind::sent, .at = now_});
+    events_.push_back({.kind = ByteEvent::Kind::received, .at = now_, .items = came_, .idle_low = idle_low});
+  }
+  ByteEvent wait(const ByteStep& step) override {
+    if (!events_.empty()) {
+      const ByteEvent event = events_.front();
+      events_.pop_front();
+      return event;
+    }
+    if (step.at == never) throw std::logic_error("nothing can happen on this line");
+    now_ = std::max(now_, step.at);
+    return {.kind = ByteEvent::Kind::timer, .at = step.at};
+  }
+  [[nodiscard]] const os::SpiDevice& device() const { return device_; }
+
+ private:
+  LineSettings line_;
+  const Flaws& flaws_;
+  std::uint32_t rate_;
+  Time now_{};
+  os::SpiDevice device_;
+  std::vector<std::uint8_t> came_;
+  std::deque<ByteEvent> events_;
+};
+
 template <class Item>
 class Host {
  public:
@@ -78,11 +145,12 @@ class Host {
         unit_(*address.unit),
         flaws_(flaws),
         device_(unit_, address.options, settings(address)),
-        line_(unit_.link, address.line.with_some_rate(), *machine()),
-        port_(line_),
+        line_(make_line()),
+        port_(*line_),
         storage_(unit_.host_storage) {
     device_.watch_rules(&rules_);
     device_.power_on(Time{});
+    port_.hasty = flaws_.early;
   }
 
   /// `all`: at its end it runs every command once.
@@ -98,11 +166,24 @@ class Host {
       const bool moves = !command.changes_option.empty();  // then it would have to follow
       if (all && !moves) run(command, complete_arguments(command, given(command)));
     }
-    trial.look(answered(), rules_.counts());
+    trial.look(answered(), counts());
     return trial.judge(unit_);
   }
 
  private:
+  std::shared_ptr<Port<Item>> make_line() {
+    const LineSettings line = address_.line.with_some_rate();
+    if constexpr (std::is_same_v<Item, std::uint8_t>) {
+      if (unit_.link == LinkKind::spi || unit_.link == LinkKind::clocked) {
+        controller_ = std::make_shared<ControllerPort>(unit_.link, line, *machine(), flaws_);
+        return controller_;
+      }
+    }
+    return std::make_shared<sim::SimPort<Item>>(unit_.link, line, *machine());
+  }
+  [[nodiscard]] std::vector<RuleCount> counts() const {
+    return controller_ != nullptr ? with_mode(rules_.counts(), controller_->device()) : rules_.counts();
+  }
   static DeviceSettings settings(const EncoderAddress& address) {
     DeviceSettings with = address.device;
     with.faults_may_come = true;
@@ -122,6 +203,7 @@ class Host {
 
   void round(HostTrial& trial) {
     if (flaws_.babbles) {
+      if (controller_ != nullptr) return;  // whatever is clocked is answered
       if constexpr (std::is_same_v<Item, CanFrame>) return send({CanFrame{.id = 0x7FF}});
       listen(std::chrono::milliseconds(1));  // two of them begin no request either
       if constexpr (!std::is_same_v<Item, CanFrame>) return send({'\r'});
@@ -132,7 +214,7 @@ class Host {
     for (const std::int64_t page : {1, 0}) {
       if (memory != nullptr) one(trial, *memory, role_arguments(*memory, {{Role::page, page}, {Role::address, 3}}));
     }
-    port_.hasty = Time{};
+    port_.hasty = flaws_.early;
   }
 
   void run(const Command& command, Arguments arguments) {
@@ -141,7 +223,7 @@ class Host {
   }
   void one(HostTrial& trial, const Command& command, Arguments arguments) {
     if (stopped_ || trial.over()) return;
-    const HostTrial::Fault fault = trial.look(answered(), rules_.counts());
+    const HostTrial::Fault fault = trial.look(answered(), counts());
     sim::FaultRates rates;
     if (fault != HostTrial::Fault::none) rates[require_fault(fmt::format("{}=1", name_of(fault))).kind] = 1;
     device_.set_faults(rates);
@@ -155,7 +237,7 @@ class Host {
       stopped_ = true;
     }
     stopped_ = stopped_ || stops;
-    trial.look(answered(), rules_.counts());
+    trial.look(answered(), counts());
   }
 
   // What the encoder is told by itself: what it does then is nobody's to wait for.
@@ -198,13 +280,13 @@ class Host {
     if (items.empty()) return;
     Step<Item> step{.kind = Step<Item>::Kind::transfer};
     step.out = items;
-    line_.begin(step);
-    while (line_.wait({.at = never}).kind != Event<Item>::Kind::sent) {
+    line_->begin(step);
+    while (line_->wait({.at = never}).kind != Event<Item>::Kind::sent) {
     }
   }
   void listen(Time time) {
-    const Step<Item> step{.at = line_.now() + time};
-    while (line_.now() < step.at && line_.wait(step).kind != Event<Item>::Kind::timer) {
+    const Step<Item> step{.at = line_->now() + time};
+    while (line_->now() < step.at && line_->wait(step).kind != Event<Item>::Kind::timer) {
     }
   }
 
@@ -213,7 +295,8 @@ class Host {
   Flaws flaws_;
   RuleCounter rules_;
   VirtualDevice device_;
-  sim::SimPort<Item> line_;
+  std::shared_ptr<ControllerPort> controller_;  // of spi and clocked links
+  std::shared_ptr<Port<Item>> line_;
   HastyPort<Item> port_;
   std::vector<std::byte> storage_;
   bool stopped_ = false;
@@ -241,13 +324,24 @@ std::vector<Flaws> scripts_for(std::string_view unit) {
             {.sends = {page, {milliseconds(20), "memory-write", {1, 5}}, {milliseconds(5), "memory-write", {2, 5}}}},
             {.sends = {page, {milliseconds(20), "memory-read", {1}}, {milliseconds(20), "memory-read", {2}}}}};
   }
-  if (unit == "encolink") {
+  if (unit.starts_with("biss")) {
+    return {{.rate = 12'500'000, .bytes = 40},
+            {.rate = 20'000},
+            {.early = milliseconds(1)},
+            {.bytes = -3},
+            {.other_mode = true}};
+  }
+  if (unit == "ssi") {
+    return {{.rate = 300'000}, {.early = milliseconds(1)}, {.bytes = -1}, {.other_mode = true}};
+  }
+  if (unit.starts_with("encolink")) {
     // A whole access, and the keys of the next before its answer has come.
     constexpr std::array bytes{"00 00", "00 cd", "00 ef", "00 89", "00 ab", "00 59", "00 00", "00 02",
                                "00 00", "00 00", "00 00", "00 10", "00 00", "00 00", "00 cd"};
     std::vector<Sent> two;
     for (const char* const frame : bytes) two.push_back({milliseconds(1), frame});
-    return {{.sends = two}};
+    return {
+        {.sends = two}, {.rate = 5'000'000}, {.early = milliseconds(1)}, {.other_mode = true}, {.without_lead = true}};
   }
   if (unit == "e201") return {{.sends = {{{}, "78"}}}, {.sends = {{{}, "4d 0d"}}}};
   if (unit == "raa38-modbus") {

@@ -49,4 +49,20 @@ inline constexpr std::array<Clause, 2> chain_clauses{{
      Demand::as_drawn},
 }};
 
+// Of one encoder, of two words or of a chain: the line is the same.
+inline constexpr std::array<HostClause, 8> host_clauses{{
+    {"asks", "BiSS C timing diagram", "MA makes the encoder send", HostDemand::asks},
+    {"silence", "BiSS C timing diagram", "after SLO that stayed as it was it clocks again", HostDemand::after_silence},
+    {"damage", "BiSS C timing diagram, CRC", "after a frame with a wrong CRC it clocks again",
+     HostDemand::after_damage},
+    {"fast", "BiSS C timing diagram, MA", "MA is no faster than 10 MHz", HostDemand::rule, "MA faster than 10 MHz"},
+    {"slow", "BiSS C timing diagram, MA", "half a period of MA is shorter than the BiSS timeout", HostDemand::rule,
+     "MA slower than the BiSS timeout allows"},
+    {"pause", "BiSS C timing diagram, timeout", "between two frames it waits for the BiSS timeout", HostDemand::rule,
+     "clocked before the BiSS timeout has passed"},
+    {"clocks", "BiSS C timing diagram", "each bit of the frame, from ACK to CRC, has its clock", HostDemand::rule,
+     "fewer clocks than the frame has bits"},
+    {"mode", "BiSS C timing diagram, MA", "MA idles high", HostDemand::rule, spi_mode_rule},
+}};
+
 }  // namespace absenc::biss

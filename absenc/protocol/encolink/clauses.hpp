@@ -34,6 +34,21 @@ inline constexpr std::array<Clause, 2> spi_clauses{{
     {"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
 }};
 
+inline constexpr std::array<HostClause, 8> spi_host_clauses{{
+    {"asks", "SPI timing diagram", "the encoder is selected and clocked", HostDemand::asks},
+    {"silence", "SPI, Channel 1", "after a data line that stayed as it was it asks again", HostDemand::after_silence},
+    {"damage", "SPI, Channel 1", "after a damaged frame it asks again", HostDemand::after_damage},
+    {"lead", "SPI timing diagram, t_s", "the clock begins 5 us after NCS went low", HostDemand::rule,
+     "clock less than 5 us after NCS went low"},
+    {"pause", "SPI timing diagram, t_p", "NCS is high for 5 us between two frames", HostDemand::rule,
+     "NCS high for less than 5 us"},
+    {"speed", "SPI, Communication parameters", "the clock is no faster than 4 MHz", HostDemand::rule,
+     "clock faster than 4 MHz"},
+    {"mode", "SPI timing diagram", "SCK idles low, and MISO is sampled when it falls", HostDemand::rule, spi_mode_rule},
+    {"access", "SPI, Encoder programming", "a register is not asked for before the last one was answered",
+     HostDemand::rule, "register access before the last one was answered"},
+}};
+
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
     {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},

@@ -29,8 +29,8 @@ struct Frames {
   using Reply = Position;  // of the identity nothing
   static constexpr std::size_t longest_reply = identity_bytes;
 
-  static constexpr author::HostTimes host_times(const Format&) {
-    return {.answer_limit = answer_limit, .gap_limit = gap_limit};
+  static constexpr author::HostTimes host_times(const Format& format) {
+    return {.answer_limit = answer_limit, .gap_limit = gap_limit, .silence = pause(format)};
   }
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
@@ -39,8 +39,8 @@ struct Frames {
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
   /// SPI has brought all there is; on a UART more may be coming.
   static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
-  /// How long after a frame the next one may begin.
-  static Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
+  /// How long after a frame the next one may begin: also after one of a conversation before this.
+  static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
 /// What the frames of a conversation say together: the position, and cycles of channel 2, a byte a frame, from a reset

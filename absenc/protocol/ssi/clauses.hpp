@@ -17,4 +17,15 @@ inline constexpr std::array<Clause, 1> clauses{{
      .value = 1},
 }};
 
+inline constexpr std::array<HostClause, 6> host_clauses{{
+    {"asks", "3.5", "the clock makes the encoder send", HostDemand::asks},
+    {"silence", "3.5", "after a data line that stayed as it was it clocks again", HostDemand::after_silence},
+    {"speed", "3.5", "the clock is within the limits of the encoder", HostDemand::rule,
+     "clock outside min_clock_khz to max_clock_khz"},
+    {"pause", "3.5", "between two words it pauses for longer than Tm", HostDemand::rule,
+     "clocked again within monoflop_us"},
+    {"clocks", "3.5", "each bit of the word has its clock", HostDemand::rule, "fewer clocks than the word has bits"},
+    {"mode", "3.5", "the clock idles high", HostDemand::rule, spi_mode_rule},
+}};
+
 }  // namespace absenc::ssi

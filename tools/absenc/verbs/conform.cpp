@@ -6,8 +6,11 @@
 #include <array>
 #include <fstream>
 
+#include "absenc/client/conform/host_stage.hpp"
 #include "absenc/client/conform_host.hpp"
 #include "absenc/client/text/json.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/cuse/spidev_node.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/consent.hpp"
 #include "tools/absenc/error.hpp"
@@ -77,9 +80,65 @@ int run_conform(const Invocation& invocation) {
   return tell_verdict(invocation, conformance);
 }
 
+/// Behind an SPI controller. Not in the library, for which libfuse is not needed.
+class SpidevStage final : public HostStage {
+ public:
+  SpidevStage(const EncoderAddress& address, const std::string& name)
+      : device_(*address.unit, address.options, address.device),
+        controller_(address.unit->link, line_settings(*address.unit, address.options), *device_.bytes()),
+        spidev_(controller_),
+        node_(name, spidev_) {
+    device_.watch_rules(&rules_);
+    device_.power_on(os::now());
+    controller_.begin(os::now());
+  }
+
+  [[nodiscard]] const std::string& path() const { return node_.path(); }
+  std::uint64_t answer_count() override { return device_.device().bytes->answer_count(); }
+  std::vector<RuleCount> rule_counts() override { return with_mode(rules_.counts(), controller_); }
+  void set_fault(HostTrial::Fault fault) override {
+    sim::FaultRates rates;
+    if (fault != HostTrial::Fault::none) rates[require_fault(fmt::format("{}=1", name_of(fault))).kind] = 1;
+    device_.set_faults(rates);
+  }
+  void play(Time until) override { node_.serve(until); }
+
+ private:
+  RuleCounter rules_;
+  VirtualDevice device_;
+  os::SpiDevice controller_;
+  os::Spidev spidev_;
+  os::SpidevNode node_;
+};
+
+Conformance judge_on_spidev(const std::string& text, const Invocation& invocation, const ConformHostChoices& choices) {
+  EncoderAddress address = parse_address("sim:" + text);
+  address.device.faults_may_come = true;
+  require_host(*address.unit, address.options);
+  SpidevStage stage(address, std::string(invocation.text("--spidev")));
+  print_message(fmt::format("ready: {}", stage.path()));
+  return judge_host(*address.unit, stage, choices);
+}
+
+void check_place(const Unit& unit, const Invocation& invocation) {
+  const bool is_spi = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
+  const bool elsewhere = invocation.has("--pty") || invocation.has("--tcp") || invocation.has("--can");
+  if (is_spi && (elsewhere || !invocation.has("--spidev"))) {
+    throw UsageError(fmt::format("{} ({}) does not go over a pseudo-terminal, TCP or CAN: use --spidev NAME alone",
+                                 unit.id, line_of(unit)));
+  }
+  if (!is_spi && invocation.has("--spidev")) {
+    throw UsageError(
+        fmt::format("{} ({}) does not go over an SPI controller: use --pty, --tcp or --can", unit.id, line_of(unit)));
+  }
+}
+
 int run_conform_host(const Invocation& invocation) {
   os::catch_interrupts();
-  std::string text(invocation.text("protocol"));
+  const Unit* unit = &require_unit(invocation.text("protocol"));
+  if (invocation.has("--spidev") && unit->over_spi != nullptr) unit = unit->over_spi;
+  check_place(*unit, invocation);
+  std::string text(unit->id);
   char joint = '?';
   for (const std::string& option : invocation.texts("--option")) {
     text += joint + option;
@@ -94,7 +153,8 @@ int run_conform_host(const Invocation& invocation) {
     print_message(fmt::format("ready: {}", encoder.path()));
     if (encoder.tcp_port() != 0) print_message(fmt::format("ready: tcp:127.0.0.1:{}", encoder.tcp_port()));
   };
-  return tell_verdict(invocation, conform_host(text, place, choices));
+  return tell_verdict(invocation, invocation.has("--spidev") ? judge_on_spidev(text, invocation, choices)
+                                                             : conform_host(text, place, choices));
 }
 
 constexpr std::array<Parameter, 8> conform_parameters{{
@@ -114,12 +174,13 @@ constexpr std::array<Example, 3> conform_examples{{
     {"absenc conform amt21:/dev/ttyUSB0 --tap --junit amt21.xml", "for programs that count tests"},
 }};
 
-constexpr std::array<Parameter, 10> host_parameters{{
+constexpr std::array<Parameter, 11> host_parameters{{
     parameter::protocol,
     {"--pty", "PATH", "where to put the link to the pseudo-terminal; CAN: that of an slcan adapter",
      "only the pseudo-terminal itself"},
     {"--tcp", "PORT", "listen on 127.0.0.1 as well; 0: on a free port"},
     {"--can", "INTERFACE", "CAN: be on this interface, as vcan0"},
+    {"--spidev", "NAME", "SPI: be a device /dev/NAME, which the kernel's module cuse makes"},
     {"--answers", "N", "how many requests are answered well", "100"},
     {"--patience", "SECONDS", "so long a silence of the host ends it, once it has asked", "10"},
     {"--tap", "", "print the Test Anything Protocol"},
@@ -128,9 +189,10 @@ constexpr std::array<Parameter, 10> host_parameters{{
     parameter::protocol_option,
 }};
 
-constexpr std::array<Example, 2> host_examples{{
+constexpr std::array<Example, 3> host_examples{{
     {"absenc conform-host tformat --pty /tmp/encoder", "then let the drive's program read tformat at /tmp/encoder"},
     {"absenc conform-host raa38-modbus --tcp 4001 --tap --junit host.xml", "for programs that count tests"},
+    {"sudo absenc conform-host biss --spidev spidev9.0", "for a program that clocks its encoder by an SPI controller"},
 }};
 
 }  // namespace
