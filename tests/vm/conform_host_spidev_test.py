@@ -33,7 +33,8 @@ class ConformHost(unittest.TestCase):
         try:
             return self.verdicts(process)
         finally:
-            end(host, signal.SIGTERM)
+            host.terminate()
+            host.wait(PATIENCE)
 
     def test_our_hosts_hold_all(self):
         for protocol in ("biss", "ssi", "encolink"):
