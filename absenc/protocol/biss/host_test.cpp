@@ -92,6 +92,29 @@ TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
   }
 }
 
+// A late frame that no other one is as late as may be what a lost start bit leaves.
+TEST(BissHost, FramesThatAreLateByChanceAreNoPosition) {
+  FindPosition<Format> read(turns_19);
+  Time now{};
+  unsigned frames = 0;
+  for (unsigned ack = 14; ack < 40; ack += 4) {
+    Step<std::uint8_t> step = read.next(now);
+    if (step.kind == Step<std::uint8_t>::Kind::configure) step = read.next(now);
+    if (step.kind == Step<std::uint8_t>::Kind::done) break;
+    ++frames;
+    BitBuffer<512> frame;
+    EXPECT_TRUE(encode(turns_19, {.ack_bits = ack}, frame));
+    std::vector<std::uint8_t> bytes(frame.bytes().begin(), frame.bytes().end());
+    bytes.resize(step.expect);
+    now = step.at + 100us;
+    read.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+    read.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = bytes});
+  }
+  EXPECT_EQ(frames, 5u);
+  EXPECT_EQ(read.error(), Error::truncated);
+  EXPECT_EQ(read.reading(), nullptr);
+}
+
 // README, timing: a host that nobody told otherwise gives the clocks of an encoder that needs 10 us.
 template <class F>
 void expect_ten_microseconds() {

@@ -11,15 +11,16 @@
 #include <set>
 #include <vector>
 
-#include "absenc/protocol/biss/commands.hpp"
-#include "absenc/protocol/biss/device.hpp"
+#include "absenc/protocol/biss/questions_test.hpp"
 #include "absenc/sim/faults.hpp"
-#include "absenc/sim/line.hpp"
 #include "absenc/sim/motion.hpp"
 #include "absenc/sim/random.hpp"
 
 namespace absenc::biss {
 namespace {
+
+using testing::bits_24;
+using testing::Questions;
 
 #if defined(__SANITIZE_ADDRESS__)
 constexpr bool slow = true;
@@ -189,8 +190,6 @@ void truncate(sim::Random& random, std::span<std::uint8_t> bytes) {
   std::ranges::fill(bytes.subspan(1 + random.below(bytes.size() - 1)), std::uint8_t{0xFF});
 }
 
-constexpr Format bits_24{.word = "position:24 error:1! warning:1!"_word};
-
 TEST(BissRegisters, PositionsGoByWhileEveryRegisterIsReadAndWritten) {
   const Format format = bits_24;
   Host<Format> host(format, frames_wanted());
@@ -247,41 +246,6 @@ TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
   EXPECT_EQ(host.machine.found().wrong, 0u);
 }
 
-template <auto procedure, auto... bound>
-struct Asking final : author::Run<Protocol, Found, procedure, bound...> {
-  using author::Run<Protocol, Found, procedure, bound...>::Run;
-  void report(FieldSink&) const override {}
-};
-using Asked = Asking<read_info<Format>>;
-
-/// What a host asks one encoder after the other.
-struct Questions {
-  explicit Questions(const Format& of = bits_24) : format(of), encoder(of, motion) {
-    encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-    line.attach(sim::Role::device, encoder);
-  }
-  template <auto procedure, auto... bound>
-  Found ask(std::initializer_list<std::int64_t> arguments = {}, Error expected = Error::none) {
-    std::vector<std::byte> storage(4096);
-    Asking<procedure, bound...> asking(format, {arguments.begin(), arguments.size()}, storage);
-    if (node == none) {
-      node = line.attach(sim::Role::host, asking);
-    } else {
-      line.replace(node, asking);
-    }
-    EXPECT_TRUE(line.run(node, line.now() + 10s));
-    EXPECT_EQ(asking.error(), expected);
-    return asking.found();
-  }
-
-  static constexpr std::size_t none = ~std::size_t{0};
-  Format format;
-  sim::Motion motion = sim::Motion::constant_speed(0, 600);
-  VirtualEncoder encoder;
-  sim::Line<std::uint8_t> line{LinkKind::clocked, line_settings};
-  std::size_t node = none;
-};
-
 TEST(BissRegisters, EachThatHasANameIsReadAlone) {
   Questions one;
   EXPECT_EQ((one.ask<read_setting<Format>, registers::eds_bank>().eds_bank), 3);
@@ -329,7 +293,7 @@ TEST(BissRegisters, SomeMakersHaveTheLowByteFirst) {
       VirtualEncoder encoder(of_encoder, motion);
       encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
       std::vector<std::byte> storage(4096);
-      Asked asked(of_host, {}, storage);
+      testing::Asking<read_info<Format>> asked(of_host, {}, storage);
       sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
       line.attach(sim::Role::device, encoder);
       EXPECT_TRUE(line.run(line.attach(sim::Role::host, asked), 10s));

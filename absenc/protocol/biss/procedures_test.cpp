@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// What procedures of registers refuse, wait for, verify and tell; and which frames they take.
+#include "absenc/protocol/biss/procedures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "absenc/protocol/biss/questions_test.hpp"
+
+namespace absenc::biss {
+namespace {
+
+using testing::Asking;
+using testing::Questions;
+
+TEST(BissProcedures, WhatNoRegisterCanBeIsNotAsked) {
+  Questions one;
+  const auto refused = [&one](const Found&) { EXPECT_EQ(one.encoder.answer_count(), 0u); };
+  const Error no = Error::invalid_argument;
+  refused(one.ask<read_memory<Format>>({60, 0, 5}, no));   // behind the bank
+  refused(one.ask<read_memory<Format>>({120, 0, 9}, no));  // behind the last
+  refused(one.ask<read_memory<Format>>({64, 1, 1}, no));   // what is behind the banks is on bank 0
+  refused(one.ask<write_memory<Format>>({72, 1, 7, 1}, no));
+  refused(one.ask<write_memory<Format>>({72, 7, 1, 1}, no));
+  refused(one.ask<write_memory<Format>>({68, 7, 0, 1}, no));  // the serial number
+  refused(one.ask<write_memory<Format>>({72, 7, 0, 0}, no));  // the maker's own
+  refused(one.ask<write_memory<Format>>({3, 7, 1, 0}, no));
+  EXPECT_EQ(one.ask<read_memory<Format>>({60, 0, 4}).bytes.size(), 4u);
+  EXPECT_EQ(one.ask<read_memory<Format>>({120, 0, 8}).bytes.size(), 8u);
+  EXPECT_EQ(one.ask<write_memory<Format>>({72, 7, 0, 1}).written, true);
+  EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 1, 1}).written, true);
+  EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 0, 0}).written, true);
+  EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 0, 0}).written, false);
+}
+
+// D2: up to 20 ms; a host allows twice that.
+TEST(BissProcedures, AStartBitIsWaitedForFortyMilliseconds) {
+  const auto asked = [](std::uint16_t delay_us, Error expected) {
+    Format format = testing::bits_24;
+    format.register_delay_us = delay_us;
+    Questions one(format);
+    one.ask<read_setting<Format>, registers::profile>({}, expected);
+  };
+  asked(38'000, Error::none);
+  asked(42'000, Error::busy);
+}
+
+/// An encoder that does not keep what is written.
+struct Forgets final : Machine<std::uint8_t> {
+  explicit Forgets(VirtualEncoder& of) : encoder(of) {}
+  void feed(const Event<std::uint8_t>& event) override {
+    encoder.feed(event);
+    encoder.memory()[3] = 0;
+  }
+  Step<std::uint8_t> next(Time now) override {
+    const Step<std::uint8_t> step = encoder.next(now);
+    encoder.memory()[3] = 0;
+    return step;
+  }
+  VirtualEncoder& encoder;
+};
+
+TEST(BissProcedures, WhatIsNotKeptWasNotWritten) {
+  const sim::Motion motion = sim::Motion::constant_speed(0, 600);
+  VirtualEncoder encoder(testing::bits_24, motion);
+  encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  Forgets forgets(encoder);
+  sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
+  line.attach(sim::Role::device, forgets);
+  const std::array<std::int64_t, 4> arguments{3, 7, 0, 0};
+  std::vector<std::byte> storage(4096);
+  Asking<write_memory<Format>> asking(testing::bits_24, arguments, storage);
+  EXPECT_TRUE(line.run(line.attach(sim::Role::host, asking), 10s));
+  EXPECT_EQ(asking.error(), Error::cross_check_failed);
+}
+
+std::vector<std::string> names_of(const Found& found) {
+  struct Names final : FieldSink {
+    void put(const FieldValue& value) override { names.emplace_back(value.info->name); }
+    std::vector<std::string> names;
+  } sink;
+  register_fields.put(sink, found);
+  return sink.names;
+}
+
+TEST(BissProcedures, WhatWasNotFoundIsNotTold) {
+  using Names = std::vector<std::string>;
+  Questions one;
+  EXPECT_EQ(names_of(one.ask<read_memory<Format>>({60, 0, 1})), (Names{"slave_id", "bank", "address", "value"}));
+  EXPECT_EQ(names_of(one.ask<read_memory<Format>>({60, 0, 2})),
+            (Names{"slave_id", "bank", "address", "value", "data"}));
+  EXPECT_EQ(names_of(one.ask<read_setting<Format>, registers::profile>()), (Names{"slave_id", "profile"}));
+  EXPECT_EQ(names_of(one.ask<send_command<Format>>({0, 1})),
+            (Names{"slaves", "more_slaves", "operation", "command", "broadcast", "executed"}));
+}
+
+// ---- Which frames are taken
+
+struct Seen {
+  std::vector<Error> errors;
+};
+
+Procedure take_five_frames(ControlDialog<Format>& dialog, Seen& seen) {
+  for (int i = 0; i < 5; ++i) {
+    const Result<Reply> reply = co_await dialog.frame();
+    seen.errors.push_back(reply.error());
+  }
+  co_return done;
+}
+
+struct FiveFrames final : author::Run<Protocol, Seen, take_five_frames> {
+  using author::Run<Protocol, Seen, take_five_frames>::Run;
+  void report(FieldSink&) const override {}
+};
+
+std::vector<Error> errors_of(const Format& format, const std::array<Reply, 5>& replies) {
+  std::vector<std::byte> storage(4096);
+  FiveFrames frames(format, {}, storage);
+  Time now{};
+  for (const Reply& reply : replies) {
+    Step<std::uint8_t> step = frames.next(now);
+    while (step.kind == Step<std::uint8_t>::Kind::configure) step = frames.next(now);
+    EXPECT_EQ(step.kind, Step<std::uint8_t>::Kind::transfer);
+    BitBuffer<512> frame;
+    EXPECT_TRUE(encode(format, reply, frame));
+    std::vector<std::uint8_t> bytes(frame.bytes().begin(), frame.bytes().end());
+    bytes.resize(step.expect);
+    now = step.at + 100us;
+    frames.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+    frames.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = bytes});
+  }
+  EXPECT_EQ(frames.next(now).kind, Step<std::uint8_t>::Kind::done);
+  return frames.found().errors;
+}
+
+using Errors = std::vector<Error>;
+
+TEST(BissProcedures, TheLifeCounterMovesByOneFromFrameToFrame) {
+  const Format format{.word = testing::bits_24.word, .check = crc16};
+  const auto errors = [&format](std::array<std::uint8_t, 5> counters) {
+    std::array<Reply, 5> replies{};
+    for (std::size_t i = 0; i < 5; ++i) replies[i] = {.ack_bits = 10, .life_counter = counters[i]};
+    return errors_of(format, replies);
+  };
+  const Error none = Error::none;
+  const Error moved = Error::sequence_mismatch;
+  EXPECT_EQ(errors({61, 62, 63, 0, 1}), (Errors{none, none, none, none, none}));
+  EXPECT_EQ(errors({41, 42, 42, 43, 45}), (Errors{none, none, moved, none, moved}));
+}
+
+// A start bit that got lost makes a late frame, too.
+TEST(BissProcedures, ALateFrameIsTakenWhenAnotherComesAsLate) {
+  const auto errors = [](std::array<unsigned, 5> ack_bits) {
+    std::array<Reply, 5> replies{};
+    for (std::size_t i = 0; i < 5; ++i) replies[i].ack_bits = ack_bits[i];
+    return errors_of(testing::bits_24, replies);
+  };
+  const Error none = Error::none;
+  const Error late = Error::truncated;
+  EXPECT_EQ(errors({10, 10, 9, 10, 10}), (Errors{none, none, none, none, none}));
+  // For the first of them there were too few clocks.
+  EXPECT_EQ(errors({10, 12, 12, 12, 14}), (Errors{none, late, late, none, late}));
+}
+
+}  // namespace
+}  // namespace absenc::biss

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames of several words: which formats there can be, what does not fit, and what BiSS Safety compares.
+#include <gtest/gtest.h>
+
+#include "absenc/protocol/biss/bench_test.hpp"
+#include "absenc/protocol/biss/commands.hpp"
+
+namespace absenc::biss {
+namespace {
+
+template <class F>
+void expect_unusable(const F& format) {
+  EXPECT_FALSE(is_usable(format));
+  BitBuffer<512> frame;
+  EXPECT_TRUE(encode(F{}, {}, frame));
+  EXPECT_EQ(detail::decoded(format, frame.view()).error(), Error::invalid_argument);
+}
+
+TEST(BissWords, AChainHasOneToEightWordsWithAPositionEach) {
+  ChainFormat format;
+  format.count = ChainFormat::most;
+  format.slave = ChainFormat::most - 1;
+  EXPECT_TRUE(is_usable(format));
+  format.count = ChainFormat::most + 1;
+  expect_unusable(format);
+  format.count = format.slave;  // nobody has this number
+  expect_unusable(format);
+  format = {};
+  format.channels[1].word = WordFormat{};
+  expect_unusable(format);
+  format = {};
+  format.channels[1].check.poly = 0x02;
+  expect_unusable(format);
+}
+
+TEST(BissWords, BothWordsOfSafetyNeedACheck) {
+  SafetyFormat format;
+  EXPECT_TRUE(is_usable(format));
+  format.cpw.check.poly = 0x02;
+  expect_unusable(format);
+  format = {};
+  format.spw.check.poly = 0x02;
+  expect_unusable(format);
+}
+
+template <class F>
+void expect_no_room() {
+  BitBuffer<512> frame;
+  ASSERT_TRUE(encode(F{}, {}, frame));
+  BitBuffer<24> small;
+  EXPECT_FALSE(encode(F{}, {}, small));
+  EXPECT_EQ(small.size(), 0u);
+}
+
+TEST(BissWords, WhatDoesNotFitIsNotEncoded) {
+  expect_no_room<Format>();
+  expect_no_room<ChainFormat>();
+  expect_no_room<SafetyFormat>();
+}
+
+TEST(BissWords, SafetyComparesBothWordsAndCountsFrames) {
+  SafetyFormat format;
+  const auto error = [&format](std::uint64_t control, std::uint64_t safety, std::uint8_t life_counter) {
+    SafetyReply reply;
+    reply.cpw.word.position = control;
+    reply.spw = {.word = {.position = safety}, .life_counter = life_counter};
+    BitBuffer<512> frame;
+    EXPECT_TRUE(encode(format, reply, frame));
+    return decode(format, frame.view()).error();
+  };
+  // 13 of 24 and of 16 bits.
+  EXPECT_EQ(error(0x123456, 0x1234, 5), Error::none);
+  EXPECT_EQ(error(0x123456, 0x1234 + 8, 5), Error::none);
+  EXPECT_EQ(error(0x123456, 0x1234 + 16, 5), Error::cross_check_failed);
+  EXPECT_EQ(error(0x123456, 0x1234 - 16, 5), Error::cross_check_failed);
+  EXPECT_EQ(error(0xFFFFFF, 0, 5), Error::none);
+  format.previous_life_counter = 4;
+  EXPECT_EQ(error(0x123456, 0x1234, 5), Error::none);
+  EXPECT_EQ(error(0x123456, 0x1234, 4), Error::sequence_mismatch);
+  format.previous_life_counter = 63;
+  EXPECT_EQ(error(0x123456, 0x1234, 0), Error::none);
+  EXPECT_EQ(error(0x123456, 0x1234, 1), Error::sequence_mismatch);
+}
+
+// At any clock the clocks of an encoder that needs 10 us: no more and no fewer.
+template <class F>
+void expect_clocks_of_ten_microseconds() {
+  for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 10'000})) {
+    F format;
+    format.ma_khz = khz;
+    const Time period = LineSettings{.rate = khz * 1000u}.bits(1);
+    const auto read_from = [&](Time latency) {
+      testing::ClockedBench<VirtualEncoderOf<F>> bench(line_settings, format, Behaviour{.latency = latency});
+      PositionReader<F, false> read(format);
+      return bench.run(read).error();
+    };
+    EXPECT_EQ(read_from(10us), Error::none) << khz;
+    EXPECT_EQ(read_from(10us + 2 * period), Error::truncated) << khz;
+  }
+}
+
+TEST(BissWords, ClocksFollowTheClock) {
+  expect_clocks_of_ten_microseconds<Format>();
+  expect_clocks_of_ten_microseconds<ChainFormat>();
+  expect_clocks_of_ten_microseconds<SafetyFormat>();
+}
+
+TEST(BissWords, TheEncodersBitStandsBehindTheStartBit) {
+  const auto place = [](std::initializer_list<std::uint8_t> bytes, std::size_t bits) {
+    return place_of_cds({.bytes = {bytes.begin(), bytes.size()}, .bits = bits});
+  };
+  EXPECT_EQ(place_of_cds(Frame{}), std::nullopt);
+  EXPECT_EQ(place({0b1110'0101}, 8), 6u);
+  EXPECT_EQ(place({0b0001'0100}, 8), 4u);
+  EXPECT_EQ(place({0b1110'0000}, 8), std::nullopt);
+  EXPECT_EQ(place({0b1110'0100}, 6), std::nullopt);
+  EXPECT_EQ(place({0b1111'1111}, 8), std::nullopt);
+}
+
+}  // namespace
+}  // namespace absenc::biss
