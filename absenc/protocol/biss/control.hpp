@@ -138,7 +138,7 @@ class ControlMaster {
   Error error_ = Error::none;
 };
 
-/// What the encoders do with what is asked of them.
+/// What the encoders do with what is asked of them: `slave` is one of theirs.
 struct ControlTarget {
   /// Whether the register may be read, or written.
   [[nodiscard]] virtual bool allows(unsigned slave, unsigned address, bool write) const = 0;

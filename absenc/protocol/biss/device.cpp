@@ -64,7 +64,6 @@ std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
 
 // All but what tells which encoder this is, and banks that there are not.
 bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
-  if (slave >= slaves_) return false;
   if (address < registers::bank_size) return bank_[slave] < banks;
   if (!write || address == registers::bank_select) return true;
   return address >= registers::device && address < registers::device_id;
@@ -95,7 +94,7 @@ bool VirtualRegisters::is_ready() const {
 }
 
 // The commands of the standard, all of which only have to do with the line.
-bool VirtualRegisters::obeys(unsigned slave, unsigned command) const { return slave < slaves_ && command < 2; }
+bool VirtualRegisters::obeys(unsigned, unsigned command) const { return command < 2; }
 
 void VirtualRegisters::execute(std::uint8_t, unsigned) {}
 

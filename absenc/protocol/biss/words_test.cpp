@@ -4,6 +4,7 @@
 
 #include "absenc/protocol/biss/bench_test.hpp"
 #include "absenc/protocol/biss/commands.hpp"
+#include "absenc/protocol/biss/unit.hpp"
 
 namespace absenc::biss {
 namespace {
@@ -41,6 +42,17 @@ TEST(BissWords, BothWordsOfSafetyNeedACheck) {
   format = {};
   format.spw.check.poly = 0x02;
   expect_unusable(format);
+}
+
+// Else the CRC does not see every wrong bit.
+TEST(BissWords, APolynomialEndsInOne) {
+  Options options;
+  const std::array<OptionText, 2> even{{{"crc_width", "6"}, {"crc_poly", "2"}}};
+  ASSERT_EQ(resolve_options(unit, {}, even, options).kind, OptionError::Kind::none);
+  NoFields fields;
+  BitBuffer<512> frame;
+  EXPECT_TRUE(encode(Format{.check = {.poly = 2}}, {}, frame));
+  EXPECT_EQ(unit.decode(options, {}, {.bytes = frame.bytes(), .bits = frame.size()}, fields), Error::invalid_argument);
 }
 
 template <class F>
