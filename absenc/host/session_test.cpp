@@ -88,6 +88,69 @@ TEST(ReplyGuard, ARequestWaitsAndWhatIsNoneDoesNot) {
   EXPECT_EQ(first(1, 1s + 5ms).at, 1s + 5ms);
 }
 
+/// Asks once, and hears what it is told.
+struct Asking final : Machine<std::uint8_t> {
+  using Kind = Step<std::uint8_t>::Kind;
+  void feed(const Event<std::uint8_t>& event) override {
+    sent = sent || event.kind == Event<std::uint8_t>::Kind::sent;
+    heard.insert(heard.end(), event.items.begin(), event.items.end());
+  }
+  Step<std::uint8_t> next(Time now) override {
+    if (sent) return {.expect = 6, .at = now + 1ms, .gap = gap};
+    return {.kind = Kind::transfer, .out = request, .expect = 6, .gap = gap};
+  }
+  static constexpr Time gap = 200us;
+  static constexpr std::array<std::uint8_t, 1> request{0x02};
+  bool sent = false;
+  Wire heard;
+};
+
+// One that is owed may be what comes first; ten seconds later it is lost.
+TEST(ReplyGuard, NothingIsOwedForMoreThanTenSeconds) {
+  using Kind = Step<std::uint8_t>::Kind;
+  const Bench bench(EchoMode::off);
+  const Wire reply{0x02, 0x00, 0x11, 0x22, 0x01, 0x02 ^ 0x11 ^ 0x22 ^ 0x01};
+  const auto heard = [&](Time pause) {
+    ReplyGuard<std::uint8_t> guard;
+    Time now = 1s;
+    const auto send = [&](Asking& asking) {
+      guard.attach(asking, bench.unit, bench.options, true);
+      Step<std::uint8_t> step = guard.next(now);
+      while (step.kind == Kind::wait) step = guard.next(now = step.at);
+      EXPECT_EQ(step.kind, Kind::transfer);
+      guard.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+    };
+    Asking unanswered;
+    send(unanswered);
+    guard.feed({.kind = Event<std::uint8_t>::Kind::silence, .at = now + 3ms});
+    guard.conclude();
+    now += pause;
+    Asking again;
+    send(again);
+    guard.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now + 100us, .items = reply});
+    static_cast<void>(guard.next(now + 100us));
+    return again.heard;
+  };
+  EXPECT_EQ(heard(9s), Wire{});
+  EXPECT_EQ(heard(11s), reply);
+}
+
+TEST(ReplyGuard, ALineThatIsNeverQuietIsSpokenIntoAfterATenthOfASecond) {
+  const Bench bench(EchoMode::off);
+  ReplyGuard<std::uint8_t> guard;
+  Asking asking;
+  guard.attach(asking, bench.unit, bench.options, true);
+  constexpr Time begin = 1s;
+  Time now = begin;
+  const Wire noise{0x55};
+  while (guard.next(now).kind == Step<std::uint8_t>::Kind::wait && now < begin + 5s) {
+    now += 100us;
+    guard.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = noise});
+  }
+  EXPECT_GE(now, begin + 100ms);
+  EXPECT_LT(now, begin + 110ms);
+}
+
 // ---- Echo
 
 struct EchoRow {
