@@ -97,13 +97,12 @@ constexpr auto options_of_chain = std::apply(
                 "slave", "whose position is read, and whose registers: 0 is at the end of the line, its word the last",
                 0, most - 1),
             OptionOf<&ChainSettings::unit_pm>{unit_um_option},
-            option<&ChainSettings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
+            clock_option<&ChainSettings::ma_khz>,
             decimal<3>(option<&ChainSettings::latency>(
                 "latency_us",
                 "the longest time until the positions are ready, us: of the encoders, and of the line there and back",
                 0, 1'000'000)),
-            option<&ChainSettings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
-                                               100'000),
+            line_delay_option<&ChainSettings::line_delay>,
             register_order_option<&ChainSettings::register_order>,
             register_delay_option<&ChainSettings::register_delay_us>,
             start_sequence_option<&ChainSettings::start_sequence>,
@@ -146,12 +145,10 @@ constexpr void put_channel(FieldSink& sink, const Channel& channel, const Channe
   if (channel.check.width != 0) put(in_crc, data.crc);
 }
 
-struct ChainDefinition {
-  using Protocol = ProtocolOf<ChainFormat>;
-  using Encoder = VirtualEncoderOf<ChainFormat>;
+struct ChainDefinition : DeclaresBiss<ChainDefinition, ChainFormat> {
+  using DeclaresBiss::put;
   static constexpr std::string_view id = "biss-chain", name = "BiSS-C, several encoders in a chain",
                                     document = "BiSS C Protocol Description rev D2";
-  static constexpr LinkKind link = LinkKind::clocked;
   static constexpr std::size_t frames_size = 6400;
 
   static constexpr const auto& options = options_of_chain;
@@ -173,19 +170,12 @@ struct ChainDefinition {
     }
     return given;
   }
-  static constexpr LineSettings line(const ChainFormat&) { return line_settings; }
   static constexpr Resolution resolution(const ChainFormat& format) {
     return resolution_of(format.channels[format.shown()].word, format.scale);
   }
   static constexpr bool is_usable(const ChainFormat& format) { return biss::is_usable(format); }
 
   static constexpr auto commands = commands_of<ChainDefinition, ChainFormat>(is_usable);
-  static constexpr const auto& memory = registers::areas;
-
-  static constexpr Error decode(const ChainFormat& format, Frame asked, Frame reply, FieldSink& sink) {
-    return decode_either<ChainDefinition>(format, asked, reply, sink);
-  }
-  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
   static constexpr void put(FieldSink& sink, const ChainFormat& format, const ChainReply& reply) {
     put_line_delay(sink, format, reply);
@@ -193,13 +183,6 @@ struct ChainDefinition {
     for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
     const unsigned shown = format.shown();
     put_word(sink, format.channels[shown].word, reply.channels[shown].word, format.scale);
-  }
-  static constexpr void put(FieldSink& sink, const ChainFormat&, const Found& found) {
-    register_fields.put(sink, found);
-  }
-
-  static Explanation explain(const ChainFormat& format, Error error, Bytes, Bytes) {
-    return explain_frame(format, error);
   }
   static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
     const ChainFormat made = format(values);

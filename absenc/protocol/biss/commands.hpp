@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/biss/device.hpp"
 #include "absenc/protocol/biss/procedures.hpp"
 
 namespace absenc::biss {
@@ -30,7 +31,13 @@ constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
 }
 
-// The options about registers and the start that all units of BiSS have.
+// The options that all units of BiSS have.
+template <auto member>
+inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
+template <auto member>
+inline constexpr auto line_delay_option = author::option<member>("line_delay_ns",
+                                                                 "virtual encoder: delay of the line, there and back",
+                                                                 0, 100'000);
 template <auto member>
 inline constexpr auto register_order_option = author::option<member>(
     "register_byte_order", "of profile and serial number: some makers have the low byte first", register_order_choices);
@@ -112,21 +119,33 @@ template <class F>
   return start + 1 < samples.size ? std::optional(start + 1) : std::nullopt;
 }
 
-/// A frame of the encoder; or, with a request, a control frame: the bits of CDM and those of CDS.
+/// What the units of BiSS declare alike.
 template <class Definition, class F>
-constexpr Error decode_either(const F& format, Frame asked, Frame answered, FieldSink& sink) {
-  if (!asked.empty()) {
-    const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
-    if (!frame) return frame.error();
-    register_fields.put(sink, shown_by(*frame, !answered.empty()));
+struct DeclaresBiss {
+  using Protocol = ProtocolOf<F>;
+  using Encoder = VirtualEncoderOf<F>;
+  static constexpr LinkKind link = LinkKind::clocked;
+  static constexpr const auto& memory = registers::areas;
+
+  static constexpr LineSettings line(const F&) { return line_settings; }  // the conversation sets its rate
+  /// A frame of the encoder; or, with a request, a control frame: the bits of CDM and those of CDS.
+  static constexpr Error decode(const F& format, Frame asked, Frame answered, FieldSink& sink) {
+    if (!asked.empty()) {
+      const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
+      if (!frame) return frame.error();
+      register_fields.put(sink, shown_by(*frame, !answered.empty()));
+      return Error::none;
+    }
+    if (!Definition::is_usable(format)) return Error::invalid_argument;
+    const auto reply = detail::decoded(format, author::to_bits(answered));
+    if (!reply) return reply.error();
+    Definition::put(sink, format, *reply);
+    sink.put_reading(reading_of(format, *reply));
     return Error::none;
   }
-  if (!Definition::is_usable(format)) return Error::invalid_argument;
-  const auto reply = detail::decoded(format, author::to_bits(answered));
-  if (!reply) return reply.error();
-  Definition::put(sink, format, *reply);
-  sink.put_reading(reading_of(format, *reply));
-  return Error::none;
-}
+  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
+  static constexpr void put(FieldSink& sink, const F&, const Found& found) { register_fields.put(sink, found); }
+  static Explanation explain(const F& format, Error error, Bytes, Bytes) { return explain_frame(format, error); }
+};
 
 }  // namespace absenc::biss

@@ -82,12 +82,10 @@ constexpr void put_word_of(FieldSink& sink, const Channel& channel, const Channe
   if (channel.check.width != 0) put(field_cpw_crc, field_spw_crc, data.crc);
 }
 
-struct SafetyDefinition {
-  using Protocol = ProtocolOf<SafetyFormat>;
-  using Encoder = VirtualEncoderOf<SafetyFormat>;
+struct SafetyDefinition : DeclaresBiss<SafetyDefinition, SafetyFormat> {
+  using DeclaresBiss::put;
   static constexpr std::string_view id = "biss-safety", name = "BiSS Safety",
                                     document = "BiSS C Protocol Description rev D2, BiSS Safety";
-  static constexpr LinkKind link = LinkKind::clocked;
   static constexpr std::size_t frames_size = 2400;
 
   static constexpr OptionsOf options{
@@ -113,14 +111,13 @@ struct SafetyDefinition {
           "compare_bits", "upper bits of the position in which both words agree within one count", 1, 64),
       option<&SafetySettings::previous_life_counter>(
           "previous_life_counter", "of the frame before the one that is decoded; -1: not known", -1, 63),
-      option<&SafetySettings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
+      clock_option<&SafetySettings::ma_khz>,
       decimal<3>(
           option<&SafetySettings::latency>("latency_us",
                                            "the longest time until the position is ready, us: of the encoder, and "
                                            "of the line there and back",
                                            0, 1'000'000)),
-      option<&SafetySettings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0,
-                                          100'000),
+      line_delay_option<&SafetySettings::line_delay>,
       option<&SafetySettings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0,
                                      7),
       register_order_option<&SafetySettings::register_order>,
@@ -163,19 +160,12 @@ struct SafetyDefinition {
         {given.spw_crc_width, given.spw_crc_poly, given.spw_crc_init, given.spw_crc_inverted, given.spw_life_counter}};
     return given;
   }
-  static constexpr LineSettings line(const SafetyFormat&) { return line_settings; }
   static constexpr Resolution resolution(const SafetyFormat& format) { return resolution_of(format.cpw.word, {}); }
   static constexpr bool is_usable(const SafetyFormat& format) {
     return biss::is_usable(format) && absenc::is_usable(format.cpw.word) && absenc::is_usable(format.spw.word);
   }
 
   static constexpr auto commands = commands_of<SafetyDefinition, SafetyFormat>(is_usable);
-  static constexpr const auto& memory = registers::areas;
-
-  static constexpr Error decode(const SafetyFormat& format, Frame asked, Frame reply, FieldSink& sink) {
-    return decode_either<SafetyDefinition>(format, asked, reply, sink);
-  }
-  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
   static constexpr void put(FieldSink& sink, const SafetyFormat& format, const SafetyReply& reply) {
     put_line_delay(sink, format, reply);
@@ -183,10 +173,6 @@ struct SafetyDefinition {
     put_word_of(sink, format.cpw, reply.cpw, false);
     put_word_of(sink, format.spw, reply.spw, true);
   }
-  static constexpr void put(FieldSink& sink, const SafetyFormat&, const Found& found) {
-    register_fields.put(sink, found);
-  }
-
   static Explanation explain(const SafetyFormat& format, Error error, Bytes, Bytes) {
     if (error == Error::sequence_mismatch) {
       return {"the life counter of the safety word did not go on by one: a frame was lost, or sent twice"};

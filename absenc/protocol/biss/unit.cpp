@@ -26,12 +26,10 @@ struct Settings : WordSettings<Format> {
   bool life_counter = crc6.life_counter;
 };
 
-struct Definition {
-  using Protocol = biss::Protocol;
-  using Encoder = VirtualEncoder;
+struct Definition : DeclaresBiss<Definition, Format> {
+  using DeclaresBiss::put;
   static constexpr std::string_view id = "biss", name = "BiSS-C",
                                     document = "RLS E201-9S Decoding the BiSS information";
-  static constexpr LinkKind link = LinkKind::clocked;
   static constexpr std::size_t frames_size = 2400;
 
   static constexpr OptionsOf options{
@@ -47,12 +45,12 @@ struct Definition {
       with_role<Role::check_init>(option<&Settings::crc_init>("crc_init", "its start value", 0, 0xFFFF)),
       with_role<Role::check_inverted>(option<&Settings::crc_inverted>("crc_inverted", "whether it is sent inverted")),
       option<&Settings::life_counter>("life_counter", "6 bits between status bits and CRC that count frames"),
-      option<&Settings::ma_khz>("ma_khz", "clock, kHz", 10, 10'000),
+      clock_option<&Settings::ma_khz>,
       decimal<3>(option<&Settings::latency>(
           "latency_us",
           "the longest time until the position is ready, us: of the encoder, and of the line there and back", 0,
           1'000'000)),
-      option<&Settings::line_delay>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0, 100'000),
+      line_delay_option<&Settings::line_delay>,
       decimal<3>(option<&Settings::ready>(
           "ready_us", "virtual encoder: the time that it needs itself, us; 0: as latency_us, but at most 10", 0,
           1'000'000)),
@@ -73,7 +71,6 @@ struct Definition {
     given.check = {given.crc_width, given.crc_poly, given.crc_init, given.crc_inverted, given.life_counter};
     return given.with_word(values, word_with_status(given.bits()), given.position_bits != 0);
   }
-  static constexpr LineSettings line(const Format&) { return line_settings; }  // the conversation sets its rate
   static constexpr Resolution resolution(const Format& format) { return resolution_of(format.word, format.scale); }
   static constexpr bool is_usable(const Format& format) {
     return absenc::is_usable(format.word) && biss::is_usable(format.check);
@@ -83,13 +80,6 @@ struct Definition {
   }
 
   static constexpr auto commands = commands_of<Definition, Format>(is_readable);
-  static constexpr const auto& memory = registers::areas;
-
-  /// A frame of the encoder; or, with a request, a control frame: the bits of CDM and of CDS.
-  static constexpr Error decode(const Format& format, Frame asked, Frame reply, FieldSink& sink) {
-    return decode_either<Definition>(format, asked, reply, sink);
-  }
-  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
   // In the order of the wire.
   static constexpr void put(FieldSink& sink, const Format& format, const Reply& reply) {
@@ -99,10 +89,6 @@ struct Definition {
     if (format.check.life_counter) sink.put({&own_fields[field_life_counter], reply.life_counter});
     if (format.check.width != 0) sink.put({&own_fields[field_crc], reply.crc});
   }
-  static constexpr void put(FieldSink& sink, const Format&, const Found& found) { register_fields.put(sink, found); }
-
-  static Explanation explain(const Format& format, Error error, Bytes, Bytes) { return explain_frame(format, error); }
-
   static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
     return format(values).check.width != 0 && is_behind_ack(reply, bit);
   }
