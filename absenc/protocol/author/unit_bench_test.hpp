@@ -80,6 +80,14 @@ Options options_of(const Declared& declared, const Format& format) {
   return options;
 }
 
+/// Rules that a virtual encoder saw broken, one after the other.
+struct BrokenRules final : RuleWatch {
+  void looked(std::string_view rule, bool kept) override {
+    if (!kept) rules.emplace_back(rule);
+  }
+  std::vector<std::string> rules;
+};
+
 /// A command of a unit; the last arguments may be left out.
 template <class Item>
 class Talk {

@@ -211,6 +211,35 @@ TEST(EslDevice, APageChangeTakes18Milliseconds) {
   EXPECT_EQ(bench.raw(memory_read(page_select_address)), memory_reply(memory_read(page_select_address), false, 4));
 }
 
+// What is no violation, but told to who watches.
+TEST(EslDevice, TellsWhatAHostLeavesUndone) {
+  using Rules = std::vector<std::string>;
+  const std::string once = "an EEPROM byte asked for only once";
+  Bench bench;
+  author::testing::BrokenRules broken;
+  bench.encoder.watch_rules(&broken);
+  bench.raw(memory_write(page_select_address, 0));
+  bench.pass(page_time);
+  bench.raw(memory_read(5));
+  bench.pass(1ms);
+  bench.raw(memory_read(5));
+  EXPECT_EQ(broken.rules, Rules{});
+  bench.raw(memory_read(6));
+  bench.pass(1ms);
+  bench.raw(memory_read(7));
+  EXPECT_EQ(broken.rules, Rules{once});
+  bench.pass(1ms);
+  bench.raw(memory_read(7));
+  broken.rules.clear();
+  bench.raw(memory_write(5, 1));
+  bench.raw(memory_write(6, 1));
+  EXPECT_EQ(broken.rules, Rules{"memory written less than 6 ms after the write before"});
+  broken.rules.clear();
+  reset(bench, DataId::zero, reset_requests - 1);
+  bench.raw(Request{DataId::temperature});
+  EXPECT_EQ(broken.rules, Rules{"reset not sent eight times in a row"});
+}
+
 // Heard so late, a request may have come so much earlier: its host need not wait again.
 TEST(EslDevice, ItsTimesBeginWhenARequestMayHaveCome) {
   const auto rules = [](const Request& first, const Request& second, Time apart, Time late) {

@@ -231,6 +231,16 @@ TEST(TformatDevice, ResetsSentTooFastOrOnATurningShaftDoNothing) {
   ASSERT_GT(bench.violations(), 0u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "reset sent too fast: less than 40 us after the one before");
 
+  Bench exact;
+  exact.shaft.put(3, 0);
+  for (unsigned i = 0; i < reset_requests; ++i) {
+    testing::RawHost host({0x62}, exact.line.now() + 9us);
+    exact.line.put_on(host);
+    while (host.reply.size() < 6) exact.line.step();
+  }
+  EXPECT_EQ(exact.violations(), 0u);
+  EXPECT_EQ(exact.encoder.everything(exact.line.now()).multiturn, 0u);
+
   Bench turning;
   turning.shaft.put(3, 0);
   turning.shaft.spin(10, Time{});
@@ -263,6 +273,30 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
     delayed.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 4ms, .items = all, .late = late});
     EXPECT_EQ(delayed.violation_count(), rules) << late.count();
   }
+}
+
+// What is no violation, but told to who watches (9.1, 10).
+TEST(TformatDevice, TellsWhatAHostLeavesUndone) {
+  using Rules = std::vector<std::string>;
+  const std::string again = "what was refused as busy was not asked for again";
+  Bench bench;
+  author::testing::BrokenRules broken;
+  bench.encoder.watch_rules(&broken);
+  memory_write(bench, 5, 1);
+  memory_read(bench, 5);  // busy
+  memory_read(bench, 5);
+  EXPECT_EQ(broken.rules, Rules{});
+  memory_read(bench, 6);
+  EXPECT_EQ(broken.rules, Rules{again});
+  broken.rules.clear();
+  memory_write(bench, 6, 1);
+  EXPECT_EQ(broken.rules, (Rules{again, "memory written while the encoder writes"}));
+  broken.rules.clear();
+  bench.pass(18ms);
+  reset(bench, DataId::zero, 9);
+  bench.everything();
+  EXPECT_EQ(broken.rules, Rules{"reset not sent ten times in a row"});
+  EXPECT_EQ(bench.violations(), 0u);
 }
 
 // ---- Alarms (6.5)
@@ -377,7 +411,7 @@ TEST(TformatDevice, IsSilentWhileItStarts) {
     Bench bench;
     bench.condition(battery_voltage, battery ? 3600 : 0);
     bench.restart(PowerOn::real);
-    const Time start = battery ? start_up_with_battery : start_up_without_battery;
+    const Time start = battery ? 1s : 1500ms;  // 5.4
     testing::RawHost early({0x1A}, start - 1ms);
     EXPECT_TRUE(bench.run(early).reply.empty());
     testing::RawHost late({0x1A}, start);

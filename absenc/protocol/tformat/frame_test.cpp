@@ -88,6 +88,27 @@ TEST(TformatFrame, ARefusalIsToldApartFromAWrongLength) {
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, damaged).error(), Error::bad_checksum);
 }
 
+// Table 5, 9.1.
+TEST(TformatFrame, AMemoryReplyIsThatOfItsRequest) {
+  const Request write{DataId::write_memory, 5, 7};
+  const auto answered = [&write](std::uint8_t address, bool busy, std::uint8_t value, bool strict = true) {
+    const Reply reply{.id = write.id, .address = address, .busy = busy, .value = value};
+    return decode_reply({.strict = strict}, write, encode_reply(reply)).error();
+  };
+  EXPECT_EQ(answered(5, false, 7), Error::none);
+  EXPECT_EQ(answered(6, false, 7), Error::unexpected_reply);
+  EXPECT_EQ(answered(5, false, 8), Error::unexpected_reply);
+  EXPECT_EQ(answered(5, true, 0), Error::none);
+  EXPECT_EQ(answered(5, true, 1), Error::unexpected_reply);
+  EXPECT_EQ(answered(5, true, 1, false), Error::none);
+}
+
+TEST(TformatFrame, WhatIsNoRequest) {
+  EXPECT_EQ(decode_request({}).error(), Error::wrong_length);
+  EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);  // the busy bit
+  EXPECT_TRUE(decode_request(hex<"32010033">));
+}
+
 // Paragraph 6.5: which alarm takes what of a reading away.
 TEST(TformatFrame, ValidityOfEachPart) {
   struct Row {

@@ -197,6 +197,7 @@ TEST(TformatProcedures, ABusyEncoderIsWaitedFor) {
   }
   Bench writing(busy(2, 99));
   EXPECT_EQ(writing.run("memory-write", {1, 1, 0}).error, Error::busy);
+  EXPECT_LE(writing.line.now(), 95ms);  // nothing else is tried
 }
 
 // ---- Resets
