@@ -98,6 +98,20 @@ TEST(TformatHost, ARefusalIsExplained) {
   EXPECT_TRUE(reset.says("; one of the ten requests")) << reset.detail;
 }
 
+// What captures show: a reply alone, and what came of a request that is none (8.4, 9.4).
+TEST(TformatHost, ARequestIsGuessedOrWasNone) {
+  const Bench bench;
+  const auto error = [&bench](const Wire& request, const Wire& reply) {
+    NoFields nowhere;
+    return unit.decode(bench.options, {.bytes = request}, {.bytes = reply}, nowhere);
+  };
+  const Wire good = testing::wire(Reply{.id = DataId::everything, .encoder_id = 0x11});
+  EXPECT_EQ(error({}, good), Error::none);
+  EXPECT_EQ(error({}, {0x22, 0, 0, 0, 0, 0x22}), Error::unexpected_reply);  // an id that Table 1 does not list
+  EXPECT_EQ(error({0x9A}, good), Error::request_rejected);
+  EXPECT_EQ(error({0x9A}, Wire(good.begin(), good.end() - 1)), Error::bad_checksum);
+}
+
 TEST(TformatHost, ARefusedRequestIsSentAgainInsideProcedures) {
   Bench bench(refuse(2, 3, status::parity_error));  // the read behind the page select
   const auto read = bench.run("temperature");
