@@ -350,13 +350,14 @@ class Campaign:
                     break
                 if result[0] == "survived":
                     left.append(one)
-                    if self.verbose:
-                        print(f"left to be compiled alone: {one[0].id}", flush=True)
                 else:
                     self.note(unit, one, result, time.monotonic() - began)
             tree.restore_switched()
         left += [one for one in mutants if one not in numbered.values()]
-        return sorted(left, key=lambda one: (one[1], one[0].start))
+        left.sort(key=lambda one: (one[1], one[0].start))
+        for mutant, _, _ in left if self.verbose else ():
+            print(f"left to be compiled alone: {mutant.id}", flush=True)
+        return left
 
     def switched_programs(self, tree, unit, numbered):
         """With the constants among them, if the compiler takes them as functions: those that it does not are left."""
