@@ -31,8 +31,7 @@ RoughLine<Item>::RoughLine(LinkKind kind, LineSettings settings, Machine<Item>& 
       character_(settings.character()),
       host_rate_(settings.rate),
       device_rate_(settings.rate) {
-  const Step<Item> step = device_.next(time_);
-  send(step);
+  serve_device();
 }
 
 template <class Item>
@@ -187,7 +186,7 @@ template <class Item>
 Time RoughLine<Item>::due() const {
   Time first = side_.timer;
   if (side_.sending) return std::min(first, side_.end);
-  const Time limit = side_.heard ? side_.waiting.gap : side_.waiting.answer;
+  const Time limit = side_.heard ? side_.gap : side_.answer;
   if (limit > Time{} && !side_.silence_told) first = std::min(first, side_.quiet_since + limit);
   return first;
 }
@@ -225,37 +224,48 @@ void RoughLine<Item>::feed(const Event<Item>& event) {
     side_.silence_told = false;
   }
   device_.feed(event);
-  send(device_.next(time_));
+  serve_device();
 }
 
 // What the device wants, until it waits.
 template <class Item>
-void RoughLine<Item>::send(const Step<Item>& first) {
+void RoughLine<Item>::serve_device() {
+  while (carry_out(device_.next(time_))) {
+  }
+}
+
+// Whether the device is to be asked for more.
+template <class Item>
+bool RoughLine<Item>::carry_out(const Step<Item>& step) {
   using Kind = typename Step<Item>::Kind;
-  for (Step<Item> step = first;; step = device_.next(time_)) {
-    if (step.kind == Kind::done) return;
-    if (step.kind == Kind::wait) {
-      side_.waiting = step;
-      side_.timer = step.at > time_ ? step.at : never;
-      return;
+  if (step.kind == Kind::done) return false;
+  if (step.kind == Kind::wait) {
+    side_.answer = step.answer;
+    side_.gap = step.gap;
+    side_.timer = step.at > time_ ? step.at : never;
+    return false;
+  }
+  if (step.kind == Kind::configure) set_rate(device_rate_, step.rate);
+  if (step.kind == Kind::transfer) send(step);
+  return true;
+}
+
+template <class Item>
+void RoughLine<Item>::send(const Step<Item>& step) {
+  copy(step.out, out_);
+  if (driven()) return;
+  const Time start = std::max(step.at, time_);
+  side_.sending = true;
+  side_.end = start;
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    for (const CanFrame& frame : out_) {
+      const Time begun = side_.end;
+      side_.end += settings_.bits(can_bits(frame).size() + can_intermission_bits);
+      hold(begun, side_.end, side_.end, {&frame, 1});
     }
-    if (step.kind == Kind::configure) set_rate(device_rate_, step.rate);
-    if (step.kind != Kind::transfer) continue;
-    copy(step.out, out_);
-    if (driven()) continue;
-    const Time start = std::max(step.at, time_);
-    side_.sending = true;
-    side_.end = start;
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      for (const CanFrame& frame : out_) {
-        const Time begun = side_.end;
-        side_.end += settings_.bits(can_bits(frame).size() + can_intermission_bits);
-        hold(begun, side_.end, side_.end, {&frame, 1});
-      }
-    } else {
-      side_.end += character_ * static_cast<std::int64_t>(out_.size());
-      hold(start, start + character_, side_.end, out_);
-    }
+  } else {
+    side_.end += character_ * static_cast<std::int64_t>(out_.size());
+    hold(start, start + character_, side_.end, out_);
   }
 }
 

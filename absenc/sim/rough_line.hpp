@@ -70,7 +70,8 @@ class RoughLine final : public Port<Item> {
   };
   // The device's side of the line.
   struct Side {
-    Step<Item> waiting{};
+    Time answer{};
+    Time gap{};
     Time timer = never;
     Time quiet_since{};
     bool heard = false;
@@ -86,6 +87,8 @@ class RoughLine final : public Port<Item> {
   void run_device();
   void run_until(Time limit);
   void feed(const Event<Item>& event);
+  void serve_device();
+  bool carry_out(const Step<Item>& step);
   void send(const Step<Item>& step);
   void transfer(const Step<Item>& step);
   void hold(Time start, Time first, Time end, std::span<const Item> items);

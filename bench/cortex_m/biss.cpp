@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A program without a library that decodes FRAMES of 64 BiSS frames with 32 bits, for count.sh. WAY: 0, a format known
-// at compile time; 1, one known at run time; 2, the peer of bench/sampled_peer.hpp. It ends with status 0 when all were
-// right.
+// at compile time; 1, one known at run time; 2, the peer of bench/sampled_peer.hpp; 3, moteus' own function, whose header
+// is in a folder of yours. It ends with status 0 when all were right.
 #include "absenc/protocol/biss/frame.hpp"
 #include "bench/sampled_peer.hpp"
+#if WAY == 3
+#include "bissc_extract.h"
+#endif
 
 namespace {
 
@@ -41,6 +44,13 @@ constexpr auto frames = [] {
     asm volatile("" : : "r"(&format) : "memory");
     const auto reply = biss::decode(format, {frame.packed, samples});
     return reply ? static_cast<std::uint32_t>(reply->word.position) : 0;
+#if WAY == 3
+  } else if constexpr (WAY == 3) {
+    static moteus::BisscExtractConfig config{pin, 32, 6, false};
+    asm volatile("" : : "r"(&config) : "memory");
+    const auto result = moteus::ExtractBisscFrame(frame.sampled.data(), samples, config);
+    return result.error == moteus::BisscExtractError::kNone ? static_cast<std::uint32_t>(result.data_value) : 0;
+#endif
   } else {
     static bench::SampledPeer peer{pin, 32};
     asm volatile("" : : "r"(&peer) : "memory");
