@@ -160,9 +160,9 @@ class Page(ServeCase):
     def test_figures_of_one_in_trouble(self):
         self.open("#encoder=" + urllib.parse.quote("sim:tformat?alarm=over_heat&fault=corrupt=0.2"))
         self.wait_for("bad_checksum", ".histogram")
-        tables = self.browser.find_elements(By.CSS_SELECTOR, ".histogram")
-        self.assertEqual([table.get_attribute("aria-label") for table in tables],
-                         ["replies by latency", "failed attempts by kind"])
+        # By the page itself, which makes them anew when something changes.
+        labels = "return [...document.querySelectorAll('.histogram')].map((table) => table.getAttribute('aria-label'))"
+        self.assertEqual(self.browser.execute_script(labels), ["replies by latency", "failed attempts by kind"])
         wait_until(lambda: re.search(r"to \d+ (µs|ms) \d+", self.text(".histogram")), "latencies are counted")
         widest = "return Math.max(...[...document.querySelectorAll('.bar')].map((bar) => bar.offsetWidth))"
         wait_until(lambda: self.browser.execute_script(widest) > 100, "there are bars")
