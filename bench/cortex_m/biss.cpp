@@ -5,7 +5,7 @@
 #include "absenc/protocol/biss/frame.hpp"
 #include "bench/sampled_peer.hpp"
 #if WAY == 3
-#include "bissc_extract.h"
+#include <bissc_extract.h>
 #endif
 
 namespace {
