@@ -28,7 +28,9 @@ class Buffer {
   /// False, and nothing stored, when `items` do not all fit.
   constexpr bool append(std::span<const Item> items) {
     if (items.size() > Capacity - size_) return false;
-    for (const Item& item : items) items_[size_++] = item;
+    std::size_t size = size_;  // a byte that is stored could be part of a member: it would be read anew for each
+    for (const Item& item : items) items_[size++] = item;
+    size_ = size;
     return true;
   }
 

@@ -60,14 +60,8 @@ template <class Item>
 Step<Item> ReplyGuard<Item>::next(Time now) {
   for (;;) {
     switch (phase_) {
-      case Phase::passing: {
-        const Step<Item> step = next_passing(now);
-        const bool asks = is_request(step);
-        if (asks || step.kind == Step<Item>::Kind::done) close();
-        if (!asks) return step;
-        begin(step, now);
-        break;
-      }
+      case Phase::passing:
+        return pass(now);
       case Phase::before:
         if (now < until_) return {.at = until_, .gap = pending_.gap};
         // Not into what is still coming, unless it never ends: then the conversation finds out.
@@ -94,14 +88,27 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
   }
 }
 
+// What the conversation wants goes on where it was made: a step is not copied on each of its ways.
+template <class Item>
+Step<Item> ReplyGuard<Item>::pass(Time now) {
+  Step<Item> step = next_passing(now);
+  const bool asks = is_request(step);
+  if (asks || step.kind == Step<Item>::Kind::done) close();
+  if (asks) {
+    begin(step, now);
+    step = next(now);
+  }
+  return step;
+}
+
 // After each event that is told, the conversation is asked for its next step.
 template <class Item>
 Step<Item> ReplyGuard<Item>::next_passing(Time now) {
-  for (;;) {
-    const bool told = deliver();
+  while (deliver()) {
     const Step<Item> step = inner_->next(now);
-    if (!told || step.kind != Step<Item>::Kind::wait) return step;
+    if (step.kind != Step<Item>::Kind::wait) return step;
   }
+  return inner_->next(now);
 }
 
 template <class Item>

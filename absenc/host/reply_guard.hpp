@@ -65,6 +65,7 @@ class ReplyGuard final : public Machine<Item> {
   [[nodiscard]] Time quiet_time() const;
   [[nodiscard]] Time longest_wait() const;
 
+  Step<Item> pass(Time now);
   Step<Item> next_passing(Time now);
   bool deliver();
   void begin(const Step<Item>& request, Time now);
