@@ -38,7 +38,8 @@ class Virtual(Case):
                 self.assert_good(absenc("record", encoder, "--output", file, "--count", "5"))
                 with open(file, encoding="utf-8") as rows:
                     lines = [line for line in rows if not line.startswith("#")]
-                self.assertEqual([row["singleturn"] for row in csv.DictReader(lines)], [str(singleturn)] * 5)
+                taken = [row["singleturn"] for row in csv.DictReader(lines) if row["event"] != "gap"]  # of a busy machine
+                self.assertEqual(taken, [str(singleturn)] * 5)
 
     def test_info(self):
         for encoder, line in [(BISS, "clocked bits, 1 Mbit/s"), (SSI, "clocked bits, 200 kbit/s")]:

@@ -2,10 +2,10 @@
 // A sentence put together from fixed texts, where there is no heap.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <string_view>
-
-#include "absenc/core/bytes.hpp"
 
 namespace absenc {
 
@@ -13,7 +13,10 @@ class Sentence {
  public:
   /// What does not fit is left out.
   Sentence& add(std::string_view text) {
-    static_cast<void>(text_.append({text.data(), text.size()}));
+    if (text.size() <= text_.size() - size_) {
+      std::copy(text.begin(), text.end(), text_.begin() + size_);
+      size_ += text.size();
+    }
     return *this;
   }
   /// Behind what is there already, parted from it by "; ".
@@ -21,12 +24,13 @@ class Sentence {
     if (!part.empty() && !empty()) add("; ");
     return add(part);
   }
-  void clear() { text_.clear(); }
-  [[nodiscard]] bool empty() const { return text_.empty(); }
-  [[nodiscard]] std::string_view view() const { return {text_.view().data(), text_.size()}; }
+  void clear() { size_ = 0; }
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+  [[nodiscard]] std::string_view view() const { return {text_.data(), size_}; }
 
  private:
-  Buffer<char, 400> text_;
+  std::array<char, 400> text_;  // not cleared: each conversation has one, and few have anything to say
+  std::size_t size_ = 0;
 };
 
 }  // namespace absenc
