@@ -25,8 +25,7 @@ void FramePort::push_happened(const Happened& happened) {
 
 Time FramePort::now() {
   collect(Time{});
-  told_ = os::now();
-  return told_;
+  return waiting_.now();
 }
 
 void FramePort::begin(const Step<CanFrame>& step) {
@@ -63,43 +62,29 @@ void FramePort::transfer(const Step<CanFrame>& step) {
 }
 
 Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
-  // A timer stays due when another event came in its moment and the machine asks for it once more.
-  armed_ = step.at > told_ || step.at == armed_ ? step.at : never;
+  waiting_.begin(step, latency_);
   for (;;) {
     if (!happened_.empty()) return tell_first();
-    const Time limit = heard_ ? step.gap : step.answer;
-    const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency_ : never;
-    collect(std::min({armed_, quiet_end, end_}));
+    collect(std::min(waiting_.due(), end_));
     const Time time = os::now();
     if (time >= end_) throw Ended{};
     // Frames go before limits: that we come late to look is not the fault of the other side.
     if (!happened_.empty()) continue;
-    if (time >= armed_ && armed_ <= quiet_end) {
-      armed_ = never;
-      return tell({.kind = EventKind::timer, .at = time});
-    }
-    if (time >= quiet_end) {
-      silence_told_ = true;
-      return tell({.kind = EventKind::silence, .at = time});
-    }
+    if (const std::optional<Event<CanFrame>> event = waiting_.over(time)) return *event;
   }
 }
 
 Event<CanFrame> FramePort::tell_first() {
   const Happened first = happened_.front();
   happened_.pop_front();
-  heard_ = first.kind != EventKind::sent;
-  silence_told_ = false;
-  quiet_since_ = first.at;
-  if (first.kind != EventKind::received) return tell({.kind = first.kind, .at = first.at});
+  if (first.kind == EventKind::sent) {
+    waiting_.silence.sent(first.at);
+  } else {
+    waiting_.silence.heard(first.at);
+  }
+  if (first.kind != EventKind::received) return waiting_.tell({.kind = first.kind, .at = first.at});
   told_frame_ = first.frame;
-  return tell({.kind = EventKind::received, .at = first.at, .items = {&told_frame_, 1}});
-}
-
-// The machine's time is that of its last event, also when that was told late: a timer behind it is still to come.
-Event<CanFrame> FramePort::tell(const Event<CanFrame>& event) {
-  told_ = event.at;
-  return event;
+  return waiting_.tell({.kind = EventKind::received, .at = first.at, .items = {&told_frame_, 1}});
 }
 
 }  // namespace absenc::os

@@ -5,6 +5,7 @@
 #include <deque>
 
 #include "absenc/link/port.hpp"
+#include "absenc/os/waiting.hpp"
 
 namespace absenc::os {
 
@@ -55,7 +56,6 @@ class FramePort : public Port<CanFrame> {
     CanFrame frame{};
   };
 
-  Event<CanFrame> tell(const Event<CanFrame>& event);
   Event<CanFrame> tell_first();
   void transfer(const Step<CanFrame>& step);
   void push_happened(const Happened& happened);
@@ -66,11 +66,7 @@ class FramePort : public Port<CanFrame> {
 
   std::deque<Happened> happened_;
   CanFrame told_frame_{};
-  Time told_{};                // the time that the machine knows: of `now`, or of its last event
-  Time armed_ = never;         // the `timer` that was promised and not yet reported
-  Time quiet_since_{};         // end of the last transfer, or time of the last frame
-  bool heard_ = false;         // a frame since the last transfer
-  bool silence_told_ = false;  // one `silence` for each transfer or frame
+  Waiting<CanFrame> waiting_;
 };
 
 }  // namespace absenc::os

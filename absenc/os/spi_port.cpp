@@ -96,10 +96,7 @@ SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& set
   apply(settings);
 }
 
-Time SpiPort::now() {
-  told_ = os::now();
-  return told_;
-}
+Time SpiPort::now() { return waiting_.now(); }
 
 void SpiPort::begin(const ByteStep& step) {
   switch (step.kind) {
@@ -126,27 +123,13 @@ void SpiPort::begin(const ByteStep& step) {
 }
 
 ByteEvent SpiPort::wait(const ByteStep& step) {
-  // A timer stays due when another event came in its moment and the machine asks for it once more.
-  armed_ = step.at > told_ || step.at == armed_ ? step.at : never;
-  if (std::exchange(sent_pending_, false)) return tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
+  waiting_.begin(step);
+  if (std::exchange(sent_pending_, false)) return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
   if (std::exchange(heard_pending_, false)) {
-    return tell({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_, .idle_low = idle_low_});
+    return waiting_.tell({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_, .idle_low = idle_low_});
   }
-  const Time limit = heard_ ? step.gap : step.answer;
-  const Time quiet_end = limit > 0ns && !silence_told_ ? sent_at_ + limit : never;
-  sleep_until(std::min(armed_, quiet_end));
-  if (armed_ <= quiet_end) {
-    armed_ = never;
-    return tell({.kind = ByteEvent::Kind::timer, .at = os::now()});
-  }
-  silence_told_ = true;
-  return tell({.kind = ByteEvent::Kind::silence, .at = os::now()});
-}
-
-// The machine's time is that of its last event.
-ByteEvent SpiPort::tell(const ByteEvent& event) {
-  told_ = event.at;
-  return event;
+  sleep_until(waiting_.due());
+  return waiting_.over(std::max(os::now(), waiting_.due())).value();
 }
 
 void SpiPort::transfer(const ByteStep& step) {
@@ -159,8 +142,9 @@ void SpiPort::transfer(const ByteStep& step) {
   sent_at_ = os::now();
   if (clocked) keep_bits(step.bits);
   sent_pending_ = true;
-  heard_ = heard_pending_ = !in_.empty();
-  silence_told_ = false;
+  heard_pending_ = !in_.empty();
+  waiting_.silence.sent(sent_at_);
+  if (heard_pending_) waiting_.silence.heard(sent_at_);
 }
 
 // One message: the chip stays selected from its first transfer to its last.

@@ -11,6 +11,7 @@
 
 #include "absenc/link/port.hpp"
 #include "absenc/os/descriptor.hpp"
+#include "absenc/os/waiting.hpp"
 
 namespace absenc::os {
 
@@ -53,7 +54,6 @@ class SpiPort final : public Port<std::uint8_t> {
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
 
  private:
-  Event<std::uint8_t> tell(const Event<std::uint8_t>& event);
   void transfer(const Step<std::uint8_t>& step);
   void send_message(bool with_output);
   void keep_bits(std::size_t bits);
@@ -76,14 +76,11 @@ class SpiPort final : public Port<std::uint8_t> {
 
   std::vector<std::uint8_t> out_;
   std::vector<std::uint8_t> in_;
-  Time told_{};                 // the time that the machine knows: of `now`, or of its last event
-  Time armed_ = never;          // the `timer` that was promised and not yet reported
+  Waiting<std::uint8_t> waiting_;
   Time sent_at_{};              // end of the last transfer
   bool sent_pending_ = false;   // `sent` is to be reported,
   bool heard_pending_ = false;  // and then `received`
   bool idle_low_ = false;       // the data line, before the first bit of a clocked transfer
-  bool heard_ = false;          // by the last transfer
-  bool silence_told_ = false;   // one `silence` for each transfer
 };
 
 /// "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.

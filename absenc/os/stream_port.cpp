@@ -15,12 +15,9 @@ namespace absenc::os {
 
 using namespace std::chrono_literals;
 
-StreamPort::StreamPort() : quiet_since_(os::now()) {}
+StreamPort::StreamPort() : waiting_(os::now()) {}
 
-Time StreamPort::now() {
-  told_ = os::now();
-  return told_;
-}
+Time StreamPort::now() { return waiting_.now(); }
 
 void StreamPort::begin(const ByteStep& step) {
   switch (step.kind) {
@@ -44,7 +41,7 @@ void StreamPort::begin(const ByteStep& step) {
 
 void StreamPort::transfer(const ByteStep& step) {
   // The first comparison spares most transfers a look at the clock.
-  if (step.at > told_ + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
+  if (step.at > waiting_.told() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
   const Time before = read_at_once_ ? os::now() : Time{};
   if (!step.out.empty()) write_all(step.out);
   const Time written = read_at_once_ ? before : os::now();
@@ -52,43 +49,25 @@ void StreamPort::transfer(const ByteStep& step) {
 }
 
 ByteEvent StreamPort::wait(const ByteStep& step) {
-  // A timer stays due when another event came in its moment and the machine asks for it once more.
-  armed_ = step.at > told_ || step.at == armed_ ? step.at : never;
-  if (std::exchange(sent_pending_, false)) return tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
-
-  const Time limit = heard_ ? step.gap : step.answer;
-  const Time latency = heard_ && step.expect == 0 ? std::min(latency_, idle_latency_) : latency_;
-  const Time quiet_end = limit > 0ns && !silence_told_ ? quiet_since_ + limit + latency : never;
-  const Time due = std::min(armed_, quiet_end);
+  const bool is_idle = waiting_.silence.has_heard() && step.expect == 0;
+  waiting_.begin(step, is_idle ? std::min(latency_, idle_latency_) : latency_);
+  if (std::exchange(sent_pending_, false)) return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
   for (;;) {
-    const std::span<const int> ready = poller_.wait(std::min(due, end_));
+    const std::span<const int> ready = poller_.wait(std::min(waiting_.due(), end_));
     const Time time = os::now();
     if (time >= end_) throw Ended{};
     if (!ready.empty()) {
       // Bytes go before limits: that we come late to look is not the fault of the other side.
       if (const std::size_t size = read_some(buffer_, ready); size > 0) {
-        heard_ = true;
-        silence_told_ = false;
-        quiet_since_ = std::max(time, sent_at_);  // an echo comes before the computed end of sending
-        return tell({.kind = ByteEvent::Kind::received,
-                     .at = quiet_since_,
-                     .items = {buffer_.data(), size},
-                     .late = lateness()});
+        const Time at = std::max(time, sent_at_);  // an echo comes before the computed end of sending
+        waiting_.silence.heard(at);
+        return waiting_.tell(
+            {.kind = ByteEvent::Kind::received, .at = at, .items = {buffer_.data(), size}, .late = lateness()});
       }
-    } else if (time >= armed_ && armed_ <= quiet_end) {
-      armed_ = never;
-      return tell({.kind = ByteEvent::Kind::timer, .at = time});
-    } else if (time >= quiet_end) {
-      silence_told_ = true;
-      return tell({.kind = ByteEvent::Kind::silence, .at = time});
+    } else if (const std::optional<ByteEvent> event = waiting_.over(time)) {
+      return *event;
     }
   }
-}
-
-// The machine's time is that of its last event.
-ByteEvent StreamPort::tell(const ByteEvent& event) {
-  told_ = event.at;
-  return event;
 }
 
 void StreamPort::reach(Time time) {
@@ -110,10 +89,8 @@ void StreamPort::pulse(const ByteStep& step) {
 
 void StreamPort::mark_sent(Time at) {
   sent_at_ = at;
-  quiet_since_ = at;
   sent_pending_ = true;
-  heard_ = false;
-  silence_told_ = false;
+  waiting_.silence.sent(at);
 }
 
 void StreamPort::drive(ExtraWire, bool) {

@@ -13,6 +13,7 @@
 #include "absenc/link/port.hpp"
 #include "absenc/os/descriptor.hpp"
 #include "absenc/os/poller.hpp"
+#include "absenc/os/waiting.hpp"
 
 namespace absenc::os {
 
@@ -69,7 +70,6 @@ class StreamPort : public Port<std::uint8_t> {
   [[nodiscard]] virtual Time pulse_width(ExtraWire wire, Time asked) const;
 
  private:
-  Event<std::uint8_t> tell(const Event<std::uint8_t>& event);
   void reach(Time time);
   void pulse(const Step<std::uint8_t>& step);
   void mark_sent(Time at);
@@ -83,13 +83,9 @@ class StreamPort : public Port<std::uint8_t> {
   Time character_time_{};
   bool read_at_once_ = false;
 
-  Time told_{};                // the time that the machine knows: of `now`, or of its last event
-  Time armed_ = never;         // the `timer` that was promised and not yet reported
+  Waiting<std::uint8_t> waiting_;
   Time sent_at_{};             // end of the last transfer
-  Time quiet_since_;           // end of the last transfer, or time of the last bytes
   bool sent_pending_ = false;  // `sent` is to be reported
-  bool heard_ = false;         // bytes since the last transfer
-  bool silence_told_ = false;  // one `silence` for each transfer, or bytes
   std::array<std::uint8_t, 4096> buffer_;
 };
 

@@ -24,7 +24,7 @@ auto Line<Item>::attach(Role role, Machine<Item>& machine, const OnEmit& on_emit
   state->machine = &machine;
   state->on_emit = on_emit;
   state->settings = settings_;
-  state->quiet_since = now_;
+  state->silence = Silence(now_);
   nodes_.push_back(std::move(state));
   const Node node = nodes_.size() - 1;
   serve(node);
@@ -39,9 +39,7 @@ void Line<Item>::replace(Node node, Machine<Item>& machine) {
   state.doing = Step<Item>::Kind::wait;
   ++state.begin_generation;
   state.on_wire = 0;
-  state.quiet_since = now_;
-  state.heard = false;
-  state.silence_told = false;
+  state.silence = Silence(now_);
   serve(node);
 }
 
@@ -237,10 +235,8 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
 template <class Item>
 void Line<Item>::arm(State& state) {
   state.due = state.timer_due;
-  const Time limit = state.heard ? state.waiting.gap : state.waiting.answer;
-  if (state.doing == Step<Item>::Kind::wait && limit.count() > 0 && !state.silence_told) {
-    state.due = std::min(state.due, std::max(now_, state.quiet_since + limit));
-  }
+  if (state.doing != Step<Item>::Kind::wait) return;
+  state.due = std::min(state.due, std::max(now_, state.silence.due(state.waiting.answer, state.waiting.gap)));
 }
 
 template <class Item>
@@ -256,7 +252,7 @@ void Line<Item>::deadline(Node node) {
     state.due = std::min(now_ + state.settings.character(), state.timer_due);
     return;
   }
-  state.silence_told = true;
+  state.silence.told();
   feed(node, {.kind = Event<Item>::Kind::silence, .at = now_});
 }
 
@@ -264,9 +260,7 @@ template <class Item>
 void Line<Item>::finish(Node node) {
   State& state = *nodes_[node];
   state.doing = Step<Item>::Kind::wait;
-  state.quiet_since = now_;
-  state.heard = false;
-  state.silence_told = false;
+  state.silence.sent(now_);
   feed(node, {.kind = Event<Item>::Kind::sent, .at = now_});
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "absenc/link/silence.hpp"
 #include "absenc/sim/line.hpp"
 
 namespace absenc::sim {
@@ -21,12 +22,10 @@ struct Line<Item>::State {
   bool echo = false;
   bool done = false;
 
-  Step<Item> waiting{};       // the last wait step
-  Time timer_due = never;     // its `at`, until it is told
-  Time quiet_since{};         // end of the last item heard, or of the last transfer
-  bool heard = false;         // an item since `sent`
-  bool silence_told = false;  // one silence for each transfer or item
-  Time due = never;           // the next timer or silence
+  Step<Item> waiting{};    // the last wait step
+  Time timer_due = never;  // its `at`, until it is told
+  Silence silence;
+  Time due = never;  // the next timer or silence
 
   // Which sender's character this node's receiver is synchronised to; what begins before its end is not seen apart.
   Node framed_sender = 0;

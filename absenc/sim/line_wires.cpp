@@ -111,7 +111,7 @@ void Line<Item>::end_character(Node node) {
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       hear(other, node, item, false);
     } else {  // part of another sender's character, but no silence either
-      receiver.quiet_since = now_;
+      receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }
   }
@@ -121,9 +121,7 @@ void Line<Item>::end_character(Node node) {
 template <class Item>
 void Line<Item>::hear(Node node, Node sender, const Item& item, bool garbled) {
   State& state = *nodes_[node];
-  state.quiet_since = now_;
-  state.silence_told = false;
-  if (state.doing == Step<Item>::Kind::wait) state.heard = true;
+  state.silence.heard(now_);
   if (garbled || !understand(state.settings, nodes_[sender]->settings)) {
     feed(node, {.kind = Event<Item>::Kind::line_error, .at = now_});
   } else {
@@ -175,7 +173,7 @@ void Line<Item>::end_transfer(Node node) {
       feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period, .lead = host.lead});
     }
     finish(node);
-    host.heard = true;
+    host.silence.heard(now_);
     feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = in});
   }
 }

@@ -71,8 +71,7 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
     }
   }
   sent_due_ = true;
-  quiet_since_ = time_;
-  heard_ = silence_told_ = false;
+  silence_.sent(time_);
 }
 
 template <class Item>
@@ -120,8 +119,7 @@ Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
   if (std::exchange(sent_due_, false)) return tell({.kind = Kind::sent, .at = time_});
   const Time timer = step.at > told_ ? step.at : never;
   for (;;) {
-    const Time limit = heard_ ? step.gap : step.answer;
-    Time quiet = limit > Time{} && !silence_told_ ? quiet_since_ + limit : never;
+    Time quiet = silence_.due(step.answer, step.gap);
     const Time arrival = front_ != back_ ? held_[front_].at : never;
     if (arrival != never && held_[front_].first <= quiet) quiet = never;  // it is being heard
     const Time mine = std::min(timer, quiet);
@@ -138,7 +136,7 @@ Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
     if (mine == never) throw std::logic_error("a wait on a line for what can never happen");
     time_ = std::max(time_, mine);
     if (timer <= quiet) return tell({.kind = Kind::timer, .at = time_});
-    silence_told_ = true;
+    silence_.told();
     return tell({.kind = Kind::silence, .at = time_});
   }
 }
@@ -173,9 +171,7 @@ Event<Item> RoughLine<Item>::deliver() {
   if (held.sent < mark_) old_.push_back(held.sent);
   std::swap(told_items_, held.items);
   if (front_ == back_) front_ = back_ = 0;
-  heard_ = true;
-  silence_told_ = false;
-  quiet_since_ = time_;
+  silence_.heard(time_);
   if (told_items_.empty()) return tell({.kind = Kind::line_error, .at = time_});
   return tell({.kind = Kind::received, .at = time_, .items = told_items_});
 }
@@ -184,11 +180,7 @@ Event<Item> RoughLine<Item>::deliver() {
 
 template <class Item>
 Time RoughLine<Item>::due() const {
-  Time first = side_.timer;
-  if (side_.sending) return std::min(first, side_.end);
-  const Time limit = side_.heard ? side_.gap : side_.answer;
-  if (limit > Time{} && !side_.silence_told) first = std::min(first, side_.quiet_since + limit);
-  return first;
+  return std::min(side_.timer, side_.sending ? side_.end : side_.silence.due(side_.answer, side_.gap));
 }
 
 template <class Item>
@@ -210,7 +202,7 @@ void RoughLine<Item>::run_device() {
     side_.timer = never;
     feed({.kind = Kind::timer, .at = time_});
   } else {
-    side_.silence_told = true;
+    side_.silence.told();
     feed({.kind = Kind::silence, .at = time_});
   }
 }
@@ -218,11 +210,8 @@ void RoughLine<Item>::run_device() {
 template <class Item>
 void RoughLine<Item>::feed(const Event<Item>& event) {
   using Kind = typename Event<Item>::Kind;
-  if (event.kind == Kind::received || event.kind == Kind::sent) {
-    side_.quiet_since = event.at;
-    side_.heard = event.kind == Kind::received;
-    side_.silence_told = false;
-  }
+  if (event.kind == Kind::received) side_.silence.heard(event.at);
+  if (event.kind == Kind::sent) side_.silence.sent(event.at);
   device_.feed(event);
   serve_device();
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absenc/link/port.hpp"
+#include "absenc/link/silence.hpp"
 #include "absenc/sim/random.hpp"
 
 namespace absenc::sim {
@@ -73,9 +74,7 @@ class RoughLine final : public Port<Item> {
     Time answer{};
     Time gap{};
     Time timer = never;
-    Time quiet_since{};
-    bool heard = false;
-    bool silence_told = false;
+    Silence silence;
     bool sending = false;
     Time end{};
   };
@@ -126,9 +125,7 @@ class RoughLine final : public Port<Item> {
   std::vector<Item> told_items_;
   // The host's side.
   bool sent_due_ = false;
-  Time quiet_since_{};
-  bool heard_ = false;
-  bool silence_told_ = false;
+  Silence silence_;
   Time mark_{};
   std::vector<Time> old_;
 };
