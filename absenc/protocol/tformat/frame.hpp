@@ -256,31 +256,26 @@ struct Reply {
 
 namespace detail {
 
-// The fields of a reply of the right length and checksum, unchecked, into one that has none.
-constexpr void split_reply(DataId id, Bytes bytes, Reply& reply) {
-  reply.id = id;
+// The fields of a reply of the right length and checksum, unchecked.
+[[nodiscard]] constexpr Reply split_reply(DataId id, Bytes bytes) {
   if (is_memory_access(id)) {
-    reply.address = bytes[1] & 0x7F;
-    reply.busy = (bytes[1] & busy_bit) != 0;
-    reply.value = bytes[2];
-    return;
+    return {.id = id,
+            .address = static_cast<std::uint8_t>(bytes[1] & 0x7F),
+            .busy = (bytes[1] & busy_bit) != 0,
+            .value = bytes[2]};
   }
+  if (id == DataId::encoder_id) return {.id = id, .status = bytes[1], .encoder_id = bytes[2]};
   const auto load = [bytes](std::size_t at) {
     return static_cast<std::uint32_t>(bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16);
   };
-  reply.status = bytes[1];
-  if (id == DataId::encoder_id) {
-    reply.encoder_id = bytes[2];
-  } else if (id == DataId::multiturn) {
-    reply.multiturn = load(2);
-  } else {
-    reply.singleturn = load(2);
-  }
-  if (id == DataId::everything) {
-    reply.encoder_id = bytes[5];
-    reply.multiturn = load(6);
-    reply.alarms = bytes[9];
-  }
+  if (id == DataId::multiturn) return {.id = id, .status = bytes[1], .multiturn = load(2)};
+  const bool has_all = id == DataId::everything;
+  return {.id = id,
+          .status = bytes[1],
+          .singleturn = load(2),
+          .multiturn = has_all ? load(6) : 0,
+          .encoder_id = has_all ? bytes[5] : std::uint8_t{0},
+          .alarms = has_all ? bytes[9] : std::uint8_t{0}};
 }
 
 [[nodiscard]] constexpr Error check_memory_reply(const Format& format, const Request& request, const Reply& reply) {
@@ -315,14 +310,16 @@ constexpr void split_reply(DataId id, Bytes bytes, Reply& reply) {
 
 namespace detail {
 
-constexpr Error take_reply(const Format& format, const Request& request, Bytes bytes, Reply& reply) {
+constexpr Error check_frame(const Request& request, Bytes bytes) {
   if (bytes.empty()) return Error::timeout;
   const bool rejection = begins_rejection(request.id, bytes);
   if (bytes.size() != reply_length(rejection ? DataId::everything : request.id)) return Error::wrong_length;
   if (checksum(bytes) != 0) return Error::bad_checksum;
   if (rejection) return Error::request_rejected;
-  if (bytes[0] != control_field(request.id)) return Error::unexpected_reply;
-  split_reply(request.id, bytes, reply);
+  return bytes[0] == control_field(request.id) ? Error::none : Error::unexpected_reply;
+}
+
+constexpr Error check_reply(const Format& format, const Request& request, const Reply& reply) {
   return is_memory_access(request.id) ? check_memory_reply(format, request, reply) : check_data_reply(format, reply);
 }
 
@@ -331,10 +328,12 @@ constexpr Error take_reply(const Format& format, const Request& request, Bytes b
 /// Checks in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the first that fails
 /// names the error. A busy memory reply is no error: `busy` is set.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
-  Result<Reply> result;
-  const Error error = detail::take_reply(format, request, bytes, *result);
-  if (error != Error::none) result = error;
-  return result;
+  Error error = detail::check_frame(request, bytes);
+  if (error != Error::none) return error;
+  const Reply reply = detail::split_reply(request.id, bytes);
+  error = detail::check_reply(format, request, reply);
+  if (error != Error::none) return error;
+  return reply;
 }
 
 /// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. Other replies need what
