@@ -263,18 +263,27 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
   }
 }
 
+/// How many bits of a word are position and turns, and which come first.
+struct PositionBits {
+  unsigned position;
+  unsigned multiturn = 0;
+  bool multiturn_first = true;
+};
+
 /// An error bit makes position and turns invalid.
-[[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
-  const unsigned bits = format.bits_of(Meaning::position);
-  const unsigned multiturn_bits = format.bits_of(Meaning::multiturn);
+template <std::size_t size>
+[[nodiscard]] constexpr Reading to_reading(const PositionBits& bits, const WordWith<size>& word, const Scale& scale) {
   return {.singleturn = word.position,
           .multiturn = word.multiturn,
-          .singleturn_bits = bits,
-          .multiturn_bits = multiturn_bits,
-          .singleturn_valid_bits = word.error ? 0 : bits,
-          .multiturn_valid = !word.error && multiturn_bits != 0,
+          .singleturn_bits = bits.position,
+          .multiturn_bits = bits.multiturn,
+          .singleturn_valid_bits = word.error ? 0 : bits.position,
+          .multiturn_valid = !word.error && bits.multiturn != 0,
           .unit_um = scale.linear ? scale.unit_um : 0,
           .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0)};
+}
+[[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
+  return to_reading({format.bits_of(Meaning::position), format.bits_of(Meaning::multiturn)}, word, scale);
 }
 
 /// Every field of the word and its reading.
@@ -296,12 +305,6 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
 }
 
 /// The usual words: turns before or behind the position, then nError and nWarning, if wanted.
-struct PositionBits {
-  unsigned position;
-  unsigned multiturn = 0;
-  bool multiturn_first = true;
-};
-
 [[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };

@@ -85,6 +85,8 @@ struct ReplyWith {
   unsigned delay_bits = 0;        // idle samples more than those of an encoder at hand: the line's delay, in clocks
 };
 using Reply = ReplyWith<Word>;
+template <const Format& format>
+using ReplyTo = ReplyWith<typename Known<format>::Word>;
 
 /// Whether a CDS of 1 is right: only while registers are read and written.
 enum class Cds : std::uint8_t { zero, any };
@@ -180,7 +182,7 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 /// The same of a format that is known when the program is written, at the cost of what a hand would write for it. The
 /// word has `values` only where the format has some.
 template <const Format& format>
-[[nodiscard]] constexpr Result<ReplyWith<typename Known<format>::Word>> decode(BitView samples, Cds cds = Cds::zero) {
+[[nodiscard]] constexpr Result<ReplyTo<format>> decode(BitView samples, Cds cds = Cds::zero) {
   return detail::decode_by(Known<format>{}, samples, cds);
 }
 
@@ -201,6 +203,28 @@ constexpr void show(const Format& format, const ShaftState& state, std::uint32_t
 
 [[nodiscard]] constexpr Reading reading_of(const Format& format, const Reply& reply) {
   return to_reading(format.word, reply.word, format.scale);
+}
+
+/// A format that is known when the program is written, where a host takes any format: what it asks of one.
+template <const Format& known>
+struct KnownFormat {
+  static constexpr std::uint16_t ma_khz = known.ma_khz;
+  static constexpr Time latency = known.latency;
+  [[nodiscard]] static constexpr Time period() { return known.period(); }
+};
+template <const Format& format>
+[[nodiscard]] constexpr unsigned data_bits(const KnownFormat<format>&) {
+  constexpr unsigned bits = data_bits(format);
+  return bits;
+}
+template <const Format& format>
+[[nodiscard]] constexpr Result<ReplyTo<format>> decode(const KnownFormat<format>&, BitView samples, Cds cds) {
+  return decode<format>(samples, cds);
+}
+template <const Format& format>
+[[nodiscard]] constexpr Reading reading_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
+  constexpr PositionBits bits{format.word.bits_of(Meaning::position), format.word.bits_of(Meaning::multiturn)};
+  return to_reading(bits, reply.word, format.scale);
 }
 
 /// Whether these samples end before a frame does, whose encoder or line may need longer than was thought.

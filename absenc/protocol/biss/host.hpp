@@ -52,6 +52,10 @@ using Protocol = ProtocolOf<Format>;
 [[nodiscard]] constexpr int life_counter_of(const Format& format, const Reply& reply) {
   return format.check.life_counter ? reply.life_counter : -1;
 }
+template <const Format& format>
+[[nodiscard]] constexpr int life_counter_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
+  return format.check.life_counter ? reply.life_counter : -1;
+}
 
 /// Where frames begin that come later than was thought: believed is what comes twice. A start bit that gets lost makes
 /// a frame that is late, too, and whose CRC is good once in 64 times.
@@ -128,6 +132,12 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
 };
 /// What a drive that knows its line repeats.
 using ReadPosition = PositionReader<Format, false>;
+/// The same of a format that is known when the program is written: `static constexpr Format format{...};`.
+template <const Format& format>
+class ReadKnownPosition final : public PositionReader<KnownFormat<format>, false> {
+ public:
+  ReadKnownPosition() : PositionReader<KnownFormat<format>, false>({}) {}
+};
 template <class F>
 using FindPosition = PositionReader<F, true>;
 

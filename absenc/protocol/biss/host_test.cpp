@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "absenc/protocol/biss/bench_test.hpp"
@@ -90,6 +91,68 @@ TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
     EXPECT_EQ(read.found().ack_bits, 30u);
     EXPECT_EQ(read.found().delay_bits, delay / 1us);
   }
+}
+
+// Clocks these frames out, one after the other.
+template <class Reader>
+Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
+  Time now{};
+  for (Step<std::uint8_t> step = read.next(now); step.kind != Step<std::uint8_t>::Kind::done; step = read.next(now)) {
+    if (step.kind != Step<std::uint8_t>::Kind::transfer) continue;
+    if (frames.empty()) break;
+    std::vector<std::uint8_t> bytes(frames.front().bytes().begin(), frames.front().bytes().end());
+    frames = frames.subspan(1);
+    bytes.resize(step.expect);
+    now = step.at + 100us;
+    read.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+    read.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = bytes});
+  }
+  return read.error();
+}
+
+// Good frames and each of one wrong bit: what comes of them.
+template <const Format& format>
+void reads_as_any_format() {
+  std::array<BitBuffer<128>, 2> good;
+  for (std::uint8_t i = 0; i < good.size(); ++i) {
+    Reply reply{.ack_bits = ack_bits(format.latency, format.period()), .life_counter = i};
+    reply.word = word_of(format.word, {.position = 0x3'89AB'CDEFll}, 0);
+    ASSERT_TRUE(encode(format, reply, good[i]));
+  }
+  const BitView view = good[0].view();
+  for (std::size_t wrong = 0; wrong <= view.size; ++wrong) {
+    BitBuffer<128> first;
+    for (std::size_t i = 0; i < view.size; ++i) first.append(view[i] != (i == wrong) ? 1 : 0, 1);
+    const std::array frames{first, good[1]};
+    ReadPosition any(format);
+    ReadKnownPosition<format> known;
+    EXPECT_EQ(clock_out(known, frames), clock_out(any, frames)) << wrong;
+    if (wrong == view.size) {
+      EXPECT_EQ(any.error(), Error::none);
+    }
+    ASSERT_EQ(known.reading() != nullptr, any.reading() != nullptr) << wrong;
+    if (any.reading() == nullptr) continue;
+    EXPECT_EQ(known.reading()->singleturn, any.reading()->singleturn);
+    EXPECT_EQ(known.reading()->multiturn, any.reading()->multiturn);
+    EXPECT_EQ(known.reading()->singleturn_bits, any.reading()->singleturn_bits);
+    EXPECT_EQ(known.reading()->multiturn_bits, any.reading()->multiturn_bits);
+    EXPECT_EQ(known.reading()->unit_um, any.reading()->unit_um);
+    EXPECT_EQ(known.reading()->alarms, any.reading()->alarms);
+    EXPECT_EQ(known.reading()->latched, any.reading()->latched);
+  }
+}
+
+constexpr Format known_default{};
+constexpr Format known_turns{.word = word_with_status({.position = 19, .multiturn = 16}), .ma_khz = 4000};
+constexpr Format known_life_counter{
+    .word = word_with_status({.position = 32, .multiturn = 12}), .check = crc16, .latency = 5us};
+constexpr Format known_linear{.word = word_with_status({.position = 26}), .scale = {.linear = true, .unit_um = 0.5}};
+
+TEST(BissHost, KnownFormatsAreReadAsAnyFormat) {
+  reads_as_any_format<known_default>();
+  reads_as_any_format<known_turns>();
+  reads_as_any_format<known_life_counter>();
+  reads_as_any_format<known_linear>();
 }
 
 // A late frame that no other one is as late as may be what a lost start bit leaves.
