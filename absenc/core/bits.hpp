@@ -18,9 +18,9 @@ namespace absenc {
 /// True when an odd number of bits is set.
 [[nodiscard]] constexpr bool odd_parity(std::uint64_t value) { return (std::popcount(value) & 1) != 0; }
 
-/// The low `bits` bits of `value` in reverse order; 1 to 64.
-[[nodiscard]] constexpr std::uint64_t reflect(std::uint64_t value, unsigned bits) {
-  std::uint64_t reversed = 0;
+/// The low `bits` bits of `value` in reverse order; 1 to 32, which a small processor shifts at once.
+[[nodiscard]] constexpr std::uint32_t reflect(std::uint32_t value, unsigned bits) {
+  std::uint32_t reversed = 0;
   for (unsigned i = 0; i < bits; ++i) reversed |= ((value >> i) & 1) << (bits - 1 - i);
   return reversed;
 }

@@ -39,7 +39,7 @@ struct CrcParameters {
       if (feedback) remainder ^= parameters.poly;
     }
   }
-  if (parameters.refout) remainder = static_cast<std::uint32_t>(reflect(remainder, parameters.width));
+  if (parameters.refout) remainder = reflect(remainder, parameters.width);
   return static_cast<std::uint16_t>((remainder ^ parameters.xorout) & mask);
 }
 
@@ -81,7 +81,7 @@ class Crc {
   [[nodiscard]] constexpr Word value() const {
     std::uint32_t result = parameters.refin ? remainder_ : remainder_ >> spare_bits;
     if constexpr (parameters.refin != parameters.refout) {
-      result = static_cast<std::uint32_t>(reflect(result, parameters.width));
+      result = reflect(result, parameters.width);
     }
     return static_cast<Word>((result ^ parameters.xorout) & low_mask(parameters.width));
   }
@@ -100,9 +100,8 @@ class Crc {
   static constexpr unsigned spare_bits = word_bits - parameters.width;
 
   // The polynomial as the remainder is kept.
-  static constexpr std::uint32_t poly = parameters.refin
-                                            ? static_cast<std::uint32_t>(reflect(parameters.poly, parameters.width))
-                                            : std::uint32_t{parameters.poly} << spare_bits;
+  static constexpr std::uint32_t poly =
+      parameters.refin ? reflect(parameters.poly, parameters.width) : std::uint32_t{parameters.poly} << spare_bits;
 
   // What `bits` bits of input do to an otherwise empty remainder.
   static constexpr Word advance(std::uint32_t input, unsigned bits) {

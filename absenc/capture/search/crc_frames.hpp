@@ -85,7 +85,7 @@ std::size_t covered_bits(const CheckedFrame& frame, const Shape& shape, std::siz
 }
 
 inline std::uint32_t reflected_if(bool reflected, std::uint32_t value, unsigned width) {
-  return reflected ? static_cast<std::uint32_t>(reflect(value, width)) : value;
+  return reflected ? reflect(value, width) : value;
 }
 
 /// A multiple of the polynomial when the frame is good and init and xorout are right.
