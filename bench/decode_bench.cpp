@@ -41,8 +41,7 @@ void tformat_everything_reference(benchmark::State& state) {
     const Bytes bytes = frames[i++ % frames.size()];
     Result<Reply> result = Error::bad_checksum;
     if (crc_bitwise(crc_parameters, bytes.first(bytes.size() - 1)) == bytes.back()) {
-      Reply reply;
-      tformat::detail::split_reply(DataId::everything, bytes, reply);
+      const Reply reply = tformat::detail::split_reply(DataId::everything, bytes);
       const Error error = tformat::detail::check_data_reply(format, reply);
       result = error == Error::none ? Result<Reply>(reply) : Result<Reply>(error);
     }
