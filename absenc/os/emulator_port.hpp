@@ -61,6 +61,7 @@ class EmulatorPort final : public StreamPort {
   std::string link_;
   std::uint16_t tcp_port_ = 0;
   RunDelay delay_;
+  Time looked_{};  // when it was asked
   Time late_{};
   Time late_until_{};
   std::uint64_t dropped_ = 0;
