@@ -22,6 +22,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t most_messages_out = 500;  // that are not acknowledged yet
+constexpr Time between_first_messages = 200ms;  // where nothing is acknowledged
 constexpr Time one_wait = 20ms;
 constexpr Time between_state_looks = 200ms;
 constexpr Time between_many_state_looks = 1s;  // of more encoders than many
@@ -118,6 +119,7 @@ MqttClient::State MqttSender::connect(MqttClient& client, const std::string& hos
 
 void MqttSender::begin() {
   told_lost_ = false;
+  next_message_ = os::now() + between_first_messages;
   {
     const std::lock_guard lock(mutex_);
     figures_.connected = true;
@@ -215,9 +217,13 @@ void MqttSender::send_retained(MqttClient& client, const Retained& retained) {
   outstanding_[*number] = 0;
 }
 
+// Until the broker has taken one, one at a time, for a while: mosquitto hangs up behind its refusal, which is lost in
+// what is still being sent to it.
 void MqttSender::send_messages(MqttClient& client) {
   if (messages_out_ >= most_messages_out || spool_->held().messages <= messages_out_) return;
-  for (const Message& one : spool_->after(last_sent_, most_messages_out - messages_out_)) {
+  if (!has_taken_ && !outstanding_.empty() && os::now() < next_message_) return;
+  next_message_ = os::now() + between_first_messages;
+  for (const Message& one : spool_->after(last_sent_, has_taken_ ? most_messages_out - messages_out_ : 1)) {
     const std::optional<int> number = client.publish(one.topic, one.payload, 1, false);
     if (!number) throw Failure(client.trouble());
     outstanding_[*number] = one.id;

@@ -59,6 +59,7 @@ class MqttSender {
 
   // Of the thread alone.
   MqttClient::Version version_ = MqttClient::Version::v5;
+  Time next_message_{};                                // while the broker has taken none
   std::unordered_map<int, std::int64_t> outstanding_;  // ids of messages, 0 of states, by the number of the library
   std::size_t messages_out_ = 0;                       // of those
   std::int64_t last_sent_ = 0;
