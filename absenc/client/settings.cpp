@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <memory>
 #include <utility>
 
 #include "absenc/client/error.hpp"
@@ -73,6 +75,27 @@ std::string note_of(const Unit& unit, const Options& before, const Command& sett
 }
 
 }  // namespace
+
+std::vector<const Command*> questions(const Unit& unit) {
+  std::vector<const Command*> all;
+  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
+    for (const Command& command : unit.commands) {
+      if (command.verb == verb && std::ranges::none_of(command.arguments, &Argument::required)) all.push_back(&command);
+    }
+  }
+  return all;
+}
+
+std::vector<const Command*> questions(const Unit& unit, const Options& options) {
+  std::vector<const Command*> all = questions(unit);
+  std::erase_if(all, [&](const Command* command) {
+    const std::vector<std::int64_t> arguments = complete_arguments(*command, {});
+    const auto storage = std::make_unique<std::byte[]>(unit.host_storage);
+    const Any<Conversation> made = unit.host(options, *command, arguments, {storage.get(), unit.host_storage});
+    return made.bytes == nullptr && made.frames == nullptr;
+  });
+  return all;
+}
 
 std::vector<const Command*> readable_settings(const Unit& unit) {
   std::vector<const Command*> settings;

@@ -21,6 +21,12 @@ struct Setting {
   [[nodiscard]] std::string_view name() const { return getter != nullptr ? getter->name : setter->name; }
 };
 
+/// By which an encoder is asked what it is and what it is set to, in the order in which that is best told: commands
+/// that need no argument.
+[[nodiscard]] std::vector<const Command*> questions(const Unit& unit);
+/// Those of them that there are with these options.
+[[nodiscard]] std::vector<const Command*> questions(const Unit& unit, const Options& options);
+
 /// Those that can be read, at least one. Throws UsageError.
 [[nodiscard]] std::vector<const Command*> readable_settings(const Unit& unit);
 /// Throws UsageError, which names the nearest, when there is none of that name; and when it cannot be read.

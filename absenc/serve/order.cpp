@@ -98,30 +98,17 @@ Json shown(const Column& column, const Value& value) {
   return text.empty() ? "none" : text;
 }
 
-// What an encoder says of itself, as `absenc info` asks it, and what it is set to.
-std::vector<const Command*> getters(const Unit& unit) {
-  std::vector<const Command*> all;
-  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
-    for (const Command& command : unit.commands) {
-      const bool alone = std::none_of(command.arguments.begin(), command.arguments.end(),
-                                      [](const Argument& argument) { return argument.required; });
-      if (command.verb == verb && alone) all.push_back(&command);
-    }
-  }
-  return all;
-}
-
 Done read_settings(Encoder& live, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();
   Json rows = Json::array();
   Json failed = Json::object();
-  Questions questions(live, between);
-  for (const Command* getter : getters(live.unit())) {
+  Questions asked(live, between);
+  for (const Command* getter : questions(live.unit())) {
     const bool is_setting = getter->verb == Verb::config_get;
-    const std::optional<Answer> answer = questions.ask(getter->name, {});
+    const std::optional<Answer> answer = asked.ask(getter->name, {});
     if (!answer) {
-      if (is_setting || questions.was_asked()) failed.set(getter->name, questions.reason());
+      if (is_setting || asked.was_asked()) failed.set(getter->name, asked.reason());
       continue;
     }
     (is_setting ? settings : identity).set(getter->name, to_json(answer->row()));
@@ -136,7 +123,7 @@ Done read_settings(Encoder& live, const Between& between) {
     }
   }
   Json json = Json::object().set("ok", true).set("identity", identity).set("settings", settings);
-  return questions.done(json.set("rows", rows).set("failed", failed));
+  return asked.done(json.set("rows", rows).set("failed", failed));
 }
 
 // What is told last of a register is its meaning.
@@ -193,7 +180,7 @@ std::string_view Order::name() const {
 }
 
 Order settings_order(const Unit& unit) {
-  if (getters(unit).empty()) throw UsageError(fmt::format("{} has no settings and does not say what it is", unit.id));
+  if (questions(unit).empty()) throw UsageError(fmt::format("{} has no settings and does not say what it is", unit.id));
   Order order;
   order.kind = Order::Kind::settings;
   return order;
@@ -237,7 +224,7 @@ Done carry_out(Encoder& live, const Order& order, const Between& between) {
 
 Json readable_json(const Unit& unit) {
   Json settings = Json::array();
-  for (const Command* command : getters(unit)) settings.append(command->name);
+  for (const Command* command : questions(unit)) settings.append(command->name);
   Json memory = Json::array();
   const bool has_memory = find_command(unit, Verb::memory_read) != nullptr;
   for (const MemoryArea& area : unit.memory) {

@@ -163,24 +163,10 @@ py::list scan(PyEncoder& encoder) {
   return list;
 }
 
-// What needs no argument and exists with the encoder's options.
-bool can_be_asked(const client::Encoder& encoder, const Command& command) {
-  const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
-                                          [](const Argument& argument) { return argument.required; });
-  if (needs_argument) return false;
-  const Unit& unit = encoder.unit();
-  const std::vector<std::int64_t> arguments = client::complete_arguments(command, {});
-  const auto storage = std::make_unique<std::byte[]>(unit.host_storage);
-  const Any<Conversation> made = unit.host(encoder.options(), command, arguments, {storage.get(), unit.host_storage});
-  return made.bytes != nullptr || made.frames != nullptr;
-}
-
 std::vector<std::string> questions(const PyEncoder& encoder) {
   std::vector<std::string> names;
-  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
-    for (const Command& command : encoder.unit().commands) {
-      if (command.verb == verb && can_be_asked(encoder.encoder(), command)) names.emplace_back(command.name);
-    }
+  for (const Command* command : client::questions(encoder.unit(), encoder.encoder().options())) {
+    names.emplace_back(command->name);
   }
   return names;
 }

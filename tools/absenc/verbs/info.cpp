@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absenc/client/reading_columns.hpp"
+#include "absenc/client/settings.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
@@ -25,29 +26,6 @@ namespace absenc::tool {
 namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
-
-// What needs no argument and exists with these options.
-bool can_be_asked(const EncoderAddress& uri, const Command& command) {
-  const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
-                                          [](const Argument& argument) { return argument.required; });
-  if (needs_argument) return false;
-  const std::vector<std::int64_t> arguments = require_arguments(command, {});
-  const auto storage = std::make_unique<std::byte[]>(uri.unit->host_storage);
-  const Any<Conversation> made =
-      uri.unit->host(uri.options, command, arguments, {storage.get(), uri.unit->host_storage});
-  return made.bytes != nullptr || made.frames != nullptr;
-}
-
-// In this order; the position comes behind them.
-std::vector<const Command*> questions(const EncoderAddress& uri) {
-  std::vector<const Command*> commands;
-  for (const Verb verb : {Verb::info, Verb::temperature, Verb::config_get}) {
-    for (const Command& command : uri.unit->commands) {
-      if (command.verb == verb && can_be_asked(uri, command)) commands.push_back(&command);
-    }
-  }
-  return commands;
-}
 
 std::string resolution_text(const Resolution& resolution) {
   if (resolution.unit_um > 0) return fmt::format("{} bits of {} um", resolution.singleturn_bits, resolution.unit_um);
@@ -189,7 +167,7 @@ int run_info(const Invocation& invocation) {
   const bool json = invocation.has("--json");
   if (!json) print_line(table(identity_rows(uri)) + '\n');
   Survey survey(uri);
-  for (const Command* command : questions(uri)) survey.ask(*command);
+  for (const Command* command : questions(*uri.unit, uri.options)) survey.ask(*command);
   if (find_command(*uri.unit, Verb::read) != nullptr) survey.read();
   const bool good = survey.troubles.empty();
   if (json) {
