@@ -71,8 +71,7 @@ std::vector<std::int64_t> arguments_in(const Request& request, const Command& co
 }  // namespace
 
 Json state_json(const Fleet& fleet, const Chronicler* chronicler) {
-  Json encoders = Json::array();
-  for (const auto& watch : fleet.all()) encoders.append(overview(*watch, watch->snapshot()));
+  const Json encoders = Json::list(fleet.all(), [](const auto& one) { return overview(*one, one->snapshot()); });
   Json history;
   if (chronicler != nullptr) {
     const Chronicler::Health health = chronicler->health();

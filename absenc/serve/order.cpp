@@ -153,13 +153,12 @@ Done read_memory(Encoder& live, const MemoryImage& addresses, const Between& bet
   const MemoryImage image = live.memory().read(addresses, [&](std::size_t done, std::size_t all) {
     if (done < all) between();
   });
-  Json parts = Json::array();
-  for (const MemoryRun& run : runs(image)) {
-    parts.append(Json::object()
-                     .set("page", run.first.page)
-                     .set("address", run.first.address)
-                     .set("data", fmt::format("{:02x}", fmt::join(run.bytes, ""))));
-  }
+  const Json parts = Json::list(runs(image), [](const MemoryRun& run) {
+    return Json::object()
+        .set("page", run.first.page)
+        .set("address", run.first.address)
+        .set("data", fmt::format("{:02x}", fmt::join(run.bytes, "")));
+  });
   return {true, "read", Json::object().set("ok", true).set("bytes", image.size()).set("memory", parts)};
 }
 
@@ -223,8 +222,7 @@ Done carry_out(Encoder& live, const Order& order, const Between& between) {
 }
 
 Json readable_json(const Unit& unit) {
-  Json settings = Json::array();
-  for (const Command* command : questions(unit)) settings.append(command->name);
+  const Json settings = Json::list(questions(unit), [](const Command* command) { return command->name; });
   Json memory = Json::array();
   const bool has_memory = find_command(unit, Verb::memory_read) != nullptr;
   for (const MemoryArea& area : unit.memory) {

@@ -2,6 +2,7 @@
 #include "absenc/serve/view.hpp"
 
 #include "absenc/client/reading.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
 
@@ -17,10 +18,8 @@ Json alarms_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
   for (const Flags& flags : channels) {
-    for (std::size_t bit = 0; bit < flags.field->flags.size(); ++bit) {
-      const FlagInfo& flag = flags.field->flags[bit];
-      if ((flags.bits >> bit & 1) == 0 || flag.name.empty()) continue;
-      Json one = Json::object().set("name", flag.name).set("meaning", flag.meaning).set("action", flag.action);
+    for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
+      Json one = flag_to_json(flag);
       if (channels.size() > 1) one.set("channel", flags.field->name);
       all.append(one);
     }
@@ -48,16 +47,14 @@ void set_place(Json& json, const Reading& reading, bool live) {
 }
 
 Json arguments_json(const Command& command) {
-  Json all = Json::array();
-  for (const Argument& argument : command.arguments) {
-    all.append(Json::object()
-                   .set("name", argument.name)
-                   .set("meaning", argument.meaning)
-                   .set("minimum", argument.minimum)
-                   .set("maximum", argument.maximum)
-                   .set("default", argument.required ? Json() : Json(argument.default_value)));
-  }
-  return all;
+  return Json::list(command.arguments, [](const Argument& argument) {
+    return Json::object()
+        .set("name", argument.name)
+        .set("meaning", argument.meaning)
+        .set("minimum", argument.minimum)
+        .set("maximum", argument.maximum)
+        .set("default", argument.required ? Json() : Json(argument.default_value));
+  });
 }
 
 Json commands_json(const Unit& unit) {
@@ -101,17 +98,14 @@ Json latency_json(const LatencyFigures& latency) {
 }
 
 Json bad_json(const Details& details) {
-  Json all = Json::array();
-  const Time now = os::now();
-  for (const BadExchangeText& bad : details.bad) {
-    all.append(Json::object()
-                   .set("age_s", seconds_of(now - bad.at))
-                   .set("error", text_of(bad.error).name)
-                   .set("meaning", text_of(bad.error).description)
-                   .set("sent", bad.sent)
-                   .set("received", bad.received));
-  }
-  return all;
+  return Json::list(details.bad, [now = os::now()](const BadExchangeText& bad) {
+    return Json::object()
+        .set("age_s", seconds_of(now - bad.at))
+        .set("error", text_of(bad.error).name)
+        .set("meaning", text_of(bad.error).description)
+        .set("sent", bad.sent)
+        .set("received", bad.received);
+  });
 }
 
 }  // namespace
@@ -159,12 +153,9 @@ Json details(const Watch& watch) {
 }
 
 Json points(const Watch& watch, std::span<const Point> taken) {
-  Json list = Json::array();
-  for (const Point& point : taken) {
-    Json one = Json::array();
-    one.append(point.at_ms).append(point.place).append(point.speed ? Json(*point.speed) : Json());
-    list.append(one);
-  }
+  const Json list = Json::list(taken, [](const Point& point) {
+    return Json::array().append(point.at_ms).append(point.place).append(point.speed ? Json(*point.speed) : Json());
+  });
   return Json::object().set("encoder", watch.name()).set("points", list);
 }
 

@@ -282,15 +282,14 @@ Examination examine(std::string_view text, std::span<const std::string> settings
 }
 
 Json to_json(const Examination& examination) {
-  Json findings = Json::array();
-  for (const Finding& one : examination.findings) {
-    findings.append(Json::object()
-                        .set("id", one.id)
-                        .set("severity", name_of(one.severity))
-                        .set("evidence", one.evidence)
-                        .set("cause", one.cause)
-                        .set("action", one.action));
-  }
+  const Json findings = Json::list(examination.findings, [](const Finding& one) {
+    return Json::object()
+        .set("id", one.id)
+        .set("severity", name_of(one.severity))
+        .set("evidence", one.evidence)
+        .set("cause", one.cause)
+        .set("action", one.action);
+  });
   Json json = Json::object().set("ok", examination.healthy()).set("findings", findings);
   json.set("readings", examination.tried).set("good", examination.good).set("complete", examination.complete);
   return json.set("verdict", examination.verdict());

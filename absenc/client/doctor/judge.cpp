@@ -174,12 +174,10 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
                                                    last->ready ? ", and at the end no more" : ""}));
   }
   for (const Flags& flags : one.unit.alarms != nullptr ? alarms_of(one.unit, *last) : status_of(one.unit, *last)) {
-    for (std::size_t i = 0; i < flags.field->flags.size(); ++i) {
-      const FlagInfo& flag = flags.field->flags[i];
-      if ((flags.bits >> i & 1) == 0 || flag.name.empty()) continue;
-      const std::string_view action = flag.action.empty() ? "what the encoder's document says of it" : flag.action;
+    for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
+      const std::string_view action = flag->action.empty() ? "what the encoder's document says of it" : flag->action;
       findings.push_back(
-          finding(Ailment::alarm, {std::string(flag.name), std::string(flag.meaning), std::string(action)}));
+          finding(Ailment::alarm, {std::string(flag->name), std::string(flag->meaning), std::string(action)}));
     }
   }
 }

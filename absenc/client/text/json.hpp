@@ -26,6 +26,17 @@ class Json {
   Json(const std::string& text) : Json(std::string_view(text)) {}
   [[nodiscard]] static Json object();
   [[nodiscard]] static Json array();
+  /// An array of what `make` makes of each of them.
+  template <class All, class Make>
+  [[nodiscard]] static Json list(const All& all, const Make& make) {
+    Json made = array();
+    for (const auto& one : all) made.append(make(one));
+    return made;
+  }
+  template <class All>
+  [[nodiscard]] static Json list(const All& all) {
+    return list(all, [](const auto& one) { return Json(one); });
+  }
 
   Json(const Json& other);
   Json(Json&& other) noexcept;

@@ -68,11 +68,11 @@ std::string to_csv(const Row& row) {
   return line;
 }
 
-Json flags_to_json(const FieldInfo& field, std::uint64_t bits) {
-  Json names = Json::array();
-  for (const std::string_view name : flag_names(field, bits)) names.append(name);
-  return names;
+Json flag_to_json(const FlagInfo* flag) {
+  return Json::object().set("name", flag->name).set("meaning", flag->meaning).set("action", flag->action);
 }
+
+Json flags_to_json(const FieldInfo& field, std::uint64_t bits) { return Json::list(flag_names(field, bits)); }
 
 Json to_json(const Value& value) {
   struct Visitor {

@@ -18,6 +18,8 @@ namespace absenc::client {
 void append_csv(std::string& text, const Row& row);
 [[nodiscard]] std::string to_csv(const Row& row);
 
+/// {"name":"over_heat","meaning":...,"action":...}
+[[nodiscard]] Json flag_to_json(const FlagInfo* flag);
 /// ["over_heat","battery_alarm"]
 [[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] Json to_json(const Value& value);

@@ -246,11 +246,17 @@ std::vector<std::string> option_texts(const Unit& unit, const Options& options) 
   return texts;
 }
 
+std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits) {
+  std::vector<const FlagInfo*> flags;
+  for (std::size_t i = 0; i < field.flags.size(); ++i) {
+    if ((bits >> i & 1) != 0 && !field.flags[i].name.empty()) flags.push_back(&field.flags[i]);
+  }
+  return flags;
+}
+
 std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits) {
   std::vector<std::string_view> names;
-  for (std::size_t i = 0; i < field.flags.size(); ++i) {
-    if ((bits >> i & 1) != 0 && !field.flags[i].name.empty()) names.push_back(field.flags[i].name);
-  }
+  for (const FlagInfo* flag : raised(field, bits)) names.push_back(flag->name);
   return names;
 }
 

@@ -73,6 +73,8 @@ struct RoleArgument {
 /// "name=value" of each that counts; a word in place of those that it stands in for.
 [[nodiscard]] std::vector<std::string> option_texts(const Unit& unit, const Options& options);
 
+/// Those that are set in `bits` and have a name.
+[[nodiscard]] std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);
 /// Text of an encoder as it can be shown: what is no ASCII is a point.

@@ -39,13 +39,10 @@ std::string FieldPlaces::text() const {
 Json FieldPlaces::json() const {
   Json json = Json::object();
   for (const auto& [name, ranges] : all_) {
-    Json parts = Json::array();
-    for (const BitRange& range : ranges.view()) {
-      Json part = Json::object().set("first", range.first).set("count", range.count);
-      if (range.inverted) part.set("inverted", true);
-      parts.append(part);
-    }
-    json.set(name, parts);
+    json.set(name, Json::list(ranges.view(), [](const BitRange& range) {
+               Json part = Json::object().set("first", range.first).set("count", range.count);
+               return range.inverted ? part.set("inverted", true) : part;
+             }));
   }
   return json;
 }

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <span>
 
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
@@ -219,12 +220,9 @@ Json CaptureStatistics::json(const CaptureOutcome& outcome) const {
                  .set("document",
                       unit_.timing.turnaround.count() == 0 ? Json() : Json(microseconds(unit_.timing.turnaround))));
   }
-  Json bauds = Json::array();
-  for (const double baud : outcome.baud) bauds.append(baud);
-  if (!outcome.baud.empty()) json.set("baud", bauds);
-  Json list = Json::array();
-  for (std::size_t i = 0; i < first_count_; ++i) {
-    const Annotation annotation = restored(first_[i]);
+  if (!outcome.baud.empty()) json.set("baud", Json::list(outcome.baud));
+  const Json first_errors = Json::list(std::span(first_).first(first_count_), [&](const Kept& kept) {
+    const Annotation annotation = restored(kept);
     Json one = Json::object();
     if (clock_.has_time()) {
       one.set("time_s", clock_.seconds(annotation.begin));
@@ -234,9 +232,9 @@ Json CaptureStatistics::json(const CaptureOutcome& outcome) const {
     one.set("error", text_of(annotation.error).name).set("kind", name_of(annotation.kind));
     if (!annotation.request.empty()) one.set("request", to_compact_wire_text(unit_.link, annotation.request));
     if (!annotation.reply.empty()) one.set("reply", to_compact_wire_text(unit_.link, annotation.reply));
-    list.append(one.set("message", message_of(unit_, options_, annotation)));
-  }
-  json.set("first_errors", list);
+    return one.set("message", message_of(unit_, options_, annotation));
+  });
+  json.set("first_errors", first_errors);
   if (worst_row_.count > 1) json.set("most_errors_in_a_row", worst_row_.count);
   return json;
 }

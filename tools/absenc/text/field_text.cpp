@@ -45,12 +45,10 @@ void FieldTable::put(const FieldValue& value) {
 }
 
 void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& field, std::uint64_t bits) {
-  for (std::size_t i = 0; i < field.flags.size(); ++i) {
-    const FlagInfo& flag = field.flags[i];
-    if ((bits >> i & 1) == 0 || flag.name.empty()) continue;
-    std::string words(flag.meaning);
-    if (!flag.action.empty()) words += fmt::format(": {}", flag.action);
-    rows.push_back({fmt::format("  {}", flag.name), "", words});
+  for (const FlagInfo* flag : raised(field, bits)) {
+    std::string words(flag->meaning);
+    if (!flag->action.empty()) words += fmt::format(": {}", flag->action);
+    rows.push_back({fmt::format("  {}", flag->name), "", words});
   }
 }
 

@@ -133,8 +133,7 @@ int show_candidates(std::span<const Candidate> candidates, const std::function<s
                     bool json) {
   const bool found = !candidates.empty() && is_found(candidates.front());
   if (json) {
-    Json list = Json::array();
-    for (const Candidate& one : candidates) list.append(to_json(one, command(one)));
+    const Json list = Json::list(candidates, [&](const Candidate& one) { return to_json(one, command(one)); });
     print_line(Json::object().set("ok", found).set("candidates", list).line());
     return found ? exit_good : exit_failed;
   }

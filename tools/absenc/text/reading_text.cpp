@@ -104,12 +104,10 @@ std::string millimetres_text(double millimetres, double unit_um) {
 
 std::string flags_in_words(const Flags& flags) {
   std::string lines;
-  for (std::size_t i = 0; i < flags.field->flags.size(); ++i) {
-    const FlagInfo& flag = flags.field->flags[i];
-    if ((flags.bits >> i & 1) == 0 || flag.name.empty()) continue;
+  for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
     if (!lines.empty()) lines += '\n';
-    lines += fmt::format("  {}: {}", flag.name, flag.meaning);
-    if (!flag.action.empty()) lines += fmt::format(". What to do: {}", flag.action);
+    lines += fmt::format("  {}: {}", flag->name, flag->meaning);
+    if (!flag->action.empty()) lines += fmt::format(". What to do: {}", flag->action);
   }
   return lines;
 }

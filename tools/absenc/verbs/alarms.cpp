@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
 #include "absenc/os/signals.hpp"
@@ -31,16 +32,6 @@ std::vector<ShownAlarms> flags_of(const Unit& unit, const Reading& reading) {
   return all;
 }
 
-Json in_words(const Flags& flags) {
-  Json json = Json::array();
-  for (std::size_t i = 0; i < flags.field->flags.size(); ++i) {
-    const FlagInfo& flag = flags.field->flags[i];
-    if ((flags.bits >> i & 1) == 0 || flag.name.empty()) continue;
-    json.append(Json::object().set("name", flag.name).set("meaning", flag.meaning).set("action", flag.action));
-  }
-  return json;
-}
-
 void show_alarms(const Unit& unit, const Reading& reading) {
   for (const auto& [flags, told_when_none] : flags_of(unit, reading)) {
     const std::string words = flags_in_words(flags);
@@ -51,7 +42,9 @@ void show_alarms(const Unit& unit, const Reading& reading) {
 
 void show_json(const Unit& unit, const Reading& reading) {
   Json json = Json::object().set("ok", true).set("protocol", unit.id);
-  for (const auto& [flags, told] : flags_of(unit, reading)) json.set(flags.field->name, in_words(flags));
+  for (const auto& [flags, told] : flags_of(unit, reading)) {
+    json.set(flags.field->name, Json::list(raised(*flags.field, flags.bits), flag_to_json));
+  }
   print_line(json.line());
 }
 

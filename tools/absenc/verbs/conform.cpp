@@ -23,23 +23,20 @@ namespace absenc::tool {
 namespace {
 
 Json conformance_json(const Conformance& conformance) {
-  Json clauses = Json::array();
-  for (const ClauseResult& one : conformance.clauses) {
-    clauses.append(Json::object()
-                       .set("id", one.id)
-                       .set("document", one.document)
-                       .set("paragraph", one.paragraph)
-                       .set("words", one.words)
-                       .set("verdict", name_of(one.verdict))
-                       .set("evidence", one.evidence));
-  }
-  Json left = Json::array();
-  for (const std::string& command : conformance.left) left.append(command);
+  const Json clauses = Json::list(conformance.clauses, [](const ClauseResult& one) {
+    return Json::object()
+        .set("id", one.id)
+        .set("document", one.document)
+        .set("paragraph", one.paragraph)
+        .set("words", one.words)
+        .set("verdict", name_of(one.verdict))
+        .set("evidence", one.evidence);
+  });
   return Json::object()
       .set("ok", conformance.good())
       .set("protocol", conformance.protocol)
       .set("clauses", clauses)
-      .set("left", left);
+      .set("left", Json::list(conformance.left));
 }
 
 std::string without_end(std::string text) {

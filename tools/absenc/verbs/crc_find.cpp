@@ -114,16 +114,10 @@ Json check_json(const FoundCheck& check, LinkKind link, std::string_view unit) {
   } else {
     json.set("init", hex(crc.init, 8));
   }
-  Json first = Json::array();
-  for (const std::size_t one : check.first) first.append(one);
-  json.set("unit", unit).set("covered_from", first).set("check_size", check.check_size);
+  json.set("unit", unit).set("covered_from", Json::list(check.first)).set("check_size", check.check_size);
   json.set("behind_check", check.trailing).set("chance", check.chance);
   Json options = Json::object();
-  for (const CheckOptions& one : options_for(check, link)) {
-    Json texts = Json::array();
-    for (const std::string& text : one.options) texts.append(text);
-    options.set(one.unit->id, texts);
-  }
+  for (const CheckOptions& one : options_for(check, link)) options.set(one.unit->id, Json::list(one.options));
   if (!options.empty()) json.set("options", options);
   return json.set("frames_to_settle", check.frames_to_settle);
 }
@@ -135,8 +129,7 @@ int run_crc_find(const Invocation& invocation) {
   const LinkKind link = frames.front().bits != 0 ? LinkKind::clocked : LinkKind::half_duplex;
   const std::string_view unit = link == LinkKind::clocked ? "bits" : "bytes";
   if (invocation.has("--json")) {
-    Json list = Json::array();
-    for (const FoundCheck& check : findings.checks) list.append(check_json(check, link, unit));
+    const Json list = Json::list(findings.checks, [&](const auto& check) { return check_json(check, link, unit); });
     print_line(Json::object().set("ok", found).set("frames", frames.size()).set("solutions", list).line());
   } else if (found) {
     show_checks(findings, invocation.has("--all") ? SIZE_MAX : most_shown, unit);

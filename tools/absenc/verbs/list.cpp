@@ -143,10 +143,9 @@ Rows field_rows(const Unit& unit) {
   Rows rows;
   for (const FieldInfo& field : unit.fields) {
     rows.push_back({std::string(field.name), std::string(field.unit), std::string(field.meaning)});
-    for (const FlagInfo& flag : field.flags) {
-      if (flag.name.empty()) continue;
-      rows.push_back({fmt::format("  {}", flag.name), "", std::string(flag.meaning)});
-      if (!flag.action.empty()) rows.push_back({"", "", fmt::format("  -> {}", flag.action)});
+    for (const FlagInfo* flag : raised(field, ~0ull)) {
+      rows.push_back({fmt::format("  {}", flag->name), "", std::string(flag->meaning)});
+      if (!flag->action.empty()) rows.push_back({"", "", fmt::format("  -> {}", flag->action)});
     }
   }
   return rows;
@@ -185,121 +184,99 @@ std::string details(const Unit& unit) {
 }
 
 Json models_json(const Unit& unit) {
-  Json models = Json::array();
-  for (const Model& model : unit.models) {
+  return Json::list(unit.models, [&](const Model& model) {
     Json options = Json::object();
     for (const OptionValue& value : model.values) {
       const Option& option = unit.options[value.option];
       options.set(option.name, to_json(option, value.value));
     }
-    models.append(Json::object()
-                      .set("name", model.name)
-                      .set("meaning", model.meaning)
-                      .set("maximum_rpm", model.maximum_rpm)
-                      .set("options", options));
-  }
-  return models;
+    return Json::object()
+        .set("name", model.name)
+        .set("meaning", model.meaning)
+        .set("maximum_rpm", model.maximum_rpm)
+        .set("options", options);
+  });
 }
 
 Json options_json(const Unit& unit) {
-  Json options = Json::array();
-  for (const Option& option : unit.options) {
+  return Json::list(unit.options, [](const Option& option) {
     Json json = Json::object().set("name", option.name).set("meaning", option.meaning);
     json.set("default", to_json(option, option.default_value));
     if (option.choices.empty()) {
-      json.set("minimum", to_json(option, option.minimum)).set("maximum", to_json(option, option.maximum));
-    } else {
-      Json choices = Json::array();
-      for (std::size_t i = 0; i < option.choices.size(); ++i) {
-        choices.append(to_json(option, static_cast<std::int64_t>(i)));
-      }
-      json.set("choices", choices);
+      return json.set("minimum", to_json(option, option.minimum)).set("maximum", to_json(option, option.maximum));
     }
-    options.append(json);
-  }
-  return options;
+    Json choices = Json::array();
+    for (std::size_t i = 0; i < option.choices.size(); ++i) {
+      choices.append(to_json(option, static_cast<std::int64_t>(i)));
+    }
+    return json.set("choices", choices);
+  });
+}
+
+Json argument_json(const Argument& argument) {
+  Json json = Json::object().set("name", argument.name).set("meaning", argument.meaning);
+  json.set("minimum", argument.minimum).set("maximum", argument.maximum).set("required", argument.required);
+  return argument.required ? json : json.set("default", argument.default_value);
 }
 
 Json commands_json(const Unit& unit) {
-  Json commands = Json::array();
-  for (const Command& command : unit.commands) {
-    Json arguments = Json::array();
-    for (const Argument& argument : command.arguments) {
-      Json json = Json::object().set("name", argument.name).set("meaning", argument.meaning);
-      json.set("minimum", argument.minimum).set("maximum", argument.maximum).set("required", argument.required);
-      if (!argument.required) json.set("default", argument.default_value);
-      arguments.append(json);
-    }
-    commands.append(Json::object()
-                        .set("name", command.name)
-                        .set("verb", name_of(command.verb))
-                        .set("meaning", command.meaning)
-                        .set("changes_encoder", command.changes_encoder)
-                        .set("arguments", arguments));
-  }
-  return commands;
+  return Json::list(unit.commands, [](const Command& command) {
+    return Json::object()
+        .set("name", command.name)
+        .set("verb", name_of(command.verb))
+        .set("meaning", command.meaning)
+        .set("changes_encoder", command.changes_encoder)
+        .set("arguments", Json::list(command.arguments, argument_json));
+  });
 }
 
 Json registers_json(const Unit& unit) {
-  Json registers = Json::array();
-  for (const RegisterInfo& one : unit.registers) {
-    registers.append(Json::object()
-                         .set("name", one.name)
-                         .set("address", one.address)
-                         .set("size", one.size)
-                         .set("readable", one.readable)
-                         .set("writable", one.writable));
-  }
-  return registers;
+  return Json::list(unit.registers, [](const RegisterInfo& one) {
+    return Json::object()
+        .set("name", one.name)
+        .set("address", one.address)
+        .set("size", one.size)
+        .set("readable", one.readable)
+        .set("writable", one.writable);
+  });
 }
 
 Json memory_json(const Unit& unit) {
-  Json areas = Json::array();
-  for (const MemoryArea& area : unit.memory) {
-    areas.append(Json::object()
-                     .set("page", area.page)
-                     .set("first", area.first)
-                     .set("count", area.count)
-                     .set("meaning", area.meaning)
-                     .set("writable", area.writable)
-                     .set("in_dump", area.in_dump)
-                     .set("write_life", area.write_life)
-                     .set("write_life_in_total", area.life_in_total)
-                     .set("protection", area.protection));
-  }
-  return areas;
+  return Json::list(unit.memory, [](const MemoryArea& area) {
+    return Json::object()
+        .set("page", area.page)
+        .set("first", area.first)
+        .set("count", area.count)
+        .set("meaning", area.meaning)
+        .set("writable", area.writable)
+        .set("in_dump", area.in_dump)
+        .set("write_life", area.write_life)
+        .set("write_life_in_total", area.life_in_total)
+        .set("protection", area.protection);
+  });
 }
 
 Json fields_json(const Unit& unit) {
   static constexpr std::array<std::string_view, 7> kinds{"number", "counts", "boolean", "flags",
                                                          "real",   "text",   "bytes"};
-  Json fields = Json::array();
-  for (const FieldInfo& field : unit.fields) {
+  return Json::list(unit.fields, [](const FieldInfo& field) {
     Json json = Json::object().set("name", field.name).set("kind", kinds[static_cast<std::size_t>(field.kind)]);
     json.set("unit", field.unit).set("meaning", field.meaning);
-    Json flags = Json::array();
-    for (const FlagInfo& flag : field.flags) {
-      if (flag.name.empty()) continue;
-      flags.append(Json::object().set("name", flag.name).set("meaning", flag.meaning).set("action", flag.action));
-    }
-    if (!flags.empty()) json.set("flags", flags);
-    fields.append(json);
-  }
-  return fields;
+    const Json flags = Json::list(raised(field, ~0ull), flag_to_json);
+    return flags.empty() ? json : json.set("flags", flags);
+  });
 }
 
 Json conditions_json(const Unit& unit) {
-  Json conditions = Json::array();
-  for (const Condition& condition : unit.conditions) {
-    conditions.append(Json::object()
-                          .set("name", condition.name)
-                          .set("unit", condition.unit)
-                          .set("meaning", condition.meaning)
-                          .set("minimum", condition.minimum)
-                          .set("maximum", condition.maximum)
-                          .set("normal", condition.normal));
-  }
-  return conditions;
+  return Json::list(unit.conditions, [](const Condition& condition) {
+    return Json::object()
+        .set("name", condition.name)
+        .set("unit", condition.unit)
+        .set("meaning", condition.meaning)
+        .set("minimum", condition.minimum)
+        .set("maximum", condition.maximum)
+        .set("normal", condition.normal);
+  });
 }
 
 Json unit_json(const Unit& unit) {

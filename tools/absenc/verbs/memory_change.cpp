@@ -26,12 +26,9 @@ namespace {
 std::string_view noun(std::size_t bytes) { return bytes == 1 ? "byte" : "bytes"; }
 
 Json addresses_json(const MemoryImage& image) {
-  Json list = Json::array();
-  for (const MemoryRun& run : runs(image)) {
-    list.append(
-        Json::object().set("page", run.first.page).set("address", run.first.address).set("count", run.bytes.size()));
-  }
-  return list;
+  return Json::list(runs(image), [](const MemoryRun& run) {
+    return Json::object().set("page", run.first.page).set("address", run.first.address).set("count", run.bytes.size());
+  });
 }
 
 // The least that one of these bytes bears; "": not known.
@@ -190,15 +187,14 @@ std::string difference_table(const Unit& unit, std::string_view wanted_name, con
 }
 
 Json differences_json(const MemoryImage& differing, const MemoryImage& found) {
-  Json list = Json::array();
-  for (const auto& [at, value] : differing) {
-    list.append(Json::object()
-                    .set("page", at.page)
-                    .set("address", at.address)
-                    .set("encoder", found.at(at))
-                    .set("wanted", value));
-  }
-  return list;
+  return Json::list(differing, [&](const auto& one) {
+    const auto& [at, value] = one;
+    return Json::object()
+        .set("page", at.page)
+        .set("address", at.address)
+        .set("encoder", found.at(at))
+        .set("wanted", value);
+  });
 }
 
 }  // namespace absenc::tool

@@ -92,14 +92,12 @@ bool same_reason(std::span<const OptionEvidence> evidence) {
 }
 
 Json evidence_json(const Unit& unit, std::span<const OptionEvidence> evidence) {
-  Json list = Json::array();
-  for (const OptionEvidence& one : evidence) {
+  return Json::list(evidence, [&](const OptionEvidence& one) {
     const Option& option = unit.options[one.option];
     Json json = Json::object().set("option", option.name).set("value", to_json(option, one.value));
     json.set("possible", one.possible).set("why", one.why);
-    list.append(one.possible ? json : json.set("frame", one.capture + 1));
-  }
-  return list;
+    return one.possible ? json : json.set("frame", one.capture + 1);
+  });
 }
 
 int run_probe(const Invocation& invocation) {
@@ -116,9 +114,7 @@ int run_probe(const Invocation& invocation) {
       explained ? settled(unit, options, evidence.all) : std::vector<std::string>();
   if (invocation.has("--json")) {
     Json json = Json::object().set("protocol", unit.id).set("ok", explained);
-    Json list = Json::array();
-    for (const std::string& setting : settings) list.append(setting);
-    print_line(json.set("evidence", evidence_json(unit, evidence.all)).set("settled", list).line());
+    print_line(json.set("evidence", evidence_json(unit, evidence.all)).set("settled", Json::list(settings)).line());
   } else {
     if (explained || !same_reason(evidence.all)) show(unit, evidence.all);
     if (explained && settings.empty()) print_line("\nthe defaults explain all frames; nothing else is excluded");
