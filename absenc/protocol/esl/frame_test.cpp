@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absenc/core/hex.hpp"
+#include "absenc/protocol/author/known_test.hpp"
 #include "absenc/protocol/author/unit_bench_test.hpp"
 #include "absenc/protocol/esl/unit.hpp"
 #include "absenc/sim/random.hpp"
@@ -131,6 +132,22 @@ TEST(EslFrame, FramesComeBackInEveryProfile) {
       EXPECT_EQ(wire(encode_reply(profile, *reply).view()), wire(bytes.view()));
     }
   }
+}
+
+constexpr Profile known_default{};
+constexpr Profile known_other{.crc_bit_order = CrcBitOrder::word,
+                              .crc16_byte_order = CrcByteOrder::table12,
+                              .rs1_sc2 = RedundantBit::b0,
+                              .status_order = FieldOrder::tformat,
+                              .request_crc = false};
+constexpr Request known_position{DataId::position, 3};
+constexpr Request known_calibration{DataId::calibration, 3};
+
+TEST(EslFrame, WhatIsKnownIsReadAsAnyProfile) {
+  const auto frame = [](const Profile& profile, DataId id) { return wire(encode_reply(profile, sample(id, profile))); };
+  author::testing::expect_known_as_any<Protocol, known_default, known_position>(frame({}, DataId::position));
+  author::testing::expect_known_as_any<Protocol, known_other, known_position>(frame(known_other, DataId::position));
+  author::testing::expect_known_as_any<Protocol, known_default, known_calibration>(frame({}, DataId::calibration));
 }
 
 // The Hamming distance of both CRCs is 5.

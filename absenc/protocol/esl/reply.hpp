@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "absenc/core/angle.hpp"
-#include "absenc/protocol/author/dialog.hpp"
+#include "absenc/protocol/author/known.hpp"
 #include "absenc/protocol/esl/frame.hpp"
 #include "absenc/protocol/esl/timing.hpp"
 
@@ -275,8 +275,8 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 
 /// The position in a good reply and what of it holds, the flags of channel 2 above those of channel 1. IDs 4, 5 and 6
 /// carry no alarms: SF alone tells then. This is not a safe position (safety.hpp).
-[[nodiscard]] constexpr Reading to_reading(const Reply& reply) {
-  const Layout& layout = layout_of(reply.id);
+[[nodiscard]] constexpr Reading to_reading(DataId id, const Reply& reply) {
+  const Layout& layout = layout_of(id);
   const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
   const unsigned either = reply.one.status | second;
   const unsigned raised = reply.one.alarms | reply.two.alarms;
@@ -299,6 +299,7 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
   }
   return reading;
 }
+[[nodiscard]] constexpr Reading to_reading(const Reply& reply) { return to_reading(reply.id, reply); }
 
 // ---- As the author's layer takes it
 
@@ -330,8 +331,15 @@ struct Protocol {
   static constexpr auto encode = encode_request;
   static constexpr auto decode_request = esl::decode_request;
   static constexpr auto decode = decode_reply;
-  static constexpr Reading reading(const Profile&, const Request&, const Reply& reply) { return to_reading(reply); }
+  static constexpr Reading reading(const Profile&, const Request& request, const Reply& reply) {
+    return to_reading(request.id, reply);  // by the request, which may be known when the program is written
+  }
   static constexpr auto latched = latch_time;
 };
+
+/// Of a profile that is known when the program is written, by a request that is: `static constexpr Profile
+/// profile{...};` and `static constexpr Request request{...};`.
+template <const Profile& profile, const Request& request>
+using ReadKnownPosition = author::ReadKnownPosition<Protocol, profile, request>;
 
 }  // namespace absenc::esl

@@ -339,12 +339,11 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 /// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. Other replies need what
 /// ID 3 said since the encoder was switched on (`known_alarms`), since SF hides over_speed and full_absolute_status:
 /// without it no more is promised than what holds even with these set.
-[[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
+[[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
-  const bool has_all = reply.id == DataId::everything;
-  const bool has_turns = has_all || reply.id == DataId::multiturn;
-  const bool has_position =
-      has_all || (reply.id != DataId::multiturn && reply.id != DataId::encoder_id && !is_memory_access(reply.id));
+  const bool has_all = id == DataId::everything;
+  const bool has_turns = has_all || id == DataId::multiturn;
+  const bool has_position = has_all || (id != DataId::multiturn && id != DataId::encoder_id && !is_memory_access(id));
   const bool alarms_known = has_all || known_alarms.has_value();
   const std::uint8_t almc = has_all ? reply.alarms : known_alarms.value_or(alarms::full_absolute_status);
   const bool counting_error = (reply.status & status::counting_error) != 0 || (almc & alarms::counting_error) != 0;
@@ -364,6 +363,10 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
           .multiturn_valid = multiturn_bits != 0 && alarms_known && (almc & alarms::turns_lost) == 0 && !late_alarm,
           .status = reply.status,
           .alarms = alarms_known ? almc : 0u};
+}
+[[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
+                                           std::optional<std::uint8_t> known_alarms = std::nullopt) {
+  return to_reading(format, reply.id, reply, known_alarms);
 }
 
 // ---- As the engine and the virtual encoder use it
@@ -391,8 +394,8 @@ struct Protocol {
   /// A refusal may be followed by the same request at once. After anything else that is wrong more may be coming, and
   /// sending while the encoder sends can destroy its driver (11).
   static constexpr bool is_whole(Error error) { return error == Error::request_rejected; }
-  static constexpr Reading reading(const Format& format, const Request&, const Reply& reply) {
-    return to_reading(format, reply);
+  static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
+    return to_reading(format, request.id, reply);  // by the request, which may be known when the program is written
   }
 
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }

@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "absenc/protocol/author/known.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 
 namespace absenc::tformat {
@@ -52,5 +53,10 @@ class ReadPosition : public author::HostOf<Protocol> {
   std::optional<std::uint8_t> known_alarms_;
   Reading reading_{};
 };
+
+inline constexpr Request everything{DataId::everything};
+/// Data ID 3 of a format that is known when the program is written: `static constexpr Format format{...};`.
+template <const Format& format>
+using ReadKnownPosition = author::ReadKnownPosition<Protocol, format, everything>;
 
 }  // namespace absenc::tformat

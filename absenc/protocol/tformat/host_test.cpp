@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "absenc/protocol/author/known_test.hpp"
 #include "absenc/protocol/tformat/bench_test.hpp"
 
 namespace absenc::tformat {
@@ -38,6 +39,22 @@ TEST(TformatHost, ReadsEverythingInTheTimeOfTheWire) {
                                                     {"encoder_id", 17},
                                                     {"multiturn", 4660},
                                                     {"alarms", 0}}));
+}
+
+constexpr Format known_17{.encoder_id = 17};
+constexpr Format known_23{.singleturn_bits = 23, .encoder_id = 0x17};
+constexpr Format known_loose{.strict = false};
+constexpr Request known_singleturn{DataId::singleturn};
+
+TEST(TformatHost, WhatIsKnownIsReadAsAnyFormat) {
+  const auto frame = [](const Reply& reply) { return author::testing::wire(encode_reply(reply)); };
+  const Wire good = frame({.singleturn = 0x12345, .multiturn = 4660, .encoder_id = 17});
+  author::testing::expect_known_as_any<Protocol, known_17, everything>(good);
+  author::testing::expect_known_as_any<Protocol, known_loose, everything>(good);
+  author::testing::expect_known_as_any<Protocol, known_23, everything>(
+      frame({.status = status::alarm, .singleturn = 0x712345, .encoder_id = 0x17, .alarms = alarms::over_heat}));
+  author::testing::expect_known_as_any<Protocol, known_17, known_singleturn>(
+      frame({.id = DataId::singleturn, .singleturn = 0x12345}));
 }
 
 TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {

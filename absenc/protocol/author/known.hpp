@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// A position of an encoder whose format, and what it is asked, are known when the program is written, as a drive knows
+// them: what follows from them is not computed, and what they exclude is not linked.
+#pragma once
+
+#include <cstddef>
+
+#include "absenc/protocol/author/dialog.hpp"
+
+namespace absenc::author {
+
+/// P with one format and one request.
+template <class P, const typename P::Format& format, const typename P::Request& request>
+struct Known {
+  struct Format {};
+  struct Request {};
+  using Reply = typename P::Reply;
+  static constexpr std::size_t longest_reply = P::longest_reply;
+
+  static constexpr HostTimes host_times(const Format&) { return P::host_times(format); }
+  static constexpr Manner manner(const Format&, const Request&) { return P::manner(format, request); }
+  static constexpr auto encode(const Format&, const Request&) { return P::encode(format, request); }
+  static constexpr std::size_t reply_size(const Format&, const Request&) { return P::reply_size(format, request); }
+  static constexpr std::size_t expected(const Format&, const Request&, Bytes so_far) requires requires {
+    P::expected(format, request, so_far);
+  }
+  { return P::expected(format, request, so_far); }
+  [[gnu::flatten]] static constexpr Result<Reply> decode(const Format&, const Request&, Bytes bytes) {
+    return P::decode(format, request, bytes);
+  }
+  static constexpr bool is_whole(Error error) requires requires { P::is_whole(error); }
+  { return P::is_whole(error); }
+  static constexpr bool is_whole(const Format&, Error error) requires requires { P::is_whole(format, error); }
+  { return P::is_whole(format, error); }
+  [[gnu::flatten]] static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
+    return P::reading(format, request, reply);
+  }
+  static constexpr Time latched(const Format&, Time sent_at) requires requires { P::latched(format, sent_at); }
+  { return P::latched(format, sent_at); }
+};
+
+/// `static constexpr Format format{...}; static constexpr Request request{...};`. Of a protocol whose ReadPosition is
+/// author's: not where one reply is not enough.
+template <class P, const typename P::Format& format, const typename P::Request& request>
+requires(!requires { P::needs_another; }) class ReadKnownPosition final
+    : public ReadPosition<Known<P, format, request>> {
+ public:
+  ReadKnownPosition() : ReadPosition<Known<P, format, request>>({}, {}) {}
+};
+
+}  // namespace absenc::author

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// For the tests of units: what is known when the program is written is read as anything is.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "absenc/protocol/author/known.hpp"
+
+namespace absenc::author::testing {
+
+/// What a conversation sends, when it is over, and its events: those of `reply`, told in one piece or byte by byte, and
+/// silence behind it.
+template <class Reader>
+std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<std::uint8_t>& reply, bool whole) {
+  using Kind = Event<std::uint8_t>::Kind;
+  std::vector<std::vector<std::uint8_t>> sent;
+  Time now{1000};
+  for (unsigned steps = 0; steps < 100; ++steps) {
+    const ByteStep step = reader.next(now);
+    if (step.kind == ByteStep::Kind::done) return sent;
+    if (step.kind == ByteStep::Kind::transfer) {
+      sent.emplace_back(step.out.begin(), step.out.end());
+      reader.feed({.kind = Kind::sent, .at = now += Time{4000}});
+      for (std::size_t i = 0; i < reply.size(); i += whole ? reply.size() : 1) {
+        const Bytes part = Bytes(reply).subspan(i, whole ? reply.size() : 1);
+        reader.feed({.kind = Kind::received, .at = now += Time{100}, .items = part});
+      }
+      reader.feed({.kind = Kind::silence, .at = now += Time{100'000}});
+    } else {
+      now = step.at;
+    }
+  }
+  ADD_FAILURE() << "it does not end";
+  return sent;
+}
+
+/// A good reply, each of its bits wrong, and each of its beginnings.
+template <class P, const typename P::Format& format, const typename P::Request& request>
+void expect_known_as_any(const std::vector<std::uint8_t>& good) {
+  std::vector<std::vector<std::uint8_t>> replies{good};
+  for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
+    replies.push_back(good);
+    replies.back()[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
+  }
+  for (auto end = good.begin(); end != good.end(); ++end) replies.emplace_back(good.begin(), end);
+  for (const std::vector<std::uint8_t>& reply : replies) {
+    for (const bool whole : {true, false}) {
+      ReadPosition<P> any(format, request);
+      ReadKnownPosition<P, format, request> known;
+      EXPECT_EQ(talk(known, reply, whole), talk(any, reply, whole));
+      EXPECT_EQ(known.error(), any.error());
+      EXPECT_EQ(any.error() == Error::none || &reply != &replies.front(), true) << "the good one";
+      ASSERT_EQ(known.reading() != nullptr, any.reading() != nullptr);
+      if (any.reading() == nullptr) continue;
+      EXPECT_EQ(known.reading()->singleturn, any.reading()->singleturn);
+      EXPECT_EQ(known.reading()->multiturn, any.reading()->multiturn);
+      EXPECT_EQ(known.reading()->singleturn_bits, any.reading()->singleturn_bits);
+      EXPECT_EQ(known.reading()->multiturn_bits, any.reading()->multiturn_bits);
+      EXPECT_EQ(known.reading()->singleturn_valid_bits, any.reading()->singleturn_valid_bits);
+      EXPECT_EQ(known.reading()->multiturn_valid, any.reading()->multiturn_valid);
+      EXPECT_EQ(known.reading()->ready, any.reading()->ready);
+      EXPECT_EQ(known.reading()->status, any.reading()->status);
+      EXPECT_EQ(known.reading()->alarms, any.reading()->alarms);
+      EXPECT_EQ(known.reading()->latched, any.reading()->latched);
+      EXPECT_EQ(known.reading()->received, any.reading()->received);
+    }
+  }
+}
+
+}  // namespace absenc::author::testing
