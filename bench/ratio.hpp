@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <map>
+#include <ostream>
 #include <string>
 #include <vector>
 

@@ -25,7 +25,7 @@ BELOW = {
 }
 FREESTANDING = {"core", "link", "protocol", "host"}
 FREESTANDING_HEADERS = set(
-    """algorithm array bit cfloat chrono climits compare concepts coroutine cstddef cstdint cstring initializer_list iterator
+    """algorithm array bit bits/chrono.h cfloat chrono climits compare concepts coroutine cstddef cstdint cstring initializer_list iterator
     limits new numbers numeric optional ratio span string_view tuple type_traits utility version""".split()
 )
 # Layers whose headers are all public.

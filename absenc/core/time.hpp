@@ -2,7 +2,12 @@
 // The one clock type: nanoseconds since whatever start the caller chose. No layer below `os` reads a clock.
 #pragma once
 
+// Of <chrono> durations alone, without calendars and time zones: half a second for everybody who includes this.
+#if __has_include(<bits/chrono.h>)
+#include <bits/chrono.h>  // libstdc++
+#else
 #include <chrono>
+#endif
 
 namespace absenc {
 
