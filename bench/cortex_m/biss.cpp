@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A program without a library that decodes FRAMES of 64 BiSS frames with 32 bits, for count.sh. WAY: 0, a format known
-// at compile time; 1, one known at run time; 2, the peer of bench/sampled_peer.hpp; 3, moteus' own function, whose header
-// is in a folder of yours. It ends with status 0 when all were right.
+// at compile time; 1, one known at run time; 2, the peer of bench/sampled_peer.hpp; 3, moteus' own function, whose
+// header is in a folder of yours. It ends with status 0 when all were right.
 #include "absenc/protocol/biss/frame.hpp"
 #include "bench/sampled_peer.hpp"
 #if WAY == 3
