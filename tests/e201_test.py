@@ -248,7 +248,7 @@ class ClockSweep(InterfaceCase):
         with self.emulator() as emulator:
             process, terminal = self.start(emulator.path, 300)
             self.read_until(terminal, "clock-sweep: valid_35_khz: 300")
-            emulator.end(signal.SIGKILL)
+            emulator.kill()
             messages = self.read_until(terminal)
             self.assertEqual(self.leave(process), (1, ""))
         self.assertIn("went away", messages)

@@ -156,7 +156,7 @@ class Screen(MonitorCase):
         with Emulator(self.directory, "--singleturn", "65536") as emulator:
             terminal = Terminal(self, f"tformat:{emulator.path}?latency=300")
             terminal.wait_for(r"live +180\.000")
-            emulator.end(signal.SIGKILL)
+            emulator.kill()
             screen = terminal.wait_for(r" lost +- +- +-")
             self.assertRegex(screen, r"lost: no reading for .*; the last was: 180\.000 deg")
             terminal.wait_for("the port went away: 1")
@@ -300,7 +300,7 @@ class Lines(MonitorCase):
         with Emulator(self.directory, "--singleturn", "1000") as emulator:
             process = self.start("monitor", f"tformat:{emulator.path}?latency=300", "--json", "--interval", "0.1")
             self.wait_for(process, lambda line: line["state"] == "live")
-            emulator.end(signal.SIGKILL)
+            emulator.kill()
             lost = self.wait_for(process, lambda line: line["state"] == "lost")
             self.assertEqual((lost["reading"], lost["position"], lost["losses"]), (None, None, 1))
         with Emulator(self.directory, "--singleturn", "2000"):

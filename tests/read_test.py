@@ -260,7 +260,7 @@ class Trouble(EncoderCase):
         with Emulator(self.directory, "--singleturn", "1000") as emulator:
             process = self.start("read", f"tformat:{emulator.path}?latency=300", "--count", "0", "--rate", "100", "--json")
             self.first_line(process)
-            emulator.end(signal.SIGKILL)
+            emulator.kill()
             lines = [self.next_line(process)]
             while "event" not in lines[-1]:
                 lines.append(self.next_line(process))

@@ -272,7 +272,7 @@ class Trouble(RecordCase):
         with Emulator(self.directory) as first:
             process = self.start("record", f"tformat:{first.path}?latency=300", "--output", self.output())
             wait_until(lambda: len(rows_so_far(self.output())) > 5, "readings")
-            first.end(signal.SIGKILL)
+            first.kill()
             wait_until(lambda: read_csv(self.output())[1][-1]["event"] == "lost", "the loss in the file")
         messages = end(process, signal.SIGINT)[2]
         events = [row["event"] for row in read_csv(self.output())[1]]
@@ -317,7 +317,7 @@ class Trouble(RecordCase):
         with Emulator(self.directory, "--singleturn", "1000") as first:
             process = self.start("record", f"tformat:{first.path}?latency=300", "--output", self.output(), "--rate", "200")
             wait_until(lambda: len(rows_so_far(self.output())) > 20, "readings")
-            first.end(signal.SIGKILL)
+            first.kill()
         wait_until(lambda: read_csv(self.output())[1][-1]["event"] == "lost", "the loss in the file")
         with Emulator(self.directory, "--singleturn", "2000", "--alarm", "battery_alarm"):
             wait_until(lambda: len(read_csv(self.output())[1][-1]["singleturn"]) > 0, "readings again")

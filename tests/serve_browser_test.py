@@ -96,7 +96,7 @@ class Page(ServeCase):
     def test_an_encoder_is_lost_and_comes_back(self):
         self.open()
         self.wait_for("connected: 3 of 3 live", "#connection")
-        self.emulator.process.kill()
+        self.emulator.kill()
         killed = time.monotonic()
         self.wait_for("no reading for", ".card:first-child .state")
         self.assertLess(time.monotonic() - killed, BUSY)
@@ -185,7 +185,7 @@ class Page(ServeCase):
         self.open("#encoder=" + self.name)
         self.wait_for("readings come", "table")
         self.wait_for("live", ".state")
-        self.emulator.process.kill()
+        self.emulator.kill()
         past = "[aria-label*='marked: lost']"
         wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, past), "the plot of the past says it")
         wait_until(lambda: self.canvas_has(past, [0x8a, 0x5a, 0x00]), "it is marked although nothing is read after it")
@@ -301,7 +301,7 @@ class Page(ServeCase):
         self.press("Doctor", "Examine")
         self.says("Doctor", "good: ")
         self.look("inside")
-        self.emulator.process.kill()
+        self.emulator.kill()
         self.says("Memory", "no longer shown: the encoder is lost")
         self.assertNotIn("0x00", self.box("Memory").text)
         self.assertNotIn("77 degC", self.box("Settings").text)

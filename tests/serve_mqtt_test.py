@@ -113,7 +113,7 @@ class What(MqttCase):
         self.addCleanup(emulator.end)
         self.sender(broker.url, f"tformat:{emulator.path}")
         receiver.until("state", lambda one: one["state"] == "live")
-        emulator.process.kill()
+        emulator.kill()
         told = receiver.until("event", lambda one: one["kind"] == "lost")
         state = receiver.until("state", lambda one: one.get("encoder") and one["state"] == "lost")
         self.assertEqual(told["text"], state["message"])

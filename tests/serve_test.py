@@ -59,7 +59,7 @@ class Values(ServeCase):
         status, body = server.command(name, "clear-alarms", {"Authorization": f"Bearer {TOKEN}"})
         self.assertEqual(status, 200, body)
         wait_until(lambda: 'alarm="over_heat"} 0\n' in server.ask("/metrics")[1], "it is over")
-        emulator.process.kill()
+        emulator.kill()
         wait_until(lambda: "absenc_alarm{" not in server.ask("/metrics")[1], "it is not known any more")
 
     def test_latencies(self):
@@ -169,7 +169,7 @@ class Losses(ServeCase):
         wait_until(lambda: server.encoder()["state"] == "live", "it is read")
         stream = self.stream(server)
         stream.state()
-        emulator.process.kill()
+        emulator.kill()
         killed = time.monotonic()
         told = stream.until(lambda event, data: event == "happening")
         gone = stream.state(lambda one: one["state"] != "live")
