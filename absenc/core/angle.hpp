@@ -9,6 +9,14 @@
 
 namespace absenc {
 
+/// What an encoder has reported about a part of its position.
+enum class Validity : std::uint8_t {
+  absent,   // the reply does not carry this part
+  unknown,  // it carries it, but neither this reply nor an earlier one reports whether it holds: do not use it
+  invalid,  // an alarm or a state that was reported says that it does not hold
+  valid,    // everything that could make it invalid was reported, and clear
+};
+
 /// One position as an encoder reported it, with what of it may be trusted.
 struct Reading {
   std::uint64_t singleturn = 0;        // counts, 0 .. 2^singleturn_bits - 1
@@ -17,15 +25,30 @@ struct Reading {
   unsigned multiturn_bits = 0;         // 0: the reply carries no revolutions
   unsigned singleturn_valid_bits = 0;  // the top bits that hold; 0: do not use the position
   bool multiturn_valid = false;
-  double unit_um = 0;        // linear encoders: micrometres a count of `singleturn`; 0: a rotation
-  bool ready = true;         // false while the encoder says that it is starting
-  std::uint32_t status = 0;  // bits named by the unit's status field, then those of its second
-  std::uint32_t alarms = 0;  // bits named by the unit's alarms field, then those of its second
-  Time latched{};            // when the encoder took the position
-  Time received{};           // when the last byte of the reply was there
+  bool singleturn_known = true;  // false: no reply so far reports whether the position holds; then it is not valid
+  bool multiturn_known = true;   // the same of the turns
+  double unit_um = 0;            // linear encoders: micrometres a count of `singleturn`; 0: a rotation
+  bool ready = true;             // false while the encoder says that it is starting
+  std::uint32_t status = 0;      // bits named by the unit's status field, then those of its second
+  std::uint32_t alarms = 0;      // bits named by the unit's alarms field, then those of its second
+  std::uint32_t status_reported =
+      0;  // the bits of `status` that were reported; a bit that was not is unknown, not clear
+  std::uint32_t alarms_reported = 0;  // the same of `alarms`
+  Time latched{};                     // when the encoder took the position
+  Time received{};                    // when the last byte of the reply was there
 
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
+  }
+  [[nodiscard]] constexpr Validity singleturn_validity() const {
+    if (singleturn_bits == 0) return Validity::absent;
+    if (!singleturn_known) return Validity::unknown;
+    return singleturn_valid() ? Validity::valid : Validity::invalid;
+  }
+  [[nodiscard]] constexpr Validity multiturn_validity() const {
+    if (multiturn_bits == 0) return Validity::absent;
+    if (!multiturn_known) return Validity::unknown;
+    return multiturn_valid ? Validity::valid : Validity::invalid;
   }
 };
 
