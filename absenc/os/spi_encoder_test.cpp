@@ -41,7 +41,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
       ssi::ReadPosition read(format);
       ASSERT_TRUE(run(read, port));
       ASSERT_EQ(read.error(), Error::none) << bits;
-      EXPECT_EQ(read.found(), word_of(format.word, shaft.state, 0)) << bits;
+      EXPECT_EQ(read.last(), word_of(format.word, shaft.state, 0)) << bits;
     }
     EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
   }
@@ -58,7 +58,7 @@ TEST_F(SpiEncoder, SsiReadTwice) {
   ssi::ReadPosition read(format);
   ASSERT_TRUE(run(read, port));
   EXPECT_EQ(read.error(), Error::none);
-  EXPECT_EQ(read.found(), word_of(format.word, shaft.state, 0));
+  EXPECT_EQ(read.last(), word_of(format.word, shaft.state, 0));
 }
 
 TEST_F(SpiEncoder, Biss) {
@@ -74,7 +74,7 @@ TEST_F(SpiEncoder, Biss) {
     biss::ReadPosition read(clocked);
     ASSERT_TRUE(run(read, port));
     ASSERT_EQ(read.error(), Error::none) << rate;
-    EXPECT_EQ(read.found().word, word_of(format.word, shaft.state, 0)) << rate;
+    EXPECT_EQ(read.last().word, word_of(format.word, shaft.state, 0)) << rate;
     EXPECT_EQ(kernel.settings().speed, rate);
   }
   EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;

@@ -50,36 +50,52 @@ struct Values {
   std::optional<std::uint16_t> singleturn{};
 };
 
-struct Definition : Declares<Definition, Protocol> {
-  using Encoder = protocol_name::Encoder;
-  static constexpr std::string_view id = "protocol_name", name = "maker and protocol",
-                                    document = "title of the document";
-  static constexpr LinkKind link = LinkKind::half_duplex;
-  static constexpr std::size_t frames_size = 1200;
-  static constexpr LineTiming timing{.turnaround_limit = answer_limit};
+constexpr auto options = OptionsOf{option<&Format::address>("address", "of the encoder on its line", 0, 255)};
+constexpr auto models = std::array{ModelText{"unnamed", "one sentence", 6000, ""}};
+constexpr auto fields = fields_of<Values>(field<&Values::singleturn>(
+    {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Role::position}));
 
-  static constexpr OptionsOf options{option<&Format::address>("address", "of the encoder on its line", 0, 255)};
-  static constexpr std::array models{ModelText{"unnamed", "one sentence", 6000, ""}};
-  static constexpr auto fields = fields_of<Values>(field<&Values::singleturn>(
-      {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Role::position}));
-  static constexpr std::array commands{
-      reading<request<Ask::position>>({"position", Verb::read, 0, "position"}),
-      command<Found, set_zero, request<Ask::zero>>(
-          {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
-  };
-  static constexpr std::array vectors{
-      VectorText{"protocol_name-1", "a position", "invented", "", "5001", "123447", "singleturn=4660"},
-      VectorText{"protocol_name-2", "a wrong sum", "invented", "", "5001", "123448", "bad_checksum"},
-  };
+constexpr Values values_of_request(const Format&, const Request&) { return {}; }
+constexpr Values values_of_reply(const Format&, const Request&, const Reply& reply) { return {reply.singleturn}; }
+constexpr Values values_of_found(const Format&, const Found& found) { return {found.reply.singleturn}; }
 
-  static constexpr Request guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
-  static constexpr Values values(const Format&, const Request&) { return {}; }
-  static constexpr Values values(const Format&, const Request&, const Reply& reply) { return {reply.singleturn}; }
-  static constexpr Values values(const Format&, const Found& found) { return {found.reply.singleturn}; }
+constexpr Report<Protocol> report{
+    .put_request = put_values<fields, values_of_request>,
+    .put_reply = put_values<fields, values_of_reply>,
+};
+constexpr Finding<Format, Found> found{.put = put_values<fields, values_of_found>};
+
+constexpr auto commands = std::array{
+    reading<report, request<Ask::position>>({"position", Verb::read, 0, "position"}),
+    command<report, found, set_zero, request<Ask::zero>>(
+        {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
+};
+constexpr auto vectors = std::array{
+    VectorText{"protocol_name-1", "a position", "invented", "", "5001", "123447", "singleturn=4660"},
+    VectorText{"protocol_name-2", "a wrong sum", "invented", "", "5001", "123448", "bad_checksum"},
+};
+
+constexpr Result<Request> guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
+
+constexpr Declaration<Protocol, Encoder> declaration{
+    .id = "protocol_name",
+    .name = "maker and protocol",
+    .document = "title of the document",
+    .link = LinkKind::half_duplex,
+    .options = options.infos,
+    .format = format_of<options>,
+    .models = models,
+    .fields = fields.infos,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_size = 1200,
+    .report = report,
+    .guess_request = guess_request,
+    .timing = {.turnaround_limit = answer_limit},
 };
 
 }  // namespace
 
-constinit const Unit unit = UnitOf<Definition>::make();
+constinit const Unit unit = Descriptor<declaration>::make();
 
 }  // namespace absenc::protocol_name

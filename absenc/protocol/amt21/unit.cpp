@@ -107,116 +107,138 @@ struct Values {
 
 constexpr std::array<std::string_view, 5> rate_names{"2000000", "115200", "38400", "19200", "9600"};
 
-struct Definition : Declares<Definition, Protocol> {
-  using Encoder = amt21::Encoder;
-  static constexpr std::string_view id = "amt21", name = "CUI AMT21 (RS-485)",
-                                    document = "CUI Devices AMT21, 2019-11-21";
-  static constexpr LinkKind link = LinkKind::half_duplex;
-  static constexpr std::size_t frames_size = 1500;
+constexpr auto options = OptionsOf{
+    option<&Format::singleturn_bits>("singleturn_bits", "bits of the position", 12, 14, 2),
+    option<&Format::multiturn_bits>("multiturn_bits", "bits of the turns; 0: none", 0, 14, 14),
+    with_role<Role::encoder>(option<&Format::address>("address", "of the encoder on its line", 0, 252, 4)),
+    with_role<Role::rate>(option<&Format::rate>("rate", "baud", rate_names)),
+    option<&Format::drops_low_bits>("drop_low_bits", "read an encoder of 14 bits as one of 12"),
+};
+constexpr auto models = std::array{
+    ModelText{"AMT21xB", "14 bits, 2 Mbit/s", 4000, "singleturn_bits=14 multiturn_bits=0 rate=2000000"},
+    ModelText{"AMT21xD", "14 bits and turns, 2 Mbit/s", 4000, "singleturn_bits=14 multiturn_bits=14 rate=2000000"},
+    ModelText{"AMT21xA", "12 bits, 2 Mbit/s", 8000, "singleturn_bits=12 multiturn_bits=0 rate=2000000"},
+    ModelText{"AMT21xC", "12 bits and turns, 2 Mbit/s", 8000, "singleturn_bits=12 multiturn_bits=14 rate=2000000"},
+    ModelText{"AMT21xF", "14 bits, rate to be set", 4000, "singleturn_bits=14 multiturn_bits=0 rate=115200"},
+    ModelText{"AMT21xH", "14 bits and turns, rate to be set", 4000, "singleturn_bits=14 multiturn_bits=14 rate=115200"},
+    ModelText{"AMT21xE", "12 bits, rate to be set", 8000, "singleturn_bits=12 multiturn_bits=0 rate=115200"},
+    ModelText{"AMT21xG", "12 bits and turns, rate to be set", 8000, "singleturn_bits=12 multiturn_bits=14 rate=115200"},
+};
+constexpr auto fields = fields_of<Values>(
+    field<&Values::encoder_address>("encoder_address", "", "whose request this is", Role::encoder),
+    field<&Values::command>("command", "", "what was asked"),
+    field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
+    field<&Values::multiturn>("multiturn", "revolutions", "turns", Role::turns),
+    field<&Values::clash>("clash", "", "what came was damaged: two encoders of one address, or a bad line",
+                          Role::clash));
 
-  static constexpr OptionsOf options{
-      option<&Format::singleturn_bits>("singleturn_bits", "bits of the position", 12, 14, 2),
-      option<&Format::multiturn_bits>("multiturn_bits", "bits of the turns; 0: none", 0, 14, 14),
-      with_role<Role::encoder>(option<&Format::address>("address", "of the encoder on its line", 0, 252, 4)),
-      with_role<Role::rate>(option<&Format::rate>("rate", "baud", rate_names)),
-      option<&Format::drops_low_bits>("drop_low_bits", "read an encoder of 14 bits as one of 12"),
-  };
-  static constexpr std::array models{
-      ModelText{"AMT21xB", "14 bits, 2 Mbit/s", 4000, "singleturn_bits=14 multiturn_bits=0 rate=2000000"},
-      ModelText{"AMT21xD", "14 bits and turns, 2 Mbit/s", 4000, "singleturn_bits=14 multiturn_bits=14 rate=2000000"},
-      ModelText{"AMT21xA", "12 bits, 2 Mbit/s", 8000, "singleturn_bits=12 multiturn_bits=0 rate=2000000"},
-      ModelText{"AMT21xC", "12 bits and turns, 2 Mbit/s", 8000, "singleturn_bits=12 multiturn_bits=14 rate=2000000"},
-      ModelText{"AMT21xF", "14 bits, rate to be set", 4000, "singleturn_bits=14 multiturn_bits=0 rate=115200"},
-      ModelText{"AMT21xH", "14 bits and turns, rate to be set", 4000,
-                "singleturn_bits=14 multiturn_bits=14 rate=115200"},
-      ModelText{"AMT21xE", "12 bits, rate to be set", 8000, "singleturn_bits=12 multiturn_bits=0 rate=115200"},
-      ModelText{"AMT21xG", "12 bits and turns, rate to be set", 8000,
-                "singleturn_bits=12 multiturn_bits=14 rate=115200"},
-  };
-  static constexpr auto fields = fields_of<Values>(
-      field<&Values::encoder_address>("encoder_address", "", "whose request this is", Role::encoder),
-      field<&Values::command>("command", "", "what was asked"),
-      field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
-      field<&Values::multiturn>("multiturn", "revolutions", "turns", Role::turns),
-      field<&Values::clash>("clash", "", "what came was damaged: two encoders of one address, or a bad line",
-                            Role::clash));
+// ---- What is shown
 
-  static constexpr std::string_view no_turns(const Format& format) {
-    return format.multiturn_bits == 0 ? "this encoder has no turns (multiturn_bits=14 says that it has)" : "";
+constexpr Values values_of_request(const Format&, const Request& asked) {
+  constexpr std::array<std::string_view, 2> answered{"position", "turns"};
+  return {.encoder_address = asked.address,
+          .command = asked.is_answered()      ? answered[static_cast<std::size_t>(asked.ask)]
+                     : asked.ask == Ask::zero ? "zero"
+                                              : "reset"};
+}
+constexpr Values values_of_reply(const Format& format, const Request& asked, const Reply& reply) {
+  Values all = values_of_request(format, asked);
+  (asked.ask == Ask::turns ? all.multiturn : all.singleturn) = reply.value;
+  return all;
+}
+constexpr Values values_of_found(const Format& format, const Found& found) {
+  Values all = values_of_reply(format, found.request, found.reply);
+  all.multiturn = found.turns;
+  return all;
+}
+void put_nodes(FieldSink& sink, const Format&, const Nodes<addresses>& nodes) {
+  for (std::size_t i = 0; i < addresses; ++i) {
+    if (nodes.there[i]) fields.put(sink, {.encoder_address = request_to(i).address, .clash = nodes.clash[i]});
   }
-  static constexpr std::string_view no_zero(const Format& format) {
-    return format.multiturn_bits != 0 ? "an encoder with turns cannot be zeroed: it takes its reset only" : "";
-  }
-  static constexpr bool has_turns(const Format& format) { return format.multiturn_bits != 0; }
-  static constexpr Command read{"position", Verb::read, 0, "position, and turns where it has them"};
-  static constexpr std::array commands{
-      reading<request<Ask::position>>(read).or_when(has_turns, command<Found, read_both, request<Ask::position>>(read)),
-      reading<request<Ask::turns>>({"turns", Verb::read_part, 0, "turns"}).unless(no_turns),
-      command<Found, restart, request<Ask::zero>, Ask::zero>(
-          {"zero", Verb::zero, 0, "make this the zero of the turn: it restarts, 200 ms", {}, true, false})
-          .unless(no_zero),
-      command<Found, restart, request<Ask::reset>, Ask::reset>(
-          {"reset", Verb::run, 0, "restart it, 200 ms", {}, true, false}),
-      command<Nodes<addresses>, scan<Protocol, addresses, request_to>, request<Ask::position>>(
-          {"scan", Verb::scan, 0, "ask each of the 64 addresses", {}, false, false}),
-  };
-  static constexpr LineTiming timing{
-      .turnaround = turn_around[0],
-      .turnaround_limit = Protocol::host_times({.rate = rates.size() - 1}).answer_limit,  // of the slowest
-  };
-  static constexpr std::array conditions{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
-  static constexpr std::string_view source = document;
-  static constexpr std::string_view d14 = "singleturn_bits=14 multiturn_bits=14";
-  static constexpr std::array vectors{
-      VectorText{"amt21-1", "a position", source, "", "54", "ab61",
-                 "encoder_address=84 command=position singleturn=8619"},
-      VectorText{"amt21-2", "one turn", source, d14, "55", "0180", "encoder_address=84 command=turns multiturn=1"},
-      VectorText{"amt21-3", "two turns back", "derived", d14, "55", "fe7f",
-                 "encoder_address=84 command=turns multiturn=-2"},
-      VectorText{"amt21-4", "12 bits", "derived", "singleturn_bits=12", "54", "0480",
-                 "encoder_address=84 command=position singleturn=1"},
-      VectorText{"amt21-5", "14 bits read as 12", "derived", "singleturn_bits=12", "54", "e679", "out_of_range"},
-      VectorText{"amt21-6", "K1 is wrong", "derived", "", "54", "3412", "bad_checksum"},
-      VectorText{"amt21-7", "nothing is there", "derived", "", "54", "ffff", "bad_checksum"},
-      VectorText{"amt21-8", "one byte", "derived", "", "54", "34", "wrong_length"},
-      VectorText{"amt21-9", "zero", source, "", "565e", "", "encoder_address=84 command=zero"},
-      VectorText{"amt21-10", "a reset has no reply", source, "", "5675", "3492", "wrong_length"},
-  };
+}
+BitRanges place_of(const Options& values, Frame, Frame, const FieldInfo& field) {
+  const unsigned singleturn = options.format(values).singleturn_bits;
+  if (&field == fields.of<&Values::singleturn>()) return bits_of(0, 14 - singleturn, singleturn);
+  return bits_of(0, 0, &field == fields.of<&Values::multiturn>() ? turns_bits : 0);
+}
 
-  static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
-    const unsigned singleturn = options.format(values).singleturn_bits;
-    if (&field == fields.of<&Values::singleturn>()) return bits_of(0, 14 - singleturn, singleturn);
-    return bits_of(0, 0, &field == fields.of<&Values::multiturn>() ? turns_bits : 0);
-  }
+constexpr Report<Protocol> report{
+    .put_request = put_values<fields, values_of_request>,
+    .put_reply = put_values<fields, values_of_reply>,
+};
+constexpr Finding<Format, Found> found{.put = put_values<fields, values_of_found>};
+constexpr Finding<Format, Nodes<addresses>> nodes{.put = put_nodes};
 
-  static constexpr Request guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
+// ---- Commands
 
-  static constexpr Values values(const Format&, const Request& asked) {
-    constexpr std::array<std::string_view, 2> answered{"position", "turns"};
-    return {.encoder_address = asked.address,
-            .command = asked.is_answered()      ? answered[static_cast<std::size_t>(asked.ask)]
-                       : asked.ask == Ask::zero ? "zero"
-                                                : "reset"};
-  }
-  static constexpr Values values(const Format& format, const Request& asked, const Reply& reply) {
-    Values all = values(format, asked);
-    (asked.ask == Ask::turns ? all.multiturn : all.singleturn) = reply.value;
-    return all;
-  }
-  static constexpr Values values(const Format& format, const Found& found) {
-    Values all = values(format, found.request, found.reply);
-    all.multiturn = found.turns;
-    return all;
-  }
-  static void put(FieldSink& sink, const Format&, const Nodes<addresses>& nodes) {
-    for (std::size_t i = 0; i < addresses; ++i) {
-      if (nodes.there[i]) fields.put(sink, {.encoder_address = request_to(i).address, .clash = nodes.clash[i]});
-    }
-  }
+constexpr std::string_view no_turns(const Format& format) {
+  return format.multiturn_bits == 0 ? "this encoder has no turns (multiturn_bits=14 says that it has)" : "";
+}
+constexpr std::string_view no_zero(const Format& format) {
+  return format.multiturn_bits != 0 ? "an encoder with turns cannot be zeroed: it takes its reset only" : "";
+}
+constexpr bool has_turns(const Format& format) { return format.multiturn_bits != 0; }
+constexpr Command read{"position", Verb::read, 0, "position, and turns where it has them"};
+constexpr auto commands = std::array{
+    reading<report, request<Ask::position>>(read).or_when(
+        has_turns, command<report, found, read_both, request<Ask::position>>(read)),
+    reading<report, request<Ask::turns>>({"turns", Verb::read_part, 0, "turns"}).unless(no_turns),
+    command<report, found, restart, request<Ask::zero>, Ask::zero>(
+        {"zero", Verb::zero, 0, "make this the zero of the turn: it restarts, 200 ms", {}, true, false})
+        .unless(no_zero),
+    command<report, found, restart, request<Ask::reset>, Ask::reset>(
+        {"reset", Verb::run, 0, "restart it, 200 ms", {}, true, false}),
+    command<report, nodes, scan<Protocol, addresses, request_to>, request<Ask::position>>(
+        {"scan", Verb::scan, 0, "ask each of the 64 addresses", {}, false, false}),
+};
+
+// ---- Vectors
+
+constexpr std::string_view document = "CUI Devices AMT21, 2019-11-21";
+constexpr std::string_view d14 = "singleturn_bits=14 multiturn_bits=14";
+constexpr auto vectors = std::array{
+    VectorText{"amt21-1", "a position", document, "", "54", "ab61",
+               "encoder_address=84 command=position singleturn=8619"},
+    VectorText{"amt21-2", "one turn", document, d14, "55", "0180", "encoder_address=84 command=turns multiturn=1"},
+    VectorText{"amt21-3", "two turns back", "derived", d14, "55", "fe7f",
+               "encoder_address=84 command=turns multiturn=-2"},
+    VectorText{"amt21-4", "12 bits", "derived", "singleturn_bits=12", "54", "0480",
+               "encoder_address=84 command=position singleturn=1"},
+    VectorText{"amt21-5", "14 bits read as 12", "derived", "singleturn_bits=12", "54", "e679", "out_of_range"},
+    VectorText{"amt21-6", "K1 is wrong", "derived", "", "54", "3412", "bad_checksum"},
+    VectorText{"amt21-7", "nothing is there", "derived", "", "54", "ffff", "bad_checksum"},
+    VectorText{"amt21-8", "one byte", "derived", "", "54", "34", "wrong_length"},
+    VectorText{"amt21-9", "zero", document, "", "565e", "", "encoder_address=84 command=zero"},
+    VectorText{"amt21-10", "a reset has no reply", document, "", "5675", "3492", "wrong_length"},
+};
+
+// ---- What is declared
+
+constexpr Result<Request> guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
+constexpr auto conditions = std::array{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
+
+constexpr Declaration<Protocol, Encoder> declaration{
+    .id = "amt21",
+    .name = "CUI AMT21 (RS-485)",
+    .document = document,
+    .link = LinkKind::half_duplex,
+    .options = options.infos,
+    .format = format_of<options>,
+    .models = models,
+    .fields = fields.infos,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_size = 1500,
+    .report = report,
+    .guess_request = guess_request,
+    .bits = place_of,
+    .conditions = conditions,
+    .timing = {.turnaround = turn_around[0],
+               .turnaround_limit = Protocol::host_times({.rate = rates.size() - 1}).answer_limit},  // of the slowest
 };
 
 }  // namespace
 
-constinit const Unit unit = UnitOf<Definition>::make();
+constinit const Unit unit = Descriptor<declaration>::make();
 
 }  // namespace absenc::amt21

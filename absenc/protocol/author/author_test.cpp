@@ -287,10 +287,10 @@ TEST(Scan, AsksEachAddress) {
   EXPECT_EQ(anywhere.error(), Error::wrong_length);
 }
 
-struct Explains {
-  static void put(FieldSink&, const Toy::Format&, const Found&) {}
-  static Explanation explain(const Toy::Format&, Error, Bytes, Bytes) { return {"document", "its advice"}; }
-};
+constexpr Report<Toy> report{.explain = [](const Toy::Format&, Error, Bytes, Bytes) -> Explanation {
+  return {"document", "its advice"};
+}};
+constexpr Finding<Toy::Format, Found> finding{.put = [](FieldSink&, const Toy::Format&, const Found&) {}};
 
 Procedure end_as_told(ToyDialog& dialog, Found&, Arguments arguments) {
   co_await dialog.ask(1);
@@ -299,11 +299,11 @@ Procedure end_as_told(ToyDialog& dialog, Found&, Arguments arguments) {
   co_return ways[static_cast<std::size_t>(arguments[0])];
 }
 
-TEST(Told, TheDocumentExplainsWhatTheProcedureLeavesOpen) {
+TEST(Reported, TheDocumentExplainsWhatTheProcedureLeavesOpen) {
   const std::array<std::string, 4> said{"/", "document; own/its advice", "own/", "own/own advice"};
   for (std::int64_t way = 0; way < 4; ++way) {
     alignas(std::max_align_t) std::array<std::byte, 4096> arena;
-    Told<Explains, author::Run<Toy, Found, end_as_told>> host({}, {&way, 1}, arena);
+    Reported<report, author::Run<Toy, Found, end_as_told>, finding> host({}, {&way, 1}, arena);
     Bench(echo).run(host);
     EXPECT_EQ(std::string(host.detail()) + "/" + std::string(host.advice()), said[static_cast<std::size_t>(way)]);
   }

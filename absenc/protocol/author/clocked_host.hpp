@@ -43,7 +43,8 @@ class ClockedHostOf : public ClockedEngine {
 
   [[nodiscard]] const Format& format() const { return format_; }
   /// The last good reply.
-  [[nodiscard]] const Reply& found() const { return found_; }
+  [[nodiscard]] const Reply& last() const { return last_; }
+  [[nodiscard]] static constexpr NoRequest request() { return {}; }
   [[nodiscard]] const Reading* reading() const override {
     return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
@@ -61,12 +62,12 @@ class ClockedHostOf : public ClockedEngine {
   void ask() { clock(P::clocks(format_)); }
   [[nodiscard]] Error take(BitView bits) {
     const Result<Reply> reply = P::decode(format_, bits);
-    if (reply) found_ = *reply;
+    if (reply) last_ = *reply;
     return reply.error();
   }
   /// This is the last good reply, whose position was taken at the first edge of the clock.
   void keep(const Reply& reply) {
-    found_ = reply;
+    last_ = reply;
     keep();
   }
   /// Ends it, with no error by the last good reply.
@@ -77,13 +78,13 @@ class ClockedHostOf : public ClockedEngine {
 
  private:
   void keep() {
-    new (&reading_) Reading(P::reading(format_, found_));  // made there, not copied
+    new (&reading_) Reading(P::reading(format_, last_));  // made there, not copied
     reading_.latched = begun_at();
     reading_.received = received_at();
   }
 
   Format format_;
-  Reply found_{};
+  Reply last_{};
   Reading reading_{};
   std::array<std::uint8_t, (P::most_clocks + 7) / 8> storage_;
 };
@@ -99,12 +100,13 @@ class ReadClocked : public ClockedHostOf<P> {
 };
 
 /// What Reader, made of the format, reads.
-template <class Definition, Clocked P, class Reader = ReadClocked<P>>
-[[nodiscard]] constexpr CommandOf<P> clocked_reading(const Command& info) {
-  using Made = Told<Definition, Reader>;
+template <const auto& said, class Reader = ReadClocked<ReportedProtocol<said>>>
+[[nodiscard]] constexpr CommandOf<ReportedProtocol<said>> clocked_reading(const Command& info) {
+  using Format = typename ReportedProtocol<said>::Format;
+  using Made = Reported<said, Reader>;
   return {.info = info,
           .request = nullptr,
-          .make = [](const typename P::Format& format, Arguments,
+          .make = [](const Format& format, Arguments,
                      std::span<std::byte> storage) { return make_host<Made>(storage, format); },
           .size = sizeof(Made)};
 }

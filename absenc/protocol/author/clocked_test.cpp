@@ -41,9 +41,9 @@ class Host final : public ClockedHostOf<Toy> {
   void clocked(BitView bits) override {
     seen.push_back(bits.size);
     const Error error = take(bits);
-    if (error == Error::none) keep(found());
-    if (error != Error::none || seen.size() > found()) return conclude(error);
-    clock(16 + found());
+    if (error == Error::none) keep(last());
+    if (error != Error::none || seen.size() > last()) return conclude(error);
+    clock(16 + last());
   }
 };
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/make.hpp"
@@ -32,93 +33,6 @@ class Refusal final : public Conversation<Item> {
   std::string_view why_;
 };
 
-/// Puts the fields of what `values` are made of: a request, a request and its reply, what a procedure found. A
-/// Definition has `values(format, ...)`, whose result its `fields` show; or `put(sink, format, ...)`, where one table
-/// cannot say it.
-template <class Definition, class Format, class... What>
-constexpr void put_values(FieldSink& sink, const Format& format, const What&... what) {
-  if constexpr (requires { Definition::put(sink, format, what...); }) {
-    Definition::put(sink, format, what...);
-  } else {
-    Definition::fields.put(sink, Definition::values(format, what...));
-  }
-}
-
-/// What a unit hands out: the conversation, and the words for people that firmware does not link. What the document
-/// says of a bad reply is `Definition::explain(format, error, request, reply)`, where it says something and the
-/// procedure has not said what to do. `noise_advice`, where a line that is never silent means something. What a
-/// procedure that is broken off leaves: `put_left(sink, format, found)`, and `left(found)` in words. Of what only the
-/// conversation knows `put(sink, conversation)` and `explain(conversation)`; where words must be put together,
-/// `tell(sentence, format, engine)` of the exchange that went wrong.
-template <class Definition, class Base>
-class Told final : public Base {
- public:
-  using Base::Base;
-
-  void report(FieldSink& sink) const override {
-    if (this->error() != Error::none) return;
-    if constexpr (requires { Definition::put(sink, self()); }) {
-      Definition::put(sink, self());
-    } else if constexpr (requires { this->found(); }) {
-      put_values<Definition>(sink, this->format(), this->found());
-    } else {
-      put_values<Definition>(sink, this->format(), this->request(), this->last());
-    }
-    if (const Reading* reading = this->reading()) sink.put_reading(*reading);
-  }
-  void report_left(FieldSink& sink) const override {
-    if constexpr (requires { Definition::put_left(sink, this->format(), this->found()); }) {
-      Definition::put_left(sink, this->format(), this->found());
-    }
-  }
-  [[nodiscard]] std::string_view detail() const override {
-    words_.clear();
-    const std::string_view own = Base::detail();
-    if (this->error() != Error::none && this->is_noisy()) {
-      if (own != endless_noise.detail) words_.add(endless_noise.detail);
-    } else if constexpr (requires { Definition::tell(words_, this->format(), *this); }) {
-      if (this->error() != Error::none) Definition::tell(words_, this->format(), *this);
-    } else {
-      words_.add(explained().detail);
-    }
-    words_.add_part(own).add_part(left());
-    return words_.view();
-  }
-  [[nodiscard]] std::string_view advice() const override {
-    const std::string_view own = Base::advice();
-    if (!own.empty()) return own;
-    if (!this->is_noisy()) return explained().advice;
-    if constexpr (requires { Definition::noise_advice; }) return Definition::noise_advice;
-    return endless_noise.advice;
-  }
-
- private:
-  [[nodiscard]] const Base& self() const { return *this; }
-  [[nodiscard]] Explanation explained() const {
-    const auto exchange = this->exchange();
-    if constexpr (requires { Definition::explain(self()); }) {
-      return this->error() == Error::none || this->is_alone() || !Base::advice().empty() ? Explanation{}
-                                                                                         : Definition::explain(self());
-    } else if constexpr (requires {
-                           Definition::explain(this->format(), Error::none, exchange.sent, exchange.received);
-                         }) {
-      if (this->error() == Error::none || this->is_alone() || !Base::advice().empty()) return {};
-      return Definition::explain(this->format(), this->error(), exchange.sent, exchange.received);
-    } else {
-      return {};
-    }
-  }
-
-  [[nodiscard]] std::string_view left() const {
-    if constexpr (requires { Definition::left(this->found()); }) {
-      if (this->error() != Error::none) return Definition::left(this->found());
-    }
-    return {};
-  }
-
-  mutable Sentence words_;
-};
-
 namespace detail {
 template <class P>
 struct ItemOf {
@@ -134,6 +48,124 @@ struct ItemOf<P> {
 /// What the lines of a protocol carry: characters where it does not say otherwise.
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
+
+/// How a unit shows what it received, and what it says of errors; firmware does not link these words. `Host` is a
+/// class that all its conversations derive from.
+template <class P, class Host = Conversation<ItemOf<P>>>
+struct Report {
+  using Protocol = P;
+  using Format = typename P::Format;
+  using Request = typename P::Request;
+  using Reply = typename P::Reply;
+  using Items = std::span<const ItemOf<P>>;
+
+  /// Puts the fields of a request. `put_values<fields, values>` makes such a function.
+  void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
+  /// Puts the fields of a good reply to it.
+  void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
+  /// What the document says of a bad reply, or of none. Of a conversation only where the procedure itself has not said
+  /// what to do.
+  Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
+  /// In place of `explain` where it takes what only the conversation knows.
+  Explanation (*explain_host)(const Host&) = nullptr;
+  /// In place of `explain` where words must be put together. The exchange of `host` is the one that went wrong.
+  void (*tell)(Sentence&, const Host& host) = nullptr;
+  /// What to do about a line that is never silent.
+  std::string_view noise_advice = endless_noise.advice;
+};
+
+/// How what a procedure finds is shown. `Subject` is the format; or a class that the conversation derives from, where
+/// the format alone does not tell.
+template <class Subject, class T>
+struct Finding {
+  using Of = Subject;
+  using Found = T;
+
+  void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
+  /// Fields of what a procedure leaves that is broken off, and the same in words.
+  void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
+  std::string_view (*left)(const T&) = nullptr;
+};
+
+/// Puts the `fields` of what `values(format, ...)` returns.
+template <const auto& fields, auto values, class... What>
+constexpr void put_values(FieldSink& sink, const What&... what) {
+  fields.put(sink, values(what...));
+}
+
+/// A conversation as a unit hands it out: with the fields and the words of `said`. A procedure has a `finding`; without
+/// one the last reply is shown.
+template <const auto& said, class Base, const auto&... finding>
+class Reported final : public Base {
+ public:
+  using Base::Base;
+  static_assert(sizeof...(finding) == 1 || said.put_reply != nullptr, "a report needs put_reply");
+  static_assert(((finding.put != nullptr) && ...), "a finding needs put");
+
+  void report(FieldSink& sink) const override {
+    if (this->error() != Error::none) return;
+    if constexpr (sizeof...(finding) == 0) {
+      said.put_reply(sink, this->format(), this->request(), this->last());
+    } else {
+      (finding.put(sink, subject<finding>(), this->found()), ...);
+    }
+    if (const Reading* reading = this->reading()) sink.put_reading(*reading);
+  }
+  void report_left(FieldSink& sink) const override { (put_left<finding>(sink), ...); }
+  [[nodiscard]] std::string_view detail() const override {
+    words_.clear();
+    const std::string_view own = Base::detail();
+    if (this->error() != Error::none && this->is_noisy()) {
+      if (own != endless_noise.detail) words_.add(endless_noise.detail);
+    } else if constexpr (said.tell != nullptr) {
+      if (this->error() != Error::none) said.tell(words_, *this);
+    } else {
+      words_.add(explained().detail);
+    }
+    words_.add_part(own);
+    (words_.add_part(left<finding>()), ...);
+    return words_.view();
+  }
+  [[nodiscard]] std::string_view advice() const override {
+    const std::string_view own = Base::advice();
+    if (!own.empty()) return own;
+    return this->is_noisy() ? said.noise_advice : explained().advice;
+  }
+
+ private:
+  [[nodiscard]] Explanation explained() const {
+    const bool open = this->error() != Error::none && !this->is_alone() && Base::advice().empty();
+    if constexpr (said.explain_host != nullptr) {
+      if (open) return said.explain_host(*this);
+    } else if constexpr (said.explain != nullptr) {
+      const auto exchange = this->exchange();
+      if (open) return said.explain(this->format(), this->error(), exchange.sent, exchange.received);
+    }
+    return {};
+  }
+  template <const auto& one>
+  [[nodiscard]] const auto& subject() const {
+    using Of = typename std::remove_cvref_t<decltype(one)>::Of;
+    if constexpr (std::is_base_of_v<Of, Base>) {
+      return static_cast<const Of&>(*this);
+    } else {
+      return this->format();
+    }
+  }
+  template <const auto& one>
+  void put_left(FieldSink& sink) const {
+    if constexpr (one.put_left != nullptr) one.put_left(sink, subject<one>(), this->found());
+  }
+  template <const auto& one>
+  [[nodiscard]] std::string_view left() const {
+    if constexpr (one.left != nullptr) {
+      if (this->error() != Error::none) return one.left(this->found());
+    }
+    return {};
+  }
+
+  mutable Sentence words_;
+};
 
 /// Whether a pulse on a wire of its own is the request.
 template <class P>
@@ -226,10 +258,15 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 }
 }  // namespace detail
 
+/// The protocol that a report is of.
+template <const auto& said>
+using ReportedProtocol = typename std::remove_cvref_t<decltype(said)>::Protocol;
+
 /// A position, or another value, that one request asks for: `request` makes it of the format, and Reader reads it.
-template <class Definition, class P, auto request, class Reader = ReadPosition<P>>
-[[nodiscard]] constexpr CommandOf<P> reading(const Command& info) {
-  using Made = Told<Definition, Reader>;
+template <const auto& said, auto request, class Reader = ReadPosition<ReportedProtocol<said>>>
+[[nodiscard]] constexpr CommandOf<ReportedProtocol<said>> reading(const Command& info) {
+  using P = ReportedProtocol<said>;
+  using Made = Reported<said, Reader>;
   return {.info = info,
           .request = [](const typename P::Format& format, Arguments) -> Result<typename P::Request> {
             return detail::request_of<request>(format);
@@ -242,9 +279,11 @@ template <class Definition, class P, auto request, class Reader = ReadPosition<P
 }
 
 /// What a procedure does. `request(format, arguments)`: see CommandOf; a Request, or a Result.
-template <class Definition, class P, class Found, auto procedure, auto request, auto... bound>
-[[nodiscard]] constexpr CommandOf<P> command(const Command& info) {
-  using Made = Told<Definition, Run<P, Found, procedure, bound...>>;
+template <const auto& said, const auto& finding, auto procedure, auto request, auto... bound>
+[[nodiscard]] constexpr CommandOf<ReportedProtocol<said>> command(const Command& info) {
+  using P = ReportedProtocol<said>;
+  using Found = typename std::remove_cvref_t<decltype(finding)>::Found;
+  using Made = Reported<said, Run<P, Found, procedure, bound...>, finding>;
   return {.info = info,
           .request = [](const typename P::Format& format, Arguments arguments) -> Result<typename P::Request> {
             return request(format, arguments);

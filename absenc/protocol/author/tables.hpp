@@ -10,24 +10,21 @@
 
 #include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/author/command.hpp"
+#include "absenc/protocol/author/declaration.hpp"
 #include "absenc/protocol/author/option.hpp"
 #include "absenc/protocol/author/text.hpp"
 
 namespace absenc::author {
 
-/// Of a Definition as UnitOf (unit.hpp) wants it.
-template <class Definition>
-struct TablesOf {
-  using P = typename Definition::Protocol;
-
-  // Copies, because g++ lets those of a class that is no template be written to: on firmware that is RAM.
-  static constexpr auto command_table = Definition::commands;
-  static constexpr auto options = Definition::options.infos;
+/// The tables of a Declaration.
+template <const auto& declared>
+struct Tables {
+  using P = typename std::remove_cvref_t<decltype(declared)>::Protocol;
 
   static constexpr auto commands = [] {
-    std::array<Command, Definition::commands.size()> made{};
+    std::array<Command, declared.commands.size()> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
-      made[i] = Definition::commands[i].info;
+      made[i] = declared.commands[i].info;
       made[i].id = static_cast<std::uint8_t>(i);
     }
     return made;
@@ -35,17 +32,24 @@ struct TablesOf {
 
   static constexpr std::size_t host_storage = [] {
     std::size_t most = sizeof(Refusal<ItemOf<P>>);
-    for (const CommandOf<P>& one : Definition::commands) most = std::max(most, one.size);
-    return most + Definition::frames_size;
+    for (const CommandOf<P>& one : declared.commands) most = std::max(most, one.size);
+    return most + declared.frames_size;
   }();
+
+  /// Index of the option with this name; the number of options when there is none.
+  static constexpr std::size_t find_option(std::string_view name) {
+    std::size_t i = 0;
+    while (i < declared.options.size() && declared.options[i].name != name) ++i;
+    return i;
+  }
 
   // What texts say lies one behind the other, and no larger than if it were written by hand.
   static constexpr Buffer<OptionValue, maximum_options> values_of(const ModelText& model) {
     Buffer<OptionValue, maximum_options> made;
     const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {
-      const std::size_t option = Definition::options.find(name);
-      if (option == Definition::options.infos.size()) return false;
-      const Result<std::int64_t> value = parse_value(Definition::options.infos[option], text);
+      const std::size_t option = find_option(name);
+      if (option == declared.options.size()) return false;
+      const Result<std::int64_t> value = parse_value(declared.options[option], text);
       return value && made.push_back({option, *value});
     });
     if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
@@ -54,18 +58,18 @@ struct TablesOf {
   static constexpr auto model_values = [] {
     constexpr std::size_t size = [] {
       std::size_t sum = 0;
-      for (const ModelText& text : Definition::models) sum += values_of(text).size();
+      for (const ModelText& text : declared.models) sum += values_of(text).size();
       return sum;
     }();
     Buffer<OptionValue, size> all;
-    for (const ModelText& text : Definition::models) all.append(values_of(text));
+    for (const ModelText& text : declared.models) all.append(values_of(text));
     return all;
   }();
   static constexpr auto models = [] {
-    std::array<Model, Definition::models.size()> made{};
+    std::array<Model, declared.models.size()> made{};
     std::size_t first = 0;
     for (std::size_t i = 0; i < made.size(); ++i) {
-      const ModelText& text = Definition::models[i];
+      const ModelText& text = declared.models[i];
       const std::size_t size = values_of(text).size();
       made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
       if (size != 0) made[i].values = model_values.view().subspan(first, size);  // g++ 12 cannot view an empty one
@@ -75,21 +79,12 @@ struct TablesOf {
   }();
 
   static constexpr VectorParts parts_of(const VectorText& text) {
-    return VectorParts(
-        text, Clocked<P> || requires { Definition::frames_are_texts; });
+    return VectorParts(text, Clocked<P> || declared.frames_are_texts);
   }
-  static constexpr bool has_texts = std::is_same_v<std::remove_cvref_t<decltype(Definition::vectors[0])>, VectorText>;
-  static constexpr auto texts = [] {
-    if constexpr (has_texts) {
-      return Definition::vectors;
-    } else {
-      return std::array<VectorText, 0>{};
-    }
-  }();
   static constexpr auto vector_parts = [] {
     constexpr auto sizes = [] {
       std::array<std::size_t, 2> sums{};
-      for (const VectorText& text : texts) {
+      for (const VectorText& text : declared.vectors) {
         const VectorParts parts = parts_of(text);
         sums[0] += parts.request.size() + parts.reply.size();
         sums[1] += parts.fields.size();
@@ -97,7 +92,7 @@ struct TablesOf {
       return sums;
     }();
     AllParts<sizes[0], sizes[1]> all;
-    for (const VectorText& text : texts) {
+    for (const VectorText& text : declared.vectors) {
       const VectorParts parts = parts_of(text);
       all.bytes.append(parts.request);
       all.bytes.append(parts.reply);
@@ -105,8 +100,8 @@ struct TablesOf {
     }
     return all;
   }();
-  static constexpr auto vectors_of_texts = [] {
-    std::array<Vector, texts.size()> made{};
+  static constexpr auto vectors = [] {
+    std::array<Vector, declared.vectors.size()> made{};
     Bytes bytes = vector_parts.bytes;
     std::span<const Expected> fields = vector_parts.fields;
     const auto taken = [](auto& all, std::size_t size) {
@@ -115,7 +110,7 @@ struct TablesOf {
       return first;
     };
     for (std::size_t i = 0; i < made.size(); ++i) {
-      const VectorText& text = texts[i];
+      const VectorText& text = declared.vectors[i];
       const VectorParts parts = parts_of(text);
       const Bytes request = taken(bytes, parts.request.size());
       const Bytes reply = taken(bytes, parts.reply.size());
@@ -124,13 +119,6 @@ struct TablesOf {
           parts.error};
     }
     return made;
-  }();
-  static constexpr auto vectors = [] {
-    if constexpr (has_texts) {
-      return vectors_of_texts;
-    } else {
-      return Definition::vectors;
-    }
   }();
 };
 

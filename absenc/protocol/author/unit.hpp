@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes the descriptor of a unit from what its author declares. docs/protocol-template shows a whole one.
+// Makes the descriptor of a unit from what its author declares (declaration.hpp).
 #pragma once
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include "absenc/core/hex.hpp"
 #include "absenc/protocol/author/clocked_host.hpp"
 #include "absenc/protocol/author/command.hpp"
+#include "absenc/protocol/author/declaration.hpp"
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/field.hpp"
@@ -22,76 +23,44 @@
 
 namespace absenc::author {
 
-/// Shortens what a Definition that derives from it declares: `command<Found, procedure, request>({...})`.
-template <class Definition, class P>
-struct Declares {
-  using Protocol = P;
-  template <auto request>
-  [[nodiscard]] static constexpr CommandOf<P> reading(const Command& info) {
-    return author::reading<Definition, P, request>(info);
-  }
-  template <class Found, auto procedure, auto request, auto... bound>
-  [[nodiscard]] static constexpr CommandOf<P> command(const Command& info) {
-    return author::command<Definition, P, Found, procedure, request, bound...>(info);
-  }
-};
-
-/// A Definition has these, all static and constexpr:
-///
-/// - `Protocol` (dialog.hpp, device.hpp; clocked_host.hpp), and `Encoder`, the virtual one, made of (format, shaft):
-///   BusDevice, ClockedDevice
-/// - `id`, `name`, `document`, `link`
-/// - `options`: OptionsOf (option.hpp), whose defaults are those of Format; or `Format format(const Options&)`
-/// - `models`: an array of ModelText
-/// - `fields`: FieldsOf (field.hpp)
-/// - `commands`: an array of CommandOf (command.hpp)
-/// - `vectors`: an array of VectorText (text.hpp) or of Vector; they hold, or it does not compile. `frames_are_texts`:
-///   those of the texts are no hexadecimal; clocked ones are texts of 0 and 1
-/// - `frames_size`: bytes of storage that the procedures' frames need at the most
-/// - `values(format, request)`, `values(format, request, reply)`, `values(format, found)`: see put_values (command.hpp)
-/// - `Request guess_request(const Format&, Bytes reply)`: what was asked, of a reply alone; or a Result, where it
-///   may not tell. On a clocked line, where nothing is asked, there is none
-///
-/// and where it must: `line(format)`, `resolution(format)` (else those of the format); `reply_size(format, begin)`, of
-/// any reply that begins so, 0: none (else the longest); `explain(format, error, request, reply)`; `is_usable(format)`,
-/// false: no virtual encoder is made, nor any clocked frame decoded; `answer_to_bad(error, reply)`, of a request that
-/// is none; `status`, `alarms`, `conditions`, `timing`, `is_checked`, `bits`, `memory`, `registers`, `over_spi`,
-/// `probe`, `streams`, `extra_wires`, `control_bit` as in Unit; and `decode`, `frame_end`, `is_answered` themselves,
-/// with the parameters that they have there.
-template <class Definition>
-struct UnitOf {
-  using P = typename Definition::Protocol;
+/// Makes the descriptor of a unit from its Declaration, which has static storage and is constexpr.
+template <const auto& declared>
+struct Descriptor {
+  using Declared = std::remove_cvref_t<decltype(declared)>;
+  using P = typename Declared::Protocol;
   using Format = typename P::Format;
   using Request = typename P::Request;
-  using Tables = TablesOf<Definition>;
+  using Made = Tables<declared>;
 
-  static constexpr Format format(const Options& values) {
-    if constexpr (requires { Definition::format(values); }) {
-      return Definition::format(values);
-    } else {
-      return Definition::options.format(values);
-    }
-  }
+  static_assert(!declared.id.empty() && !declared.name.empty() && !declared.document.empty(),
+                "a unit has id, name and document");
+  static_assert(declared.format != nullptr, "a unit needs `format`: format_of<options>, or a function");
+
+  // Requests and replies of the protocol as it is; else the unit says itself what its frames are.
+  static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
 
   // ---- The functions of the descriptor
 
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
-    if constexpr (requires { Definition::decode(Format{}, asked, frame, sink); }) {
-      return Definition::decode(format(values), asked, frame, sink);
+    if constexpr (declared.decode != nullptr) {
+      return declared.decode(declared.format(values), asked, frame, sink);
     } else if constexpr (Clocked<P>) {
-      return decode_bits(format(values), to_bits(frame), sink);
+      return decode_bits(declared.format(values), to_bits(frame), sink);
     } else {
-      return decode_bytes(format(values), asked, frame, sink);
+      return decode_bytes(declared.format(values), asked, frame, sink);
     }
   }
 
+  static constexpr bool is_usable(const Format& f) {
+    if constexpr (declared.is_usable != nullptr) return declared.is_usable(f);
+    return true;
+  }
+
   static constexpr Error decode_bits(const Format& f, BitView bits, FieldSink& sink) {
-    if constexpr (requires { Definition::is_usable(f); }) {
-      if (!Definition::is_usable(f)) return Error::invalid_argument;
-    }
+    if (!is_usable(f)) return Error::invalid_argument;
     const auto reply = P::decode(f, bits);
     if (!reply) return reply.error();
-    put_values<Definition>(sink, f, *reply);
+    declared.report.put_reply(sink, f, {}, *reply);
     sink.put_reading(P::reading(f, *reply));
     return Error::none;
   }
@@ -100,30 +69,31 @@ struct UnitOf {
     const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
     if (!request) return request.error();
     if (frame.bytes.empty()) {
-      put_values<Definition>(sink, f, *request);
+      declared.report.put_request(sink, f, *request);
       return Error::none;
     }
     const auto reply = P::decode(f, *request, frame.bytes);
     if (!reply) return reply.error();
-    put_values<Definition>(sink, f, *request, *reply);
+    declared.report.put_reply(sink, f, *request, *reply);
     const Reading reading = P::reading(f, *request, *reply);
     if (reading.singleturn_bits != 0 || reading.multiturn_bits != 0) sink.put_reading(reading);
     return Error::none;
   }
 
   static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
+    static_assert(declared.guess_request != nullptr, "a unit that sends requests needs `guess_request`");
     if (asked.empty()) {
       if (reply.empty()) return Error::wrong_length;
-      return Definition::guess_request(f, reply);
+      return declared.guess_request(f, reply);
     }
     const Result<Request> request = P::decode_request(f, asked);
-    if constexpr (requires { Definition::answer_to_bad(request.error(), reply); }) {
-      if (!request) return Definition::answer_to_bad(request.error(), reply);
+    if constexpr (declared.answer_to_bad != nullptr) {
+      if (!request) return declared.answer_to_bad(request.error(), reply);
     }
     return request;
   }
 
-  static constexpr const CommandOf<P>& find(const Command& command) { return Tables::command_table[command.id]; }
+  static constexpr const CommandOf<P>& find(const Command& command) { return declared.commands[command.id]; }
 
   // One for each that the command has, in its range.
   static constexpr bool are_good(const Command& command, Arguments arguments) {
@@ -138,7 +108,7 @@ struct UnitOf {
     if constexpr (Clocked<P>) {
       return std::size_t{0};
     } else {
-      return encode_bytes(format(values), find(command), arguments, out);
+      return encode_bytes(declared.format(values), find(command), arguments, out);
     }
   }
   static Result<std::size_t> encode_bytes(const Format& f, const CommandOf<P>& one, Arguments arguments,
@@ -155,24 +125,24 @@ struct UnitOf {
   }
 
   static constexpr std::size_t request_size(const Options& values, Bytes begin) {
-    if constexpr (requires { P::request_size(format(values), begin); }) {
-      return P::request_size(format(values), begin);
+    if constexpr (requires { P::request_size(declared.format(values), begin); }) {
+      return P::request_size(declared.format(values), begin);
     } else {
       return P::request_size(begin);
     }
   }
 
   static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
-    if constexpr (requires { Definition::reply_size(Format{}, begin); }) {
-      return Definition::reply_size(format(values), begin);
+    if constexpr (declared.reply_size != nullptr) {
+      return declared.reply_size(declared.format(values), begin);
     } else {
       return P::longest_reply;
     }
   }
 
   static constexpr FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
-    if constexpr (requires { Definition::frame_end(values, direction, bytes); }) {
-      return Definition::frame_end(values, direction, bytes);
+    if constexpr (declared.frame_end != nullptr) {
+      return declared.frame_end(values, direction, bytes);
     } else if constexpr (Clocked<P>) {
       return {FrameEnd::Kind::complete, bytes.size()};  // the pause of the clock ends a frame
     } else {
@@ -190,48 +160,42 @@ struct UnitOf {
       return make_host<Refusal<ItemOf<P>>>(storage, Error::invalid_argument,
                                            "an argument is missing, or outside its range; nothing was sent");
     }
-    return find(command).run(format(values), arguments, storage);
+    return find(command).run(declared.format(values), arguments, storage);
   }
 
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
-    const Format f = format(values);
-    if constexpr (requires { Definition::is_usable(f); }) {
-      if (!Definition::is_usable(f)) return {};
-    }
-    return make_device<typename Definition::Encoder>(storage, f, shaft);
+    const Format f = declared.format(values);
+    if (!is_usable(f)) return {};
+    return make_device<typename Declared::Encoder>(storage, f, shaft);
   }
 
   static constexpr Resolution resolution(const Options& values) {
-    if constexpr (requires { Definition::resolution(Format{}); }) {
-      return Definition::resolution(format(values));
+    if constexpr (declared.resolution != nullptr) {
+      return declared.resolution(declared.format(values));
     } else {
-      return format(values).resolution();
+      return declared.format(values).resolution();
     }
   }
   static constexpr LineSettings line_of(const Format& f) {
-    if constexpr (requires { Definition::line(f); }) {
-      return Definition::line(f);
+    if constexpr (declared.line != nullptr) {
+      return declared.line(f);
     } else {
       return f.line();
     }
   }
-  static constexpr LineSettings settings(const Options& values) { return line_of(format(values)); }
+  static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
+  // By the manner of its request.
   static bool is_answered(const Options& values, Frame asked) {
-    if constexpr (requires { Definition::is_answered(values, asked); }) {
-      return Definition::is_answered(values, asked);
-    } else {
-      const Format f = format(values);
-      const Result<Request> request = P::decode_request(f, items(asked));
-      if (!request) return true;
-      const Manner manner = P::manner(f, *request);
-      return manner.expects_reply && !manner.any_reply;
-    }
+    const Format f = declared.format(values);
+    const Result<Request> request = P::decode_request(f, asked.bytes);
+    if (!request) return true;
+    const Manner manner = P::manner(f, *request);
+    return manner.expects_reply && !manner.any_reply;
   }
-
   static Time pause(const Options& values, Frame asked) {
-    const Format f = format(values);
-    const Result<Request> request = P::decode_request(f, items(asked));
+    const Format f = declared.format(values);
+    const Result<Request> request = P::decode_request(f, asked.bytes);
     return request ? P::manner(f, *request).pause : Time{};
   }
 
@@ -245,7 +209,7 @@ struct UnitOf {
   }
 
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
-    return Definition::explain(format(values), error, items(asked), items(reply));
+    return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }
 
   static constexpr Error decode_vector(const Options& values, const Vector& vector, FieldSink& sink) {
@@ -266,14 +230,14 @@ struct UnitOf {
 
   // Whether the text is understood, which comes over a model, which comes over the defaults.
   static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
-    for (std::size_t i = 0; i < Definition::options.infos.size(); ++i) {
-      values.values[i] = Definition::options.infos[i].default_value;
+    for (std::size_t i = 0; i < declared.options.size(); ++i) {
+      values.values[i] = declared.options[i].default_value;
     }
     for (const OptionValue& one : model) values.values[one.option] = one.value;
     return for_each_value(text, [&](std::string_view name, std::string_view value) {
-      const std::size_t option = Definition::options.find(name);
-      if (option == Definition::options.infos.size()) return false;
-      const Result<std::int64_t> parsed = parse_value(Definition::options.infos[option], value);
+      const std::size_t option = Made::find_option(name);
+      if (option == declared.options.size()) return false;
+      const Result<std::int64_t> parsed = parse_value(declared.options[option], value);
       if (parsed) values.values[option] = *parsed;
       return parsed.error() == Error::none;
     });
@@ -287,7 +251,7 @@ struct UnitOf {
     Options values;
     bool known = resolve(vector.options, {}, values);
     // The first model that agrees with what is said, as resolve_options has it.
-    for (const Model& model : Tables::models) {
+    for (const Model& model : Made::models) {
       Options of_model;
       known = known && resolve(vector.options, model.values, of_model);
       if (!agrees(model, of_model)) continue;
@@ -297,53 +261,48 @@ struct UnitOf {
     VectorCheck check(vector.fields);
     return known && decode_vector(values, vector, check) == vector.error && check.all();
   }
-  static_assert(std::all_of(Tables::vectors.begin(), Tables::vectors.end(), holds),
+  static_assert(std::all_of(Made::vectors.begin(), Made::vectors.end(), holds),
                 "a vector does not decode to what it says");
 
   static constexpr Unit make() {
-    Unit unit{.id = Definition::id,
-              .name = Definition::name,
-              .document = Definition::document,
-              .link = Definition::link,
+    Unit unit{.id = declared.id,
+              .name = declared.name,
+              .document = declared.document,
+              .link = declared.link,
               .line = line_of(Format{}),
-              .options = Tables::options,
-              .models = Tables::models,
-              .fields = Definition::fields.infos,
-              .commands = Tables::commands,
-              .vectors = Tables::vectors,
-              .status = nullptr,
-              .alarms = nullptr,
-              .host_storage = Tables::host_storage,
-              .device_storage = sizeof(typename Definition::Encoder),
+              .options = declared.options,
+              .models = Made::models,
+              .fields = declared.fields,
+              .commands = Made::commands,
+              .memory = declared.memory,
+              .registers = declared.registers,
+              .vectors = Made::vectors,
+              .status = declared.status,
+              .alarms = declared.alarms,
+              .second_status = declared.second_status,
+              .second_alarms = declared.second_alarms,
+              .host_storage = Made::host_storage,
+              .device_storage = sizeof(typename Declared::Encoder),
               .decode = decode,
               .encode = encode,
               .frame_end = frame_end,
               .host = host,
               .device = device,
               .resolution = resolution,
-              .settings = settings};
-    constexpr bool by_manner = requires {
-      P::decode_request(Format{}, Bytes{});
-      P::manner(Format{}, Request{});
-    };
-    if constexpr (by_manner || requires { &Definition::is_answered; }) unit.is_answered = is_answered;
-    if constexpr (by_manner && requires { P::manner(Format{}, Request{}).pause; }) unit.pause = pause;
-    if constexpr (requires { Definition::status; }) unit.status = Definition::status;
-    if constexpr (requires { Definition::alarms; }) unit.alarms = Definition::alarms;
-    if constexpr (requires { Definition::memory; }) unit.memory = Definition::memory;
-    if constexpr (requires { Definition::conditions; }) unit.conditions = Definition::conditions;
-    if constexpr (requires { Definition::timing; }) unit.timing = Definition::timing;
-    if constexpr (requires { Definition::is_checked; }) unit.is_checked = Definition::is_checked;
-    if constexpr (requires { &Definition::bits; }) unit.bits = Definition::bits;
-    if constexpr (requires { Definition::registers; }) unit.registers = Definition::registers;
-    if constexpr (requires { Definition::over_spi; }) unit.over_spi = Definition::over_spi;
-    if constexpr (requires { Definition::probe; }) unit.probe = Definition::probe;
-    if constexpr (requires { Definition::control_bit; }) unit.control_bit = Definition::control_bit;
-    if constexpr (requires { Definition::streams; }) unit.streams = Definition::streams;
-    if constexpr (requires { Definition::extra_wires; }) unit.extra_wires = Definition::extra_wires;
-    if constexpr (requires { Definition::explain(Format{}, Error::none, items({}), items({})); }) {
-      unit.explain = explain;
-    }
+              .is_checked = declared.is_checked,
+              .bits = declared.bits,
+              .settings = settings,
+              .over_spi = declared.over_spi,
+              .probe = declared.probe,
+              .extra_wires = declared.extra_wires,
+              .timing = declared.timing,
+              .streams = declared.streams,
+              .is_answered = declared.is_answered,
+              .conditions = declared.conditions,
+              .control_bit = declared.control_bit};
+    if constexpr (declared.report.explain != nullptr) unit.explain = explain;
+    if constexpr (has_requests && declared.is_answered == nullptr) unit.is_answered = is_answered;
+    if constexpr (has_requests) unit.pause = pause;
     return unit;
   }
 };

@@ -88,7 +88,7 @@ constexpr auto options_of_channels(std::index_sequence<channel...>) {
   return std::tuple_cat(channel_options<channel>()...);
 }
 
-constexpr auto options_of_chain = std::apply(
+constexpr auto chain_options = std::apply(
     [](const auto&... all) { return OptionsOf{all...}; },
     std::tuple_cat(
         std::tuple{
@@ -145,56 +145,70 @@ constexpr void put_channel(FieldSink& sink, const Channel& channel, const Channe
   if (channel.check.width != 0) put(in_crc, data.crc);
 }
 
-struct ChainDefinition : DeclaresBiss<ChainDefinition, ChainFormat> {
-  using DeclaresBiss::put;
-  static constexpr std::string_view id = "biss-chain", name = "BiSS-C, several encoders in a chain",
-                                    document = "BiSS C Protocol Description rev D2";
-  static constexpr std::size_t frames_size = 6400;
+constexpr auto chain_models = std::array{ModelText{"two-19", "two encoders of 19 bits", 0, "slaves=2"}};
+constexpr auto all_chain_fields =
+    joined_fields(joined_fields(word_fields, channel_fields), joined_fields(own_fields, register_fields.infos));
 
-  static constexpr const auto& options = options_of_chain;
-  static constexpr std::array models{ModelText{"two-19", "two encoders of 19 bits", 0, "slaves=2"}};
-  static constexpr struct {
-    decltype(joined_fields(joined_fields(word_fields, channel_fields),
-                           joined_fields(own_fields, register_fields.infos))) infos;
-  } fields{joined_fields(joined_fields(word_fields, channel_fields), joined_fields(own_fields, register_fields.infos))};
-  static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
-  static constexpr auto vectors = chain_vectors;
+constexpr ChainFormat chain_format(const Options& values) {
+  ChainSettings given = chain_options.format(values);
+  given.count = given.slaves;
+  given.channels = given.all();
+  if (values.has_word()) {
+    for (Channel& channel : given.channels) channel.word = values.word;
+    given.scale = {.linear = given.unit_pm != 0, .unit_um = static_cast<double>(given.unit_pm) / 1e6};
+  }
+  return given;
+}
+constexpr Resolution chain_resolution(const ChainFormat& format) {
+  return resolution_of(format.channels[format.shown()].word, format.scale);
+}
+constexpr bool is_chain_possible(const ChainFormat& format) { return biss::is_usable(format); }
 
-  static constexpr ChainFormat format(const Options& values) {
-    ChainSettings given = options.format(values);
-    given.count = given.slaves;
-    given.channels = given.all();
-    if (values.has_word()) {
-      for (Channel& channel : given.channels) channel.word = values.word;
-      given.scale = {.linear = given.unit_pm != 0, .unit_um = static_cast<double>(given.unit_pm) / 1e6};
-    }
-    return given;
-  }
-  static constexpr Resolution resolution(const ChainFormat& format) {
-    return resolution_of(format.channels[format.shown()].word, format.scale);
-  }
-  static constexpr bool is_usable(const ChainFormat& format) { return biss::is_usable(format); }
+constexpr void put_chain_reply(FieldSink& sink, const ChainFormat& format, const NoRequest&, const ChainReply& reply) {
+  put_line_delay(sink, format, reply);
+  sink.put({&own_fields[field_ack_bits], reply.ack_bits});
+  for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
+  const unsigned shown = format.shown();
+  put_word(sink, format.channels[shown].word, reply.channels[shown].word, format.scale);
+}
 
-  static constexpr auto commands = commands_of<ChainDefinition, ChainFormat>(is_usable);
+constexpr Report<ProtocolOf<ChainFormat>> chain_report{.put_reply = put_chain_reply,
+                                                       .explain = explain_frame<ChainFormat>};
+constexpr auto chain_commands = commands_of<chain_report, ChainFormat>(is_chain_possible);
 
-  static constexpr void put(FieldSink& sink, const ChainFormat& format, const ChainReply& reply) {
-    put_line_delay(sink, format, reply);
-    sink.put({&own_fields[field_ack_bits], reply.ack_bits});
-    for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
-    const unsigned shown = format.shown();
-    put_word(sink, format.channels[shown].word, reply.channels[shown].word, format.scale);
+bool is_chain_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
+  const ChainFormat made = chain_format(values);
+  for (unsigned i = 0; i < made.count; ++i) {
+    if (made.channels[i].check.width == 0) return false;
   }
-  static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
-    const ChainFormat made = format(values);
-    for (unsigned i = 0; i < made.count; ++i) {
-      if (made.channels[i].check.width == 0) return false;
-    }
-    return is_behind_ack(reply, bit);
-  }
+  return is_behind_ack(reply, bit);
+}
+
+constexpr Declaration<ProtocolOf<ChainFormat>, VirtualEncoderOf<ChainFormat>> chain_declaration{
+    .id = "biss-chain",
+    .name = "BiSS-C, several encoders in a chain",
+    .document = "BiSS C Protocol Description rev D2",
+    .link = LinkKind::clocked,
+    .options = chain_options.infos,
+    .format = chain_format,
+    .models = chain_models,
+    .fields = all_chain_fields,
+    .commands = chain_commands,
+    .vectors = chain_vectors,
+    .frames_size = 6400,
+    .report = chain_report,
+    .line = line_of<ChainFormat>,
+    .resolution = chain_resolution,
+    .is_usable = is_chain_possible,
+    .decode = decode_frame<chain_report, is_chain_possible, ChainFormat>,
+    .is_checked = is_chain_checked,
+    .control_bit = control_bit,
+    .alarms = &all_chain_fields[word_field_alarms],
+    .memory = registers::areas,
 };
 
 }  // namespace
 
-constinit const Unit chain_unit = UnitOf<ChainDefinition>::make();
+constinit const Unit chain_unit = Descriptor<chain_declaration>::make();
 
 }  // namespace absenc::biss

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <type_traits>
 
 #include "absenc/protocol/author/unit.hpp"
@@ -48,32 +49,38 @@ template <auto member>
 inline constexpr auto start_sequence_option = author::option<member>(
     "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence");
 
+template <class F>
+constexpr void put_registers(FieldSink& sink, const F&, const Found& found) {
+  register_fields.put(sink, found);
+}
+template <class F>
+inline constexpr author::Finding<F, Found> registers_found{.put = put_registers<F>};
+
 /// A position, and what the registers do.
-template <class Definition, class F>
+template <const auto& report, class F>
 [[nodiscard]] constexpr auto commands_of(bool (*is_readable)(const F&)) {
-  using P = ProtocolOf<F>;
   constexpr auto request = no_request<F>;
   const auto setting = [is_readable](auto address, std::string_view name, std::string_view meaning) {
-    return author::command<Definition, P, Found, read_setting<F>, request, decltype(address)::value>(
+    return author::command<report, registers_found<F>, read_setting<F>, request, decltype(address)::value>(
                {name, Verb::config_get, 0, meaning})
         .only_if(is_readable);
   };
   return std::array{
-      author::clocked_reading<Definition, P, FindPosition<F>>(
+      author::clocked_reading<report, FindPosition<F>>(
           {"position", Verb::read, 0, "position, turns, error and warning"})
           .only_if(is_readable),
-      author::command<Definition, P, Found, read_info<F>, request>(
+      author::command<report, registers_found<F>, read_info<F>, request>(
           {"info", Verb::info, 0, "who is on the line, profile, serial number, device id"})
           .only_if(is_readable),
-      author::command<Definition, P, Found, read_memory<F>, request>(
+      author::command<report, registers_found<F>, read_memory<F>, request>(
           {"memory-read", Verb::memory_read, 0, "read registers; the bank stays selected", read_arguments})
           .only_if(is_readable),
-      author::command<Definition, P, Found, write_memory<F>, request>({"memory-write", Verb::memory_write, 0,
-                                                                       "write a register; the bank stays selected",
-                                                                       write_arguments, true, false})
+      author::command<report, registers_found<F>, write_memory<F>, request>(
+          {"memory-write", Verb::memory_write, 0, "write a register; the bank stays selected", write_arguments, true,
+           false})
           .only_if(is_readable),
       setting(std::integral_constant<unsigned, registers::bank_select>{}, "bank", "which bank addresses 0 to 63 mean"),
-      author::command<Definition, P, Found, write_bank<F>, request>(
+      author::command<report, registers_found<F>, write_bank<F>, request>(
           {"set-bank", Verb::config_set, 0, "select a bank", select_arguments, true, false, "bank"})
           .only_if(is_readable),
       setting(std::integral_constant<unsigned, registers::eds_bank>{}, "eds-bank",
@@ -82,14 +89,14 @@ template <class Definition, class F>
       setting(std::integral_constant<unsigned, registers::serial_number>{}, "serial-number", "its serial number"),
       setting(std::integral_constant<unsigned, registers::device_id>{}, "device-id", "which device it is"),
       setting(std::integral_constant<unsigned, registers::manufacturer>{}, "manufacturer", "who made it"),
-      author::command<Definition, P, Found, send_command<F>, request>(
+      author::command<report, registers_found<F>, send_command<F>, request>(
           {"control-command", Verb::run, 0, "a command of control communication", command_arguments, true, false})
           .only_if(is_readable),
   };
 }
 
 template <class F>
-[[nodiscard]] Explanation explain_frame(const F& format, Error error) {
+[[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes = {}) {
   switch (error) {
     case Error::invalid_argument:
       if (ProtocolOf<F>::clocks(format) <= ProtocolOf<F>::most_clocks) return {};
@@ -119,33 +126,29 @@ template <class F>
   return start + 1 < samples.size ? std::optional(start + 1) : std::nullopt;
 }
 
-/// What the units of BiSS declare alike.
-template <class Definition, class F>
-struct DeclaresBiss {
-  using Protocol = ProtocolOf<F>;
-  using Encoder = VirtualEncoderOf<F>;
-  static constexpr LinkKind link = LinkKind::clocked;
-  static constexpr const auto& memory = registers::areas;
+// ---- What the units of BiSS declare alike
 
-  static constexpr LineSettings line(const F&) { return line_settings; }  // the conversation sets its rate
-  /// A frame of the encoder; or, with a request, a control frame: the bits of CDM and those of CDS.
-  static constexpr Error decode(const F& format, Frame asked, Frame answered, FieldSink& sink) {
-    if (!asked.empty()) {
-      const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
-      if (!frame) return frame.error();
-      register_fields.put(sink, shown_by(*frame, !answered.empty()));
-      return Error::none;
-    }
-    if (!Definition::is_usable(format)) return Error::invalid_argument;
-    const auto reply = detail::decoded(format, author::to_bits(answered));
-    if (!reply) return reply.error();
-    Definition::put(sink, format, *reply);
-    sink.put_reading(reading_of(format, *reply));
+template <class F>
+constexpr LineSettings line_of(const F&) {
+  return line_settings;  // the conversation sets its rate
+}
+
+/// A frame of the encoder; or, with a request, a control frame: the bits of CDM and those of CDS.
+template <const auto& report, auto is_usable, class F>
+constexpr Error decode_frame(const F& format, Frame asked, Frame answered, FieldSink& sink) {
+  if (!asked.empty()) {
+    const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
+    if (!frame) return frame.error();
+    register_fields.put(sink, shown_by(*frame, !answered.empty()));
     return Error::none;
   }
-  static std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
-  static constexpr void put(FieldSink& sink, const F&, const Found& found) { register_fields.put(sink, found); }
-  static Explanation explain(const F& format, Error error, Bytes, Bytes) { return explain_frame(format, error); }
-};
+  if (!is_usable(format)) return Error::invalid_argument;
+  const auto reply = detail::decoded(format, author::to_bits(answered));
+  if (!reply) return reply.error();
+  report.put_reply(sink, format, {}, *reply);
+  sink.put_reading(reading_of(format, *reply));
+  return Error::none;
+}
+inline std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
 }  // namespace absenc::biss

@@ -105,18 +105,18 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
     if constexpr (finds) {
       if (start_.was_given()) return this->ask();
     }
-    const int before = life_counter_of(this->format(), this->found());
+    const int before = life_counter_of(this->format(), this->last());
     const Error error = this->take(samples);
     if constexpr (finds) {
       if (start_.is_due(error)) return this->clock(start_pulses);
-      const unsigned head = this->found().delay_bits + this->found().ack_bits;
+      const unsigned head = this->last().delay_bits + this->last().ack_bits;
       const bool expected = tries_ == 0 && head <= ack_bits(this->format().latency, this->format().period());
       const bool late = error == Error::none ? !expected && !late_.is_again(head) : needs_more(error, samples);
       if (late && tries_++ < most_late) return this->clock(P::all_clocks(this->format()));
       if (late) return this->conclude(Error::truncated);
     }
     if (error != Error::none || before < 0) return this->conclude(error);
-    const int now = life_counter_of(this->format(), this->found());
+    const int now = life_counter_of(this->format(), this->last());
     if (second_) {
       const bool follows = now == static_cast<int>((static_cast<unsigned>(before) + 1) & low_mask(life_counter_bits));
       return this->conclude(follows ? Error::none : Error::sequence_mismatch);

@@ -24,8 +24,8 @@ TEST(BissHost, ReadsAtTheFirstFallingEdge) {
   ReadPosition read(turns_19);
   bench.run(read);
   ASSERT_EQ(read.error(), Error::none);
-  EXPECT_EQ(read.found().ack_bits, 10u);
-  EXPECT_EQ(read.found().crc, 0x1C);
+  EXPECT_EQ(read.last().ack_bits, 10u);
+  EXPECT_EQ(read.last().crc, 0x1C);
   ASSERT_NE(read.reading(), nullptr);
   EXPECT_EQ(read.reading()->latched, 40us);
   EXPECT_EQ(read.reading()->received, 40us + (2 + 10 + 2 + 43) * 1us);
@@ -41,7 +41,7 @@ TEST(BissHost, AckFollowsTheClock) {
     Bench bench(line_settings, format);
     ReadPosition read(format);
     ASSERT_EQ(bench.run(read).error(), Error::none) << khz;
-    EXPECT_EQ(read.found().ack_bits, ack_bits(10us, LineSettings{.rate = khz * 1000u}.bits(1)));
+    EXPECT_EQ(read.last().ack_bits, ack_bits(10us, LineSettings{.rate = khz * 1000u}.bits(1)));
     EXPECT_EQ(bench.encoder.violation_count(), 0u);
   }
 }
@@ -88,8 +88,8 @@ TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
     FindPosition<Format> read(turns_19);
     ASSERT_EQ(bench.run(read).error(), Error::none) << delay.count();
     EXPECT_EQ(read.reading()->singleturn, 275096u);
-    EXPECT_EQ(read.found().ack_bits, 30u);
-    EXPECT_EQ(read.found().delay_bits, delay / 1us);
+    EXPECT_EQ(read.last().ack_bits, 30u);
+    EXPECT_EQ(read.last().delay_bits, delay / 1us);
   }
 }
 
@@ -296,7 +296,7 @@ TEST(BissHost, LifeCounterGoesOnAtZero) {
   for (int i = 0; i < 70; ++i) {
     ReadPosition read(safety);
     ASSERT_EQ(bench.run(read).error(), Error::none) << i;
-    EXPECT_EQ(read.found().life_counter, (2 * i + 1) % 64);
+    EXPECT_EQ(read.last().life_counter, (2 * i + 1) % 64);
   }
 }
 

@@ -82,112 +82,125 @@ constexpr void put_word_of(FieldSink& sink, const Channel& channel, const Channe
   if (channel.check.width != 0) put(field_cpw_crc, field_spw_crc, data.crc);
 }
 
-struct SafetyDefinition : DeclaresBiss<SafetyDefinition, SafetyFormat> {
-  using DeclaresBiss::put;
-  static constexpr std::string_view id = "biss-safety", name = "BiSS Safety",
-                                    document = "BiSS C Protocol Description rev D2, BiSS Safety";
-  static constexpr std::size_t frames_size = 2400;
+constexpr auto safety_options = OptionsOf{
+    probeable(option<&SafetySettings::cpw_singleturn_bits>("cpw_singleturn_bits", "control word: bits of the position",
+                                                           1, 64)),
+    probeable(
+        option<&SafetySettings::cpw_multiturn_bits>("cpw_multiturn_bits", "control word: bits of the turns", 0, 63)),
+    option<&SafetySettings::cpw_crc_width>("cpw_crc_width", "control word: bits of the CRC; 0: none", 0, 16),
+    option<&SafetySettings::cpw_crc_poly>("cpw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
+    option<&SafetySettings::cpw_crc_init>("cpw_crc_init", "its start value", 0, 0xFFFF),
+    option<&SafetySettings::cpw_crc_inverted>("cpw_crc_inverted", "whether it is sent inverted"),
+    option<&SafetySettings::cpw_life_counter>("cpw_life_counter", "control word: 6 bits that count frames"),
+    probeable(option<&SafetySettings::spw_singleturn_bits>("spw_singleturn_bits", "safety word: bits of the position",
+                                                           1, 64)),
+    probeable(
+        option<&SafetySettings::spw_multiturn_bits>("spw_multiturn_bits", "safety word: bits of the turns", 0, 63)),
+    option<&SafetySettings::spw_crc_width>("spw_crc_width", "safety word: bits of the CRC; 0: none", 0, 16),
+    option<&SafetySettings::spw_crc_poly>("spw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
+    option<&SafetySettings::spw_crc_init>("spw_crc_init", "its start value", 0, 0xFFFF),
+    option<&SafetySettings::spw_crc_inverted>("spw_crc_inverted", "whether it is sent inverted"),
+    option<&SafetySettings::spw_life_counter>("spw_life_counter", "safety word: 6 bits that count frames"),
+    option<&SafetySettings::compare_bits>(
+        "compare_bits", "upper bits of the position in which both words agree within one count", 1, 64),
+    option<&SafetySettings::previous_life_counter>(
+        "previous_life_counter", "of the frame before the one that is decoded; -1: not known", -1, 63),
+    clock_option<&SafetySettings::ma_khz>,
+    decimal<3>(option<&SafetySettings::latency>("latency_us",
+                                                "the longest time until the position is ready, us: of the encoder, and "
+                                                "of the line there and back",
+                                                0, 1'000'000)),
+    line_delay_option<&SafetySettings::line_delay>,
+    option<&SafetySettings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0,
+                                   7),
+    register_order_option<&SafetySettings::register_order>,
+    register_delay_option<&SafetySettings::register_delay_us>,
+    start_sequence_option<&SafetySettings::start_sequence>,
+};
+constexpr auto safety_models = std::array{
+    ModelText{
+        "RXH", "24 bits, safety word 16", 0,
+        "cpw_singleturn_bits=24 cpw_multiturn_bits=0 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
+    ModelText{"RXM", "16 bits, safety word 12", 0,
+              "cpw_singleturn_bits=16 cpw_multiturn_bits=0 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
+    ModelText{
+        "RSH", "24 bits and turns, safety word 16 and turns", 0,
+        "cpw_singleturn_bits=24 cpw_multiturn_bits=12 spw_singleturn_bits=16 spw_multiturn_bits=12 compare_bits=13"},
+    ModelText{
+        "RSM", "16 bits and turns, safety word 12 and turns", 0,
+        "cpw_singleturn_bits=16 cpw_multiturn_bits=12 spw_singleturn_bits=12 spw_multiturn_bits=12 compare_bits=9"},
+    ModelText{
+        "RUH", "24 bits and turns, safety word 16", 0,
+        "cpw_singleturn_bits=24 cpw_multiturn_bits=12 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
+    ModelText{
+        "RUM", "16 bits and turns, safety word 12", 0,
+        "cpw_singleturn_bits=16 cpw_multiturn_bits=12 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
+};
+constexpr auto all_safety_fields = joined_fields(joined_fields(safety_fields, own_fields), register_fields.infos);
 
-  static constexpr OptionsOf options{
-      probeable(option<&SafetySettings::cpw_singleturn_bits>("cpw_singleturn_bits",
-                                                             "control word: bits of the position", 1, 64)),
-      probeable(
-          option<&SafetySettings::cpw_multiturn_bits>("cpw_multiturn_bits", "control word: bits of the turns", 0, 63)),
-      option<&SafetySettings::cpw_crc_width>("cpw_crc_width", "control word: bits of the CRC; 0: none", 0, 16),
-      option<&SafetySettings::cpw_crc_poly>("cpw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
-      option<&SafetySettings::cpw_crc_init>("cpw_crc_init", "its start value", 0, 0xFFFF),
-      option<&SafetySettings::cpw_crc_inverted>("cpw_crc_inverted", "whether it is sent inverted"),
-      option<&SafetySettings::cpw_life_counter>("cpw_life_counter", "control word: 6 bits that count frames"),
-      probeable(option<&SafetySettings::spw_singleturn_bits>("spw_singleturn_bits", "safety word: bits of the position",
-                                                             1, 64)),
-      probeable(
-          option<&SafetySettings::spw_multiturn_bits>("spw_multiturn_bits", "safety word: bits of the turns", 0, 63)),
-      option<&SafetySettings::spw_crc_width>("spw_crc_width", "safety word: bits of the CRC; 0: none", 0, 16),
-      option<&SafetySettings::spw_crc_poly>("spw_crc_poly", "its polynomial without the highest power", 0, 0xFFFF),
-      option<&SafetySettings::spw_crc_init>("spw_crc_init", "its start value", 0, 0xFFFF),
-      option<&SafetySettings::spw_crc_inverted>("spw_crc_inverted", "whether it is sent inverted"),
-      option<&SafetySettings::spw_life_counter>("spw_life_counter", "safety word: 6 bits that count frames"),
-      option<&SafetySettings::compare_bits>(
-          "compare_bits", "upper bits of the position in which both words agree within one count", 1, 64),
-      option<&SafetySettings::previous_life_counter>(
-          "previous_life_counter", "of the frame before the one that is decoded; -1: not known", -1, 63),
-      clock_option<&SafetySettings::ma_khz>,
-      decimal<3>(
-          option<&SafetySettings::latency>("latency_us",
-                                           "the longest time until the position is ready, us: of the encoder, and "
-                                           "of the line there and back",
-                                           0, 1'000'000)),
-      line_delay_option<&SafetySettings::line_delay>,
-      option<&SafetySettings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0,
-                                     7),
-      register_order_option<&SafetySettings::register_order>,
-      register_delay_option<&SafetySettings::register_delay_us>,
-      start_sequence_option<&SafetySettings::start_sequence>,
-  };
-  static constexpr std::array models{
-      ModelText{
-          "RXH", "24 bits, safety word 16", 0,
-          "cpw_singleturn_bits=24 cpw_multiturn_bits=0 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
-      ModelText{
-          "RXM", "16 bits, safety word 12", 0,
-          "cpw_singleturn_bits=16 cpw_multiturn_bits=0 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
-      ModelText{
-          "RSH", "24 bits and turns, safety word 16 and turns", 0,
-          "cpw_singleturn_bits=24 cpw_multiturn_bits=12 spw_singleturn_bits=16 spw_multiturn_bits=12 compare_bits=13"},
-      ModelText{
-          "RSM", "16 bits and turns, safety word 12 and turns", 0,
-          "cpw_singleturn_bits=16 cpw_multiturn_bits=12 spw_singleturn_bits=12 spw_multiturn_bits=12 compare_bits=9"},
-      ModelText{
-          "RUH", "24 bits and turns, safety word 16", 0,
-          "cpw_singleturn_bits=24 cpw_multiturn_bits=12 spw_singleturn_bits=16 spw_multiturn_bits=0 compare_bits=13"},
-      ModelText{
-          "RUM", "16 bits and turns, safety word 12", 0,
-          "cpw_singleturn_bits=16 cpw_multiturn_bits=12 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
-  };
-  static constexpr struct {
-    decltype(joined_fields(joined_fields(safety_fields, own_fields), register_fields.infos)) infos;
-  } fields{joined_fields(joined_fields(safety_fields, own_fields), register_fields.infos)};
-  static constexpr const FieldInfo* alarms = &safety_fields[field_alarms];
-  static constexpr auto vectors = safety_vectors;
+constexpr SafetyFormat safety_format(const Options& values) {
+  SafetySettings given = safety_options.format(values);
+  given.cpw = {
+      word_with_status({given.cpw_singleturn_bits, given.cpw_multiturn_bits, true}),
+      {given.cpw_crc_width, given.cpw_crc_poly, given.cpw_crc_init, given.cpw_crc_inverted, given.cpw_life_counter}};
+  given.spw = {
+      word_with_status({given.spw_singleturn_bits, given.spw_multiturn_bits, true}),
+      {given.spw_crc_width, given.spw_crc_poly, given.spw_crc_init, given.spw_crc_inverted, given.spw_life_counter}};
+  return given;
+}
+constexpr Resolution safety_resolution(const SafetyFormat& format) { return resolution_of(format.cpw.word, {}); }
+constexpr bool is_safety_possible(const SafetyFormat& format) {
+  return biss::is_usable(format) && absenc::is_usable(format.cpw.word) && absenc::is_usable(format.spw.word);
+}
 
-  static constexpr SafetyFormat format(const Options& values) {
-    SafetySettings given = options.format(values);
-    given.cpw = {
-        word_with_status({given.cpw_singleturn_bits, given.cpw_multiturn_bits, true}),
-        {given.cpw_crc_width, given.cpw_crc_poly, given.cpw_crc_init, given.cpw_crc_inverted, given.cpw_life_counter}};
-    given.spw = {
-        word_with_status({given.spw_singleturn_bits, given.spw_multiturn_bits, true}),
-        {given.spw_crc_width, given.spw_crc_poly, given.spw_crc_init, given.spw_crc_inverted, given.spw_life_counter}};
-    return given;
+constexpr void put_safety_reply(FieldSink& sink, const SafetyFormat& format, const NoRequest&,
+                                const SafetyReply& reply) {
+  put_line_delay(sink, format, reply);
+  sink.put({&own_fields[field_ack_bits], reply.ack_bits});
+  put_word_of(sink, format.cpw, reply.cpw, false);
+  put_word_of(sink, format.spw, reply.spw, true);
+}
+Explanation explain_safety(const SafetyFormat& format, Error error, Bytes, Bytes) {
+  if (error == Error::sequence_mismatch) {
+    return {"the life counter of the safety word did not go on by one: a frame was lost, or sent twice"};
   }
-  static constexpr Resolution resolution(const SafetyFormat& format) { return resolution_of(format.cpw.word, {}); }
-  static constexpr bool is_usable(const SafetyFormat& format) {
-    return biss::is_usable(format) && absenc::is_usable(format.cpw.word) && absenc::is_usable(format.spw.word);
-  }
+  if (error == Error::cross_check_failed) return {"control word and safety word show different positions"};
+  return explain_frame(format, error);
+}
 
-  static constexpr auto commands = commands_of<SafetyDefinition, SafetyFormat>(is_usable);
+constexpr Report<ProtocolOf<SafetyFormat>> safety_report{.put_reply = put_safety_reply, .explain = explain_safety};
+constexpr auto safety_commands = commands_of<safety_report, SafetyFormat>(is_safety_possible);
 
-  static constexpr void put(FieldSink& sink, const SafetyFormat& format, const SafetyReply& reply) {
-    put_line_delay(sink, format, reply);
-    sink.put({&own_fields[field_ack_bits], reply.ack_bits});
-    put_word_of(sink, format.cpw, reply.cpw, false);
-    put_word_of(sink, format.spw, reply.spw, true);
-  }
-  static Explanation explain(const SafetyFormat& format, Error error, Bytes, Bytes) {
-    if (error == Error::sequence_mismatch) {
-      return {"the life counter of the safety word did not go on by one: a frame was lost, or sent twice"};
-    }
-    if (error == Error::cross_check_failed) return {"control word and safety word show different positions"};
-    return explain_frame(format, error);
-  }
-  static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
-    const SafetyFormat made = format(values);
-    return made.cpw.check.width != 0 && made.spw.check.width != 0 && is_behind_ack(reply, bit);
-  }
+bool is_safety_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
+  const SafetyFormat made = safety_format(values);
+  return made.cpw.check.width != 0 && made.spw.check.width != 0 && is_behind_ack(reply, bit);
+}
+
+constexpr Declaration<ProtocolOf<SafetyFormat>, VirtualEncoderOf<SafetyFormat>> safety_declaration{
+    .id = "biss-safety",
+    .name = "BiSS Safety",
+    .document = "BiSS C Protocol Description rev D2, BiSS Safety",
+    .link = LinkKind::clocked,
+    .options = safety_options.infos,
+    .format = safety_format,
+    .models = safety_models,
+    .fields = all_safety_fields,
+    .commands = safety_commands,
+    .vectors = safety_vectors,
+    .frames_size = 2400,
+    .report = safety_report,
+    .line = line_of<SafetyFormat>,
+    .resolution = safety_resolution,
+    .is_usable = is_safety_possible,
+    .decode = decode_frame<safety_report, is_safety_possible, SafetyFormat>,
+    .is_checked = is_safety_checked,
+    .control_bit = control_bit,
+    .alarms = &safety_fields[field_alarms],
+    .memory = registers::areas,
 };
 
 }  // namespace
 
-constinit const Unit safety_unit = UnitOf<SafetyDefinition>::make();
+constinit const Unit safety_unit = Descriptor<safety_declaration>::make();
 
 }  // namespace absenc::biss

@@ -36,7 +36,7 @@ struct Settings {
 
 constexpr std::array<std::string_view, 2> carries_choices{"biss", "ssi"};
 
-constexpr OptionsOf options{
+constexpr auto options = OptionsOf{
     OptionOf<&Settings::singleturn_bits>{singleturn_bits_option},
     OptionOf<&Settings::multiturn_bits>{multiturn_bits_option},
     OptionOf<&Settings::multiturn_first>{multiturn_first_option},
@@ -148,122 +148,136 @@ constexpr void put_samples(FieldSink& sink, const Format& format, std::uint64_t 
   if (is_biss) sink.put({&biss::own_fields[biss::field_crc], position.crc});
 }
 
+// ---- What is shown
+
+constexpr void put_request(FieldSink& sink, const Format& format, const Request& request) {
+  Found found;
+  found.command.emplace().append(trimmed(Protocol::encode(format, request)));
+  own_fields.put(sink, found);
+}
+constexpr void put_reply(FieldSink& sink, const Format& format, const Request& request, const Reply& reply) {
+  if (request.letter == letter::samples) return put_samples(sink, format, reply.samples);
+  if (!letter::is_in(letter::answered_by_a_line, request.letter)) return put_request(sink, format, request);
+  Found found;
+  found.take(request.letter, reply);
+  own_fields.put(sink, found);
+}
+void put_found(FieldSink& sink, const Format& format, const Found& found) {
+  if (found.reading.singleturn_bits != 0) put_samples(sink, format, found.samples);
+  own_fields.put(sink, found);
+}
+void put_left(FieldSink& sink, const Format&, const Found& found) {
+  if (found.left != 0) left_fields.put(sink, found);
+}
+
+constexpr Report<Protocol> report{
+    .put_request = put_request,
+    .put_reply = put_reply,
+    .explain = explain,
+    .noise_advice = check_stream,
+};
+constexpr Finding<Format, Found> found{.put = put_found, .put_left = put_left};
+
+// ---- Commands
+
+// Readings can be told from angles only when a linear encoder has its unit.
+constexpr bool is_readable(const Format& format) { return fits(format) && absenc::is_usable(format.scale); }
+
+template <std::uint8_t one>
+constexpr Request asks(const Format&) {
+  return {one};
+}
+template <std::uint8_t one>
+constexpr Request does(const Format&, Arguments) {
+  return {one};
+}
+constexpr Request selects(const Format&, Arguments arguments) { return {letter::set_clock, clock_of(arguments[0])}; }
+constexpr std::array<Argument, 1> clock_arguments{
+    {{"clock", "1 to 8, or 35 70 140 280 560 1100 2200 4400 kHz", 1, 4400}}};
+constexpr std::array<Argument, 1> sweep_arguments{{{"frames", "to read at each clock", 1, 1000, 20, false}}};
+constexpr auto commands = std::array{
+    command<report, found, read, does<letter::samples>>(
+        {"position", Verb::read, 0, "position, turns, error and warning"})
+        .only_if(is_readable),
+    command<report, found, inform, does<letter::version>>(
+        {"info", Verb::info, 0, "version, serial number, supply and MA clock of the interface"}),
+    reading<report, asks<letter::clock>>({"clock", Verb::config_get, 0, "MA clock"}),
+    command<report, found, set_clock, selects>(
+        {"set-clock", Verb::config_set, 0, "set the MA clock", clock_arguments, true, false, "clock"}),
+    reading<report, asks<letter::width>>({"width", Verb::config_get, 0, "width of the position that ? gives"}),
+    command<report, found, set_zero, does<letter::zero>>(
+        {"set-zero", Verb::run, 0, "the interface's own zero: decimal counts from here", {}, true, false}),
+    reading<report, asks<letter::clear_zero>>({"clear-zero", Verb::run, 0, "take that zero away", {}, true, false}),
+    reading<report, asks<letter::decimal>>({"decimal", Verb::read_part, 0, "position from that zero, by ?"}),
+    command<report, found, switch_supply, does<letter::supply_on>, true>(
+        {"supply-on", Verb::run, 0, "switch the encoder's supply on", {}, true, false}),
+    command<report, found, switch_supply, does<letter::supply_off>, false>(
+        {"supply-off", Verb::run, 0, "switch the encoder's supply off", {}, true, false}),
+    reading<report, asks<letter::stream_off>>(
+        {"stream-off", Verb::run, 0, "end the stream of positions that somebody began"}),
+    command<report, found, sweep_clocks, does<letter::samples>>(
+        {"clock-sweep", Verb::run, 0, "count the good frames at every MA clock and recommend one", sweep_arguments,
+         false, false})
+        .only_if(is_readable),
+};
+
 // ---- What is declared
 
-struct Definition : Declares<Definition, e201::Protocol> {
-  using Encoder = VirtualInterface;
-  static constexpr std::string_view id = "e201", name = "RLS E201-9S USB interface",
-                                    document = "RLS E201-9S Decoding the BiSS information";
-  static constexpr LinkKind link = LinkKind::full_duplex;
-  static constexpr LineTiming timing{.turnaround_limit = answer_limit};
-  static constexpr std::size_t frames_size = 1200;
-  static constexpr bool frames_are_texts = true;
-  static constexpr std::string_view noise_advice = check_stream;
+constexpr Format format_by(const Options& values) {
+  return format_of(options.format(values), values.has_word() ? &values.word : nullptr);
+}
+constexpr LineSettings line_of(const Format&) { return line_settings; }
+constexpr Resolution resolution_by(const Format& format) { return resolution_of(format.word, format.scale); }
+constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
+  const std::size_t end = end_of_first_line(begin);
+  return end != 0 ? end : begin.size() + 1;
+}
+constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{letter::samples}; }
 
-  static constexpr auto options = e201::options;
-  static constexpr auto models = position_models;
-  static constexpr struct { decltype(all_fields) infos; } fields{all_fields};
-  static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
-  static constexpr auto vectors = e201::vectors;
+// What follows the CRC is ignored, capitals are the same digits, and neither SSI nor text has a checksum.
+bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
+  const Format f = format_by(values);
+  const Result<std::uint64_t> samples = decode_samples(reply.bytes);
+  if (!samples || f.carries == Carries::ssi) return false;
+  const Position position = decode_position(f, *samples).value();
+  const std::size_t character = bit / 8;
+  if (character + 1 == samples_length) return true;
+  const std::uint8_t right = reply.bytes[character];
+  const int before = hex_digit(static_cast<char>(right));
+  const int after = hex_digit(static_cast<char>(right ^ 1u << bit % 8));
+  if (after < 0) return true;
+  const auto changed = static_cast<unsigned>(before ^ after);
+  if (changed == 0) return false;
+  const std::size_t first_changed = character * 4 + static_cast<unsigned>(std::countl_zero(changed << 28));
+  return first_changed < biss::idle_bits + position.ack_bits + 2 + biss::data_bits(f.biss());
+}
 
-  static constexpr Format format(const Options& values) {
-    return format_of(options.format(values), values.has_word() ? &values.word : nullptr);
-  }
-  static constexpr bool is_usable(const Format& format) { return fits(format); }
-  // Readings can be told from angles only when a linear encoder has its unit.
-  static constexpr bool is_readable(const Format& format) { return fits(format) && absenc::is_usable(format.scale); }
-  static constexpr LineSettings line(const Format&) { return line_settings; }
-  static constexpr Resolution resolution(const Format& format) { return resolution_of(format.word, format.scale); }
-  static constexpr std::size_t reply_size(const Format&, Bytes begin) {
-    const std::size_t end = end_of_first_line(begin);
-    return end != 0 ? end : begin.size() + 1;
-  }
-  static constexpr Request guess_request(const Format&, Bytes) { return {letter::samples}; }
-
-  template <std::uint8_t one>
-  static constexpr Request asks(const Format&) {
-    return {one};
-  }
-  template <std::uint8_t one>
-  static constexpr Request does(const Format&, Arguments) {
-    return {one};
-  }
-  static constexpr Request selects(const Format&, Arguments arguments) {
-    return {letter::set_clock, clock_of(arguments[0])};
-  }
-  static constexpr std::array<Argument, 1> clock_arguments{
-      {{"clock", "1 to 8, or 35 70 140 280 560 1100 2200 4400 kHz", 1, 4400}}};
-  static constexpr std::array<Argument, 1> sweep_arguments{{{"frames", "to read at each clock", 1, 1000, 20, false}}};
-  static constexpr std::array commands{
-      command<Found, read, does<letter::samples>>({"position", Verb::read, 0, "position, turns, error and warning"})
-          .only_if(is_readable),
-      command<Found, inform, does<letter::version>>(
-          {"info", Verb::info, 0, "version, serial number, supply and MA clock of the interface"}),
-      reading<asks<letter::clock>>({"clock", Verb::config_get, 0, "MA clock"}),
-      command<Found, set_clock, selects>(
-          {"set-clock", Verb::config_set, 0, "set the MA clock", clock_arguments, true, false, "clock"}),
-      reading<asks<letter::width>>({"width", Verb::config_get, 0, "width of the position that ? gives"}),
-      command<Found, set_zero, does<letter::zero>>(
-          {"set-zero", Verb::run, 0, "the interface's own zero: decimal counts from here", {}, true, false}),
-      reading<asks<letter::clear_zero>>({"clear-zero", Verb::run, 0, "take that zero away", {}, true, false}),
-      reading<asks<letter::decimal>>({"decimal", Verb::read_part, 0, "position from that zero, by ?"}),
-      command<Found, switch_supply, does<letter::supply_on>, true>(
-          {"supply-on", Verb::run, 0, "switch the encoder's supply on", {}, true, false}),
-      command<Found, switch_supply, does<letter::supply_off>, false>(
-          {"supply-off", Verb::run, 0, "switch the encoder's supply off", {}, true, false}),
-      reading<asks<letter::stream_off>>(
-          {"stream-off", Verb::run, 0, "end the stream of positions that somebody began"}),
-      command<Found, sweep_clocks, does<letter::samples>>({"clock-sweep", Verb::run, 0,
-                                                           "count the good frames at every MA clock and recommend one",
-                                                           sweep_arguments, false, false})
-          .only_if(is_readable),
-  };
-
-  static constexpr void put(FieldSink& sink, const Format& format, const Request& request) {
-    Found found;
-    found.command.emplace().append(trimmed(Protocol::encode(format, request)));
-    own_fields.put(sink, found);
-  }
-  static constexpr void put(FieldSink& sink, const Format& format, const Request& request, const Reply& reply) {
-    if (request.letter == letter::samples) return put_samples(sink, format, reply.samples);
-    if (!letter::is_in(letter::answered_by_a_line, request.letter)) return put(sink, format, request);
-    Found found;
-    found.take(request.letter, reply);
-    own_fields.put(sink, found);
-  }
-  static void put(FieldSink& sink, const Format& format, const Found& found) {
-    if (found.reading.singleturn_bits != 0) put_samples(sink, format, found.samples);
-    own_fields.put(sink, found);
-  }
-  static void put_left(FieldSink& sink, const Format&, const Found& found) {
-    if (found.left != 0) left_fields.put(sink, found);
-  }
-
-  static Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {
-    return e201::explain(format, error, request, reply);
-  }
-
-  // What follows the CRC is ignored, capitals are the same digits, and neither SSI nor text has a checksum.
-  static bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
-    const Format f = format(values);
-    const Result<std::uint64_t> samples = decode_samples(reply.bytes);
-    if (!samples || f.carries == Carries::ssi) return false;
-    const Position position = decode_position(f, *samples).value();
-    const std::size_t character = bit / 8;
-    if (character + 1 == samples_length) return true;
-    const std::uint8_t right = reply.bytes[character];
-    const int before = hex_digit(static_cast<char>(right));
-    const int after = hex_digit(static_cast<char>(right ^ 1u << bit % 8));
-    if (after < 0) return true;
-    const auto changed = static_cast<unsigned>(before ^ after);
-    if (changed == 0) return false;
-    const std::size_t first_changed = character * 4 + static_cast<unsigned>(std::countl_zero(changed << 28));
-    return first_changed < biss::idle_bits + position.ack_bits + 2 + biss::data_bits(f.biss());
-  }
+constexpr Declaration<Protocol, VirtualInterface> declaration{
+    .id = "e201",
+    .name = "RLS E201-9S USB interface",
+    .document = "RLS E201-9S Decoding the BiSS information",
+    .link = LinkKind::full_duplex,
+    .options = options.infos,
+    .format = format_by,
+    .models = position_models,
+    .fields = all_fields,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_are_texts = true,
+    .frames_size = 1200,
+    .report = report,
+    .line = line_of,
+    .resolution = resolution_by,
+    .is_usable = fits,
+    .guess_request = guess_request,
+    .reply_size = size_of_reply,
+    .is_checked = is_checked,
+    .alarms = &all_fields[word_field_alarms],
+    .timing = {.turnaround_limit = answer_limit},
 };
 
 }  // namespace
 
-constinit const Unit unit = UnitOf<Definition>::make();
+constinit const Unit unit = Descriptor<declaration>::make();
 
 }  // namespace absenc::e201

@@ -2,7 +2,7 @@
 // Registers of the virtual AksIM-2 are read and written, on both interfaces.
 #include "absenc/protocol/encolink/procedures.hpp"
 
-#include "absenc/protocol/author/command.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/encolink/bench_test.hpp"
 
 namespace absenc::encolink {
@@ -379,13 +379,12 @@ author::Procedure read_twice(Dialog& dialog, Found& found) {
 struct Twice {
   using Format = encolink::Format;
   using Dialog = encolink::Dialog;
-  static void put(FieldSink&, const Dialog&) {}
 };
 
 TEST_P(EncolinkRegister, AnAccessAfterARefusal) {
   Bench bench(testing::multi, interface);
   std::array<std::byte, 4000> frames{};
-  author::Told<Twice, author::Run<Twice, Found, read_twice>> twice(bench.encoder.format(), {}, frames);
+  author::Run<Twice, Found, read_twice> twice(bench.encoder.format(), {}, frames);
   EXPECT_EQ(bench.run(twice).error, Error::none);
   EXPECT_EQ(load_big_endian(twice.found().data), 350u);
   EXPECT_EQ(bench.first_violation(), "");

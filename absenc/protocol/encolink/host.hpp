@@ -70,7 +70,7 @@ class ReadPosition : public author::HostOf<Frames> {
   [[nodiscard]] const Reading* reading() const final {
     return error() == Error::none && channels_.reading.singleturn_bits != 0 ? &channels_.reading : nullptr;
   }
-  [[nodiscard]] const Channels& channels() const { return channels_; }
+  [[nodiscard]] const Channels& found() const { return channels_; }
 
  private:
   void concluded(Error error) final;

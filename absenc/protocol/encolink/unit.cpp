@@ -24,7 +24,7 @@ constexpr std::array<std::string_view, 2> offset_signs{"add", "subtract"};
 constexpr std::array<std::string_view, 2> offset_units{"counts", "turn_fraction"};
 constexpr std::array<std::string_view, 2> generations{"2", "4"};
 
-constexpr author::OptionsOf options{
+constexpr auto options = author::OptionsOf{
     option<&Format::resolution>("resolution",
                                 "bits of a turn; 0: asked from the encoder before each command (decode: 22)", 0,
                                 maximum_resolution),
@@ -63,6 +63,7 @@ struct Request {
 struct Protocol {
   using Format = encolink::Format;
   using Request = encolink::Request;
+  using Reply = Position;
   using Dialog = encolink::Dialog;
 
   static AccessBytes encode(const Format&, const Request& request) {
@@ -143,69 +144,72 @@ bool is_checked(const Options& values, Frame request, Frame reply, std::size_t b
   return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
 }
 
-// ---- What is told
+// ---- What is shown
 
-/// Of a conversation, as author/command.hpp asks for it.
-struct Report {
-  static void put(FieldSink& sink, const ReadPosition& read) {
-    put_position(sink, read.format(), read.last(), read.channels().status);
+using Host = author::HostOf<Frames>;
+
+void put_channels(FieldSink& sink, const Host& host, const Channels& channels) {
+  put_position(sink, host.format(), host.last(), channels.status);
+}
+void put_register(FieldSink& sink, std::uint32_t address, Bytes data) {
+  const Register* known = find_register(address);
+  const bool in_table = known != nullptr && known->size == data.size();
+  Values values{.address = address, .length = data.size(), .data = data};
+  if (known != nullptr) values.name = known->name;
+  if (!in_table && data.size() < 8) values.value = load_big_endian(data);
+  frame_fields.put(sink, values);
+  if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
+}
+void put_found(FieldSink& sink, const Host& host, const Found& found) {
+  if (found.identity) {
+    frame_fields.put(sink, {.identity = found.identity});
+    if (found.identity->protocol_version == version::aksim4) {
+      const Bytes why(reinterpret_cast<const std::uint8_t*>(not_described.data()), not_described.size());
+      sink.put({.info = &not_described_field, .bytes = why});
+    }
+  } else if (found.address) {
+    put_register(sink, *found.address, found.data);
+  } else {
+    put_position(sink, host.format(), host.last(), found.tells_status ? found.status : std::nullopt);
   }
-  template <class Run>
-  static void put(FieldSink& sink, const Run& run) {
-    put_found(sink, run, run.found());
-  }
-  static void put_found(FieldSink& sink, const Dialog& dialog, const Found& found) {
-    if (found.identity) {
-      frame_fields.put(sink, {.identity = found.identity});
-      if (found.identity->protocol_version == version::aksim4) {
-        const Bytes why(reinterpret_cast<const std::uint8_t*>(not_described.data()), not_described.size());
-        sink.put({.info = &not_described_field, .bytes = why});
+  for (const Found::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
+  if (found.running) sink.put({&running_field, *found.running ? 1 : 0});
+}
+Explanation explain_host(const Host& host) {
+  const Ask ask = host.request().ask;
+  const bool of_identity = ask == Ask::identify || ask == Ask::identity;
+  const Bytes reply = host.reply();
+  switch (host.error()) {
+    case Error::unexpected_reply:
+      if (!decode_identity(reply)) return {};
+      return {
+          "the identity says another resolution than the options, or disagrees on whether there are turns: "
+          "leave resolution and multiturn_bits out, and it is asked"};
+    case Error::wrong_length:
+      if (of_identity) {
+        return {"the encoder did not identify itself: it is starting, or resolution and multiturn_bits must be set"};
       }
-    } else if (found.address) {
-      put_register(sink, *found.address, found.data);
-    } else {
-      put_position(sink, dialog.format(), dialog.last(), found.tells_status ? found.status : std::nullopt);
-    }
-    for (const Found::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
-    if (found.running) sink.put({&running_field, *found.running ? 1 : 0});
+      if (host.is_disturbed() || reply.size() > host.format().frame_bytes()) {
+        return {"more came than one frame: other turns, or more than one sender"};
+      }
+      return {"the reply ended early"};
+    case Error::out_of_range:
+      return {of_identity ? std::string_view{} : wrong_resolution};
+    case Error::line_stuck:
+      return {reply[0] == 0 ? "MISO stayed low" : "MISO stayed high"};
+    default:
+      return {};
   }
-  static void put_register(FieldSink& sink, std::uint32_t address, Bytes data) {
-    const Register* known = find_register(address);
-    const bool in_table = known != nullptr && known->size == data.size();
-    Values values{.address = address, .length = data.size(), .data = data};
-    if (known != nullptr) values.name = known->name;
-    if (!in_table && data.size() < 8) values.value = load_big_endian(data);
-    frame_fields.put(sink, values);
-    if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
-  }
+}
+/// Of a frame, which captures have.
+constexpr Explanation explain(const Format&, Error error, Bytes, Bytes reply) {
+  const bool frame = reply.size() < identity_bytes;
+  return {error == Error::out_of_range && frame ? wrong_resolution : std::string_view{}};
+}
 
-  static Explanation explain(const author::HostOf<Frames>& host) {
-    const Ask ask = host.request().ask;
-    const bool of_identity = ask == Ask::identify || ask == Ask::identity;
-    const Bytes reply = host.reply();
-    switch (host.error()) {
-      case Error::unexpected_reply:
-        if (!decode_identity(reply)) return {};
-        return {
-            "the identity says another resolution than the options, or disagrees on whether there are turns: "
-            "leave resolution and multiturn_bits out, and it is asked"};
-      case Error::wrong_length:
-        if (of_identity) {
-          return {"the encoder did not identify itself: it is starting, or resolution and multiturn_bits must be set"};
-        }
-        if (host.is_disturbed() || reply.size() > host.format().frame_bytes()) {
-          return {"more came than one frame: other turns, or more than one sender"};
-        }
-        return {"the reply ended early"};
-      case Error::out_of_range:
-        return {of_identity ? std::string_view{} : wrong_resolution};
-      case Error::line_stuck:
-        return {reply[0] == 0 ? "MISO stayed low" : "MISO stayed high"};
-      default:
-        return {};
-    }
-  }
-};
+constexpr author::Report<Protocol, Host> report{.explain = explain, .explain_host = explain_host};
+constexpr author::Finding<Host, Channels> channels{.put = put_channels};
+constexpr author::Finding<Host, Found> found{.put = put_found};
 
 // ---- Commands
 
@@ -223,14 +227,13 @@ constexpr std::array<Argument, 1> lock_arguments{{{"value", "0: open, 1: locked"
 
 template <auto procedure, auto... bound>
 constexpr CommandOf<Protocol> command(const Command& info, MakeRequest request) {
-  CommandOf<Protocol> made =
-      author::command<Report, Protocol, Found, procedure, frame<Config::position>, bound...>(info);
+  CommandOf<Protocol> made = author::command<report, found, procedure, frame<Config::position>, bound...>(info);
   made.request = request;
   return made;
 }
 
 constexpr CommandOf<Protocol> position(const Command& info) {
-  using Made = author::Told<Report, ReadPosition>;
+  using Made = author::Reported<report, ReadPosition, channels>;
   return {.info = info,
           .request = frame<Config::position>,
           .make = [](const Format& format, Arguments,
@@ -252,7 +255,7 @@ constexpr CommandOf<Protocol> listen(const Command& info) {
 constexpr bool streams(const Format& format) { return format.interface == Interface::uart && format.stream_rate > 0; }
 
 constexpr Command read_position{"position", Verb::read, 0, "position, turns, and the alarms when there are any"};
-constexpr std::array commands_of_unit{
+constexpr auto commands_of_unit = std::array{
     position(read_position).or_when(streams, listen(read_position)),
     command<read_alarms>({"alarms", Verb::read_part, 0, "detailed status from channel 2, checked against channel 1"},
                          frame<Config::reset_channels>),
@@ -368,73 +371,66 @@ constexpr std::array<RegisterInfo, registers.size()> register_infos = [] {
   return infos;
 }();
 
-struct FieldTable {
-  std::span<const FieldInfo> infos;
-};
+constexpr LineSettings uart_line(const Format&) { return uart_settings; }
+constexpr LineSettings spi_line(const Format&) { return spi_settings; }
+constexpr auto models =
+    std::array{author::ModelText{"AksIM-2", "off-axis; resolution and turns as its identity says", 10'000, ""}};
+
+template <Interface interface>
+constexpr Format format_of(const Options& values) {
+  Format made = options.format(values);
+  made.interface = interface;
+  return made;
+}
+// Those of the virtual encoder where they are asked from the real one.
+constexpr Resolution resolution_of(const Format& format) {
+  return {format.resolution != 0 ? format.resolution : virtual_format.resolution,
+          static_cast<unsigned>(format.multiturn_bits >= 0 ? format.multiturn_bits : virtual_format.multiturn_bits)};
+}
+constexpr Error decode_frames(const Format& format, Frame asked, Frame reply, FieldSink& sink) {
+  return decode(format, asked.bytes, reply.bytes, sink);
+}
+constexpr bool is_streaming(const Options& values) { return options.format(values).stream_rate > 0; }
+template <Interface interface>
+BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+  return bits_of(format_of<interface>(values), reply.bytes, field);
+}
 
 /// What the document says of both interfaces, and of each.
 template <Interface interface>
-struct Definition {
-  using Protocol = encolink::Protocol;
-  using Encoder = VirtualEncoder;
-  static constexpr bool spi = interface == Interface::spi;
-  static constexpr std::string_view id = spi ? "encolink-spi" : "encolink";
-  static constexpr std::string_view name = spi ? "RLS EncoLink (AksIM-2), SPI" : "RLS EncoLink (AksIM-2), UART";
-  static constexpr std::string_view document =
-      "Programming AksIM-2 encoders with EncoLink communication protocol, issue 2";
-  static constexpr LinkKind link = spi ? LinkKind::spi : LinkKind::full_duplex;
-  static constexpr LineSettings line(const Format&) { return spi ? spi_settings : uart_settings; }
-  static constexpr LineTiming timing{.turnaround_limit = answer_limit};
-  static constexpr auto& options = encolink::options;
-  static constexpr std::array models{
-      author::ModelText{"AksIM-2", "off-axis; resolution and turns as its identity says", 10'000, ""}};
-  static constexpr FieldTable fields{encolink::fields};
-  static constexpr auto& commands = commands_of_unit;
-  static constexpr auto vectors = [] {
-    if constexpr (spi) {
-      return vector_texts::spi;
-    } else {
-      return vector_texts::uart;
-    }
-  }();
-  static constexpr std::size_t frames_size = 2000;
-  static constexpr auto& conditions = encolink::conditions;
-  static constexpr const FieldInfo* status = &general_status_field;
-  static constexpr const FieldInfo* alarms = frame_fields.of<detail::alarms_of>();
-  static constexpr auto& registers = register_infos;
-  static constexpr const Unit* over_spi = spi ? nullptr : &spi_unit;
-  static constexpr auto probe = encolink::probe;
-  static constexpr auto is_checked = encolink::is_checked;
-  static bool streams(const Options& values) { return format(values).stream_rate > 0; }
-  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
-    return bits_of(format(values), reply.bytes, field);
-  }
-
-  static constexpr Format format(const Options& values) {
-    Format made = options.format(values);
-    made.interface = interface;
-    return made;
-  }
-  // Those of the virtual encoder where they are asked from the real one.
-  static constexpr Resolution resolution(const Format& format) {
-    return {format.resolution != 0 ? format.resolution : virtual_format.resolution,
-            static_cast<unsigned>(format.multiturn_bits >= 0 ? format.multiturn_bits : virtual_format.multiturn_bits)};
-  }
-  static constexpr std::size_t reply_size(const Format& format, Bytes begin) {
-    return encolink::reply_size(format, begin);
-  }
-  static constexpr Error decode(const Format& format, Frame asked, Frame reply, FieldSink& sink) {
-    return encolink::decode(format, asked.bytes, reply.bytes, sink);
-  }
-  static constexpr Explanation explain(const Format&, Error error, Bytes, Bytes reply) {
-    const bool frame = reply.size() < identity_bytes;
-    return {error == Error::out_of_range && frame ? wrong_resolution : std::string_view{}};
-  }
+constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
+    .id = interface == Interface::spi ? "encolink-spi" : "encolink",
+    .name = interface == Interface::spi ? "RLS EncoLink (AksIM-2), SPI" : "RLS EncoLink (AksIM-2), UART",
+    .document = "Programming AksIM-2 encoders with EncoLink communication protocol, issue 2",
+    .link = interface == Interface::spi ? LinkKind::spi : LinkKind::full_duplex,
+    .options = options.infos,
+    .format = format_of<interface>,
+    .models = models,
+    .fields = fields,
+    .commands = commands_of_unit,
+    .vectors =
+        interface == Interface::spi ? std::span<const author::VectorText>(vector_texts::spi) : vector_texts::uart,
+    .frames_size = 2000,
+    .report = report,
+    .line = interface == Interface::spi ? spi_line : uart_line,
+    .resolution = resolution_of,
+    .reply_size = reply_size,
+    .decode = decode_frames,
+    .is_checked = is_checked,
+    .bits = bits_in<interface>,
+    .probe = probe,
+    .streams = is_streaming,
+    .status = &general_status_field,
+    .alarms = frame_fields.of<detail::alarms_of>(),
+    .registers = register_infos,
+    .conditions = conditions,
+    .timing = {.turnaround_limit = answer_limit},
+    .over_spi = interface == Interface::spi ? nullptr : &spi_unit,
 };
 
 }  // namespace
 
-constinit const Unit unit = author::UnitOf<Definition<Interface::uart>>::make();
-constinit const Unit spi_unit = author::UnitOf<Definition<Interface::spi>>::make();
+constinit const Unit unit = author::Descriptor<declaration<Interface::uart>>::make();
+constinit const Unit spi_unit = author::Descriptor<declaration<Interface::spi>>::make();
 
 }  // namespace absenc::encolink

@@ -78,7 +78,7 @@ constexpr auto open_option(std::string_view name, std::string_view meaning, cons
 }  // namespace detail
 
 /// First those that the document leaves open.
-inline constexpr author::OptionsOf options{
+inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::crc_bit_order>(
         "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",
         choices::crc_bit_order),

@@ -74,143 +74,154 @@ Check check_behind(const Profile& profile, Error error, Bytes request, Bytes rep
   return error_of(check) == error ? check : Check::passed;
 }
 
-// ---- What is declared
+// ---- What is shown, of frames and of what procedures find
 
-template <Channel channel>
-constexpr const FieldInfo* status_of = fields.of<detail::in<channel, part::status, &ChannelReply::status>>();
-template <Channel channel>
-constexpr const FieldInfo* alarms_of = fields.of<detail::in<channel, part::alarms, &ChannelReply::alarms>>();
+constexpr Shown values_of_request(const Profile& profile, const Request& request) { return {profile, request}; }
+constexpr Shown values_of_reply(const Profile&, const Request&, const Reply& reply) { return Shown(reply); }
+void put_found(FieldSink& sink, const Profile&, const Found& found) { fields.put(sink, found); }
+void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
+  for (std::uint8_t node = 0; node < most_encoders; ++node) {
+    const std::optional<Reply>& reply = nodes.answers[node];
+    if (!reply && !nodes.disturbed[node]) continue;
+    Shown node_shown;
+    node_shown.encoder_address = node;
+    node_shown.clash = !reply;
+    node_shown.reply = reply;
+    fields.put(sink, node_shown);
+    if (reply) sink.put_reading(to_reading(*reply));
+  }
+}
+// Of the last exchange, and which profile would make its reply good.
+void tell(Sentence& words, const HostOf<Protocol>& host) {
+  const Profile& profile = host.format();
+  const Bytes request = host.exchange().sent;
+  if (host.error() == Error::timeout) {
+    words.add("it is also silent when request_crc, crc_bit_order or address is another");
+    const std::optional<DataId> asked = request.empty() ? std::nullopt : data_id(request[0]);
+    if (asked && is_memory_access(*asked)) {
+      words.add_part("and to memory requests when others share its line (Figure 18)");
+    }
+    return;
+  }
+  if (host.is_disturbed()) return;
+  const Check check = check_behind(profile, host.error(), request, host.reply());
+  if (check == Check::passed) return;
+  words.add(text_of(check).sentence);
+  std::string_view before = "; the reply is good with the profile ";
+  const auto change = find_change(profile, host.reply());
+  for (const OptionValue& one : change.view()) {
+    const Option& option = options.infos[one.option];
+    words.add(before).add(option.name).add("=").add(option.choices[static_cast<std::size_t>(one.value)]);
+    before = " ";
+  }
+}
+Explanation explain_reply(const Profile& profile, Error error, Bytes request, Bytes reply) {
+  const Check check = check_behind(profile, error, request, reply);
+  if (check == Check::length) return {};  // the error says all of it
+  return {.detail = text_of(check).sentence};
+}
 
-struct Definition;
+constexpr Report<Protocol, HostOf<Protocol>> report{
+    .put_request = put_values<fields, values_of_request>,
+    .put_reply = put_values<fields, values_of_reply>,
+    .explain = explain_reply,
+    .tell = tell,
+};
+constexpr Finding<Profile, Found> found{.put = put_found};
+constexpr Finding<Profile, Nodes> nodes{.put = put_nodes};
 
 template <DataId data>
 constexpr CommandOf<Protocol> read(std::string_view name, Verb verb, std::string_view meaning) {
-  return reading<Definition, Protocol, ask<data>>({name, verb, 0, meaning});
+  return reading<report, ask<data>>({name, verb, 0, meaning});
 }
 template <auto procedure, auto request, auto... bound>
 constexpr CommandOf<Protocol> run(const Command& info) {
-  return command<Definition, Protocol, Found, procedure, request, bound...>(info);
+  return command<report, found, procedure, request, bound...>(info);
 }
 template <DataId data>
 constexpr CommandOf<Protocol> reset_by(std::string_view name, Verb verb, std::string_view meaning) {
   return run<reset, ask<data>, data>({name, verb, 0, meaning, {}, true, false});
 }
 
-struct Definition {
-  using Protocol = esl::Protocol;
-  using Encoder = VirtualEncoder;
-  static constexpr std::string_view id = "esl", name = "QS35 ESL (safety encoder, two channels)",
-                                    document = "QS35 ESL Protocol Specification, rev 1.5";
-  static constexpr LinkKind link = LinkKind::half_duplex;
-  static constexpr LineSettings line(const Profile&) { return line_settings; }
-  static constexpr std::size_t frames_size = 1200;
+constexpr auto commands = std::array{
+    read<DataId::position>("position", Verb::read, "position, turns and alarms of both channels"),
+    read<DataId::singleturn>("singleturn", Verb::read_part, "position within the turn, both channels"),
+    read<DataId::position_short>("position-short", Verb::read_part, "position and turns, one channel, no alarms"),
+    read<DataId::singleturn_short>("singleturn-short", Verb::read_part,
+                                   "position within the turn, one channel, no alarms"),
+    read<DataId::calibration>("calibration", Verb::read_part, "position within the turn as each channel sees it"),
+    run<read_safely, ask<DataId::position>>(
+        {"safe-position", Verb::run, 0,
+         "a position that passed every check of a safety reader (not a certified safety function)"}),
+    run<read_encoder_id, ask<DataId::encoder_id>>({"encoder-id", Verb::info, 0, "encoder id", {}, false, false}),
+    read<DataId::alarms>("alarms", Verb::info, "alarms of both channels"),
+    read<DataId::temperature>("temperature", Verb::temperature, "temperature inside the encoder"),
+    run<read_error_info, read_info>(
+        {"led-or-lissajous", Verb::run, 0, "which of the two is behind led_or_lissajous_error"})
+        .unless(no_memory),
+    command<report, nodes, scan, ask<DataId::singleturn_short>>(
+        {"scan", Verb::scan, 0, "who answers on the line", {}, false, false}),
+    reset_by<DataId::zero>("zero", Verb::zero, "make this the zero of the turn"),
+    reset_by<DataId::clear_alarms>("clear-alarms", Verb::clear_alarms, "clear the alarms that can be cleared"),
+    reset_by<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn, "set the turns to zero"),
+    run<read_memory, read_at>({"memory-read", Verb::memory_read, 0, "read EEPROM, MTP or registers", read_arguments})
+        .unless(no_memory),
+    run<write_memory, write_at>(
+        {"memory-write", Verb::memory_write, 0, "write a byte of the memory", write_arguments, true, false})
+        .unless(no_memory),
+    run<select_page, select>({"select-page", Verb::run, 0, "select a memory page", page_arguments, true, true})
+        .unless(no_memory),
+};
 
-  static constexpr const auto& options = esl::options;
-  static constexpr std::array models{
-      ModelText{"QS35-M40M-E12F", "24 bits, 65536 turns, two channels (SIL3)", 10'000, ""}};
-  static constexpr const auto& fields = esl::fields;
-  static constexpr const FieldInfo* status = status_of<Channel::one>;
-  static constexpr const FieldInfo* alarms = alarms_of<Channel::one>;
-  static constexpr const auto& vectors = esl::vectors;
-  static constexpr const auto& conditions = esl::conditions;
-  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
-    return place_of(options.format(values), reply.bytes, field);
-  }
-  static constexpr LineTiming timing{.pause_bits = 1, .turnaround = answer_time, .turnaround_limit = answer_limit};
-  static constexpr Resolution resolution(const Profile&) { return {singleturn_bits, multiturn_bits}; }
+// ---- What is declared
 
-  static constexpr std::array commands{
-      read<DataId::position>("position", Verb::read, "position, turns and alarms of both channels"),
-      read<DataId::singleturn>("singleturn", Verb::read_part, "position within the turn, both channels"),
-      read<DataId::position_short>("position-short", Verb::read_part, "position and turns, one channel, no alarms"),
-      read<DataId::singleturn_short>("singleturn-short", Verb::read_part,
-                                     "position within the turn, one channel, no alarms"),
-      read<DataId::calibration>("calibration", Verb::read_part, "position within the turn as each channel sees it"),
-      run<read_safely, ask<DataId::position>>(
-          {"safe-position", Verb::run, 0,
-           "a position that passed every check of a safety reader (not a certified safety function)"}),
-      run<read_encoder_id, ask<DataId::encoder_id>>({"encoder-id", Verb::info, 0, "encoder id", {}, false, false}),
-      read<DataId::alarms>("alarms", Verb::info, "alarms of both channels"),
-      read<DataId::temperature>("temperature", Verb::temperature, "temperature inside the encoder"),
-      run<read_error_info, read_info>(
-          {"led-or-lissajous", Verb::run, 0, "which of the two is behind led_or_lissajous_error"})
-          .unless(no_memory),
-      author::command<Definition, Protocol, Nodes, scan, ask<DataId::singleturn_short>>(
-          {"scan", Verb::scan, 0, "who answers on the line", {}, false, false}),
-      reset_by<DataId::zero>("zero", Verb::zero, "make this the zero of the turn"),
-      reset_by<DataId::clear_alarms>("clear-alarms", Verb::clear_alarms, "clear the alarms that can be cleared"),
-      reset_by<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn, "set the turns to zero"),
-      run<read_memory, read_at>({"memory-read", Verb::memory_read, 0, "read EEPROM, MTP or registers", read_arguments})
-          .unless(no_memory),
-      run<write_memory, write_at>(
-          {"memory-write", Verb::memory_write, 0, "write a byte of the memory", write_arguments, true, false})
-          .unless(no_memory),
-      run<select_page, select>({"select-page", Verb::run, 0, "select a memory page", page_arguments, true, true})
-          .unless(no_memory),
-  };
+template <Channel channel>
+constexpr const FieldInfo* status_of = fields.of<detail::in<channel, part::status, &ChannelReply::status>>();
+template <Channel channel>
+constexpr const FieldInfo* alarms_of = fields.of<detail::in<channel, part::alarms, &ChannelReply::alarms>>();
+constexpr auto models =
+    std::array{ModelText{"QS35-M40M-E12F", "24 bits, 65536 turns, two channels (SIL3)", 10'000, ""}};
 
-  // ---- What frames and procedures report
+constexpr LineSettings line_of(const Profile&) { return line_settings; }
+constexpr Resolution resolution_of(const Profile&) { return {singleturn_bits, multiturn_bits}; }
+BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+  return place_of(options.format(values), reply.bytes, field);
+}
+constexpr std::size_t size_of_reply(const Profile& profile, Bytes begin) {
+  return Protocol::request_size(profile, begin) == 0 ? 0 : reply_length(*data_id(begin[0]));
+}
+constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) { return asked_by(profile, {}, reply); }
 
-  static constexpr std::size_t reply_size(const Profile& profile, Bytes begin) {
-    return Protocol::request_size(profile, begin) == 0 ? 0 : reply_length(*data_id(begin[0]));
-  }
-  static constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) {
-    return asked_by(profile, {}, reply);
-  }
-  static constexpr Shown values(const Profile& profile, const Request& request) { return {profile, request}; }
-  static constexpr Shown values(const Profile&, const Request&, const Reply& reply) { return Shown(reply); }
-  static const Shown& values(const Profile&, const Found& found) { return found; }
-  static void put(FieldSink& sink, const Profile&, const Nodes& found) {
-    for (std::uint8_t node = 0; node < most_encoders; ++node) {
-      const std::optional<Reply>& reply = found.answers[node];
-      if (!reply && !found.disturbed[node]) continue;
-      Shown node_shown;
-      node_shown.encoder_address = node;
-      node_shown.clash = !reply;
-      node_shown.reply = reply;
-      fields.put(sink, node_shown);
-      if (reply) sink.put_reading(to_reading(*reply));
-    }
-  }
-  // Of the last exchange, and which profile would make its reply good.
-  static void tell(Sentence& words, const Profile& profile, const Engine& host) {
-    const Bytes request = host.exchange().sent;
-    if (host.error() == Error::timeout) {
-      words.add("it is also silent when request_crc, crc_bit_order or address is another");
-      const std::optional<DataId> asked = request.empty() ? std::nullopt : data_id(request[0]);
-      if (asked && is_memory_access(*asked)) {
-        words.add_part("and to memory requests when others share its line (Figure 18)");
-      }
-      return;
-    }
-    if (host.is_disturbed()) return;
-    const Check check = check_behind(profile, host.error(), request, host.reply());
-    if (check == Check::passed) return;
-    words.add(text_of(check).sentence);
-    std::string_view before = "; the reply is good with the profile ";
-    const auto change = find_change(profile, host.reply());
-    for (const OptionValue& one : change.view()) {
-      const Option& option = options.infos[one.option];
-      words.add(before).add(option.name).add("=").add(option.choices[static_cast<std::size_t>(one.value)]);
-      before = " ";
-    }
-  }
-  static Explanation explain(const Profile& profile, Error error, Bytes request, Bytes reply) {
-    const Check check = check_behind(profile, error, request, reply);
-    if (check == Check::length) return {};  // the error says all of it
-    return {.detail = text_of(check).sentence};
-  }
+constexpr Declaration<Protocol, VirtualEncoder, HostOf<Protocol>> declaration{
+    .id = "esl",
+    .name = "QS35 ESL (safety encoder, two channels)",
+    .document = "QS35 ESL Protocol Specification, rev 1.5",
+    .link = LinkKind::half_duplex,
+    .options = options.infos,
+    .format = format_of<options>,
+    .models = models,
+    .fields = fields.infos,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_size = 1200,
+    .report = report,
+    .line = line_of,
+    .resolution = resolution_of,
+    .guess_request = guess_request,
+    .reply_size = size_of_reply,
+    .bits = bits_in,
+    .probe = probe,
+    .status = status_of<Channel::one>,
+    .alarms = alarms_of<Channel::one>,
+    .second_status = status_of<Channel::two>,
+    .second_alarms = alarms_of<Channel::two>,
+    .memory = memory_map,
+    .conditions = conditions,
+    .timing = {.pause_bits = 1, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 
 }  // namespace
 
-constinit const Unit unit = [] {
-  Unit made = UnitOf<Definition>::make();
-  made.memory = memory_map;
-  made.second_status = status_of<Channel::two>;
-  made.second_alarms = alarms_of<Channel::two>;
-  made.probe = probe;
-  return made;
-}();
+constinit const Unit unit = Descriptor<declaration>::make();
 
 }  // namespace absenc::esl

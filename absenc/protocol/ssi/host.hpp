@@ -49,13 +49,13 @@ class ConfirmPosition : public author::ClockedHostOf<Protocol> {
 
  private:
   void clocked(BitView bits) final {
-    const Word before = found();
+    const Word before = last();
     const Time before_at = first_at_;
     const Error error = take(bits);
     if (error != Error::none) return conclude(error);
     if (second_) {
-      return conclude(can_follow(format(), before, found(), begun_at() - before_at) ? Error::none
-                                                                                    : Error::cross_check_failed);
+      return conclude(can_follow(format(), before, last(), begun_at() - before_at) ? Error::none
+                                                                                   : Error::cross_check_failed);
     }
     second_ = true;
     first_at_ = begun_at();

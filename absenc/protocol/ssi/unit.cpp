@@ -28,109 +28,121 @@ struct Settings : WordSettings<Format> {
 constexpr std::array<std::string_view, 3> error_bit_choices{"none", "active_high", "active_low"};
 constexpr std::array<std::string_view, 4> parity_choices{"none", "odd", "even", "error"};
 
-struct Definition {
-  using Protocol = ssi::Protocol;
-  using Encoder = VirtualEncoder;
-  static constexpr std::string_view id = "ssi", name = "SSI", document = "RAA38S6 manual, 3.5 SSI";
-  static constexpr LinkKind link = LinkKind::clocked;
-  static constexpr std::size_t frames_size = 0;
+constexpr auto options = OptionsOf{
+    OptionOf<&Settings::singleturn_bits>{{.name = "bits",
+                                          .meaning = "bits of the position within the turn",
+                                          .default_value = 12,
+                                          .minimum = 1,
+                                          .maximum = 64,
+                                          .describes_word = true}},
+    OptionOf<&Settings::multiturn_bits>{multiturn_bits_option},
+    OptionOf<&Settings::multiturn_first>{multiturn_first_option},
+    describing_word(option<&Settings::gray>("gray", "turns and position are one Gray-coded number")),
+    describing_word(option<&Settings::error_bit>("error_bit", "a bit behind the position", error_bit_choices)),
+    probeable(describing_word(option<&Settings::parity>(
+        "parity", "the last bit, over all before it; error: even, and inverted when the position is wrong",
+        parity_choices))),
+    OptionOf<&Settings::after_word>{after_word_option},
+    option<&Settings::extra_clocks>(
+        "extra_clocks", "clocks behind the word, compared with after_word; as many as the word has bits read it twice",
+        0, WordFormat::maximum_bits),
+    describing_word(option<&Settings::tree_turns>(
+        "tree_turns", "tree format: bits of the turns with the zeros before them; 0: another format", 0, 63)),
+    describing_word(option<&Settings::tree_steps>(
+        "tree_steps", "tree format: bits of the position with the zeros behind it; 0: another format", 0, 63)),
+    option<&Settings::confirm_rpm>(
+        "confirm_rpm", "the word is read once more: as fast as this may the shaft have moved; 0: it is read once", 0,
+        100'000),
+    OptionOf<&Settings::unit_pm>{unit_um_option},
+    option<&Settings::clock_khz>("clock_khz", "clock, kHz", 1, 10'000),
+    decimal<3>(option<&Settings::pause>(
+        "pause_us", "the longest pause of the clock after which the old word still goes on (Tm), us", 0,
+        1'000'000'000)),
+    decimal<3>(option<&Settings::monoflop>(
+        "monoflop_us", "virtual encoder: its monoflop time Tm, us, at most pause_us; 0: that", 0, 50'000)),
+    option<&Settings::slowest_khz>("min_clock_khz", "virtual encoder: slowest clock that it allows", 1, 10'000),
+    option<&Settings::fastest_khz>("max_clock_khz", "virtual encoder: fastest clock that it allows", 1, 10'000),
+};
+constexpr auto models = std::array{ModelText{"RAA38S6-12", "RAA38S6 with 12 bits, binary", 0,
+                                             "bits=12 multiturn_bits=0 gray=false pause_us=500 monoflop_us=0"}};
 
-  static constexpr OptionsOf options{
-      OptionOf<&Settings::singleturn_bits>{{.name = "bits",
-                                            .meaning = "bits of the position within the turn",
-                                            .default_value = 12,
-                                            .minimum = 1,
-                                            .maximum = 64,
-                                            .describes_word = true}},
-      OptionOf<&Settings::multiturn_bits>{multiturn_bits_option},
-      OptionOf<&Settings::multiturn_first>{multiturn_first_option},
-      describing_word(option<&Settings::gray>("gray", "turns and position are one Gray-coded number")),
-      describing_word(option<&Settings::error_bit>("error_bit", "a bit behind the position", error_bit_choices)),
-      probeable(describing_word(option<&Settings::parity>(
-          "parity", "the last bit, over all before it; error: even, and inverted when the position is wrong",
-          parity_choices))),
-      OptionOf<&Settings::after_word>{after_word_option},
-      option<&Settings::extra_clocks>(
-          "extra_clocks",
-          "clocks behind the word, compared with after_word; as many as the word has bits read it twice", 0,
-          WordFormat::maximum_bits),
-      describing_word(option<&Settings::tree_turns>(
-          "tree_turns", "tree format: bits of the turns with the zeros before them; 0: another format", 0, 63)),
-      describing_word(option<&Settings::tree_steps>(
-          "tree_steps", "tree format: bits of the position with the zeros behind it; 0: another format", 0, 63)),
-      option<&Settings::confirm_rpm>(
-          "confirm_rpm", "the word is read once more: as fast as this may the shaft have moved; 0: it is read once", 0,
-          100'000),
-      OptionOf<&Settings::unit_pm>{unit_um_option},
-      option<&Settings::clock_khz>("clock_khz", "clock, kHz", 1, 10'000),
-      decimal<3>(option<&Settings::pause>(
-          "pause_us", "the longest pause of the clock after which the old word still goes on (Tm), us", 0,
-          1'000'000'000)),
-      decimal<3>(option<&Settings::monoflop>(
-          "monoflop_us", "virtual encoder: its monoflop time Tm, us, at most pause_us; 0: that", 0, 50'000)),
-      option<&Settings::slowest_khz>("min_clock_khz", "virtual encoder: slowest clock that it allows", 1, 10'000),
-      option<&Settings::fastest_khz>("max_clock_khz", "virtual encoder: fastest clock that it allows", 1, 10'000),
-  };
-  static constexpr std::array models{ModelText{"RAA38S6-12", "RAA38S6 with 12 bits, binary", 0,
-                                               "bits=12 multiturn_bits=0 gray=false pause_us=500 monoflop_us=0"}};
-  static constexpr struct { decltype(word_fields) infos; } fields{word_fields};
-  static constexpr const FieldInfo* alarms = &fields.infos[word_field_alarms];
-  static constexpr auto vectors = ssi::vectors;
+constexpr Format format_by(const Options& values) {
+  Settings given = options.format(values);
+  const Parity parity = given.parity == WordParity::odd    ? Parity::odd
+                        : given.parity == WordParity::none ? Parity::none
+                                                           : Parity::even;
+  const bool tree = given.tree_turns + given.tree_steps != 0;
+  const WordFormat counts =
+      tree ? tree_format(given.bits(), given.tree_turns, given.tree_steps) : word_format(given.bits());
+  given.padded = tree;
+  given.error_parity = given.parity == WordParity::error;
+  return given.with_word(values, word_with(counts, given.gray, given.error_bit, parity), given.unit_pm != 0);
+}
+constexpr LineSettings line_of(const Format& format) {
+  LineSettings settings = line_settings;
+  settings.rate = format.clock_khz * 1000;
+  return settings;
+}
+constexpr Resolution resolution_by(const Format& format) { return resolution_of(format.word, format.scale); }
+constexpr bool is_possible(const Format& format) {
+  return absenc::is_usable(format.word) && clocks(format) <= frame_capacity;
+}
 
-  static constexpr Format format(const Options& values) {
-    Settings given = options.format(values);
-    const Parity parity = given.parity == WordParity::odd    ? Parity::odd
-                          : given.parity == WordParity::none ? Parity::none
-                                                             : Parity::even;
-    const bool tree = given.tree_turns + given.tree_steps != 0;
-    const WordFormat counts =
-        tree ? tree_format(given.bits(), given.tree_turns, given.tree_steps) : word_format(given.bits());
-    given.padded = tree;
-    given.error_parity = given.parity == WordParity::error;
-    return given.with_word(values, word_with(counts, given.gray, given.error_bit, parity), given.unit_pm != 0);
-  }
-  static constexpr LineSettings line(const Format& format) {
-    LineSettings settings = line_settings;
-    settings.rate = format.clock_khz * 1000;
-    return settings;
-  }
-  static constexpr Resolution resolution(const Format& format) { return resolution_of(format.word, format.scale); }
-  static constexpr bool is_usable(const Format& format) {
-    return absenc::is_usable(format.word) && clocks(format) <= frame_capacity;
-  }
+// ---- What is shown
 
-  static constexpr std::array commands{
-      clocked_reading<Definition, Protocol>({"position", Verb::read, 0, "position and turns"})
-          .or_when([](const Format& format) { return format.confirm_rpm != 0; },
-                   clocked_reading<Definition, Protocol, ConfirmPosition>({}))
-          .only_if(is_usable),
-  };
-
-  static constexpr void put(FieldSink& sink, const Format& format, const Word& word) {
-    put_word(sink, format.word, word, format.scale);
-    if (format.error_parity) sink.put({&word_fields[word_field_error], word.error ? 1 : 0});
+constexpr void put_reply(FieldSink& sink, const Format& format, const NoRequest&, const Word& word) {
+  put_word(sink, format.word, word, format.scale);
+  if (format.error_parity) sink.put({&word_fields[word_field_error], word.error ? 1 : 0});
+}
+Explanation explain(const Format& format, Error error, Bytes, Bytes) {
+  if (error == Error::bad_checksum) return {"the parity of the word is wrong"};
+  if (error == Error::out_of_range && format.padded) return {"what fills the word up is not zero"};
+  if (error != Error::cross_check_failed) return {};
+  if (format.confirm_rpm != 0) {
+    return {"the word read once more is one that the shaft cannot have reached: the line is noisy, or broken"};
   }
+  return {"the bits behind the word are not what after_word says: the number of bits may be wrong, or the line noisy"};
+}
 
-  static Explanation explain(const Format& format, Error error, Bytes, Bytes) {
-    if (error == Error::bad_checksum) return {"the parity of the word is wrong"};
-    if (error == Error::out_of_range && format.padded) return {"what fills the word up is not zero"};
-    if (error != Error::cross_check_failed) return {};
-    if (format.confirm_rpm != 0) {
-      return {"the word read once more is one that the shaft cannot have reached: the line is noisy, or broken"};
-    }
-    return {
-        "the bits behind the word are not what after_word says: the number of bits may be wrong, or the line noisy"};
-  }
+constexpr Report<Protocol> report{.put_reply = put_reply, .explain = explain};
 
-  // SSI has no checksum.
-  static bool is_checked(const Options&, Frame, Frame, std::size_t) { return false; }
-  static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
-    return place_in_word(format(values).word, field, 0);
-  }
+// ---- What is declared
+
+constexpr auto commands = std::array{
+    clocked_reading<report>({"position", Verb::read, 0, "position and turns"})
+        .or_when([](const Format& format) { return format.confirm_rpm != 0; },
+                 clocked_reading<report, ConfirmPosition>({}))
+        .only_if(is_possible),
+};
+
+// SSI has no checksum.
+bool is_checked(const Options&, Frame, Frame, std::size_t) { return false; }
+BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
+  return place_in_word(format_by(values).word, field, 0);
+}
+
+constexpr Declaration<Protocol, VirtualEncoder> declaration{
+    .id = "ssi",
+    .name = "SSI",
+    .document = "RAA38S6 manual, 3.5 SSI",
+    .link = LinkKind::clocked,
+    .options = options.infos,
+    .format = format_by,
+    .models = models,
+    .fields = word_fields,
+    .commands = commands,
+    .vectors = vectors,
+    .report = report,
+    .line = line_of,
+    .resolution = resolution_by,
+    .is_usable = is_possible,
+    .is_checked = is_checked,
+    .bits = bits_in,
+    .alarms = &word_fields[word_field_alarms],
 };
 
 }  // namespace
 
-constinit const Unit unit = UnitOf<Definition>::make();
+constinit const Unit unit = Descriptor<declaration>::make();
 
 }  // namespace absenc::ssi

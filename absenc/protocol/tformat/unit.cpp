@@ -264,6 +264,28 @@ constexpr Explanation explain_refusal(Bytes reply) {
                 "termination and shielding"};
 }
 
+// ---- What is shown
+
+constexpr Values values_of_request(const Format&, const Request& request) { return values_of(request); }
+constexpr Values values_of_reply(const Format&, const Request&, const Reply& reply) { return values_of(reply); }
+constexpr void put_found(FieldSink& sink, const Format&, const Found& found) { fields.put(sink, found); }
+constexpr void put_left(FieldSink& sink, const Format&, const Found& found) {
+  fields.put(sink, {.page_left = found.selected});
+}
+constexpr std::string_view left(const Found& found) {
+  return found.page_left ? "page 7 may be left selected, where it was another before" : "";
+}
+constexpr Explanation explain(const Format&, Error error, Bytes, Bytes reply) {
+  return error == Error::request_rejected ? explain_refusal(reply) : Explanation{};
+}
+
+constexpr Report<Protocol> report{
+    .put_request = put_values<fields, values_of_request>,
+    .put_reply = put_values<fields, values_of_reply>,
+    .explain = explain,
+};
+constexpr Finding<Format, Found> found{.put = put_found, .put_left = put_left, .left = left};
+
 // ---- Commands
 
 constexpr Argument address{"address", "of the byte", 0, page_addresses - 1, 0, true, Role::address};
@@ -272,8 +294,6 @@ constexpr std::array<Argument, 3> read_arguments{
     {address, page, {"count", "bytes from the address on", 1, page_addresses, 1, false, Role::count}}};
 constexpr std::array<Argument, 3> write_arguments{{address, {"value", "the byte", 0, 255, 0, true, Role::value}, page}};
 constexpr std::array<Argument, 1> threshold_arguments{{{"degrees", "degC, 1 to 127; 0: never", 0, 127}}};
-
-struct Definition;
 
 template <DataId id>
 constexpr Request ask_for(const Format&, Arguments) {
@@ -293,112 +313,108 @@ constexpr Request set_threshold(const Format&, Arguments arguments) {
 
 template <DataId id>
 constexpr CommandOf<Protocol> position(const Command& info) {
-  return reading<Definition, Protocol, ask_for<id>, ReadPosition>(info);
+  return reading<report, ask_for<id>, ReadPosition>(info);
 }
 template <auto procedure, auto request, auto... bound>
 constexpr CommandOf<Protocol> run(const Command& info) {
-  return command<Definition, Protocol, Found, procedure, request, bound...>(info);
+  return command<report, found, procedure, request, bound...>(info);
 }
 template <DataId id>
 constexpr CommandOf<Protocol> reset_of(std::string_view name, Verb verb, std::string_view meaning) {
   return run<reset, ask_for<id>, id>({name, verb, 0, meaning, {}, true, false});
 }
 
+constexpr auto commands = std::array{
+    position<DataId::everything>({"position", Verb::read, 0, "position, turns, encoder id and alarms"}),
+    position<DataId::singleturn>({"singleturn", Verb::read_part, 0, "position within the turn"}),
+    position<DataId::multiturn>({"multiturn", Verb::read_part, 0, "turns"}),
+    position<DataId::encoder_id>({"encoder-id", Verb::info, 0, "encoder id"}),
+    reset_of<DataId::clear_alarms>("clear-alarms", Verb::clear_alarms, "clear all latched alarms"),
+    reset_of<DataId::zero>("zero", Verb::zero, "make this the zero of the turn"),
+    reset_of<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn,
+                                      "set the turns to zero and clear all latched alarms"),
+    run<read_memory, read_at>(
+        {"memory-read", Verb::memory_read, 0, "read the user's EEPROM; the page stays selected", read_arguments}),
+    run<write_memory, write_at>({"memory-write", Verb::memory_write, 0,
+                                 "write a byte of the user's EEPROM; the page stays selected", write_arguments, true,
+                                 false}),
+    run<read_temperature, read_service_at<temperature_address>>(
+        {"temperature", Verb::temperature, 0, "temperature of the board"}),
+    run<read_threshold, read_service_at<overheat_address>>(
+        {"overheat-threshold", Verb::config_get, 0, "temperature above which over_heat is raised"}),
+    run<write_threshold, set_threshold>({"set-overheat-threshold", Verb::config_set, 0, "set that temperature",
+                                         threshold_arguments, true, false, "overheat-threshold"}),
+};
+
 // ---- What is declared
 
-struct Definition {
-  using Protocol = tformat::Protocol;
-  using Encoder = VirtualEncoder;
-  static constexpr std::string_view id = "tformat", name = "Tamagawa T-format (Smart-Abs)",
-                                    document = "Specification of Smart-Abs TS5700N8500";
-  static constexpr LinkKind link = LinkKind::half_duplex;
-  static constexpr std::size_t frames_size = 1400;
-  // Any pause ends a frame; some encoders may forgive one that is shorter than their own answer time.
-  static constexpr LineTiming timing{.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit};
+constexpr auto options = OptionsOf{
+    option<&Format::singleturn_bits>("singleturn_bits", "bits of ABS", 1, 24),
+    option<&Format::multiturn_bits>("multiturn_bits", "bits of ABM; 0: no turns", 0, 24),
+    option<&Format::encoder_id>("encoder_id", "ENID that every reply must carry; -1: any", -1, 255),
+    option<&Format::strict>("strict",
+                            "also check what encoders that deviate from the specification fail: SF information bits, "
+                            "SF against ALMC, EDF of a busy reply"),
+};
+constexpr auto models = std::array{
+    ModelText{"TS5700N8500", "Smart-Abs SA48-17/33bit-LPS-5V: 17 bits, 65536 turns", 6000,
+              "singleturn_bits=17 multiturn_bits=16 encoder_id=0x11"},
+    ModelText{"23-bit", "Tamagawa encoders with 23 bits, 65536 turns and ENID 17", 6000,
+              "singleturn_bits=23 multiturn_bits=16 encoder_id=0x17"},
+};
 
-  static constexpr OptionsOf options{
-      option<&Format::singleturn_bits>("singleturn_bits", "bits of ABS", 1, 24),
-      option<&Format::multiturn_bits>("multiturn_bits", "bits of ABM; 0: no turns", 0, 24),
-      option<&Format::encoder_id>("encoder_id", "ENID that every reply must carry; -1: any", -1, 255),
-      option<&Format::strict>("strict",
-                              "also check what encoders that deviate from the specification fail: SF information bits, "
-                              "SF against ALMC, EDF of a busy reply"),
-  };
-  static constexpr std::array models{
-      ModelText{"TS5700N8500", "Smart-Abs SA48-17/33bit-LPS-5V: 17 bits, 65536 turns", 6000,
-                "singleturn_bits=17 multiturn_bits=16 encoder_id=0x11"},
-      ModelText{"23-bit", "Tamagawa encoders with 23 bits, 65536 turns and ENID 17", 6000,
-                "singleturn_bits=23 multiturn_bits=16 encoder_id=0x17"},
-  };
-  static constexpr const auto& fields = tformat::fields;
-  static constexpr const FieldInfo* status = fields.of<&Values::status>();
-  static constexpr const FieldInfo* alarms = fields.of<&Values::alarms>();
-  static constexpr const auto& memory = memory_areas;
-  static constexpr const auto& conditions = tformat::conditions;
-  static constexpr const auto& vectors = tformat::vectors;
-  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
-    return place_of(options.format(values), reply.bytes, field);
+BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+  return place_of(options.format(values), reply.bytes, field);
+}
+constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
+  const std::optional<DataId> of = data_id(begin[0]);
+  return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
+}
+/// The reply's own control field says what was asked; the address of a memory access is taken as it comes.
+constexpr Result<Request> guess_request(const Format&, Bytes reply) {
+  const std::optional<DataId> asked = data_id(reply[0]);
+  if (!asked) return Error::unexpected_reply;
+  Request request{*asked};
+  if (is_memory_access(*asked) && reply.size() == reply_length(*asked)) {
+    request.address = reply[1] & 0x7F;
+    request.value = reply[2];
   }
-  static constexpr std::array commands{
-      position<DataId::everything>({"position", Verb::read, 0, "position, turns, encoder id and alarms"}),
-      position<DataId::singleturn>({"singleturn", Verb::read_part, 0, "position within the turn"}),
-      position<DataId::multiturn>({"multiturn", Verb::read_part, 0, "turns"}),
-      position<DataId::encoder_id>({"encoder-id", Verb::info, 0, "encoder id"}),
-      reset_of<DataId::clear_alarms>("clear-alarms", Verb::clear_alarms, "clear all latched alarms"),
-      reset_of<DataId::zero>("zero", Verb::zero, "make this the zero of the turn"),
-      reset_of<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn,
-                                        "set the turns to zero and clear all latched alarms"),
-      run<read_memory, read_at>(
-          {"memory-read", Verb::memory_read, 0, "read the user's EEPROM; the page stays selected", read_arguments}),
-      run<write_memory, write_at>({"memory-write", Verb::memory_write, 0,
-                                   "write a byte of the user's EEPROM; the page stays selected", write_arguments, true,
-                                   false}),
-      run<read_temperature, read_service_at<temperature_address>>(
-          {"temperature", Verb::temperature, 0, "temperature of the board"}),
-      run<read_threshold, read_service_at<overheat_address>>(
-          {"overheat-threshold", Verb::config_get, 0, "temperature above which over_heat is raised"}),
-      run<write_threshold, set_threshold>({"set-overheat-threshold", Verb::config_set, 0, "set that temperature",
-                                           threshold_arguments, true, false, "overheat-threshold"}),
-  };
+  return request;
+}
+/// What the encoder cannot accept is answered like ID 3 (8.4, 9.4).
+constexpr Error answer_to_bad(Error error, Bytes reply) {
+  const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
+                       reply[0] == control_field(DataId::everything);
+  return refused ? Error::request_rejected : error;
+}
 
-  static constexpr std::size_t reply_size(const Format&, Bytes begin) {
-    const std::optional<DataId> of = data_id(begin[0]);
-    return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
-  }
-  /// The reply's own control field says what was asked; the address of a memory access is taken as it comes.
-  static constexpr Result<Request> guess_request(const Format&, Bytes reply) {
-    const std::optional<DataId> asked = data_id(reply[0]);
-    if (!asked) return Error::unexpected_reply;
-    Request request{*asked};
-    if (is_memory_access(*asked) && reply.size() == reply_length(*asked)) {
-      request.address = reply[1] & 0x7F;
-      request.value = reply[2];
-    }
-    return request;
-  }
-  /// What the encoder cannot accept is answered like ID 3 (8.4, 9.4).
-  static constexpr Error answer_to_bad(Error error, Bytes reply) {
-    const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
-                         reply[0] == control_field(DataId::everything);
-    return refused ? Error::request_rejected : error;
-  }
-  static constexpr Explanation explain(const Format&, Error error, Bytes, Bytes reply) {
-    return error == Error::request_rejected ? explain_refusal(reply) : Explanation{};
-  }
-
-  static constexpr Values values(const Format&, const Request& request) { return values_of(request); }
-  static constexpr Values values(const Format&, const Request&, const Reply& reply) { return values_of(reply); }
-  static const Values& values(const Format&, const Found& found) { return found; }
-  static void put_left(FieldSink& sink, const Format&, const Found& found) {
-    fields.put(sink, {.page_left = found.selected});
-  }
-  static std::string_view left(const Found& found) {
-    return found.page_left ? "page 7 may be left selected, where it was another before" : "";
-  }
+constexpr Declaration<Protocol, VirtualEncoder> declaration{
+    .id = "tformat",
+    .name = "Tamagawa T-format (Smart-Abs)",
+    .document = "Specification of Smart-Abs TS5700N8500",
+    .link = LinkKind::half_duplex,
+    .options = options.infos,
+    .format = format_of<options>,
+    .models = models,
+    .fields = fields.infos,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_size = 1400,
+    .report = report,
+    .guess_request = guess_request,
+    .reply_size = size_of_reply,
+    .answer_to_bad = answer_to_bad,
+    .bits = bits_in,
+    .status = fields.of<&Values::status>(),
+    .alarms = fields.of<&Values::alarms>(),
+    .memory = memory_areas,
+    .conditions = conditions,
+    // Any pause ends a frame; some encoders may forgive one that is shorter than their own answer time.
+    .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 
 }  // namespace
 
-constinit const Unit unit = UnitOf<Definition>::make();
+constinit const Unit unit = Descriptor<declaration>::make();
 
 }  // namespace absenc::tformat

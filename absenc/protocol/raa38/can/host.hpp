@@ -22,6 +22,7 @@ struct Protocol {
   using Item = CanFrame;
   using Format = can::Format;
   using Request = CanFrame;
+  using Reply = CanFrame;
 
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
   /// "220:8020000000000000"

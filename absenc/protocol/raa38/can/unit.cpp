@@ -22,7 +22,7 @@ using author::with_role;
 constexpr std::array<std::string_view, 3> rate_choices{"1000000", "500000", "250000"};
 constexpr std::array<std::string_view, 2> answer_choices{"7e5", "7e4"};
 
-constexpr author::OptionsOf options{
+constexpr auto options = author::OptionsOf{
     option<&Format::bits>("bits", "of the position", 10, 21),
     with_role<Role::encoder>(option<&Format::node>("node", "number of the encoder on the bus", 1, 255)),
     with_role<Role::rate>(option<&Format::rate>("bitrate", "bits a second on the bus", rate_choices)),
@@ -50,13 +50,68 @@ constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
   return encode(order, format.node, *value);
 }
 
-// ---- What is declared
+// ---- What is shown
+
+using enum FieldInfo::Kind;
+constexpr auto fields = author::fields_of<Values>(
+    field<&Values::node>("node", "", "number of the node", Role::encoder),
+    field<&Values::function>("function", "", "what the identifier stands for in CANopen; this encoder does not use it"),
+    field<&Values::data>("data", "", "its data"), field<&Values::command>("command", "", "what is asked, or answered"),
+    field<&Values::value>("value", "", "counting direction as command 22 carries it"),
+    field<&Values::new_node>("new_node", "", "number that the node is given"),
+    field<&Values::bit_rate>("bit_rate", "bit/s", "bit rate that the node is given"),
+    field<&Values::clash>("clash", "", "two nodes share this number, or the line is bad", Role::clash),
+    field<&Values::readings_per_s>("readings_per_s", "1/s", "positions that the node sends by itself"),
+    field<&Values::singleturn>({"singleturn", counts, "counts", "position within one revolution", {}, Role::position}),
+    field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
+    field<&Values::written>("written", "", "whether anything was written: not what is set already", Role::written),
+    field<&Values::answered>("answered", "", "whether the command was answered"),
+    field<&Values::mirrored>("mirrored", "", "whether the position is counted the other way since"),
+    field<&Values::before>({"before", counts, "counts", "position before the command"}),
+    field<&Values::after>({"after", counts, "counts", "position after it"}));
+
+// A position with what it is of.
+constexpr void put_found(FieldSink& sink, const Format& format, const Values& found) {
+  fields.put(sink, found);
+  if (!found.singleturn) return;
+  sink.put_reading(author::position_reading(static_cast<std::uint64_t>(*found.singleturn), format.bits));
+}
+void put_position(FieldSink& sink, const Format& format, const Reading& position) {
+  fields.put(sink, values_of(format, format.node, position.singleturn));
+}
+void put_change(FieldSink& sink, const Format&, const Values& found) { fields.put(sink, found); }
+void put_surveyed(FieldSink& sink, const Format&, const Surveyed& found) { fields.put(sink, found); }
+void put_nodes(FieldSink& sink, const Format& format, const Nodes& found) {
+  for (unsigned number = 1; number < found.at.size(); ++number) {
+    const Heard& node = found.at[number];
+    if (!node.is_there()) continue;
+    const bool shown = node.readable && !node.clash();
+    Values values = shown ? values_of(format, 0, node.counts) : Values{};
+    values.node = number;
+    values.clash = node.clash();
+    values.readings_per_s = node.per_second;
+    put_found(sink, format, values);
+  }
+}
+void put_left(FieldSink& sink, const Format&, const Surveyed& found) {
+  if (found.written.value_or(false) && !found.verified) {
+    fields.put(sink, {.node = found.node, .bit_rate = found.bit_rate});
+  }
+}
+
+constexpr author::Report<Protocol> report{.explain = explain};
+constexpr author::Finding<Format, Reading> position{.put = put_position};
+constexpr author::Finding<Format, Values> found{.put = put_change};
+constexpr author::Finding<Format, Nodes> nodes{.put = put_nodes};
+constexpr author::Finding<Format, Surveyed> surveyed{.put = put_surveyed, .put_left = put_left};
+
+// ---- Commands
 
 constexpr bool listens(const Format& format) { return format.listens; }
 
-template <class Definition, Read::Way way>
+template <Read::Way way>
 constexpr author::CommandOf<Protocol> read_by(const Command& info) {
-  using Made = author::Told<Definition, Read>;
+  using Made = author::Reported<report, Read, position>;
   return {.info = info,
           .request = [](const Format& format, Arguments) -> Result<CanFrame> { return position_request(format, way); },
           .make = [](const Format& format, Arguments,
@@ -64,128 +119,92 @@ constexpr author::CommandOf<Protocol> read_by(const Command& info) {
           .size = sizeof(Made)};
 }
 
-struct Definition : author::Declares<Definition, Protocol> {
-  using Encoder = VirtualNode;
-  static constexpr std::string_view id = "raa38-can", name = "RAA38S6 on CAN",
-                                    document = "RAA38S6 manual, 3.4.1 CANopen";
-  static constexpr LinkKind link = LinkKind::can;
-  static constexpr std::size_t frames_size = 1700;
-  static constexpr auto options = can::options;
-  static constexpr auto vectors = can::vectors;
-  static constexpr bool frames_are_texts = true;
-  static constexpr auto explain = can::explain;
-  static constexpr LineTiming timing{.turnaround_limit = answer_limit};
-  static constexpr std::array models{author::ModelText{"RAA38S6", "one turn of 10 to 21 bits: option bits", 0, ""}};
+constexpr Command read_position{"position", Verb::read, 0, "position"};
+constexpr auto commands = std::array{
+    read_by<Read::Way::ask>(read_position).or_when(listens, read_by<Read::Way::listen>(read_position)),
+    read_by<Read::Way::listen>({"listen", Verb::read_part, 0, "the next position that the node sends by itself"}),
+    read_by<Read::Way::start>({"start", Verb::run, 0, "start the node", {}, true, false}),
+    author::command<report, found, set_cyclic, to<Order::cyclic>>(
+        {"cyclic", Verb::run, 0, "let the node send so many readings a second by itself", cyclic_arguments, true,
+         false}),
+    author::command<report, found, set_cyclic, to<Order::cyclic>>(
+        {"stop", Verb::run, 0, "let it send none by itself", {}, true, false}),
+    author::command<report, found, change, to<Order::zero>, Order::zero>(
+        {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
+    author::command<report, nodes, scan, to<Order::read>>(
+        {"scan", Verb::scan, 0, "who is on the bus", {}, false, false}),
+    author::command<report, surveyed, find_node, to<Order::read>>(
+        {"node", Verb::config_get, 0, "number of the node", {}, false, false}),
+    author::command<report, surveyed, configure, to<Order::node>, Order::node>(
+        {"set-node", Verb::config_set, 0, "give the only node on the bus another number", node_arguments, true, false,
+         "node"}),
+    author::command<report, surveyed, configure, to<Order::rate>, Order::rate>(
+        {"bitrate", Verb::config_set, 0, "set the bit rate of the only node on the bus", rate_arguments, true, false}),
+    author::command<report, found, change, to<Order::direction>, Order::direction>(
+        {"direction", Verb::config_set, 0, "set the counting direction", direction_arguments, true, false}),
+};
 
-  using enum FieldInfo::Kind;
-  static constexpr auto fields = author::fields_of<Values>(
-      field<&Values::node>("node", "", "number of the node", Role::encoder),
-      field<&Values::function>("function", "",
-                               "what the identifier stands for in CANopen; this encoder does not use it"),
-      field<&Values::data>("data", "", "its data"),
-      field<&Values::command>("command", "", "what is asked, or answered"),
-      field<&Values::value>("value", "", "counting direction as command 22 carries it"),
-      field<&Values::new_node>("new_node", "", "number that the node is given"),
-      field<&Values::bit_rate>("bit_rate", "bit/s", "bit rate that the node is given"),
-      field<&Values::clash>("clash", "", "two nodes share this number, or the line is bad", Role::clash),
-      field<&Values::readings_per_s>("readings_per_s", "1/s", "positions that the node sends by itself"),
-      field<&Values::singleturn>(
-          {"singleturn", counts, "counts", "position within one revolution", {}, Role::position}),
-      field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
-      field<&Values::written>("written", "", "whether anything was written: not what is set already", Role::written),
-      field<&Values::answered>("answered", "", "whether the command was answered"),
-      field<&Values::mirrored>("mirrored", "", "whether the position is counted the other way since"),
-      field<&Values::before>({"before", counts, "counts", "position before the command"}),
-      field<&Values::after>({"after", counts, "counts", "position after it"}));
+// ---- What is declared
 
-  static constexpr Command position{"position", Verb::read, 0, "position"};
-  static constexpr std::array commands{
-      read_by<Definition, Read::Way::ask>(position).or_when(listens, read_by<Definition, Read::Way::listen>(position)),
-      read_by<Definition, Read::Way::listen>(
-          {"listen", Verb::read_part, 0, "the next position that the node sends by itself"}),
-      read_by<Definition, Read::Way::start>({"start", Verb::run, 0, "start the node", {}, true, false}),
-      command<Values, set_cyclic, to<Order::cyclic>>({"cyclic", Verb::run, 0,
-                                                      "let the node send so many readings a second by itself",
-                                                      cyclic_arguments, true, false}),
-      command<Values, set_cyclic, to<Order::cyclic>>(
-          {"stop", Verb::run, 0, "let it send none by itself", {}, true, false}),
-      command<Values, change, to<Order::zero>, Order::zero>(
-          {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
-      command<Nodes, scan, to<Order::read>>({"scan", Verb::scan, 0, "who is on the bus", {}, false, false}),
-      command<Surveyed, find_node, to<Order::read>>(
-          {"node", Verb::config_get, 0, "number of the node", {}, false, false}),
-      command<Surveyed, configure, to<Order::node>, Order::node>({"set-node", Verb::config_set, 0,
-                                                                  "give the only node on the bus another number",
-                                                                  node_arguments, true, false, "node"}),
-      command<Surveyed, configure, to<Order::rate>, Order::rate>({"bitrate", Verb::config_set, 0,
-                                                                  "set the bit rate of the only node on the bus",
-                                                                  rate_arguments, true, false}),
-      command<Values, change, to<Order::direction>, Order::direction>(
-          {"direction", Verb::config_set, 0, "set the counting direction", direction_arguments, true, false}),
-  };
+constexpr auto models = std::array{author::ModelText{"RAA38S6", "one turn of 10 to 21 bits: option bits", 0, ""}};
 
-  static constexpr LineSettings line(const Format& format) { return {.rate = format.bit_rate()}; }
-  static constexpr Resolution resolution(const Format& format) { return {.singleturn_bits = format.bits}; }
-  static constexpr Error decode(const Format& format, Frame request, Frame reply, FieldSink& sink) {
-    const Result<Values> values = can::decode(format, request.can, reply.can);
-    if (values) put_found(sink, format, *values);
-    return values.error();
-  }
-  // The controller of the bus does it.
-  static constexpr FrameEnd frame_end(const Options&, Direction, Bytes bytes) {
-    return {FrameEnd::Kind::complete, bytes.size()};
-  }
-  // The CRC of CAN is the controller's: here only what must be as it is.
-  static bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
-    if (is_only_named(function_of(*reply.can))) return false;
-    const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
-    return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
-  }
-  // The node is in the identifier.
-  static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
-    if (&field != fields.of<&Values::singleturn>()) return {};
-    return author::bits_of(0, 0, options.format(values).bits);
-  }
-  // Nothing answers NMT, SYNC and emergencies, nor the command that enters the configuration.
-  static bool is_answered(const Options&, Frame request) {
-    const Function function = function_of(*request.can);
-    if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;
-    const OrderInfo* const asked = order_of(*request.can);
-    return asked == nullptr || asked->answer != Answer::none;
-  }
+constexpr LineSettings line_of(const Format& format) { return {.rate = format.bit_rate()}; }
+constexpr Resolution resolution_of(const Format& format) { return {.singleturn_bits = format.bits}; }
+constexpr Error decode_frames(const Format& format, Frame request, Frame reply, FieldSink& sink) {
+  const Result<Values> values = can::decode(format, request.can, reply.can);
+  if (values) put_found(sink, format, *values);
+  return values.error();
+}
+// The controller of the bus does it.
+constexpr FrameEnd end_of_frame(const Options&, Direction, Bytes bytes) {
+  return {FrameEnd::Kind::complete, bytes.size()};
+}
+// The CRC of CAN is the controller's: here only what must be as it is.
+bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
+  if (is_only_named(function_of(*reply.can))) return false;
+  const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
+  return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
+}
+// The node is in the identifier.
+BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
+  if (&field != fields.of<&Values::singleturn>()) return {};
+  return author::bits_of(0, 0, options.format(values).bits);
+}
+// Nothing answers NMT, SYNC and emergencies, nor the command that enters the configuration.
+bool awaits_answer(const Options&, Frame request) {
+  const Function function = function_of(*request.can);
+  if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;
+  const OrderInfo* const asked = order_of(*request.can);
+  return asked == nullptr || asked->answer != Answer::none;
+}
 
-  // A position with what it is of.
-  static constexpr void put_found(FieldSink& sink, const Format& format, const Values& found) {
-    fields.put(sink, found);
-    if (!found.singleturn) return;
-    sink.put_reading(author::position_reading(static_cast<std::uint64_t>(*found.singleturn), format.bits));
-  }
-  static constexpr Values values(const Format&, const Values& found) { return found; }
-  static constexpr Values values(const Format& format, const Reading& found) {
-    return values_of(format, format.node, found.singleturn);
-  }
-  static void put(FieldSink& sink, const Format& format, const Nodes& found) {
-    for (unsigned number = 1; number < found.at.size(); ++number) {
-      const Heard& node = found.at[number];
-      if (!node.is_there()) continue;
-      const bool shown = node.readable && !node.clash();
-      Values values = shown ? values_of(format, 0, node.counts) : Values{};
-      values.node = number;
-      values.clash = node.clash();
-      values.readings_per_s = node.per_second;
-      put_found(sink, format, values);
-    }
-  }
-  static void put_left(FieldSink& sink, const Format&, const Surveyed& found) {
-    if (found.written.value_or(false) && !found.verified) {
-      fields.put(sink, {.node = found.node, .bit_rate = found.bit_rate});
-    }
-  }
+constexpr author::Declaration<Protocol, VirtualNode> declaration{
+    .id = "raa38-can",
+    .name = "RAA38S6 on CAN",
+    .document = "RAA38S6 manual, 3.4.1 CANopen",
+    .link = LinkKind::can,
+    .options = options.infos,
+    .format = author::format_of<options>,
+    .models = models,
+    .fields = fields.infos,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_are_texts = true,
+    .frames_size = 1700,
+    .report = report,
+    .line = line_of,
+    .resolution = resolution_of,
+    .decode = decode_frames,
+    .frame_end = end_of_frame,
+    .is_answered = awaits_answer,
+    .is_checked = is_checked,
+    .bits = bits_in,
+    .timing = {.turnaround_limit = answer_limit},
 };
 
 }  // namespace
 }  // namespace can
 
-constinit const Unit can_unit = author::UnitOf<can::Definition>::make();
+constinit const Unit can_unit = author::Descriptor<can::declaration>::make();
 
 }  // namespace absenc::raa38

@@ -23,7 +23,7 @@ constexpr std::array<std::string_view, 3> register_choices{"auto", "1", "2"};
 constexpr std::array<std::string_view, bauds.size()> baud_choices{"2400", "4800", "9600", "19200", "57600"};
 constexpr std::array<std::string_view, 3> data_choices{"four", "three", "three_as_four"};
 
-constexpr author::OptionsOf options{
+constexpr auto options = author::OptionsOf{
     author::with_role<Role::encoder>(
         option<&Format::address>("address", "of the encoder", modbus::first_address, modbus::last_address)),
     probeable(option<&Format::bits>("bits", "of the position within the turn", 10, 21)),
@@ -156,119 +156,139 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   return bits_found && registers_found;
 }
 
+// ---- What is shown
+
+constexpr auto fields = author::fields_of<Values>(
+    field<&Values::address>("address", "", "address of the encoder", Role::encoder),
+    field<&Values::function>("function", "", "function code"),
+    field<&Values::first_register>("first_register", "", "where reading begins"),
+    field<&Values::registers>("registers", "", "how many are asked for"),
+    field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
+    field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
+    field<&Values::new_address>("new_address", "", "address from now on"),
+    field<&Values::parameter>("parameter", "", "what function CC sets"),
+    field<&Values::setting>("setting", "", "the same in words"),
+    field<&Values::crc_order>("crc_order", "", "which byte of the CRC comes first"),
+    field<&Values::baud>("baud", "bit/s", "the baud rate at which it answers"),
+    field<&Values::direction>("direction", "", "in which direction it counts"),
+    field<&Values::effect>("effect", "", "what became of the position"),
+    field<&Values::written>("written", "", "whether the setting was sent; it is not where it is so already",
+                            Role::written),
+    field<&Values::encoder_address>("encoder_address", "", "address that answers", Role::encoder),
+    field<&Values::clash>("clash", "", "the answer is damaged every time", Role::clash),
+    field<&Values::refuses>("refuses", "", "it answers with an exception: another kind of Modbus slave?"));
+
+constexpr void show_setting(Values& values, std::uint8_t value) {
+  values.parameter = value;
+  values.setting = name_of_setting(value);
+}
+constexpr Values values_of_request(const Format&, const Request& request) {
+  Values values{.function = request.function, .crc_order = "low_first"};
+  if (request.function != function::ask_address) values.address = request.address;
+  if (request.function == function::read) {
+    values.first_register = request.first_register;
+    values.registers = request.registers;
+  }
+  if (request.function == function::set_address) values.new_address = request.value;
+  if (request.function == function::set_parameter) show_setting(values, request.value);
+  return values;
+}
+constexpr Values values_of_reply(const Format& format, const Request&, const Reply& reply) {
+  Values values{.function = reply.function,
+                .crc_order = reply.order == CrcOrder::high_first ? "high_first" : "low_first"};
+  (reply.function == function::set_address ? values.new_address : values.address) = reply.address;
+  if (reply.function == function::read) {
+    values.singleturn = reply.singleturn;
+    values.angle = degrees(reply.singleturn, format.bits);
+  }
+  if (reply.function == function::set_parameter) show_setting(values, reply.value);
+  return values;
+}
+void put_found(FieldSink& sink, const Format&, const Found& found) { fields.put(sink, found); }
+void put_slaves(FieldSink& sink, const Format&, const Slaves& found) {
+  using Kind = Slaves::Kind;
+  for (std::size_t i = 0; i < found.at.size(); ++i) {
+    const Kind kind = found.at[i];
+    if (kind == Kind::none) continue;
+    fields.put(sink, {.encoder_address = static_cast<std::uint16_t>(i),
+                      .clash = kind == Kind::clash,
+                      .refuses = kind == Kind::refuses ? std::optional<bool>(true) : std::nullopt});
+  }
+}
+
+constexpr author::Report<Protocol> report{
+    .put_request = author::put_values<fields, values_of_request>,
+    .put_reply = author::put_values<fields, values_of_reply>,
+    .explain = explain,
+};
+constexpr author::Finding<Format, Found> found{.put = put_found};
+constexpr author::Finding<Format, Slaves> slaves{.put = put_slaves};
+
+// ---- Commands
+
+constexpr Command position{"position", Verb::read, 0, "position within the turn"};
+constexpr auto commands = std::array{
+    author::reading<report, read_request, ReadPosition>(position).or_when(
+        has_too_few_registers, author::command<report, found, look_once, to_read>(position)),
+    author::command<report, found, ask_address, to_ask_address>(
+        {"address", Verb::config_get, 0, "address of the encoder"}),
+    author::command<report, found, find_baud, to_read>(
+        {"baud", Verb::config_get, 0, "the baud rate at which it answers", {}, false, false}),
+    author::command<report, found, look_at_direction, to_read>(
+        {"direction", Verb::config_get, 0, "in which direction it counts: only the position shows it"}),
+    author::command<report, found, set_address, to_give<function::set_address>>(
+        {"set-address", Verb::config_set, 0, "give it another address", address_arguments, true, false, "address",
+         "address"}),
+    author::command<report, found, set_baud, to_set_baud>(
+        {"set-baud", Verb::config_set, 0, "give it another baud rate", baud_arguments, true, false, "baud", "baud"}),
+    author::command<report, found, set_direction, to_give<function::set_parameter>>(
+        {"set-direction", Verb::config_set, 0, "set in which direction it counts", direction_arguments, true, false,
+         "direction"}),
+    author::command<report, found, set_zero, to_set_zero>(
+        {"zero", Verb::zero, 0, "make this the zero of the turn", zero_arguments, true, false}),
+    author::command<report, slaves, scan, to_ask_address>(
+        {"scan", Verb::scan, 0, "who answers on the line", scan_arguments, false, false}),
+};
+
 // ---- What is declared
 
-struct Definition : author::Declares<Definition, Protocol> {
-  using Encoder = VirtualEncoder;
-  static constexpr std::string_view id = "raa38-modbus", name = "RAA38S6 over Modbus RTU",
-                                    document = "RAA38S6 Operation Manual, 3.1.7";
-  static constexpr LinkKind link = LinkKind::half_duplex;
-  static constexpr std::size_t frames_size = 1300;
-  static constexpr auto options = rtu::options;
-  static constexpr auto vectors = rtu::vectors;
-  static constexpr auto probe = rtu::probe;
-  static constexpr auto frame_end = rtu::frame_end;
-  static constexpr auto explain = rtu::explain;
-  static constexpr std::array models{author::ModelText{"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, ""}};
-  // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.
-  static constexpr LineTiming timing{.pause_bits = 25, .turnaround_limit = answer_limit};
+constexpr auto models = std::array{author::ModelText{"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, ""}};
 
-  static constexpr auto fields = author::fields_of<Values>(
-      field<&Values::address>("address", "", "address of the encoder", Role::encoder),
-      field<&Values::function>("function", "", "function code"),
-      field<&Values::first_register>("first_register", "", "where reading begins"),
-      field<&Values::registers>("registers", "", "how many are asked for"),
-      field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
-      field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
-      field<&Values::new_address>("new_address", "", "address from now on"),
-      field<&Values::parameter>("parameter", "", "what function CC sets"),
-      field<&Values::setting>("setting", "", "the same in words"),
-      field<&Values::crc_order>("crc_order", "", "which byte of the CRC comes first"),
-      field<&Values::baud>("baud", "bit/s", "the baud rate at which it answers"),
-      field<&Values::direction>("direction", "", "in which direction it counts"),
-      field<&Values::effect>("effect", "", "what became of the position"),
-      field<&Values::written>("written", "", "whether the setting was sent; it is not where it is so already",
-                              Role::written),
-      field<&Values::encoder_address>("encoder_address", "", "address that answers", Role::encoder),
-      field<&Values::clash>("clash", "", "the answer is damaged every time", Role::clash),
-      field<&Values::refuses>("refuses", "", "it answers with an exception: another kind of Modbus slave?"));
+BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+  const std::size_t address_at = reply.bytes[1] == function::ask_address ? 2 : 0;
+  if (&field == fields.of<&Values::address>()) return author::bits_of(address_at, 0, 8);
+  if (&field == fields.of<&Values::new_address>()) return author::bits_of(0, 0, 8);
+  if (&field == fields.of<&Values::function>()) return author::bits_of(1, 0, 8);
+  if (&field == fields.of<&Values::parameter>()) return author::bits_of(2, 0, 8);
+  if (&field != fields.of<&Values::singleturn>()) return {};
+  return author::big_endian_bits(3, reply.bytes.size() - 3 - modbus::crc_size, options.format(values).bits);
+}
+constexpr Result<Request> guess_request(const Format& format, Bytes reply) { return assumed_request(format, reply); }
 
-  static constexpr Command position{"position", Verb::read, 0, "position within the turn"};
-  static constexpr std::array commands{
-      author::reading<Definition, Protocol, read_request, ReadPosition>(position).or_when(
-          has_too_few_registers, command<Found, look_once, to_read>(position)),
-      command<Found, ask_address, to_ask_address>({"address", Verb::config_get, 0, "address of the encoder"}),
-      command<Found, find_baud, to_read>(
-          {"baud", Verb::config_get, 0, "the baud rate at which it answers", {}, false, false}),
-      command<Found, look_at_direction, to_read>(
-          {"direction", Verb::config_get, 0, "in which direction it counts: only the position shows it"}),
-      command<Found, set_address, to_give<function::set_address>>({"set-address", Verb::config_set, 0,
-                                                                   "give it another address", address_arguments, true,
-                                                                   false, "address", "address"}),
-      command<Found, set_baud, to_set_baud>(
-          {"set-baud", Verb::config_set, 0, "give it another baud rate", baud_arguments, true, false, "baud", "baud"}),
-      command<Found, set_direction, to_give<function::set_parameter>>({"set-direction", Verb::config_set, 0,
-                                                                       "set in which direction it counts",
-                                                                       direction_arguments, true, false, "direction"}),
-      command<Found, set_zero, to_set_zero>(
-          {"zero", Verb::zero, 0, "make this the zero of the turn", zero_arguments, true, false}),
-      command<Slaves, scan, to_ask_address>(
-          {"scan", Verb::scan, 0, "who answers on the line", scan_arguments, false, false}),
-  };
-
-  static BitRanges bits(const Options& values, Frame, Frame reply, const FieldInfo& field) {
-    const std::size_t address_at = reply.bytes[1] == function::ask_address ? 2 : 0;
-    if (&field == fields.of<&Values::address>()) return author::bits_of(address_at, 0, 8);
-    if (&field == fields.of<&Values::new_address>()) return author::bits_of(0, 0, 8);
-    if (&field == fields.of<&Values::function>()) return author::bits_of(1, 0, 8);
-    if (&field == fields.of<&Values::parameter>()) return author::bits_of(2, 0, 8);
-    if (&field != fields.of<&Values::singleturn>()) return {};
-    return author::big_endian_bits(3, reply.bytes.size() - 3 - modbus::crc_size, options.format(values).bits);
-  }
-  static constexpr Request guess_request(const Format& format, Bytes reply) { return assumed_request(format, reply); }
-
-  static constexpr Values values(const Format&, const Request& request) {
-    Values values{.function = request.function, .crc_order = "low_first"};
-    if (request.function != function::ask_address) values.address = request.address;
-    if (request.function == function::read) {
-      values.first_register = request.first_register;
-      values.registers = request.registers;
-    }
-    if (request.function == function::set_address) values.new_address = request.value;
-    if (request.function == function::set_parameter) show_setting(values, request.value);
-    return values;
-  }
-  static constexpr Values values(const Format& format, const Request&, const Reply& reply) {
-    Values values{.function = reply.function,
-                  .crc_order = reply.order == CrcOrder::high_first ? "high_first" : "low_first"};
-    (reply.function == function::set_address ? values.new_address : values.address) = reply.address;
-    if (reply.function == function::read) {
-      values.singleturn = reply.singleturn;
-      values.angle = degrees(reply.singleturn, format.bits);
-    }
-    if (reply.function == function::set_parameter) show_setting(values, reply.value);
-    return values;
-  }
-  static constexpr void show_setting(Values& values, std::uint8_t value) {
-    values.parameter = value;
-    values.setting = name_of_setting(value);
-  }
-  static constexpr Values values(const Format&, const Found& found) { return found; }
-  static void put(FieldSink& sink, const Format&, const Slaves& found) {
-    using Kind = Slaves::Kind;
-    for (std::size_t i = 0; i < found.at.size(); ++i) {
-      const Kind kind = found.at[i];
-      if (kind == Kind::none) continue;
-      fields.put(sink, {.encoder_address = static_cast<std::uint16_t>(i),
-                        .clash = kind == Kind::clash,
-                        .refuses = kind == Kind::refuses ? std::optional<bool>(true) : std::nullopt});
-    }
-  }
+constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
+    .id = "raa38-modbus",
+    .name = "RAA38S6 over Modbus RTU",
+    .document = "RAA38S6 Operation Manual, 3.1.7",
+    .link = LinkKind::half_duplex,
+    .options = options.infos,
+    .format = author::format_of<options>,
+    .models = models,
+    .fields = fields.infos,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_size = 1300,
+    .report = report,
+    .guess_request = guess_request,
+    .frame_end = frame_end,
+    .bits = bits_in,
+    .probe = probe,
+    // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.
+    .timing = {.pause_bits = 25, .turnaround_limit = answer_limit},
 };
 
 }  // namespace
 }  // namespace rtu
 
-constinit const Unit modbus_unit = author::UnitOf<rtu::Definition>::make();
+constinit const Unit modbus_unit = author::Descriptor<rtu::declaration>::make();
 
 }  // namespace absenc::raa38

@@ -27,7 +27,7 @@ using author::option;
 using author::probeable;
 using author::with_role;
 
-constexpr author::OptionsOf options{
+constexpr auto options = author::OptionsOf{
     option<&Format::mode>("mode", "what starts a frame: the encoder itself, a pulse on CLK, or BC AA Bx", mode_choices),
     probeable(option<&Format::bits>("bits", "of a turn", least_bits, most_bits)),
     with_role<Role::encoder>(
@@ -98,7 +98,33 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   });
 }
 
-// ---- What is declared
+// ---- What is shown
+
+constexpr Values values_of_request(const Format&, const Request& request) {
+  return {.command = request.kind == Request::Kind::read ? "read" : "zero_clear", .unit = request.unit};
+}
+constexpr Values values_of_reply(const Format& format, const Request&, const Position& reply) {
+  return values_of(format, reply);
+}
+void put_found(FieldSink& sink, const Format& format, const Values& found) {
+  fields.put(sink, found);
+  if (found.singleturn) sink.put_reading(author::position_reading(*found.singleturn, format.bits));
+}
+void put_units(FieldSink& sink, const Format& format, const Units& found) {
+  for (const Values& unit : found) {
+    if (unit.encoder_address) put_found(sink, format, unit);
+  }
+}
+
+constexpr author::Report<Protocol> report{
+    .put_request = author::put_values<fields, values_of_request>,
+    .put_reply = author::put_values<fields, values_of_reply>,
+    .explain = explain,
+};
+constexpr author::Finding<Format, Values> found{.put = put_found};
+constexpr author::Finding<Format, Units> units{.put = put_units};
+
+// ---- Commands
 
 constexpr bool listens(const Format& format) { return format.mode == Mode::timing; }
 
@@ -111,72 +137,70 @@ Any<Conversation> make_listen(const Format& format, Arguments, std::span<std::by
   return make_host<Listen>(storage, format);
 }
 
-struct Definition : author::Declares<Definition, Protocol> {
-  using Encoder = VirtualEncoder;
-  static constexpr std::string_view id = "raa38", name = "RAA38S6, RS-485, RS-232 or RS-422",
-                                    document = "Absolute Encoder Operation Manual, RAA38S6 series";
-  static constexpr LinkKind link = LinkKind::half_duplex;  // of three kinds of line the one that allows least
-  static constexpr std::size_t frames_size = 1000;
-  static constexpr auto options = serial::options;
-  static constexpr auto fields = serial::fields;
-  static constexpr auto vectors = serial::vectors;
-  static constexpr auto probe = serial::probe;
-  static constexpr auto frame_end = serial::frame_end;
-  static constexpr auto explain = serial::explain;
-  static constexpr LineTiming timing{.turnaround_limit = answer_limit};
-  // The document names no speed.
-  static constexpr std::array models{
-      author::ModelText{"RAA38S6", "10 to 21 bits, single-turn; by itself, by pulse, on a bus", 0, ""}};
+constexpr Command position{"position", Verb::read, 0, "position within the turn"};
+constexpr auto commands = std::array{
+    author::reading<report, position_request, ReadPosition>(position).or_when(
+        listens, {.info = position, .request = nullptr, .make = make_listen, .size = sizeof(Listen)}),
+    author::command<report, units, scan, to_scan>({"scan", Verb::scan, 0, "who answers on a bus", {}, false, false}),
+    author::command<report, found, set_zero, to_zero>(
+        {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
+};
 
-  static constexpr Command position{"position", Verb::read, 0, "position within the turn"};
-  static constexpr std::array commands{
-      author::reading<Definition, Protocol, position_request, ReadPosition>(position).or_when(
-          listens, {.info = position, .request = nullptr, .make = make_listen, .size = sizeof(Listen)}),
-      command<Units, scan, to_scan>({"scan", Verb::scan, 0, "who answers on a bus", {}, false, false}),
-      command<Values, set_zero, to_zero>({"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
-  };
+// ---- What is declared
 
-  static BitRanges bits(const Options& values, Frame, Frame, const FieldInfo& field) {
-    const Format format = options.format(values);
-    if (&field == fields.of<&Values::second_byte>()) return author::bits_of(1, 0, 8);
-    if (&field != fields.of<&Values::singleturn>()) return {};
-    return author::big_endian_bits(2, format.data_bytes(), format.bits);
-  }
-  // "T1: baud rate": not stated, must be given.
-  static constexpr LineSettings line(const Format&) { return {.rate = 0}; }
-  static constexpr Resolution resolution(const Format& format) { return {format.bits, 0}; }
-  static constexpr Request guess_request(const Format&, Bytes) { return {Request::Kind::trigger}; }
-  // A pulse is no byte either.
-  static bool streams(const Options& values) { return options.format(values).mode != Mode::bus; }
-  static bool is_answered(const Options&, Frame request) {
-    const Result<Request> asked = decode_request(request.bytes);
-    return asked && asked->kind == Request::Kind::read;
-  }
-  static ExtraWires extra_wires(const Options& values) {
-    const Format format = options.format(values);
-    return {.trigger = format.mode == Mode::handshake, .clear = format.zeroing == Zeroing::line};
-  }
+// The document names no speed.
+constexpr auto models =
+    std::array{author::ModelText{"RAA38S6", "10 to 21 bits, single-turn; by itself, by pulse, on a bus", 0, ""}};
 
-  static constexpr Values values(const Format&, const Request& request) {
-    return {.command = request.kind == Request::Kind::read ? "read" : "zero_clear", .unit = request.unit};
-  }
-  static constexpr Values values(const Format& format, const Request&, const Position& reply) {
-    return values_of(format, reply);
-  }
-  static void put(FieldSink& sink, const Format& format, const Values& found) {
-    fields.put(sink, found);
-    if (found.singleturn) sink.put_reading(author::position_reading(*found.singleturn, format.bits));
-  }
-  static void put(FieldSink& sink, const Format& format, const Units& found) {
-    for (const Values& unit : found) {
-      if (unit.encoder_address) put(sink, format, unit);
-    }
-  }
+BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
+  const Format format = options.format(values);
+  if (&field == fields.of<&Values::second_byte>()) return author::bits_of(1, 0, 8);
+  if (&field != fields.of<&Values::singleturn>()) return {};
+  return author::big_endian_bits(2, format.data_bytes(), format.bits);
+}
+// "T1: baud rate": not stated, must be given.
+constexpr LineSettings line_of(const Format&) { return {.rate = 0}; }
+constexpr Resolution resolution_of(const Format& format) { return {format.bits, 0}; }
+constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{Request::Kind::trigger}; }
+// A pulse is no byte either.
+bool is_streaming(const Options& values) { return options.format(values).mode != Mode::bus; }
+bool is_answered(const Options&, Frame request) {
+  const Result<Request> asked = decode_request(request.bytes);
+  return asked && asked->kind == Request::Kind::read;
+}
+ExtraWires wires_of(const Options& values) {
+  const Format format = options.format(values);
+  return {.trigger = format.mode == Mode::handshake, .clear = format.zeroing == Zeroing::line};
+}
+
+constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
+    .id = "raa38",
+    .name = "RAA38S6, RS-485, RS-232 or RS-422",
+    .document = "Absolute Encoder Operation Manual, RAA38S6 series",
+    .link = LinkKind::half_duplex,  // of three kinds of line the one that allows least
+    .options = options.infos,
+    .format = author::format_of<options>,
+    .models = models,
+    .fields = fields.infos,
+    .commands = commands,
+    .vectors = vectors,
+    .frames_size = 1000,
+    .report = report,
+    .line = line_of,
+    .resolution = resolution_of,
+    .guess_request = guess_request,
+    .frame_end = frame_end,
+    .is_answered = is_answered,
+    .bits = bits_in,
+    .probe = probe,
+    .streams = is_streaming,
+    .extra_wires = wires_of,
+    .timing = {.turnaround_limit = answer_limit},
 };
 
 }  // namespace
 }  // namespace serial
 
-constinit const Unit serial_unit = author::UnitOf<serial::Definition>::make();
+constinit const Unit serial_unit = author::Descriptor<serial::declaration>::make();
 
 }  // namespace absenc::raa38
