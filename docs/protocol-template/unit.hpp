@@ -54,15 +54,19 @@ struct Protocol {
     bytes.push_back(request.address);
     return bytes;
   }
-  static constexpr std::size_t request_size(Bytes begin) { return begin[0] == 0x50 || begin[0] == 0x5A ? 2 : 0; }
-  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
+  static constexpr std::size_t request_size(const Format&, Bytes begin) {
+    return begin[0] == 0x50 || begin[0] == 0x5A ? 2 : 0;
+  }
+  static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     if (bytes.size() != 2) return Error::wrong_length;
-    if (request_size(bytes) == 0) return Error::bad_framing;
+    if (request_size(format, bytes) == 0) return Error::bad_framing;
     return Request{static_cast<Ask>(bytes[0]), bytes[1]};
   }
 
   // Reply: position high byte first, then the sum of all bytes with the address.
   static constexpr std::size_t reply_size(const Format&, const Request&) { return longest_reply; }
+  static constexpr std::size_t expected(const Format&, const Request&, Bytes) { return longest_reply; }
+  static constexpr bool is_whole(const Format&, Error) { return false; }  // after an error more may be coming
   static constexpr std::uint8_t sum(std::uint8_t address, std::uint8_t high, std::uint8_t low) {
     return static_cast<std::uint8_t>(address + high + low);
   }
@@ -83,6 +87,7 @@ struct Protocol {
   static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return author::position_reading(reply.singleturn, 16);
   }
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }  // the document does not say when
 
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.character = format.line().character(), .answer_time = 10us, .start_time = 100ms};

@@ -67,7 +67,7 @@ struct Protocol {
     return {
         .repeats = request.is_answered() ? 2u : 0u, .expects_reply = request.is_answered(), .ends_by_silence = true};
   }
-  static constexpr std::size_t request_size(Bytes begin) {
+  static constexpr std::size_t request_size(const Format&, Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];
   }
   static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
@@ -77,8 +77,8 @@ struct Protocol {
     if (!request.is_answered()) bytes.push_back(ask);
     return bytes;
   }
-  static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
-    if (bytes.empty() || bytes.size() != request_size(bytes)) return Error::wrong_length;
+  static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
+    if (bytes.empty() || bytes.size() != request_size(format, bytes)) return Error::wrong_length;
     const Request request{static_cast<Ask>(bytes.size() == 1 ? bytes[0] & 3 : bytes[1]),
                           static_cast<std::uint8_t>(bytes[0] & 0xFC)};
     const bool known = bytes.size() == 1 || request.ask == Ask::zero || request.ask == Ask::reset;
@@ -87,6 +87,10 @@ struct Protocol {
   static constexpr std::size_t reply_size(const Format&, const Request& request) {
     return request.is_answered() ? 2 : 0;
   }
+  static constexpr std::size_t expected(const Format& format, const Request& request, Bytes) {
+    return reply_size(format, request);
+  }
+  static constexpr bool is_whole(const Format&, Error) { return false; }
   static constexpr ByteBuffer<2> encode_reply(const Format& format, const Request& request, const Reply& reply) {
     const unsigned shift = request.ask == Ask::position ? 14u - format.singleturn_bits : 0u;
     auto word = static_cast<std::uint16_t>(static_cast<unsigned>(reply.value) << shift & 0x3FFF);
@@ -111,6 +115,7 @@ struct Protocol {
     if (request.ask == Ask::turns) return author::turns_reading(reply.value, turns_bits);
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {format.line().character(), turn_around[format.rate], restart_time};
   }

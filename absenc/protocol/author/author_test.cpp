@@ -40,7 +40,7 @@ struct Toy {
     bytes.push_back(request);
     return bytes;
   }
-  static std::size_t reply_size(const Format&, const Request& request) { return request == 0x7F ? 0 : 1; }
+  static std::size_t expected(const Format&, const Request& request, Bytes) { return request == 0x7F ? 0 : 1; }
   static Result<Reply> decode(const Format&, const Request& request, Bytes bytes) {
     if (bytes.empty()) return Error::timeout;
     if (bytes.size() != 1) return Error::wrong_length;
@@ -48,7 +48,7 @@ struct Toy {
     if (bytes[0] != (request | 0x80)) return Error::bad_checksum;
     return bytes[0];
   }
-  static bool is_whole(Error error) { return error == Error::busy; }
+  static bool is_whole(const Format&, Error error) { return error == Error::busy; }
 };
 
 using ToyDialog = DialogOf<Toy>;
@@ -113,6 +113,7 @@ struct Bench {
 
 Wire echo(std::uint8_t request, unsigned) { return {static_cast<std::uint8_t>(request | 0x80)}; }
 Wire nothing(std::uint8_t, unsigned) { return {}; }
+Wire endless_noise_of_bytes(std::uint8_t, unsigned) { return Wire(20'000, 0x11); }
 
 template <auto procedure>
 struct Case {
@@ -187,7 +188,7 @@ Procedure attempts(ToyDialog& dialog, Found& found) {
   if (first) co_return {Error::invalid_argument};
   co_await dialog.ask(0x7F);  // is not answered
   dialog.emit();
-  dialog.set_rate(9600);
+  dialog.set_rate(9600, Toy::host_times(dialog.format()));
   const std::uint8_t last = co_await dialog.ask(3);
   found.sum = last;
   co_return done;
@@ -307,6 +308,59 @@ TEST(Reported, TheDocumentExplainsWhatTheProcedureLeavesOpen) {
     Bench(echo).run(host);
     EXPECT_EQ(std::string(host.detail()) + "/" + std::string(host.advice()), said[static_cast<std::size_t>(way)]);
   }
+}
+
+constexpr Report<Toy, ToyDialog> of_host{
+    .explain = [](const Toy::Format&, Error, Bytes, Bytes) -> Explanation { return {"of the frame"}; },
+    .explain_host = [](const ToyDialog& host) -> Explanation {
+      return {host.request() == 1 ? "of the host" : "of another"};
+    }};
+constexpr Report<Toy, ToyDialog> telling{
+    .explain_host = [](const ToyDialog&) -> Explanation {
+      return {"of the host", "advice"};
+    },
+    .tell = [](Sentence& words, const ToyDialog& host) { words.add(text_of(host.error()).name).add(" is told"); },
+    .noise_advice = "shield it"};
+constexpr Finding<ToyDialog, Found> leaving{
+    .put = [](FieldSink&, const ToyDialog&, const Found&) {},
+    .put_left = [](FieldSink& sink, const ToyDialog& host,
+                   const Found& found) { sink.put({.info = nullptr, .number = host.request() * 1000 + found.sum}); },
+    .left = [](const Found& found) -> std::string_view { return found.sum != 0 ? "something is left" : ""; }};
+
+Procedure leave_something(ToyDialog& dialog, Found& found) {
+  co_await dialog.ask(1);
+  found.sum = 7;
+  co_return {Error::busy};
+}
+
+struct Numbers final : FieldSink {
+  void put(const FieldValue& value) override { seen.push_back(value.number); }
+  std::vector<std::int64_t> seen;
+};
+
+TEST(Reported, OnlyTheConversationKnows) {
+  alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+  Reported<of_host, author::Run<Toy, Found, leave_something>, finding> host({}, {}, arena);
+  Bench(echo).run(host);
+  EXPECT_EQ(host.detail(), "of the host");
+}
+
+TEST(Reported, WordsAndFieldsOfAProcedureThatIsBrokenOff) {
+  alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+  Reported<telling, author::Run<Toy, Found, leave_something>, leaving> host({}, {}, arena);
+  Bench(echo).run(host);
+  EXPECT_EQ(host.detail(), "busy is told; something is left");
+  EXPECT_EQ(host.advice(), "advice");
+  Numbers numbers;
+  host.report_left(numbers);
+  EXPECT_EQ(numbers.seen, std::vector<std::int64_t>{1007});
+}
+
+TEST(Reported, AdviceAboutALineThatIsNeverSilent) {
+  alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+  Reported<telling, author::Run<Toy, Found, leave_something>, leaving> host({}, {}, arena);
+  Bench(endless_noise_of_bytes).run(host);
+  EXPECT_EQ(host.advice(), "shield it");
 }
 
 TEST(Text, ValuesAreNamed) {

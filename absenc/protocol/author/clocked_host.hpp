@@ -12,9 +12,6 @@
 
 namespace absenc::author {
 
-/// The host sends nothing but clocks.
-struct NoRequest {};
-
 /// What the document says of frames of clocked bits:
 ///
 ///   struct Protocol {

@@ -170,12 +170,11 @@ class Reported final : public Base {
 /// Whether a pulse on a wire of its own is the request.
 template <class P>
 constexpr bool asks_by_pulse(const typename P::Format& format, const typename P::Request& request) {
-  if constexpr (requires { P::manner(format, request).pulse; }) {
-    return P::manner(format, request).pulse != Time{};
-  } else {
-    return false;
-  }
+  return P::manner(format, request).pulse != Time{};
 }
+
+/// The host sends nothing but clocks.
+struct NoRequest {};
 
 template <class P>
 struct CommandOf {
@@ -216,12 +215,12 @@ struct CommandOf {
   }
   // Whether a request is made of these arguments, or the conversation says why there is none.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
-    if constexpr (requires(const Request& asked) { P::encode(format, asked).empty(); }) {
+    if constexpr (std::is_same_v<Request, NoRequest>) {
+      return true;
+    } else {
       if (request == nullptr) return true;
       const Result<Request> asked = request(format, arguments);
       return !asked || !P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked);
-    } else {
-      return true;
     }
   }
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {

@@ -39,7 +39,7 @@ struct Declaration {
   std::size_t frames_size = 0;                 // bytes of storage that the procedures' frames need at the most
   Report<P, Host> report{};
 
-  // ---- Where the unit must say it. Null: as the comment tells.
+  // ---- What depends on the format
 
   /// Null: `format.line()`.
   LineSettings (*line)(const Format&) = nullptr;

@@ -99,7 +99,7 @@ class Responder : public EncoderOn<std::uint8_t> {
 /// off. Of the protocol it needs besides:
 ///
 ///   static DeviceTimes device_times(const Format&);
-///   static std::size_t request_size(Bytes begin);                      // or (const Format&, Bytes begin)
+///   static std::size_t request_size(const Format&, Bytes begin);       // 0: no request begins so
 ///   static std::size_t reply_size(const Format&, const Request&);      // 0: it is not answered
 ///   static Result<Request> decode_request(const Format&, Bytes);
 ///   static ByteBuffer<N> encode_reply(const Format&, const Request&, const Reply&);
@@ -142,13 +142,7 @@ class BusDevice : public Responder {
   }
 
  private:
-  [[nodiscard]] std::size_t request_size(Bytes begin) const final {
-    if constexpr (requires { P::request_size(format_, begin); }) {
-      return P::request_size(format_, begin);
-    } else {
-      return P::request_size(begin);
-    }
-  }
+  [[nodiscard]] std::size_t request_size(Bytes begin) const final { return P::request_size(format_, begin); }
   [[nodiscard]] std::size_t others_reply_size(Bytes bytes) const final {
     const Result<Request> request = P::decode_request(format_, bytes);
     return request ? P::reply_size(format_, *request) : 0;

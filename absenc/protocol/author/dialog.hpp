@@ -16,7 +16,7 @@
 
 namespace absenc::author {
 
-/// What the document says of frames:
+/// What the document says of frames. Nothing of it is optional: a name that is misspelt does not compile.
 ///
 ///   struct Protocol {
 ///     using Format, Request, Reply;                                  // Format: what the options make of them
@@ -24,11 +24,13 @@ namespace absenc::author {
 ///     static HostTimes host_times(const Format&);
 ///     static Manner manner(const Format&, const Request&);
 ///     static ByteBuffer<N> encode(const Format&, const Request&);
-///     static std::size_t reply_size(const Format&, const Request&);              // 0: it is not answered
-///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine; left out: reply_size
+///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine
 ///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of no bytes: Error::timeout
-///     static bool is_whole(Error);                                   // see Engine; or (format, error); else never
-///   };
+///     static bool is_whole(const Format&, Error);                    // see Engine
+///     static Reading reading(const Format&, const Request&, const Reply&);
+///     static Time latched(const Format&, Time sent_at);              // when the encoder takes the position; where the
+///   };                                                               // document does not say it: at `sent_at`, the
+///   latest
 ///
 /// Typed requests and replies; a subclass says what becomes of them.
 template <class P>
@@ -42,15 +44,10 @@ class HostOf : public Engine {
   [[nodiscard]] const Request& request() const { return request_; }
   /// The last good one.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// The position in the last good reply, with the times of its exchange. Where the document says when the encoder
-  /// takes the position, `P::latched(format, sent_at)` is that time.
+  /// The position in the last good reply, with the times of its exchange.
   [[nodiscard]] Reading last_reading() const {
     Reading reading = P::reading(format_, request_, last_);
-    if constexpr (requires { P::latched(format_, sent_at()); }) {
-      reading.latched = P::latched(format_, sent_at());
-    } else {
-      reading.latched = sent_at();  // the latest it can have been taken
-    }
+    reading.latched = P::latched(format_, sent_at());
     reading.received = received_at();
     return reading;
   }
@@ -71,27 +68,13 @@ class HostOf : public Engine {
   }
 
  private:
-  [[nodiscard]] std::size_t expected() const final {
-    if constexpr (requires { P::expected(format_, request_, reply()); }) {
-      return P::expected(format_, request_, reply());
-    } else {
-      return P::reply_size(format_, request_);
-    }
-  }
+  [[nodiscard]] std::size_t expected() const final { return P::expected(format_, request_, reply()); }
   [[nodiscard]] Error check() final {
     const Result<Reply> result = P::decode(format_, request_, reply());
     if (result) last_ = *result;
     return result.error();
   }
-  [[nodiscard]] bool is_whole(Error error) const final {
-    if constexpr (requires { P::is_whole(format_, error); }) {
-      return P::is_whole(format_, error);
-    } else if constexpr (requires { P::is_whole(error); }) {
-      return P::is_whole(error);
-    } else {
-      return false;
-    }
-  }
+  [[nodiscard]] bool is_whole(Error error) const final { return P::is_whole(format_, error); }
 
   Format format_;
   Request request_{};
@@ -101,8 +84,7 @@ class HostOf : public Engine {
   std::array<std::uint8_t, 3 * P::longest_reply> storage_;
 };
 
-/// A position, asked for once: what a drive repeats ten thousand times a second. `P::reading(format, request, reply)`
-/// makes a Reading of the reply.
+/// A position, asked for once: what a drive repeats ten thousand times a second.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
@@ -197,12 +179,10 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Hands out an intermediate result before what is asked next.
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
-  /// This end of the line speaks at `rate` from here on; where the times of the line follow the rate, the protocol has
-  /// `host_times(format, rate)`.
-  void set_rate(std::uint32_t rate) {
+  /// This end of the line speaks at `rate` from here on, with these times.
+  void set_rate(std::uint32_t rate, const HostTimes& times) {
     HostOf<P>::set_rate(rate);
-    if constexpr (requires { P::host_times(this->format(), rate); })
-      this->set_times(P::host_times(this->format(), rate));
+    this->set_times(times);
   }
   /// Nothing is sent for so long, which what is awaited next begins: `heard` tells what comes, until it is over.
   void listen(Time duration) {

@@ -20,23 +20,17 @@ struct Known {
   static constexpr HostTimes host_times(const Format&) { return P::host_times(format); }
   static constexpr Manner manner(const Format&, const Request&) { return P::manner(format, request); }
   static constexpr auto encode(const Format&, const Request&) { return P::encode(format, request); }
-  static constexpr std::size_t reply_size(const Format&, const Request&) { return P::reply_size(format, request); }
-  static constexpr std::size_t expected(const Format&, const Request&, Bytes so_far) requires requires {
-    P::expected(format, request, so_far);
+  static constexpr std::size_t expected(const Format&, const Request&, Bytes so_far) {
+    return P::expected(format, request, so_far);
   }
-  { return P::expected(format, request, so_far); }
   [[gnu::flatten]] static constexpr Result<Reply> decode(const Format&, const Request&, Bytes bytes) {
     return P::decode(format, request, bytes);
   }
-  static constexpr bool is_whole(Error error) requires requires { P::is_whole(error); }
-  { return P::is_whole(error); }
-  static constexpr bool is_whole(const Format&, Error error) requires requires { P::is_whole(format, error); }
-  { return P::is_whole(format, error); }
+  static constexpr bool is_whole(const Format&, Error error) { return P::is_whole(format, error); }
   [[gnu::flatten]] static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return P::reading(format, request, reply);
   }
-  static constexpr Time latched(const Format&, Time sent_at) requires requires { P::latched(format, sent_at); }
-  { return P::latched(format, sent_at); }
+  static constexpr Time latched(const Format&, Time sent_at) { return P::latched(format, sent_at); }
 };
 
 /// `static constexpr Format format{...}; static constexpr Request request{...};`. Of a protocol whose ReadPosition is

@@ -125,11 +125,7 @@ struct Descriptor {
   }
 
   static constexpr std::size_t request_size(const Options& values, Bytes begin) {
-    if constexpr (requires { P::request_size(declared.format(values), begin); }) {
-      return P::request_size(declared.format(values), begin);
-    } else {
-      return P::request_size(begin);
-    }
+    return P::request_size(declared.format(values), begin);
   }
 
   static constexpr std::size_t reply_size(const Options& values, Bytes begin) {

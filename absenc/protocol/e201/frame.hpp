@@ -180,7 +180,7 @@ struct Protocol {
     if (is_clock) text.push_back(end_of_line);
     return text;
   }
-  static constexpr std::size_t request_size(Bytes begin) {
+  static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (!letter::is_in(letter::all, begin[0])) return 0;
     return begin[0] == letter::set_clock ? 3 : 1;
   }
@@ -200,7 +200,7 @@ struct Protocol {
     return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
   }
   /// What has its CR where it belongs is whole, whatever it says.
-  static constexpr bool is_whole(Error error) { return error != Error::wrong_length; }
+  static constexpr bool is_whole(const Format&, Error error) { return error != Error::wrong_length; }
   /// Errors: timeout; those of decode_samples and decode_position, or of decode_line; unsupported (no document says
   /// what this one answers).
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
@@ -216,6 +216,7 @@ struct Protocol {
     if (request.letter != letter::samples) return {};
     return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);
   }
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 };
 
 }  // namespace absenc::e201

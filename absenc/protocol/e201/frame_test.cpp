@@ -86,7 +86,7 @@ TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
     const ByteBuffer<3> encoded = Protocol::encode({}, request);
     EXPECT_EQ(std::string(encoded.view().begin(), encoded.view().end()), text);
     if (text.empty()) continue;
-    EXPECT_EQ(Protocol::request_size(bytes(text)), text.size());
+    EXPECT_EQ(Protocol::request_size({}, bytes(text)), text.size());
     const Result<Request> decoded = Protocol::decode_request({}, encoded);
     ASSERT_TRUE(decoded) << text;
     EXPECT_EQ(decoded->letter, request.letter);
@@ -104,7 +104,7 @@ TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
                                                                      {"M9", "out_of_range"}})) {
     EXPECT_EQ(name(Protocol::decode_request({}, bytes(text)).error()), error) << text;
   }
-  EXPECT_EQ(Protocol::request_size(bytes("q")), 0u);
+  EXPECT_EQ(Protocol::request_size({}, bytes("q")), 0u);
 }
 
 TEST(E201Frame, RepliesOfOneLine) {

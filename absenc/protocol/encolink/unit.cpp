@@ -66,6 +66,7 @@ struct Protocol {
   using Reply = Position;
   using Dialog = encolink::Dialog;
 
+  static author::Manner manner(const Format&, const Request&) { return {}; }
   static AccessBytes encode(const Format&, const Request& request) {
     if (request.access) return encode_access(*request.access);
     AccessBytes bytes;
@@ -73,7 +74,7 @@ struct Protocol {
     bytes.push_back(0);
     return bytes;
   }
-  static std::size_t request_size(Bytes begin) {
+  static std::size_t request_size(const Format&, Bytes begin) {
     return begin.size() < request_bytes || is_config(begin[0]) ? request_bytes : 0;
   }
 };

@@ -334,6 +334,10 @@ struct Protocol {
   static constexpr Reading reading(const Profile&, const Request& request, const Reply& reply) {
     return to_reading(request.id, reply);  // by the request, which may be known when the program is written
   }
+  static constexpr std::size_t expected(const Profile& profile, const Request& request, Bytes) {
+    return reply_size(profile, request);
+  }
+  static constexpr bool is_whole(const Profile&, Error) { return false; }
   static constexpr auto latched = latch_time;
 };
 

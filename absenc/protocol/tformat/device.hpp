@@ -290,7 +290,7 @@ class VirtualEncoder final : public author::Responder {
     }
   }
 
-  [[nodiscard]] std::size_t request_size(Bytes begin) const override { return Protocol::request_size(begin); }
+  [[nodiscard]] std::size_t request_size(Bytes begin) const override { return Protocol::request_size(format_, begin); }
   [[nodiscard]] std::size_t others_reply_size(Bytes) const override { return 0; }
 
   Format format_;

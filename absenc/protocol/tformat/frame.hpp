@@ -393,13 +393,14 @@ struct Protocol {
   static constexpr auto decode = decode_reply;
   /// A refusal may be followed by the same request at once. After anything else that is wrong more may be coming, and
   /// sending while the encoder sends can destroy its driver (11).
-  static constexpr bool is_whole(Error error) { return error == Error::request_rejected; }
+  static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     return to_reading(format, request.id, reply);  // by the request, which may be known when the program is written
   }
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
-  static constexpr std::size_t request_size(Bytes begin) {
+  static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     return id && begin[0] == control_field(*id) ? request_length(*id) : 0;
   }

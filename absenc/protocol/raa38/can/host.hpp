@@ -24,6 +24,7 @@ struct Protocol {
   using Request = CanFrame;
   using Reply = CanFrame;
 
+  static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
   /// "220:8020000000000000"
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {

@@ -261,6 +261,7 @@ struct Protocol {
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
+  static constexpr bool is_whole(const Format&, Error) { return false; }
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     if (bytes.empty()) return Error::timeout;
     return decode_reply(format, request, bytes);
@@ -269,6 +270,7 @@ struct Protocol {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);
   }
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
   static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {
     return differ_doubtfully(first, second) ? Error::wrong_length : Error::none;

@@ -148,15 +148,19 @@ void show_position(const Dialog& dialog, Found& found) {
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
+void set_rate(Dialog& dialog, std::uint32_t rate) {
+  dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
+}
+
 // Where a setting put the encoder it must answer, or else, when it did not take it, where it was.
 Part<Outcome> look_for_it(Dialog& dialog, std::uint8_t address, std::uint32_t rate, std::string_view at_the_old_one) {
   const Format& format = dialog.format();
   const bool moves_rate = rate != format.line().rate;
-  if (moves_rate) dialog.set_rate(rate);
+  if (moves_rate) set_rate(dialog, rate);
   co_await dialog.rest(memory_time);
   const Result<Reply> there = co_await look(dialog, address, 3);
   if (there) co_return done;
-  if (moves_rate) dialog.set_rate(format.line().rate);
+  if (moves_rate) set_rate(dialog, format.line().rate);
   const Result<Reply> back = co_await look(dialog, format.address, 3);
   if (!back) {
     co_return only(back.error(), "the setting was sent, and now the encoder answers neither as before nor as it should",
@@ -203,14 +207,14 @@ Procedure find_baud(Dialog& dialog, Found& found) {
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (i == own) continue;
     found.baud = bauds[i];
-    dialog.set_rate(bauds[i]);
+    set_rate(dialog, bauds[i]);
     const Result<Reply> reply = co_await look(dialog, dialog.format().address, 2);
     const bool there = reply || reply.error() == Error::request_rejected;
     if (!there && !dialog.is_noisy()) continue;
-    dialog.set_rate(bauds[own]);
+    set_rate(dialog, bauds[own]);
     co_return {there ? Error::none : reply.error()};
   }
-  dialog.set_rate(bauds[own]);
+  set_rate(dialog, bauds[own]);
   if (first.error() != Error::timeout) co_return only(first.error(), reason.detail, reason.advice);
   co_return only(Error::timeout, "nobody answers at this address at any of the five baud rates",
                  "`absenc scan` asks every address; then check supply and A/B");
@@ -289,7 +293,7 @@ Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
   }
   found.baud = bauds[*baud];
   found.written = false;
-  dialog.set_rate(format.line().rate);  // a port that cannot change its rate must say so before the encoder has
+  set_rate(dialog, format.line().rate);  // a port that cannot change its rate must say so before the encoder has
   co_await look_first(dialog);
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;

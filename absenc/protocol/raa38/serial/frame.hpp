@@ -227,7 +227,7 @@ struct Protocol {
   }
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
-  static constexpr std::size_t request_size(Bytes begin) {
+  static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
@@ -235,6 +235,7 @@ struct Protocol {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
   static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
+  static constexpr bool is_whole(const Format&, Error) { return false; }
   static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
     return encode_position(format, position);
   }
@@ -246,6 +247,7 @@ struct Protocol {
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
     return author::position_reading(position.singleturn, format.bits);
   }
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }
