@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # usage: freestanding.sh LINKED.o OBJECT.o...
-# Fails when the objects, linked into one, need more than a compiler brings along; prints their sizes.
+# Fails when the objects, linked into one, need more than a compiler brings along, or when one has a constant in writable
+# memory; prints their sizes.
 set -euo pipefail
 nm=${NM:-arm-none-eabi-nm}
 size=${SIZE:-arm-none-eabi-size}
@@ -29,6 +30,14 @@ while read -r _ symbol; do
     fi
   done
 done < <("$nm" -u "$linked")
+
+for object in "$@"; do
+  if [[ $object == *tests/* ]]; then continue; fi
+  while read -r _ _ symbol; do
+    status=1
+    echo "in RAM: ${object#"$PWD"/} has $(c++filt "$symbol"); say \`constexpr auto x = std::array{...}\`" >&2
+  done < <("$nm" "$object" | grep -E ' [dD] [^$]' || true)
+done
 
 "$size" "$linked" "$@" | sed -E "s|$PWD/(CMakeFiles/[^/]*/\./)?||"
 exit $status

@@ -32,7 +32,7 @@ struct Listed {
   std::span<const HostClause> host_clauses{};
 };
 
-constexpr std::array listed{
+constexpr auto listed = std::array{
     Listed{&tformat::unit, tformat::clauses, tformat::host_clauses},
     Listed{&esl::unit, esl::clauses, esl::host_clauses},
     Listed{&encolink::unit, encolink::clauses, encolink::host_clauses},

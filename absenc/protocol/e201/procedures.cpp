@@ -49,7 +49,7 @@ Procedure read(Dialog& dialog, Found& found) {
 
 // Nothing in a text tells which question it answers: one that comes twice must not be there for the next.
 Procedure inform(Dialog& dialog, Found& found) {
-  static constexpr std::array letters{letter::version, letter::serial, letter::supply, letter::clock};
+  static constexpr auto letters = std::array{letter::version, letter::serial, letter::supply, letter::clock};
   for (const std::uint8_t asked : letters) {
     const Result<Reply> reply = co_await dialog.attempt({asked}).until_silence();
     if (!reply && (asked == letter::version || dialog.is_noisy())) co_return {reply.error()};
