@@ -24,7 +24,7 @@ def list_unit(text, name):
     else:
         at = max(i for i, line in enumerate(lines) if line.startswith("#include")) + 1
     lines.insert(at, include)
-    begin = next(i for i, line in enumerate(lines) if "std::array listed{" in line)
+    begin = next(i for i, line in enumerate(lines) if "listed = std::array{" in line)
     end = next(i for i in range(begin, len(lines)) if lines[i] == "};")
     lines.insert(end, f"    Listed{{&{name}::unit}},")
     return "\n".join(lines) + "\n"
