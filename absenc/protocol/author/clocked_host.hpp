@@ -97,10 +97,10 @@ class ReadClocked : public ClockedHostOf<P> {
 };
 
 /// What Reader, made of the format, reads.
-template <const auto& said, class Reader = ReadClocked<ReportedProtocol<said>>>
-[[nodiscard]] constexpr CommandOf<ReportedProtocol<said>> clocked_reading(const Command& info) {
-  using Format = typename ReportedProtocol<said>::Format;
-  using Made = Reported<said, Reader>;
+template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<unit_report>>>
+[[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> clocked_reading(const Command& info) {
+  using Format = typename ReportedProtocol<unit_report>::Format;
+  using Made = Reported<unit_report, Reader>;
   return {.info = info,
           .request = nullptr,
           .make = [](const Format& format, Arguments,

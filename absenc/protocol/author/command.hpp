@@ -49,8 +49,8 @@ struct ItemOf<P> {
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
-/// How a unit shows what it received, and what it says of errors; firmware does not link these words. `Host` is a
-/// class that all its conversations derive from.
+/// The fields of a unit's requests and replies, and its words for people; firmware does not link them. All
+/// conversations of the unit derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   using Protocol = P;
@@ -63,27 +63,28 @@ struct Report {
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a good reply to it.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// What the document says of a bad reply, or of none. Of a conversation only where the procedure itself has not said
-  /// what to do.
+  /// Explains a bad reply, or none, as the document does. Not asked where a procedure gives an advice of its own.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
-  /// In place of `explain` where it takes what only the conversation knows.
+  /// Used in place of `explain` for conversations, where only they know enough.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// In place of `explain` where words must be put together. The exchange of `host` is the one that went wrong.
+  /// Used in place of `explain` for conversations, where words must be put together. The last exchange of `host` went
+  /// wrong.
   void (*tell)(Sentence&, const Host& host) = nullptr;
-  /// What to do about a line that is never silent.
+  /// Advice about a line that is never silent.
   std::string_view noise_advice = endless_noise.advice;
 };
 
-/// How what a procedure finds is shown. `Subject` is the format; or a class that the conversation derives from, where
-/// the format alone does not tell.
+/// The fields of a procedure's `Found`. `Subject` is the format; or a class that the conversation derives from, where
+/// the format alone is not enough.
 template <class Subject, class T>
 struct Finding {
   using Of = Subject;
   using Found = T;
 
   void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Fields of what a procedure leaves that is broken off, and the same in words.
+  /// Puts the fields of what a procedure leaves behind that is broken off.
   void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
+  /// Returns the same in words.
   std::string_view (*left)(const T&) = nullptr;
 };
 
@@ -93,19 +94,19 @@ constexpr void put_values(FieldSink& sink, const What&... what) {
   fields.put(sink, values(what...));
 }
 
-/// A conversation as a unit hands it out: with the fields and the words of `said`. A procedure has a `finding`; without
-/// one the last reply is shown.
-template <const auto& said, class Base, const auto&... finding>
+/// A conversation as a unit hands it out: with the fields and the words of `unit_report`. A procedure has a `finding`;
+/// without one the last reply is shown.
+template <const auto& unit_report, class Base, const auto&... finding>
 class Reported final : public Base {
  public:
   using Base::Base;
-  static_assert(sizeof...(finding) == 1 || said.put_reply != nullptr, "a report needs put_reply");
+  static_assert(sizeof...(finding) == 1 || unit_report.put_reply != nullptr, "a report needs put_reply");
   static_assert(((finding.put != nullptr) && ...), "a finding needs put");
 
   void report(FieldSink& sink) const override {
     if (this->error() != Error::none) return;
     if constexpr (sizeof...(finding) == 0) {
-      said.put_reply(sink, this->format(), this->request(), this->last());
+      unit_report.put_reply(sink, this->format(), this->request(), this->last());
     } else {
       (finding.put(sink, subject<finding>(), this->found()), ...);
     }
@@ -117,8 +118,8 @@ class Reported final : public Base {
     const std::string_view own = Base::detail();
     if (this->error() != Error::none && this->is_noisy()) {
       if (own != endless_noise.detail) words_.add(endless_noise.detail);
-    } else if constexpr (said.tell != nullptr) {
-      if (this->error() != Error::none) said.tell(words_, *this);
+    } else if constexpr (unit_report.tell != nullptr) {
+      if (this->error() != Error::none) unit_report.tell(words_, *this);
     } else {
       words_.add(explained().detail);
     }
@@ -129,17 +130,17 @@ class Reported final : public Base {
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
     if (!own.empty()) return own;
-    return this->is_noisy() ? said.noise_advice : explained().advice;
+    return this->is_noisy() ? unit_report.noise_advice : explained().advice;
   }
 
  private:
   [[nodiscard]] Explanation explained() const {
     const bool open = this->error() != Error::none && !this->is_alone() && Base::advice().empty();
-    if constexpr (said.explain_host != nullptr) {
-      if (open) return said.explain_host(*this);
-    } else if constexpr (said.explain != nullptr) {
+    if constexpr (unit_report.explain_host != nullptr) {
+      if (open) return unit_report.explain_host(*this);
+    } else if constexpr (unit_report.explain != nullptr) {
       const auto exchange = this->exchange();
-      if (open) return said.explain(this->format(), this->error(), exchange.sent, exchange.received);
+      if (open) return unit_report.explain(this->format(), this->error(), exchange.sent, exchange.received);
     }
     return {};
   }
@@ -258,14 +259,14 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 }  // namespace detail
 
 /// The protocol that a report is of.
-template <const auto& said>
-using ReportedProtocol = typename std::remove_cvref_t<decltype(said)>::Protocol;
+template <const auto& unit_report>
+using ReportedProtocol = typename std::remove_cvref_t<decltype(unit_report)>::Protocol;
 
 /// A position, or another value, that one request asks for: `request` makes it of the format, and Reader reads it.
-template <const auto& said, auto request, class Reader = ReadPosition<ReportedProtocol<said>>>
-[[nodiscard]] constexpr CommandOf<ReportedProtocol<said>> reading(const Command& info) {
-  using P = ReportedProtocol<said>;
-  using Made = Reported<said, Reader>;
+template <const auto& unit_report, auto request, class Reader = ReadPosition<ReportedProtocol<unit_report>>>
+[[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> reading(const Command& info) {
+  using P = ReportedProtocol<unit_report>;
+  using Made = Reported<unit_report, Reader>;
   return {.info = info,
           .request = [](const typename P::Format& format, Arguments) -> Result<typename P::Request> {
             return detail::request_of<request>(format);
@@ -278,11 +279,11 @@ template <const auto& said, auto request, class Reader = ReadPosition<ReportedPr
 }
 
 /// What a procedure does. `request(format, arguments)`: see CommandOf; a Request, or a Result.
-template <const auto& said, const auto& finding, auto procedure, auto request, auto... bound>
-[[nodiscard]] constexpr CommandOf<ReportedProtocol<said>> command(const Command& info) {
-  using P = ReportedProtocol<said>;
+template <const auto& unit_report, const auto& finding, auto procedure, auto request, auto... bound>
+[[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> command(const Command& info) {
+  using P = ReportedProtocol<unit_report>;
   using Found = typename std::remove_cvref_t<decltype(finding)>::Found;
-  using Made = Reported<said, Run<P, Found, procedure, bound...>, finding>;
+  using Made = Reported<unit_report, Run<P, Found, procedure, bound...>, finding>;
   return {.info = info,
           .request = [](const typename P::Format& format, Arguments arguments) -> Result<typename P::Request> {
             return request(format, arguments);

@@ -35,7 +35,7 @@ struct Declaration {
   std::span<const FieldInfo> fields{};         // FieldsOf::infos (field.hpp)
   std::span<const CommandOf<P>> commands{};    // command.hpp
   std::span<const VectorText> vectors{};       // text.hpp; they hold, or it does not compile
-  bool frames_are_texts = false;               // those of the vectors are not hexadecimal; clocked ones never are
+  bool frames_are_texts = false;               // frames of vectors are no hexadecimal; clocked ones are 0 and 1
   std::size_t frames_size = 0;                 // bytes of storage that the procedures' frames need at the most
   Report<P, Host> report{};
 
@@ -45,15 +45,16 @@ struct Declaration {
   LineSettings (*line)(const Format&) = nullptr;
   /// Null: `format.resolution()`.
   Resolution (*resolution)(const Format&) = nullptr;
-  /// Whether a virtual encoder is made, and clocked frames are decoded. Null: always.
+  /// Returns whether a virtual encoder is made, and clocked frames are decoded. Null: always.
   bool (*is_usable)(const Format&) = nullptr;
-  /// What was asked, of a reply alone; or why it does not tell. Needed where `decode` is null, and a request is sent.
+  /// Returns the request that a reply belongs to, by the reply alone; or an error. Needed where `decode` is null,
+  /// except on clocked lines.
   Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
-  /// The length of any reply that begins so; 0: none does. Null: the longest.
+  /// Returns the length of any reply that begins so; 0: none does. Null: the longest.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
-  /// The error of a request that is none, by the reply to it. Null: that of the request.
+  /// Returns the error of a bad request, by the reply to it. Null: the error of the request.
   Error (*answer_to_bad)(Error error, Bytes reply) = nullptr;
-  /// Null: by the protocol and the report.
+  /// Checks a frame and puts its fields. Null: by the protocol and the report.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
 
   // ---- As in Unit (protocol/unit.hpp)

@@ -36,6 +36,10 @@ struct Descriptor {
                 "a unit has id, name and document");
   static_assert(declared.format != nullptr, "a unit needs `format`: format_of<options>, or a function");
 
+  static_assert(declared.decode != nullptr || declared.report.put_reply != nullptr, "a report needs put_reply");
+  static_assert(Clocked<P> || declared.decode != nullptr || declared.report.put_request != nullptr,
+                "a report needs put_request");
+
   // Requests and replies of the protocol as it is; else the unit says itself what its frames are.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
 
