@@ -4,8 +4,10 @@
 import json
 import pathlib
 import re
+import select
 import signal
 import time
+import tty
 import unittest
 import xml.etree.ElementTree
 
@@ -106,14 +108,39 @@ class ConformHost(EncoderCase):
         self.assertEqual(verdicts, {name: "kept" if name in read else "untested" for name in verdicts}, err)
         self.assertEqual((judge.returncode, answer["ok"]), (0, True))
 
-    def test_a_host_that_asks_only_once_is_told(self):
+    def judged(self, host):
+        """What is said of a host that uses the line so, and then falls silent."""
         path = self.file("encoder")
-        judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "2", "--patience", "0.5", "--tap")
+        judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "2", "--patience", "1", "--json")
         self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
-        absenc("read", f"tformat:{path}?latency=100")
-        out, _ = judge.communicate(timeout=PATIENCE)
-        self.assertEqual(judge.returncode, 1)
-        self.assertRegex(out.decode(), "\\n(not ok .*silence|.*silence.*# SKIP|not ok .*damage|.*damage.*# SKIP)")
+        with open(path, "r+b", buffering=0) as line:
+            tty.setraw(line)
+            host(line)
+            out, _ = judge.communicate(timeout=PATIENCE)
+        answer = json.loads(out)
+        return judge.returncode, answer, {one["id"]: one["verdict"] for one in answer["clauses"]}
+
+    def test_a_host_that_gives_up_is_told(self):
+        def ask_while_answered(line):
+            line.write(b"\x1a")
+            while select.select([line], [], [], 0.5)[0]:
+                line.read(64)
+                line.write(b"\x1a")
+        status, answer, verdicts = self.judged(ask_while_answered)
+        self.assertEqual((status, answer["ok"], answer["verdict"]), (1, False, "broken"), answer)
+        self.assertEqual(verdicts["silence"], "broken", answer)
+
+    def test_what_is_no_request_breaks_one(self):
+        for sent in ((b"\x9a",) * 8, (b"\x1a", b"\x9a") * 8, (b"\x1a\x1a",)):
+            def send(line, sent=sent):
+                for one in sent:
+                    line.write(one)
+                    select.select([line], [], [], 0.1)
+            with self.subTest(sent[:2]):
+                status, answer, verdicts = self.judged(send)
+                self.assertEqual((status, answer["ok"]), (1, False), answer)
+                self.assertEqual(verdicts["asks"], "broken", answer)
+                self.assertNotIn("kept", verdicts.values())
 
     def test_ends_by_ctrl_c_and_knows_its_protocols(self):
         judge = self.start("conform-host", "tformat", "--pty", self.file("encoder"))

@@ -13,9 +13,9 @@
 namespace absenc::client {
 
 enum class Verdict : std::uint8_t {
-  kept,
-  broken,
-  untested,  // nothing came that would tell
+  kept,      // what the clause is about was seen, and was as the document says
+  broken,    // it was seen, and was not
+  untested,  // it was not seen
 };
 
 struct ClauseResult {
@@ -24,8 +24,7 @@ struct ClauseResult {
   std::string_view paragraph{};
   std::string_view words{};
   Verdict verdict{};
-  std::string evidence{};      // what was seen
-  bool need_not_come = false;  // of a host: what it is about; untested then is no fault
+  std::string evidence{};  // what was seen and how often, or why nothing was
 };
 
 struct Conformance {
@@ -34,11 +33,12 @@ struct Conformance {
   std::vector<std::string> left{};  // commands that put back by hand what could not be: the encoder is changed
 
   [[nodiscard]] std::size_t count(Verdict verdict) const;
-  /// Whether every clause that can be is kept, none is broken, and the encoder is as it was.
-  [[nodiscard]] bool good() const;
-  /// As the Test Anything Protocol, version 13.
+  /// `broken` where any clause is, or the encoder is left changed; else `kept` where any is; else `untested`: nothing
+  /// was seen that could be judged.
+  [[nodiscard]] Verdict verdict() const;
+  /// As the Test Anything Protocol, version 13. It bails out when nothing could be judged.
   [[nodiscard]] std::string tap() const;
-  /// As JUnit's XML.
+  /// As JUnit's XML. It has an error when nothing could be judged.
   [[nodiscard]] std::string junit() const;
   /// For people.
   [[nodiscard]] std::string report() const;

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "absenc/client/emulation/attended.hpp"
+#include "absenc/client/emulation/request_watch.hpp"
 #include "absenc/client/emulation/rule_counter.hpp"
 #include "absenc/client/emulation/serve_forever.hpp"
 #include "absenc/client/error.hpp"
@@ -96,7 +97,9 @@ struct Emulation::Service {
 
   template <class Item>
   void serve_on(Machine<Item>& machine, Port<Item>& on) {
-    Attended<Item> attended(machine, [this](Time now) { return look(now); });
+    RequestWatch<Item> watch(machine, address);
+    count_requests = [&watch] { return watch.counts(); };
+    Attended<Item> attended(watch, [this](Time now) { return look(now); });
     host::drive(attended, on, [] { return true; });
   }
 
@@ -105,7 +108,9 @@ struct Emulation::Service {
   }
 
   [[noreturn]] void serve_on_can() {
-    Attended<CanFrame> attended(*device.frames(), [this](Time now) { return look(now); });
+    RequestWatch<CanFrame> watch(*device.frames(), address);
+    count_requests = [&watch] { return watch.counts(); };
+    Attended<CanFrame> attended(watch, [this](Time now) { return look(now); });
     const auto open = [this] { return can != nullptr ? std::move(can) : open_can(); };
     const auto wait = [this](Time time) {
       for (Time now = os::now(); now < time; now = os::now()) {
@@ -160,6 +165,7 @@ struct Emulation::Service {
   std::function<void(Time)> wish;
   bool stopped = false;
   std::exception_ptr thrown;
+  std::function<RequestCounts()> count_requests;  // as long as it serves, in its thread
 
   std::jthread thread;  // last: it uses all of the others
 };
@@ -220,6 +226,14 @@ void Emulation::clear_faults() {
   service_->carry_out([this](Time) { service_->device.set_faults({.delay = service_->device.fault_rates().delay}); });
 }
 
+std::uint64_t Emulation::fault_count(std::string_view kind) const {
+  const sim::FaultKind wanted = require_fault(fmt::format("{}=0", kind)).kind;
+  return service_->ask([this, wanted](const auto&) -> std::uint64_t {
+    const sim::FaultCounts* const counts = service_->device.faults();
+    return counts != nullptr ? (*counts)[static_cast<std::size_t>(wanted)] : 0;
+  });
+}
+
 std::uint64_t Emulation::answer_count() const {
   return service_->ask([](const auto& device) { return device.answer_count(); });
 }
@@ -236,6 +250,10 @@ std::string Emulation::first_violation() const {
 
 std::vector<RuleCount> Emulation::rule_counts() const {
   return service_->ask([this](const auto&) { return service_->rules.counts(); });
+}
+
+RequestCounts Emulation::request_counts() const {
+  return service_->ask([this](const auto&) { return service_->count_requests(); });
 }
 
 }  // namespace absenc::client

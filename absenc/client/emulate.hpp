@@ -29,6 +29,14 @@ struct RuleCount {
   std::uint64_t broken = 0;
 };
 
+/// What hosts sent to the virtual encoder. Frames that are for no such encoder (CAN) are not counted.
+struct RequestCounts {
+  std::uint64_t good = 0;      // requests of the document, also for other encoders on the line
+  std::uint64_t bad = 0;       // runs of bytes that are none, and damaged characters, since the first good one
+  std::uint64_t before = 0;    // the same before it, once there was one
+  std::string first_bad = {};  // of `bad`, as it was on the wire
+};
+
 /// Serves in a thread of its own until it is destroyed. What is done to it is so when the call returns; any thread may.
 class Emulation {
  public:
@@ -62,6 +70,8 @@ class Emulation {
   /// None of any kind.
   void clear_faults();
 
+  /// How often its replies had a fault of this kind.
+  [[nodiscard]] std::uint64_t fault_count(std::string_view kind) const;
   /// Requests that were answered.
   [[nodiscard]] std::uint64_t answer_count() const;
   /// Rules of the document that the host broke, and the first of them; "": none.
@@ -69,6 +79,7 @@ class Emulation {
   [[nodiscard]] std::string first_violation() const;
   /// Every rule that was looked at: the host did what it is about.
   [[nodiscard]] std::vector<RuleCount> rule_counts() const;
+  [[nodiscard]] RequestCounts request_counts() const;
 
  private:
   struct Service;

@@ -2,10 +2,12 @@
 // What a unit's document demands of an encoder, clause by clause, as data: how it is tested is the same for every unit.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
 
+#include "absenc/core/time.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc {
@@ -59,12 +61,26 @@ enum class HostDemand : std::uint8_t {
   row             // nor does it this one, of requests in a row: looked at while replies are good, as a host may give up
 };
 
+/// What a host sends without a look at what comes back: how a test makes a host that breaks a clause.
+struct HostStep {
+  Time pause{};             // behind what was sent before
+  std::string_view what{};  // a command, of which only its own request is sent, or what stands on the wire: "1a 1a"
+  std::span<const std::int64_t> arguments{};  // of the command; empty: the least that it takes
+  unsigned times = 1;                         // it is sent so often, each time behind the pause
+};
+using HostScript = std::span<const HostStep>;
+
 struct HostClause {
   std::string_view id;
   std::string_view paragraph;
   std::string_view words;
   HostDemand demand;
   std::string_view rule{};  // as the virtual encoder calls it when it is broken; untested until it looked at it
+  // Where what every test tries does not do it (two commands in a row, waits that are left out, a controller that is
+  // too fast, too early or in another mode):
+  std::array<HostScript, 2> breaks{};  // two hosts that break it, and nothing else
+  HostScript keeps{};                  // a host that does what it is about, as the document wants it
+  std::string_view options{};          // of the virtual encoder to which they do it: "acquisition_us=20000"
 };
 
 /// Which edges a controller clocks and samples at shows in front of the virtual encoder: whoever plays the controller

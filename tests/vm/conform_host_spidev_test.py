@@ -41,7 +41,7 @@ class ConformHost(unittest.TestCase):
             with self.subTest(protocol):
                 verdicts = self.ours(protocol, f"{protocol}:spi:/dev/{NAME}")
                 self.assertEqual(verdicts, {name: "untested" if name == "access" else "kept" for name in verdicts})
-                self.assertEqual(len(verdicts), 6 if protocol == "ssi" else 8)
+                self.assertEqual(len(verdicts), {"biss": 7, "ssi": 5, "encolink": 8}[protocol])
 
     def test_what_a_host_does_wrong_is_told(self):
         """Too fast, in mode 0, without the pause of the chip select, and it gives up when nothing comes."""

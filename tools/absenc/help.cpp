@@ -114,7 +114,10 @@ std::string help() {
   text += "with options behind it, as in \"tformat:/dev/ttyUSB0?model=23-bit&echo=on\".\n";
   text += fmt::format("\nExamples:\n{}", example_lines(general_examples));
   text += "\n`absenc <verb> --help` explains a verb, `absenc --version` prints the version.\n";
-  return text + fmt::format("Exit status: 0 {}, 1 {}, 2 {}.\n", exit_statuses[0], exit_statuses[1], exit_statuses[2]);
+  text += "Exit status:";
+  for (std::size_t i = 0; i < exit_statuses.size(); ++i)
+    text += fmt::format("{} {} {}", i == 0 ? "" : ",", i, exit_statuses[i]);
+  return text + ".\n";
 }
 
 }  // namespace absenc::tool

@@ -40,7 +40,9 @@ inline constexpr std::array<Example, 3> environment{{
 }};
 
 /// By the number of the exit status.
-inline constexpr std::array<std::string_view, 3> exit_statuses{"good", "the encoder or the line failed", "wrong usage"};
+inline constexpr std::array<std::string_view, 4> exit_statuses{
+    "good", "the encoder or the line failed", "wrong usage",
+    "nothing was seen that could be judged (conform, conform-host)"};
 
 /// Of the whole command.
 [[nodiscard]] std::string help();

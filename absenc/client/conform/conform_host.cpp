@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "absenc/client/conform/host_stage.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -17,8 +19,13 @@ class EmulationStage final : public HostStage {
  public:
   explicit EmulationStage(Emulation& encoder) : encoder_(encoder) {}
 
-  std::uint64_t answer_count() override { return encoder_.answer_count(); }
-  std::vector<RuleCount> rule_counts() override { return encoder_.rule_counts(); }
+  HostTrial::Seen seen() override {
+    return {.answered = encoder_.answer_count(),
+            .missing = encoder_.fault_count(name_of(HostTrial::Fault::silence)),
+            .damaged = encoder_.fault_count(name_of(HostTrial::Fault::damage)),
+            .requests = encoder_.request_counts(),
+            .rules = encoder_.rule_counts()};
+  }
   void set_fault(HostTrial::Fault fault) override {
     encoder_.clear_faults();
     if (fault != HostTrial::Fault::none) encoder_.set_fault(name_of(fault), 1);
@@ -46,20 +53,21 @@ void require_host(const Unit& unit, const Options& options) {
 Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices) {
   HostTrial trial(choices.answers);
   HostTrial::Fault fault = HostTrial::Fault::none;
-  std::uint64_t answered = 0;
+  std::uint64_t sent = 0;
   Time heard_at = os::now();
   while (!trial.over() && !(choices.over && choices.over())) {
-    const std::uint64_t now_answered = stage.answer_count();
+    HostTrial::Seen seen = stage.seen();
+    const std::uint64_t now_sent = seen.answered + seen.requests.good + seen.requests.bad;
     // Nobody is impatient with a host that has not come yet.
-    if (now_answered != answered || answered == 0) heard_at = os::now();
-    answered = now_answered;
+    if (now_sent != sent || sent == 0) heard_at = os::now();
+    sent = now_sent;
     if (os::now() - heard_at > choices.patience) break;
-    const HostTrial::Fault wanted = trial.look(answered, stage.rule_counts());
+    const HostTrial::Fault wanted = trial.look(std::move(seen));
     if (wanted != fault) stage.set_fault(wanted);
     fault = wanted;
     stage.play(os::now() + between_looks);
   }
-  trial.look(stage.answer_count(), stage.rule_counts());
+  trial.look(stage.seen());
   return trial.judge(unit);
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "absenc/client/conform/asked_test.hpp"
 #include "absenc/client/conform/conform_link.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/protocol/clause.hpp"
@@ -250,7 +251,7 @@ template <class Item, class Make>
 void check(const Unit& unit, const Make& make) {
   const EncoderAddress address = address_of_unit(unit);
   const Conformance good = conform_mutant<Item>(address, {});
-  EXPECT_TRUE(good.good()) << good.report();
+  EXPECT_TRUE(all_kept(good)) << good.report();
   std::size_t tried = 0;
   std::size_t clauses = 0;
   for (const Clause& clause : clauses_of(unit)) {
@@ -304,7 +305,7 @@ TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
       line.set_echo(true);
       link.bytes = &line;
       const Conformance found = conform(address, std::move(link), {.readings = 8});
-      EXPECT_EQ(found.good(), !silent) << text << "\n" << found.report();
+      EXPECT_EQ(all_kept(found), !silent) << text << "\n" << found.report();
       if (silent) {
         EXPECT_EQ(found.clauses.front().verdict, Verdict::broken) << found.report();
         EXPECT_EQ(found.clauses.front().id, "answer");
@@ -321,11 +322,29 @@ TEST(Conformance, TellsProgramsAndPeople) {
   EXPECT_EQ(one.tap(),
             "TAP version 13\n1..3\nok 1 - a: x < y (1)\nnot ok 2 - b: z (2)\n# not \"seen\"\n"
             "ok 3 - c: w (3) # SKIP nothing\n");
-  EXPECT_NE(one.junit().find("tests=\"3\" failures=\"1\" skipped=\"1\""), std::string::npos);
+  EXPECT_NE(one.junit().find("tests=\"3\" failures=\"1\" errors=\"0\" skipped=\"1\""), std::string::npos);
   EXPECT_NE(one.junit().find("x &lt; y"), std::string::npos);
   EXPECT_NE(one.junit().find("<failure message=\"not &quot;seen&quot;\"/>"), std::string::npos);
   EXPECT_NE(one.report().find("1 kept, 1 broken, 1 untested"), std::string::npos);
-  EXPECT_FALSE(one.good());
+  EXPECT_EQ(one.verdict(), Verdict::broken);
+}
+
+// Programs that count tests take skipped ones for good.
+TEST(Conformance, SaysWhenNothingCouldBeJudged) {
+  const Conformance nothing{.protocol = "toy", .clauses = {{"a", "doc", "1", "x", Verdict::untested, "nothing came"}}};
+  EXPECT_EQ(nothing.verdict(), Verdict::untested);
+  EXPECT_EQ(nothing.tap(),
+            "TAP version 13\n1..1\nok 1 - a: x (1) # SKIP nothing came\n"
+            "Bail out! nothing was seen that could be judged\n");
+  EXPECT_NE(nothing.junit().find("tests=\"2\" failures=\"0\" errors=\"1\" skipped=\"1\""), std::string::npos);
+  EXPECT_NE(nothing.junit().find("<error message=\"nothing was seen that could be judged\"/>"), std::string::npos);
+  EXPECT_NE(nothing.report().find("0 kept, 0 broken, 1 untested\nnothing was seen that could be judged\n"),
+            std::string::npos);
+  Conformance some = nothing;
+  some.clauses.push_back({"b", "doc", "2", "y", Verdict::kept, "seen"});
+  EXPECT_EQ(some.verdict(), Verdict::kept);
+  some.left.emplace_back("absenc config set ...");
+  EXPECT_EQ(some.verdict(), Verdict::broken);
 }
 
 }  // namespace

@@ -10,6 +10,8 @@ namespace absenc::client {
 
 namespace {
 
+constexpr std::string_view nothing_judged = "nothing was seen that could be judged";
+
 std::string xml(std::string_view text) {
   std::string escaped;
   for (const char letter : text) {
@@ -38,11 +40,9 @@ std::size_t Conformance::count(Verdict verdict) const {
       std::count_if(clauses.begin(), clauses.end(), [&](const ClauseResult& one) { return one.verdict == verdict; }));
 }
 
-bool Conformance::good() const {
-  const auto is_good = [](const ClauseResult& one) {
-    return one.verdict == Verdict::kept || (one.verdict == Verdict::untested && one.need_not_come);
-  };
-  return left.empty() && std::all_of(clauses.begin(), clauses.end(), is_good);
+Verdict Conformance::verdict() const {
+  if (!left.empty() || count(Verdict::broken) != 0) return Verdict::broken;
+  return count(Verdict::kept) != 0 ? Verdict::kept : Verdict::untested;
 }
 
 std::string Conformance::tap() const {
@@ -55,19 +55,25 @@ std::string Conformance::tap() const {
     if (one.verdict == Verdict::broken) text += fmt::format("# {}\n", one.evidence);
   }
   for (const std::string& command : left) text += fmt::format("# left changed; to put it back: {}\n", command);
+  if (verdict() == Verdict::untested) text += fmt::format("Bail out! {}\n", nothing_judged);
   return text;
 }
 
 std::string Conformance::junit() const {
   std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-  text += fmt::format("<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\">\n", xml(protocol),
-                      clauses.size(), count(Verdict::broken), count(Verdict::untested));
+  const std::size_t errors = verdict() == Verdict::untested ? 1 : 0;
+  text += fmt::format("<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\">\n",
+                      xml(protocol), clauses.size() + errors, count(Verdict::broken), errors, count(Verdict::untested));
   for (const ClauseResult& one : clauses) {
     text += fmt::format("  <testcase classname=\"{}\" name=\"{}: {} ({}, {})\">", xml(protocol), xml(one.id),
                         xml(one.words), xml(one.document), xml(one.paragraph));
     if (one.verdict == Verdict::broken) text += fmt::format("<failure message=\"{}\"/>", xml(one.evidence));
     if (one.verdict == Verdict::untested) text += fmt::format("<skipped message=\"{}\"/>", xml(one.evidence));
     text += "</testcase>\n";
+  }
+  if (errors != 0) {
+    text += fmt::format("  <testcase classname=\"{}\" name=\"any clause\"><error message=\"{}\"/></testcase>\n",
+                        xml(protocol), nothing_judged);
   }
   return text + "</testsuite>\n";
 }
@@ -80,8 +86,9 @@ std::string Conformance::report() const {
   }
   if (!left.empty())
     text += fmt::format("the encoder is left changed; to put it back:\n  {}\n", fmt::join(left, "\n  "));
-  return text + fmt::format("{} kept, {} broken, {} untested\n", count(Verdict::kept), count(Verdict::broken),
-                            count(Verdict::untested));
+  text += fmt::format("{} kept, {} broken, {} untested\n", count(Verdict::kept), count(Verdict::broken),
+                      count(Verdict::untested));
+  return verdict() == Verdict::untested ? text + fmt::format("{}\n", nothing_judged) : text;
 }
 
 }  // namespace absenc::client

@@ -14,8 +14,7 @@ namespace absenc::client {
 
 class HostStage {
  public:
-  virtual std::uint64_t answer_count() = 0;
-  virtual std::vector<RuleCount> rule_counts() = 0;
+  virtual HostTrial::Seen seen() = 0;
   virtual void set_fault(HostTrial::Fault fault) = 0;  // in place of the last one
   virtual void play(Time until) = 0;                   // throws os::Interrupted
 
@@ -29,7 +28,7 @@ void require_host(const Unit& unit, const Options& options);
 /// Until it is over as `choices` say.
 [[nodiscard]] Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices);
 
-/// With what only the controller sees.
+/// With what only an SPI controller sees.
 [[nodiscard]] inline std::vector<RuleCount> with_mode(std::vector<RuleCount> counts, const os::SpiDevice& device) {
   counts.push_back({.rule = spi_mode_rule, .looked = device.messages(), .broken = device.wrong_modes()});
   return counts;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "absenc/client/conform/changes.hpp"
 #include "absenc/client/emulation/rule_counter.hpp"
@@ -16,27 +17,31 @@ std::uint64_t HostTrial::length() const {
   return answers_ / 2;
 }
 
+// What the present phase is about: of a fault, how often it really was.
+std::uint64_t HostTrial::counted() const {
+  if (phase_ == Phase::silence) return seen_.missing;
+  return phase_ == Phase::damage ? seen_.damaged : seen_.answered;
+}
+
 // What was given up for a fault may show in the first requests behind it.
 bool HostTrial::is_calm() const {
   return phase_ == Phase::good || phase_ == Phase::over ||
-         (phase_ == Phase::last && answered_ - begun_at_ >= asked_again);
+         (phase_ == Phase::last && counted() - begun_at_ >= asked_again);
 }
 
-HostTrial::Fault HostTrial::look(std::uint64_t answered, std::span<const RuleCount> rules) {
+HostTrial::Fault HostTrial::look(Seen seen) {
   if (is_calm()) {
-    for (const RuleCount& now : rules) {
-      const RuleCount& before = count_of(rules_, now.rule);
+    for (const RuleCount& now : seen.rules) {
+      const RuleCount& before = count_of(seen_.rules, now.rule);
       RuleCount& calm = count_of(calm_, now.rule);
       calm.looked += now.looked - before.looked;
       calm.broken += now.broken - before.broken;
     }
   }
-  rules_.assign(rules.begin(), rules.end());
-  answered_ = answered;
-  while (phase_ != Phase::over && answered - begun_at_ >= length()) {
-    begun_at_ += length();
+  seen_ = std::move(seen);
+  while (phase_ != Phase::over && counted() - begun_at_ >= length()) {
     phase_ = static_cast<Phase>(static_cast<unsigned>(phase_) + 1);
-    if (phase_ == Phase::silence || phase_ == Phase::damage) begun_at_ = answered;  // from the next reply on
+    begun_at_ = counted();
   }
   if (phase_ == Phase::silence) return Fault::silence;
   return phase_ == Phase::damage ? Fault::damage : Fault::none;
@@ -49,8 +54,7 @@ Conformance HostTrial::judge(const Unit& unit) const {
                         .document = unit.document,
                         .paragraph = clause.paragraph,
                         .words = clause.words,
-                        .verdict = Verdict::untested,
-                        .evidence = "the host did not come so far"};
+                        .verdict = Verdict::untested};
     judge_one(clause, result);
     conformance.clauses.push_back(std::move(result));
   }
@@ -58,31 +62,57 @@ Conformance HostTrial::judge(const Unit& unit) const {
 }
 
 void HostTrial::judge_one(const HostClause& clause, ClauseResult& result) const {
-  const auto goes_on = [&](Phase phase, std::string_view what) {
-    if (phase_ < phase) return;
-    // The one that is on its way when the fault begins tells nothing.
-    conclude(result, phase_ > phase,
-             fmt::format("{} after {}", phase_ > phase ? "asked again" : "did not ask again", what));
-  };
   switch (clause.demand) {
     case HostDemand::asks:
-      return conclude(result, answered_ > 0, fmt::format("{} requests could be answered", answered_));
+      return judge_requests(result);
     case HostDemand::after_silence:
-      return goes_on(Phase::silence, "silence");
+      return judge_going_on(Phase::silence, result);
     case HostDemand::after_damage:
-      return goes_on(Phase::damage, "damaged replies");
+      return judge_going_on(Phase::damage, result);
     case HostDemand::rule:
-    case HostDemand::row: {
-      result.need_not_come = true;
-      if (answered_ == 0) return;
-      const std::vector<RuleCount>& counts = clause.demand == HostDemand::rule ? rules_ : calm_;
-      const auto count = std::ranges::find(counts, clause.rule, &RuleCount::rule);
-      result.evidence = "the host did nothing that it is about";
-      if (count == counts.end() || count->looked == 0) return;
-      return conclude(result, count->broken == 0,
-                      fmt::format("looked at {} times, broken {} times", count->looked, count->broken));
-    }
+    case HostDemand::row:
+      return judge_rule(clause, result);
   }
+}
+
+void HostTrial::judge_requests(ClauseResult& result) const {
+  const RequestCounts& requests = seen_.requests;
+  if (requests.bad != 0) {
+    std::string evidence = fmt::format("{} requests, {} times something else", requests.good, requests.bad);
+    if (!requests.first_bad.empty()) evidence += fmt::format(", first {}", requests.first_bad);
+    return conclude(result, false, std::move(evidence));
+  }
+  result.evidence = requests.good == 0 ? "no request came" : "none of the requests is for this encoder";
+  if (seen_.answered == 0) return;
+  std::string evidence = fmt::format("{} requests, {} of them answered", requests.good, seen_.answered);
+  if (requests.before != 0) evidence += fmt::format("; before the first, {} times something else", requests.before);
+  conclude(result, true, std::move(evidence));
+}
+
+// Who sends other things too may have sent a request by chance: it shows nothing.
+void HostTrial::conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const {
+  if (!kept || seen_.requests.bad == 0) return conclude(result, kept, std::move(evidence));
+  result.evidence = fmt::format("{}, but the host also sent what is no request", evidence);
+}
+
+void HostTrial::judge_going_on(Phase phase, ClauseResult& result) const {
+  const std::string_view lacking = phase == Phase::silence ? "missing" : "damaged";
+  const std::uint64_t lacked = phase == Phase::silence ? seen_.missing : seen_.damaged;
+  result.evidence = fmt::format("the host asked for so little that no reply was {}", lacking);
+  if (lacked == 0) return;
+  const bool goes_on = phase_ > phase;
+  conclude_if_all_are_requests(
+      result, goes_on,
+      fmt::format("{} replies were {}, {}", lacked, lacking, goes_on ? "and it asked on" : "then it asked no more"));
+}
+
+void HostTrial::judge_rule(const HostClause& clause, ClauseResult& result) const {
+  const std::vector<RuleCount>& counts = clause.demand == HostDemand::rule ? seen_.rules : calm_;
+  const auto count = std::ranges::find(counts, clause.rule, &RuleCount::rule);
+  result.evidence = "the host did nothing that it is about";
+  if (count == counts.end() || count->looked == 0) return;
+  conclude_if_all_are_requests(result, count->broken == 0,
+                               fmt::format("looked at {} times, broken {} times", count->looked, count->broken));
 }
 
 }  // namespace absenc::client

@@ -50,8 +50,7 @@ inline constexpr std::array<Clause, 2> chain_clauses{{
 }};
 
 // Of one encoder, of two words or of a chain: the line is the same.
-inline constexpr std::array<HostClause, 8> host_clauses{{
-    {"asks", "BiSS C timing diagram", "MA makes the encoder send", HostDemand::asks},
+inline constexpr std::array<HostClause, 7> host_clauses{{
     {"silence", "BiSS C timing diagram", "after SLO that stayed as it was it clocks again", HostDemand::after_silence},
     {"damage", "BiSS C timing diagram, CRC", "after a frame with a wrong CRC it clocks again",
      HostDemand::after_damage},

@@ -24,14 +24,23 @@ inline constexpr std::array<Clause, 5> clauses{{
      .other = 4},
 }};
 
-inline constexpr std::array<HostClause, 5> host_clauses{{
-    {"asks", "BiSS C timing diagram, command 4", "requests are as drawn", HostDemand::asks},
+// ---- What hosts do that break a clause
+
+namespace script {
+inline constexpr std::array no_number{HostStep{{}, "4d 0d"}};
+inline constexpr std::array letter{HostStep{{}, "4d 41"}};
+}  // namespace script
+
+inline constexpr std::array<HostClause, 4> host_clauses{{
+    {"asks", "BiSS C timing diagram, command 4", "only commands of the interface are sent", HostDemand::asks},
     {"silence", "BiSS C timing diagram, command 4", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "BiSS C timing diagram, CRC", "after a damaged reply it asks again", HostDemand::after_damage},
-    {"command", "BiSS C timing diagram, command 4", "only commands of the interface are sent", HostDemand::rule,
-     "an unknown command"},
-    {"clock", "BiSS C timing diagram, command Mn", "M is sent with the number of a clock", HostDemand::rule,
-     "a command without its number"},
+    {.id = "clock",
+     .paragraph = "BiSS C timing diagram, command Mn",
+     .words = "M is sent with the number of a clock",
+     .demand = HostDemand::rule,
+     .rule = "a command without its number",
+     .breaks = {script::no_number, script::letter}},
 }};
 
 }  // namespace absenc::e201

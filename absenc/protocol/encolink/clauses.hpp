@@ -34,8 +34,24 @@ inline constexpr std::array<Clause, 2> spi_clauses{{
     {"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
 }};
 
+// ---- What hosts do that break a clause: one access, and the next before its answer has come
+
+namespace script {
+inline constexpr std::chrono::milliseconds pause{1};
+inline constexpr std::array keys_again{
+    HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
+    HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
+    HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
+    HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 2}, HostStep{pause, "00 cd"}};
+inline constexpr std::array zeros_and_keys{
+    HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
+    HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
+    HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
+    HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 3}, HostStep{pause, "00 cd"}};
+}  // namespace script
+
 inline constexpr std::array<HostClause, 8> spi_host_clauses{{
-    {"asks", "SPI timing diagram", "the encoder is selected and clocked", HostDemand::asks},
+    {"asks", "SPI, Channel 1", "the first byte of a frame is a command", HostDemand::asks},
     {"silence", "SPI, Channel 1", "after a data line that stayed as it was it asks again", HostDemand::after_silence},
     {"damage", "SPI, Channel 1", "after a damaged frame it asks again", HostDemand::after_damage},
     {"lead", "SPI timing diagram, t_s", "the clock begins 5 us after NCS went low", HostDemand::rule,
@@ -45,16 +61,24 @@ inline constexpr std::array<HostClause, 8> spi_host_clauses{{
     {"speed", "SPI, Communication parameters", "the clock is no faster than 4 MHz", HostDemand::rule,
      "clock faster than 4 MHz"},
     {"mode", "SPI timing diagram", "SCK idles low, and MISO is sampled when it falls", HostDemand::rule, spi_mode_rule},
-    {"access", "SPI, Encoder programming", "a register is not asked for before the last one was answered",
-     HostDemand::rule, "register access before the last one was answered"},
+    {.id = "access",
+     .paragraph = "SPI, Encoder programming",
+     .words = "a register is not asked for before the last one was answered",
+     .demand = HostDemand::rule,
+     .rule = "register access before the last one was answered",
+     .breaks = {script::keys_again, script::zeros_and_keys}},
 }};
 
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
     {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "UART, Channel 1", "after a damaged reply it asks again", HostDemand::after_damage},
-    {"access", "UART, Encoder programming", "a register is not asked for before the last one was answered",
-     HostDemand::rule, "register access before the last one was answered"},
+    {.id = "access",
+     .paragraph = "UART, Encoder programming",
+     .words = "a register is not asked for before the last one was answered",
+     .demand = HostDemand::rule,
+     .rule = "register access before the last one was answered",
+     .breaks = {script::keys_again, script::zeros_and_keys}},
 }};
 
 }  // namespace absenc::encolink

@@ -39,6 +39,32 @@ inline constexpr std::array<Clause, 10> clauses{{
      .verb = Verb::reset_multiturn},
 }};
 
+// ---- What hosts do that break a clause, or are about one
+
+namespace script {
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+inline constexpr std::array<std::int64_t, 1> page_0{0};
+inline constexpr std::array<std::int64_t, 2> byte_1{1, 5};
+inline constexpr std::array<std::int64_t, 2> byte_2{2, 5};
+inline constexpr std::array<std::int64_t, 1> at_1{1};
+inline constexpr std::array<std::int64_t, 1> at_2{2};
+inline constexpr HostStep select{milliseconds(20), "select-page", page_0};
+
+inline constexpr std::array seven_clears{HostStep{microseconds(100), "clear-alarms", {}, 7},
+                                         HostStep{microseconds(100), "position"}};
+inline constexpr std::array one_zero{HostStep{microseconds(100), "zero"},
+                                     HostStep{microseconds(100), "clear-alarms", {}, 8}};
+inline constexpr std::array two_writes{select, HostStep{milliseconds(20), "memory-write", byte_1},
+                                       HostStep{milliseconds(5), "memory-write", byte_2}};
+inline constexpr std::array write_and_again{select, HostStep{milliseconds(20), "memory-write", byte_1},
+                                            HostStep{milliseconds(1), "memory-write", byte_1}};
+inline constexpr std::array asked_once{select, HostStep{milliseconds(20), "memory-read", at_1},
+                                       HostStep{milliseconds(20), "memory-read", at_2}};
+inline constexpr std::array asked_and_written{select, HostStep{milliseconds(20), "memory-read", at_1},
+                                              HostStep{milliseconds(20), "memory-write", byte_2}};
+}  // namespace script
+
 inline constexpr std::array<HostClause, 12> host_clauses{{
     {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
     {"silence", "Overview of Communication", "after no reply it asks again", HostDemand::after_silence},
@@ -49,12 +75,24 @@ inline constexpr std::array<HostClause, 12> host_clauses{{
      "memory access before the page is ready"},
     {"eeprom-read", "Figure 3 (b)", "the two requests that read a byte are more than 200 us apart", HostDemand::rule,
      "memory read again less than 200 us after the request before"},
-    {"eeprom-again", "Figure 3 (a)", "a byte of the EEPROM is asked for twice", HostDemand::row,
-     "an EEPROM byte asked for only once"},
-    {"eeprom-write", "Figure 5 (e)", "two writes to the EEPROM are more than 6 ms apart", HostDemand::rule,
-     "memory written less than 6 ms after the write before"},
-    {"reset-eight", "Table 4", "a reset is sent eight times in a row, or more", HostDemand::row,
-     "reset not sent eight times in a row"},
+    {.id = "eeprom-again",
+     .paragraph = "Figure 3 (a)",
+     .words = "a byte of the EEPROM is asked for twice",
+     .demand = HostDemand::row,
+     .rule = "an EEPROM byte asked for only once",
+     .breaks = {script::asked_once, script::asked_and_written}},
+    {.id = "eeprom-write",
+     .paragraph = "Figure 5 (e)",
+     .words = "two writes to the EEPROM are more than 6 ms apart",
+     .demand = HostDemand::rule,
+     .rule = "memory written less than 6 ms after the write before",
+     .breaks = {script::two_writes, script::write_and_again}},
+    {.id = "reset-eight",
+     .paragraph = "Table 4",
+     .words = "a reset is sent eight times in a row, or more",
+     .demand = HostDemand::row,
+     .rule = "reset not sent eight times in a row",
+     .breaks = {script::seven_clears, script::one_zero}},
     {"reset-interval", "Table 4", "the requests of a reset are about 40 us apart, not much less", HostDemand::rule,
      "reset sent too fast: much less than 40 us after the one before"},
     {"reset-standing", "Table 4", "a reset is sent while the shaft stands", HostDemand::rule,

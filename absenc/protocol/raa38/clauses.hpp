@@ -44,6 +44,39 @@ inline constexpr std::array<Clause, 2> can_clauses{{
     {"node", "3.4.1", "a request to another node is not answered", Demand::foreign_silent},
 }};
 
+// ---- What hosts do that break a clause, or are about one
+
+namespace script {
+using std::chrono::milliseconds;
+inline constexpr std::array<std::int64_t, 1> negative{1};
+inline constexpr std::array parameter_3{HostStep{{}, "01 cc 03 35 01"}};
+inline constexpr std::array parameter_4{HostStep{{}, "01 cc 04 74 c3"}};
+inline constexpr std::array direction_often{HostStep{milliseconds(20), "set-direction", negative, 12}};
+inline constexpr std::array zero_often{HostStep{milliseconds(20), "zero", {}, 12}};
+
+inline constexpr std::array two_at_once{HostStep{{}, "bc aa b1 bc aa b1"}};
+// Time before the frame: what is sent during it is garbled.
+inline constexpr std::array soon_again{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
+
+inline constexpr HostStep enter{milliseconds(1), "7e5:0401000000000000"};
+inline constexpr std::array two_bytes{HostStep{{}, "220:8020"}};
+inline constexpr std::array seven_bytes{HostStep{{}, "220:80200000000000"}};
+inline constexpr std::array node_21{HostStep{{}, "220:8021000000000000"}};
+inline constexpr std::array node_0{HostStep{{}, "220:8000000000000000"}};
+inline constexpr std::array command_70{HostStep{{}, "220:7020000000000000"}};
+inline constexpr std::array command_81{HostStep{{}, "220:8120000000000000"}};
+inline constexpr std::array node_unprepared{HostStep{{}, "7e5:1121000000000000"}};
+inline constexpr std::array rate_unprepared{HostStep{{}, "7e5:1300030000000000"}};
+inline constexpr std::array configuration_44{enter, HostStep{milliseconds(1), "7e5:4400000000000000"}};
+inline constexpr std::array configuration_17{enter, HostStep{milliseconds(1), "7e5:1700000000000000"}};
+inline constexpr std::array number_0{enter, HostStep{milliseconds(1), "7e5:1100000000000000"}};
+inline constexpr std::array number_0_later{enter, HostStep{milliseconds(1), "7e5:1121000000000000"},
+                                           HostStep{milliseconds(1), "7e5:1100000000000000"}};
+inline constexpr std::array rate_1{enter, HostStep{milliseconds(1), "7e5:1300010000000000"}};
+inline constexpr std::array rate_9{enter, HostStep{milliseconds(1), "7e5:1300090000000000"}};
+inline constexpr std::array rate_3{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
+}  // namespace script
+
 inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
     {"asks", "3.1.7", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.7", "after no reply it asks again", HostDemand::after_silence},
@@ -52,10 +85,18 @@ inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
      "something was sent during the encoder's transmission"},
     {"gap", "3.1.7 (5)", "3.5 characters of silence come before a request", HostDemand::rule,
      "less than 3.5 characters of silence before a request"},
-    {"parameter", "3.1.7 (5)", "a parameter is one of those listed", HostDemand::rule,
-     "a parameter was set that the document does not have"},
-    {"wear", "3.1.7 (3)", "parameters are not sent regularly", HostDemand::rule,
-     "settings are sent again and again: the memory wears out"},
+    {.id = "parameter",
+     .paragraph = "3.1.7 (5)",
+     .words = "a parameter is one of those listed",
+     .demand = HostDemand::rule,
+     .rule = "a parameter was set that the document does not have",
+     .breaks = {script::parameter_3, script::parameter_4}},
+    {.id = "wear",
+     .paragraph = "3.1.7 (3)",
+     .words = "parameters are not sent regularly",
+     .demand = HostDemand::rule,
+     .rule = "settings are sent again and again: the memory wears out",
+     .breaks = {script::direction_often, script::zero_often}},
 }};
 
 // Of the modes only bus is one in which bytes ask.
@@ -63,24 +104,62 @@ inline constexpr std::array<HostClause, 4> serial_host_clauses{{
     {"asks", "3.1.5 (1)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.5 (1)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "3.1.5 (2)", "after a damaged reply it asks again", HostDemand::after_damage},
-    {"turn", "3.1.5 (3)", "on the one pair of wires a request waits until the reply before it is over",
-     HostDemand::rule, "request during the encoder's transmission"},
+    {.id = "turn",
+     .paragraph = "3.1.5 (3)",
+     .words = "on the one pair of wires a request waits until the reply before it is over",
+     .demand = HostDemand::rule,
+     .rule = "request during the encoder's transmission",
+     .breaks = {script::two_at_once, script::soon_again},
+     .options = "acquisition_us=20000"},
 }};
 
 inline constexpr std::array<HostClause, 10> can_host_clauses{{
     {"asks", "3.4.1 (3)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.4.1 (3)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "3.4.1 (3)", "after a reply that is none it asks again", HostDemand::after_damage},
-    {"length", "3.4.1 (3)", "frames have 8 bytes of data", HostDemand::rule, "a frame without its 8 bytes of data"},
-    {"node", "3.4.1 (3)", "the second byte is the node's number", HostDemand::rule,
-     "the second byte is not the node's number"},
-    {"command", "3.4.1 (3)", "only commands of the tables are sent", HostDemand::rule, "an unknown command"},
-    {"configuration", "3.4.1 (3) 2, 3", "node and baud rate are set in configuration mode only", HostDemand::rule,
-     "a setting without configuration mode"},
-    {"configuration-command", "3.4.1 (3) 2, 3", "in configuration mode only node and baud rate are set",
-     HostDemand::rule, "an unknown configuration command"},
-    {"number", "3.4.1 (3) 2", "a node is given a number from 1 on", HostDemand::rule, "a node number of 0"},
-    {"rate", "3.4.1 (3) 3", "a baud rate is 00, 02 or 03", HostDemand::rule, "an unknown bit rate"},
+    {.id = "length",
+     .paragraph = "3.4.1 (3)",
+     .words = "frames have 8 bytes of data",
+     .demand = HostDemand::rule,
+     .rule = "a frame without its 8 bytes of data",
+     .breaks = {script::two_bytes, script::seven_bytes}},
+    {.id = "node",
+     .paragraph = "3.4.1 (3)",
+     .words = "the second byte is the node's number",
+     .demand = HostDemand::rule,
+     .rule = "the second byte is not the node's number",
+     .breaks = {script::node_21, script::node_0}},
+    {.id = "command",
+     .paragraph = "3.4.1 (3)",
+     .words = "only commands of the tables are sent",
+     .demand = HostDemand::rule,
+     .rule = "an unknown command",
+     .breaks = {script::command_70, script::command_81}},
+    {.id = "configuration",
+     .paragraph = "3.4.1 (3) 2, 3",
+     .words = "node and baud rate are set in configuration mode only",
+     .demand = HostDemand::rule,
+     .rule = "a setting without configuration mode",
+     .breaks = {script::node_unprepared, script::rate_unprepared}},
+    {.id = "configuration-command",
+     .paragraph = "3.4.1 (3) 2, 3",
+     .words = "in configuration mode only node and baud rate are set",
+     .demand = HostDemand::rule,
+     .rule = "an unknown configuration command",
+     .breaks = {script::configuration_44, script::configuration_17}},
+    {.id = "number",
+     .paragraph = "3.4.1 (3) 2",
+     .words = "a node is given a number from 1 on",
+     .demand = HostDemand::rule,
+     .rule = "a node number of 0",
+     .breaks = {script::number_0, script::number_0_later}},
+    {.id = "rate",
+     .paragraph = "3.4.1 (3) 3",
+     .words = "a baud rate is 00, 02 or 03",
+     .demand = HostDemand::rule,
+     .rule = "an unknown bit rate",
+     .breaks = {script::rate_1, script::rate_9},
+     .keeps = script::rate_3},
 }};
 
 }  // namespace absenc::raa38

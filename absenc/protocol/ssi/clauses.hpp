@@ -17,8 +17,7 @@ inline constexpr std::array<Clause, 1> clauses{{
      .value = 1},
 }};
 
-inline constexpr std::array<HostClause, 6> host_clauses{{
-    {"asks", "3.5", "the clock makes the encoder send", HostDemand::asks},
+inline constexpr std::array<HostClause, 5> host_clauses{{
     {"silence", "3.5", "after a data line that stayed as it was it clocks again", HostDemand::after_silence},
     {"speed", "3.5", "the clock is within the limits of the encoder", HostDemand::rule,
      "clock outside min_clock_khz to max_clock_khz"},

@@ -42,20 +42,68 @@ inline constexpr std::array<Clause, 12> clauses{{
      .verb = Verb::reset_multiturn},
 }};
 
+// ---- What hosts do that break a clause, or are about one
+
+namespace script {
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+inline constexpr std::array<std::int64_t, 2> byte_1{1, 5};
+inline constexpr std::array<std::int64_t, 2> byte_2{2, 5};
+inline constexpr std::array<std::int64_t, 1> at_1{1};
+inline constexpr std::array<std::int64_t, 1> at_2{2};
+
+inline constexpr std::array nine_zeros{HostStep{microseconds(100), "zero", {}, 9},
+                                       HostStep{microseconds(100), "position"}};
+inline constexpr std::array one_clear{HostStep{microseconds(100), "clear-alarms"},
+                                      HostStep{microseconds(100), "reset-multiturn", {}, 10}};
+inline constexpr std::array two_writes{HostStep{{}, "memory-write", byte_1},
+                                       HostStep{milliseconds(5), "memory-write", byte_2}};
+inline constexpr std::array write_and_again{HostStep{{}, "memory-write", byte_1},
+                                            HostStep{milliseconds(17), "memory-write", byte_1}};
+inline constexpr std::array other_after_busy{HostStep{{}, "memory-write", byte_1},
+                                             HostStep{milliseconds(5), "memory-read", at_1},
+                                             HostStep{milliseconds(20), "memory-read", at_2}};
+inline constexpr std::array write_after_busy{HostStep{{}, "memory-write", byte_1},
+                                             HostStep{milliseconds(5), "memory-read", at_2},
+                                             HostStep{milliseconds(20), "memory-write", byte_2}};
+inline constexpr std::array same_after_busy{HostStep{{}, "memory-write", byte_1},
+                                            HostStep{milliseconds(5), "memory-read", at_1},
+                                            HostStep{milliseconds(20), "memory-read", at_1}};
+inline constexpr std::array two_at_once{HostStep{{}, "1a 1a"}};
+inline constexpr std::array three_at_once{HostStep{{}, "1a 1a 1a"}};
+}  // namespace script
+
 inline constexpr std::array<HostClause, 10> host_clauses{{
     {"asks", "6.2", "requests are as drawn", HostDemand::asks},
     {"silence", "8.4 Table 5 (1)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "6.3.4", "after a damaged reply it asks again", HostDemand::after_damage},
-    {"turn", "11", "a request waits until the reply before it is over", HostDemand::rule,
-     "request during the encoder's transmission"},
+    {.id = "turn",
+     .paragraph = "11",
+     .words = "a request waits until the reply before it is over",
+     .demand = HostDemand::rule,
+     .rule = "request during the encoder's transmission",
+     .breaks = {script::two_at_once, script::three_at_once}},
     {"page", "6.3.5 (2)", "after a change of the page the EEPROM is left alone for 18 ms", HostDemand::rule,
      "memory access before the page is ready"},
-    {"write-busy", "6.3.5 (3) Table 5", "nothing is written while the encoder still writes, up to 18 ms",
-     HostDemand::rule, "memory written while the encoder writes"},
-    {"busy-again", "6.3.5 (3) Table 5", "a readout that was refused as busy is sent again", HostDemand::row,
-     "what was refused as busy was not asked for again"},
-    {"reset-ten", "10", "a reset is sent ten times in one sequence", HostDemand::row,
-     "reset not sent ten times in a row"},
+    {.id = "write-busy",
+     .paragraph = "6.3.5 (3) Table 5",
+     .words = "nothing is written while the encoder still writes, up to 18 ms",
+     .demand = HostDemand::rule,
+     .rule = "memory written while the encoder writes",
+     .breaks = {script::two_writes, script::write_and_again}},
+    {.id = "busy-again",
+     .paragraph = "6.3.5 (3) Table 5",
+     .words = "a readout that was refused as busy is sent again",
+     .demand = HostDemand::row,
+     .rule = "what was refused as busy was not asked for again",
+     .breaks = {script::other_after_busy, script::write_after_busy},
+     .keeps = script::same_after_busy},
+    {.id = "reset-ten",
+     .paragraph = "10",
+     .words = "a reset is sent ten times in one sequence",
+     .demand = HostDemand::row,
+     .rule = "reset not sent ten times in a row",
+     .breaks = {script::nine_zeros, script::one_clear}},
     {"reset-interval", "10", "the ten requests of a reset are 40 us apart, or more", HostDemand::rule,
      "reset sent too fast: less than 40 us after the one before"},
     {"reset-standing", "10", "a reset is sent while the shaft stands", HostDemand::rule, "reset while the shaft turns"},

@@ -8,6 +8,7 @@
 
 #include "absenc/client/conform/host_stage.hpp"
 #include "absenc/client/conform_host.hpp"
+#include "absenc/client/emulation/request_watch.hpp"
 #include "absenc/client/text/json.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/cuse/spidev_node.hpp"
@@ -33,8 +34,12 @@ Json conformance_json(const Conformance& conformance) {
         .set("evidence", one.evidence);
   });
   return Json::object()
-      .set("ok", conformance.good())
+      .set("ok", conformance.verdict() == Verdict::kept)
       .set("protocol", conformance.protocol)
+      .set("verdict", name_of(conformance.verdict()))
+      .set("kept", conformance.count(Verdict::kept))
+      .set("broken", conformance.count(Verdict::broken))
+      .set("untested", conformance.count(Verdict::untested))
       .set("clauses", clauses)
       .set("left", Json::list(conformance.left));
 }
@@ -58,7 +63,15 @@ int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
   } else {
     print_line(without_end(invocation.has("--tap") ? conformance.tap() : conformance.report()));
   }
-  return conformance.good() ? exit_good : exit_failed;
+  switch (conformance.verdict()) {
+    case Verdict::kept:
+      return exit_good;
+    case Verdict::broken:
+      return exit_failed;
+    case Verdict::untested:
+      break;
+  }
+  return exit_nothing_judged;
 }
 
 int run_conform(const Invocation& invocation) {
@@ -82,7 +95,8 @@ class SpidevStage final : public HostStage {
  public:
   SpidevStage(const EncoderAddress& address, const std::string& name)
       : device_(*address.unit, address.options, address.device),
-        controller_(address.unit->link, line_settings(*address.unit, address.options), *device_.bytes()),
+        watch_(*device_.bytes(), address),
+        controller_(address.unit->link, line_settings(*address.unit, address.options), watch_),
         spidev_(controller_),
         node_(name, spidev_) {
     device_.watch_rules(&rules_);
@@ -91,8 +105,13 @@ class SpidevStage final : public HostStage {
   }
 
   [[nodiscard]] const std::string& path() const { return node_.path(); }
-  std::uint64_t answer_count() override { return device_.device().bytes->answer_count(); }
-  std::vector<RuleCount> rule_counts() override { return with_mode(rules_.counts(), controller_); }
+  HostTrial::Seen seen() override {
+    return {.answered = device_.device().bytes->answer_count(),
+            .missing = count_of(device_, HostTrial::Fault::silence),
+            .damaged = count_of(device_, HostTrial::Fault::damage),
+            .requests = watch_.counts(),
+            .rules = with_mode(rules_.counts(), controller_)};
+  }
   void set_fault(HostTrial::Fault fault) override {
     sim::FaultRates rates;
     if (fault != HostTrial::Fault::none) rates[require_fault(fmt::format("{}=1", name_of(fault))).kind] = 1;
@@ -103,6 +122,7 @@ class SpidevStage final : public HostStage {
  private:
   RuleCounter rules_;
   VirtualDevice device_;
+  RequestWatch<std::uint8_t> watch_;
   os::SpiDevice controller_;
   os::Spidev spidev_;
   os::SpidevNode node_;
@@ -202,7 +222,9 @@ const Subcommand conform_subcommand{
     "the encoder without --changes, which asks first: it saves what it writes and puts it back, also after Ctrl-C, "
     "and\n"
     "says with which commands to do it by hand what it could not. A reset is sent only where it changes nothing.\n"
-    "Exit status 1 when a clause is broken or could not be tested.",
+    "A clause is kept only when what it is about was seen: a request that was really sent and its reply, a check that\n"
+    "these options have, a value that was another before. All else is untested, with the reason.\n"
+    "Exit status 1 when a clause is broken, else 0 when one is kept, else 3: nothing was seen that could be judged.",
     conform_parameters,
     conform_examples,
     run_conform};
@@ -213,8 +235,9 @@ const Subcommand conform_host_subcommand{
     "Says on standard error where it can be opened. Replies are good, stay away for a while and are damaged for a\n"
     "while; the host has to go on, and must not break a rule of the document: intervals, pauses, turns. Each clause "
     "has\n"
-    "its paragraph, a verdict and what was seen. Rules of what the host never does are untested, which is no fault.\n"
-    "Exit status 1 when a clause is broken, or the host did not come so far.",
+    "its paragraph, a verdict and what was seen. Rules of what the host never does are untested, and so is all that a\n"
+    "host might have done by chance, because it also sent what is no request.\n"
+    "Exit status 1 when a clause is broken, else 0 when one is kept, else 3: nothing was seen that could be judged.",
     host_parameters,
     host_examples,
     run_conform_host};
