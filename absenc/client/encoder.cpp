@@ -25,11 +25,9 @@ using namespace std::chrono_literals;
 constexpr Time time_between_tries = 250ms;
 constexpr Time between_looks = 20ms;  // whether it was cancelled
 
-// What transmits by itself has no time but that of its arrival.
 host::Unwrapper make_unwrapper(const EncoderAddress& uri) {
-  const Unit& unit = *uri.unit;
-  const bool unasked = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(uri.options));
-  return host::Unwrapper(speed_limit(uri), unasked ? host::Unwrapper::Times::arrived : host::Unwrapper::Times::latched);
+  const bool unasked = host::sends_unasked(*uri.unit, uri.options);
+  return host::Unwrapper(speed_limit(uri), unasked ? host::Times::arrived : host::Times::latched);
 }
 
 std::string limit_text(const EncoderAddress& uri, const Reading& reading) {
@@ -156,12 +154,8 @@ void Encoder::forget_position() {
 Sample Encoder::next() {
   if (!connection_->connected()) return search();
   try {
-    const auto is_possible = [this](Reading reading) {
-      reading.latched += offset_;
-      return !unwrapper_.jumps(reading);
-    };
     const host::Take which = period_ == Time{} ? host::Take::every : host::Take::newest;
-    const Outcome outcome = connection_->read(which, is_possible);
+    const Outcome outcome = connection_->read(which);
     if (outcome.error != Error::none) {
       return {.kind = Sample::Kind::failed, .at = os::now(), .trouble = connection_->trouble(outcome)};
     }
@@ -233,14 +227,15 @@ void Encoder::note_restart(Sample& sample, bool jumped) {
     sample.message = fmt::format(
         "the position jumped farther than at {} and stayed there, as if somebody moved its zero: it starts again from "
         "the encoder's own{}",
-        limit, rotates ? ". If the shaft is faster, say so with max_rpm=RPM" : "");
+        limit,
+        rotates ? ". If the shaft is faster, say so with max_rpm=RPM" : ". If it is faster, say so with max_mm_s=MM/S");
     return;
   }
   sample.message = fmt::format(
       "{} between two readings are too long to know how far it went meanwhile, at up to {}: the position starts again "
       "from the encoder's own{}",
       to_text(sample.reading.latched - unwrapped_at_), limit,
-      rotates ? ". If the shaft is slower, say so with max_rpm=RPM" : "");
+      rotates ? ". If the shaft is slower, say so with max_rpm=RPM" : ". If it is slower, say so with max_mm_s=MM/S");
 }
 
 std::string_view event_name(const Sample& sample) {

@@ -72,6 +72,21 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
+// By integers the same as by floating point, but for what is rounded up: 0.016 %.
+RC_GTEST_PROP(ReachProperty, IsWhatTheFastestGetsInThatTime, ()) {
+  const auto bits = *rc::gen::inRange(1u, 65u);
+  const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);
+  const auto time = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << *rc::gen::inRange(1, 63));
+  const double unit_um = *rc::gen::element(0.0, 0.001, 0.05, 1.0, 10.0);
+  const SpeedLimit limit{.rpm = speed, .mm_s = speed};
+  const std::uint64_t counts = Reach::of(limit, {bits, 0, unit_um}).counts(Time(time), bits);
+  const double each = unit_um > 0 ? speed / unit_um / 1e6 : std::ldexp(speed / 60e9, static_cast<int>(bits));
+  const double wanted = each * static_cast<double>(time);
+  constexpr double most = 0x1p64;
+  RC_ASSERT(static_cast<double>(counts) >= std::min(wanted, most) * (1 - 1e-9) - 1);
+  RC_ASSERT(static_cast<double>(counts) <= wanted * 1.0002 + 1);
+}
+
 RC_GTEST_PROP(VelocityProperty, IsThatOfTheMiddleOfItsWindow, ()) {
   // Counts a second, and a second squared; readings every 0.1 to 20 ms, with up to half of that as jitter.
   const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);

@@ -5,13 +5,16 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <type_traits>
 
+#include "absenc/host/apart.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/host/first_reading.hpp"
 #include "absenc/host/reply_guard.hpp"
+#include "absenc/host/speed_limit.hpp"
 #include "absenc/host/statistics.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -49,7 +52,9 @@ class Session {
         storage_(storage),
         echo_(echo),
         attempts_(attempts),
-        first_(options.model != nullptr ? options.model->maximum_rpm : 0) {}
+        limit_(speed_limit(options)),
+        first_(reach()),
+        apart_(times()) {}
 
   /// One command to its end, repeatable ones up to `attempts` times. `on_emit(conversation)` is called for each
   /// result but the last and returns whether to go on. The conversation returned tells how it ended; it is null when
@@ -63,43 +68,39 @@ class Session {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// The position. After opening and after silence it is read until two readings in a row agree; when none of ten
-  /// does, the last one is returned and `confirmed` is false.
+  /// The position, and whether it is confirmed: compared with the one before, and as near as the limit of the speed
+  /// allows. Where there is none before (after opening and after silence), where it is too far away, or where the time
+  /// between was too long to tell, it is read again until two in a row agree; when none of ten does, the last one is
+  /// returned and `confirmed` is false. If those two are near the position before, the first one was damaged and counts
+  /// as an error, cross_check_failed, because no check sees all damage; if not, the position did jump.
   /// A conversation that streams goes on where it stopped, because to find the frames anew costs two of them; `take`
-  /// says whether with what came meanwhile.
-  const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
+  /// says whether with what came meanwhile. `on_reading` is called with each reading.
+  template <class OnReading>
+  const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest) catch_up(machine(), *port_);
-    const Conversation<Item>* conversation = read_once(command);
-    if (confirmed_ || conversation == nullptr) return conversation;
-    first_.start_again();
-    for (unsigned i = 0; i < 10; ++i) {
-      if (conversation->error() != Error::none || conversation->reading() == nullptr) return conversation;
-      confirmed_ = first_.confirms(*conversation->reading());
-      if (confirmed_) return conversation;
-      conversation = read_once(command);
+    const FirstReading before = first_;
+    std::optional<BadExchange<Item>> suspect;
+    constexpr unsigned most = 11;
+    for (unsigned number = 1;; ++number) {
+      confirmed_ = false;
+      const Conversation<Item>* conversation = read_once(command);
+      if (conversation == nullptr || conversation->error() != Error::none) return conversation;
+      const Reading* reading = conversation->reading();
+      if (reading == nullptr) return conversation;
+      on_reading(*reading);
+      if (number == 1 && refutes(*reading)) suspect.emplace(Error::cross_check_failed, conversation->exchange());
+      confirmed_ = confirms(*reading, number > 1);
+      if (confirmed_) {
+        if (suspect && before.is_near(*reading)) count_damaged(*suspect);
+        known_ = true;
+        return conversation;
+      }
+      // What says itself that it does not hold is not asked again, unless the encoder may be starting.
+      if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
-    return conversation;
   }
-
-  /// The same for who knows the shaft: a position for which `is_possible(reading)` is false is read again until two in
-  /// a row agree, because no check sees all damage. If these are possible, the first was damaged and counts as an
-  /// error, cross_check_failed; if not, the position did jump.
-  template <class IsPossible>
-  const Conversation<Item>* read(const Command& command, Take take, IsPossible&& is_possible) {
-    const auto shows = [&](const Conversation<Item>* conversation) {
-      return confirmed_ && conversation->error() == Error::none && conversation->reading() != nullptr;
-    };
-    const Conversation<Item>* conversation = read(command, take);
-    if (!shows(conversation) || is_possible(*conversation->reading())) return conversation;
-    const BadExchange<Item> suspect(Error::cross_check_failed, conversation->exchange());
-    doubt();
-    conversation = read(command, take);
-    if (!shows(conversation) || !is_possible(*conversation->reading())) return conversation;
-    --counters_.good;
-    ++counters_.repeated;
-    ++counters_.errors[static_cast<std::size_t>(suspect.error)];
-    if (statistics_ != nullptr) statistics_->add(suspect);
-    return conversation;
+  const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
+    return read(command, take, [](const Reading&) {});
   }
 
   /// Asks the conversation that is running to end early; see Conversation::abort.
@@ -116,7 +117,15 @@ class Session {
   [[nodiscard]] Time lateness() const { return lateness_; }
 
   /// From the next command on.
-  void set_options(const Options& options) { options_ = options; }
+  void set_options(const Options& options) {
+    options_ = options;
+    follow_options();
+  }
+  /// How fast the encoder may move, from the next reading on; before that it is the model's, or else the usual limit.
+  void set_speed_limit(const SpeedLimit& limit) {
+    limit_ = limit;
+    follow_options();
+  }
 
   /// To be fed from now on; null: none. 5 kB, which firmware may not have.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
@@ -124,8 +133,12 @@ class Session {
   /// The encoder may be another one now: what it says next has to be confirmed.
   void doubt() {
     confirmed_ = false;
+    known_ = false;
     streaming_ = false;
+    pair_ = never;
+    first_.start_again();
   }
+  /// Whether the last reading was compared with another, and agreed.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   [[nodiscard]] const Counters& counters() const { return counters_; }
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
@@ -133,6 +146,39 @@ class Session {
  private:
   const Conversation<Item>* read_once(const Command& command) {
     return attempt(command, {}, [](const Conversation<Item>&) { return true; });
+  }
+
+  // Another resolution, or other units: nothing before can be compared.
+  void follow_options() {
+    first_ = FirstReading(reach());
+    apart_ = Apart(times());
+  }
+  [[nodiscard]] Reach reach() const { return Reach::of(limit_, unit_->resolution(options_)); }
+  [[nodiscard]] Times times() const { return sends_unasked(*unit_, options_) ? Times::arrived : Times::latched; }
+
+  // Whether this and the one before cannot both be right.
+  [[nodiscard]] bool refutes(const Reading& reading) const {
+    const Time between = apart_.since_last(reading.latched);
+    return first_.has_last() && first_.tells(reading, between) && !first_.is_near(reading, between);
+  }
+
+  // After a pause that is too long to tell anything, one of its own that `follows` at once does, unless that takes too
+  // long as well: then what the limit still excludes is all that can be known.
+  bool confirms(const Reading& reading, bool follows) {
+    const Time between = apart_.since_last(reading.latched);
+    bool near = first_.is_near(reading, between);
+    if (follows && first_.has_last()) pair_ = between < pair_ ? between : pair_;
+    if (near && !follows && !first_.tells(reading, between)) near = !first_.tells(reading, pair_);
+    first_.keep(reading);
+    apart_.add(reading.latched);
+    return near;
+  }
+
+  void count_damaged(const BadExchange<Item>& damaged) {
+    --counters_.good;
+    ++counters_.repeated;
+    ++counters_.errors[static_cast<std::size_t>(damaged.error)];
+    if (statistics_ != nullptr) statistics_->add(damaged);
   }
 
   // Whole commands are repeated here. Within a procedure that is not repeatable (a reset, a write) its engine repeats
@@ -217,8 +263,12 @@ class Session {
   Time lateness_{};
   EchoFilter echo_;
   unsigned attempts_;
+  SpeedLimit limit_;
   FirstReading first_;
-  bool confirmed_ = false;
+  Apart apart_;
+  Time pair_ = never;       // how near to each other two readings have been at least, the second read at once
+  bool confirmed_ = false;  // the last reading
+  bool known_ = false;      // any reading since there was doubt
   bool streaming_ = false;  // `current_` has stopped at a result and can go on
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;

@@ -21,23 +21,45 @@ using namespace std::chrono_literals;
 using Wire = std::vector<std::uint8_t>;
 
 struct Still final : Shaft {
-  [[nodiscard]] ShaftState at(Time) const override { return state; }
-  ShaftState state{};
+  [[nodiscard]] ShaftState at(Time) const override {
+    return {.position = device != nullptr && device->answer_count() == wrong_answer ? wrong_position : position};
+  }
+  std::int64_t position = 0;
+  const Device<std::uint8_t>* device = nullptr;
+  std::uint64_t wrong_answer = UINT64_MAX;  // the number of one that says `wrong_position`
+  std::int64_t wrong_position = 0;
 };
 
 /// A virtual encoder with faults, a port to it, and a session.
 struct Bench {
-  explicit Bench(EchoMode mode, sim::FaultRates rates = {}, unsigned attempts = 3) {
-    EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
+  explicit Bench(EchoMode mode, sim::FaultRates rates = {}, unsigned attempts = 3,
+                 const std::vector<OptionText>& settings = {}) {
+    EXPECT_EQ(resolve_options(unit, {}, settings, options).kind, OptionError::Kind::none);
     device_storage.resize(unit.device_storage);
     host_storage.resize(unit.host_storage);
     device = unit.device(options, shaft, device_storage).bytes;
     device->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    shaft.device = device;
     faulty = std::make_unique<sim::FaultyDevice>(*device, rates, 1);
     port = std::make_unique<sim::SimPort<std::uint8_t>>(unit.link, unit.line, *faulty);
     session = std::make_unique<Session<std::uint8_t>>(unit, options, *port, host_storage, mode, attempts);
   }
   const Conversation<std::uint8_t>& read() { return *session->read(*find_command(unit, Verb::read)); }
+  /// How many answers a reading took.
+  std::uint64_t answers_of_a_reading() {
+    const std::uint64_t before = device->answer_count();
+    EXPECT_EQ(read().error(), Error::none);
+    return device->answer_count() - before;
+  }
+  /// Once, turned by so much.
+  void answer_wrong(std::int64_t turned) {
+    shaft.wrong_answer = device->answer_count();
+    shaft.wrong_position = shaft.position + turned;
+  }
+  void pause(Time time) { port->line().run_until(port->line().now() + time); }
+  [[nodiscard]] std::uint64_t refused() const {
+    return session->counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];
+  }
 
   const Unit& unit = *find_unit("tformat");
   Options options;
@@ -359,6 +381,131 @@ TEST(Session, AnInvalidPositionIsNeverConfirmed) {
   EXPECT_FALSE(bench.session->confirmed());
 }
 
+// ---- What is confirmed
+
+constexpr std::int64_t turn = std::int64_t{1} << 32;
+constexpr OptionText no_turns{"multiturn_bits", "0"};
+
+TEST(SessionGuard, APositionThatNoShaftReachesIsReadAgain) {
+  Bench bench(EchoMode::off);
+  Statistics<std::uint8_t> statistics;
+  bench.session->observe(&statistics);
+  EXPECT_EQ(bench.answers_of_a_reading(), 2u) << "the first needs a second";
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u);
+  bench.answer_wrong(turn / 32);  // farther than 10 000 rpm get meanwhile, and nearer than what counts as a jump
+  EXPECT_EQ(bench.answers_of_a_reading(), 3u);
+  EXPECT_TRUE(bench.session->confirmed());
+  EXPECT_EQ(bench.refused(), 1u);
+  EXPECT_EQ(bench.session->counters().good, 5u);
+  EXPECT_EQ(statistics.kept(), 1u);
+  EXPECT_EQ(statistics.bad(0).received.size(), 11u);
+}
+
+TEST(SessionGuard, AJumpNeedsASecondReadingOfItsOwn) {
+  Bench bench(EchoMode::off);
+  bench.read();
+  bench.shaft.position += 5 * turn;
+  EXPECT_EQ(bench.answers_of_a_reading(), 2u);
+  EXPECT_TRUE(bench.session->confirmed());
+  EXPECT_EQ(bench.refused(), 0u) << "it stays there";
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u);
+}
+
+TEST(SessionGuard, TheLimitIsTheOneThatIsSet) {
+  Bench bench(EchoMode::off);
+  bench.read();
+  bench.answer_wrong(turn / 1000);
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u) << "10 000 rpm get that far";
+  bench.session->set_speed_limit({.rpm = 100});
+  EXPECT_EQ(bench.answers_of_a_reading(), 2u) << "it begins again";
+  bench.answer_wrong(turn / 1000);
+  EXPECT_EQ(bench.answers_of_a_reading(), 3u);
+  EXPECT_EQ(bench.refused(), 1u);
+}
+
+// Half a turn takes 3 ms at 10 000 rpm: after 20 ms a position may be anywhere.
+TEST(SessionGuard, AfterAPauseThatTellsNothingASecondReadingDoes) {
+  Bench bench(EchoMode::off, {}, 3, {no_turns});
+  bench.read();
+  bench.pause(2ms);
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u);
+  bench.pause(20ms);
+  EXPECT_EQ(bench.answers_of_a_reading(), 2u);
+  EXPECT_TRUE(bench.session->confirmed());
+  bench.pause(20ms);
+  bench.answer_wrong(turn / 10);
+  EXPECT_EQ(bench.answers_of_a_reading(), 3u) << "the two after it agree";
+  EXPECT_EQ(bench.read().reading()->singleturn, 0u);
+  bench.session->set_speed_limit({.rpm = 1000});
+  bench.read();
+  bench.pause(20ms);
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u) << "half a turn takes 30 ms";
+}
+
+TEST(SessionGuard, TurnsTellAfterALongPause) {
+  Bench bench(EchoMode::off);
+  bench.read();
+  bench.pause(60s);
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u);
+  bench.pause(60s);
+  bench.answer_wrong(20'000 * turn);
+  EXPECT_EQ(bench.answers_of_a_reading(), 3u);
+}
+
+// A reading takes 55 us, in which such a shaft turns nearly once: a second one tells no more than the first.
+TEST(SessionGuard, WhereNoSecondReadingTellsHalfATurnIsStillRefused) {
+  Bench bench(EchoMode::off, {}, 3, {no_turns});
+  bench.session->set_speed_limit({.rpm = 1'000'000});
+  EXPECT_EQ(bench.answers_of_a_reading(), 2u);
+  bench.pause(20ms);
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u);
+  bench.answer_wrong(turn / 4);
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u);
+  bench.read();
+  bench.answer_wrong(turn * 12 / 25);
+  EXPECT_EQ(bench.answers_of_a_reading(), 2u);
+  EXPECT_EQ(bench.refused(), 0u) << "nobody knows which was wrong";
+}
+
+TEST(SessionGuard, NothingIsConfirmedThatAgreesWithNothing) {
+  Bench bench(EchoMode::off);
+  struct Wild final : Shaft {
+    [[nodiscard]] ShaftState at(Time) const override {
+      return {.position =
+                  static_cast<std::int64_t>(device->answer_count() * device->answer_count() * 0x9E37'79B9'7F4A'7C15)};
+    }
+    const Device<std::uint8_t>* device = nullptr;
+  };
+  Wild wild;
+  std::vector<std::byte> storage(bench.unit.device_storage);
+  Device<std::uint8_t>* device = bench.unit.device(bench.options, wild, storage).bytes;
+  wild.device = device;
+  device->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+  sim::SimPort<std::uint8_t> port(bench.unit.link, bench.unit.line, *device);
+  Session<std::uint8_t> session(bench.unit, bench.options, port, bench.host_storage);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(session.read(*find_command(bench.unit, Verb::read))->error(), Error::none);
+    EXPECT_FALSE(session.confirmed());
+  }
+  EXPECT_EQ(device->answer_count(), 3u * 11);
+}
+
+// It was read once; what says itself that it does not hold needs no second, and is not confirmed.
+TEST(SessionGuard, AnInvalidPositionOfAKnownEncoderIsShownAtOnce) {
+  Bench bench(EchoMode::off);
+  bench.read();
+  bench.device->raise_alarms(0x04);  // counting_error
+  EXPECT_EQ(bench.answers_of_a_reading(), 1u);
+  EXPECT_FALSE(bench.session->confirmed());
+  bench.device->lower_alarms(0x04);
+  const auto* const clear = find_command(bench.unit, Verb::clear_alarms);
+  ASSERT_EQ(bench.session->run(*clear)->error(), Error::none);
+  EXPECT_EQ(bench.answers_of_a_reading(), 2u);
+  EXPECT_TRUE(bench.session->confirmed());
+}
+
+// ---- FirstReading
+
 constexpr Reading reading_at(std::uint64_t singleturn, std::uint64_t multiturn, Time latched) {
   return {.singleturn = singleturn,
           .multiturn = multiturn,
@@ -369,35 +516,18 @@ constexpr Reading reading_at(std::uint64_t singleturn, std::uint64_t multiturn, 
           .latched = latched};
 }
 
-TEST(Session, WhatCannotBeIsReadAgainUntilTwoAgree) {
-  Bench bench(EchoMode::off);
-  Statistics<std::uint8_t> statistics;
-  bench.session->observe(&statistics);
-  const Command& command = *find_command(bench.unit, Verb::read);
-  const std::uint64_t& refused = bench.session->counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];
-  bench.read();
-  unsigned asked = 0;
-  const auto not_the_first = [&](const Reading&) { return ++asked != 1; };
-  EXPECT_EQ(bench.session->read(command, Take::newest, not_the_first)->error(), Error::none);
-  EXPECT_EQ(bench.device->answer_count(), 2u + 3u);
-  EXPECT_EQ(refused, 1u);
-  EXPECT_EQ(bench.session->counters().good, 4u);
-  EXPECT_EQ(statistics.kept(), 1u);
-  EXPECT_EQ(statistics.bad(0).received.size(), 11u);
-  // It jumped, and stays there.
-  EXPECT_EQ(bench.session->read(command, Take::newest, [](const Reading&) { return false; })->error(), Error::none);
-  EXPECT_EQ(bench.device->answer_count(), 2u + 3u + 3u);
-  EXPECT_TRUE(bench.session->confirmed());
-  EXPECT_EQ(refused, 1u);
+constexpr Reading of_bits(unsigned bits, std::uint64_t singleturn, Time latched) {
+  return {.singleturn = singleturn, .singleturn_bits = bits, .singleturn_valid_bits = bits, .latched = latched};
+}
+
+constexpr bool agree(FirstReading first, const Reading& one, const Reading& other) {
+  return !first.confirms(one) && first.confirms(other);
 }
 
 TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
-  using std::chrono::microseconds;
   // 6000 rpm are 100 turns a second: 13 107 counts in 1 ms.
   const auto confirmed = [](std::uint64_t singleturn, std::uint64_t multiturn) {
-    FirstReading first(6000);
-    EXPECT_FALSE(first.confirms(reading_at(0, 0, {})));
-    return first.confirms(reading_at(singleturn, multiturn, microseconds(1000)));
+    return agree(FirstReading(6000), reading_at(0, 0, {}), reading_at(singleturn, multiturn, 1ms));
   };
   EXPECT_TRUE(confirmed(13'107, 0));
   EXPECT_FALSE(confirmed(13'120, 0));
@@ -406,8 +536,71 @@ TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
   EXPECT_FALSE(confirmed(0, 32'768));
 }
 
+TEST(FirstReading, HasALimitEvenWhereNobodySaysOne) {
+  const auto confirmed = [](std::uint64_t singleturn, Time later) {
+    return agree(FirstReading(0), of_bits(13, 0, {}), of_bits(13, singleturn, later));
+  };
+  EXPECT_TRUE(confirmed(136, 100us)) << "a sixtieth of a turn";
+  EXPECT_FALSE(confirmed(150, 100us));
+  EXPECT_FALSE(confirmed(1024, 100us));
+}
+
+TEST(FirstReading, HalfATurnIsNeverConfirmed) {
+  for (const Time later : {Time(10ms), Time(1s), Time(24h), never}) {
+    EXPECT_FALSE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 4096, later)));
+    EXPECT_FALSE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 3841, later)));
+    EXPECT_TRUE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 3840, later)));
+  }
+}
+
+// 12 000 rpm are 200 turns a second: 0.2 of a turn in 1 ms.
+TEST(FirstReading, AShaftThatIsFasterIsSeenByItsThirdPosition) {
+  FirstReading first(6000);
+  EXPECT_FALSE(first.confirms(of_bits(13, 0, 0ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 1638, 1ms)));
+  EXPECT_TRUE(first.confirms(of_bits(13, 3277, 2ms)));
+  EXPECT_TRUE(first.confirms(of_bits(13, 4915, 3ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 3415, 4ms))) << "damaged";
+  EXPECT_FALSE(first.confirms(of_bits(13, 0, 5ms)));
+}
+
+TEST(FirstReading, TwoDamagedPositionsMakeNoSpeed) {
+  FirstReading first(6000);
+  EXPECT_FALSE(first.confirms(of_bits(13, 100, 0ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100 + 2048, 1ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100, 2ms)));
+  EXPECT_TRUE(first.confirms(of_bits(13, 100, 3ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100 + 1024, 4ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100 + 4096, 5ms)));
+}
+
+TEST(FirstReading, ComparesTheTurnsWhereBothHaveThem) {
+  const Reading with = reading_at(5, 5, {});
+  Reading without = with;
+  without.multiturn_valid = false;
+  EXPECT_FALSE(agree(FirstReading(6000), with, without));
+  EXPECT_FALSE(agree(FirstReading(6000), without, with)) << "nothing is known of the turns before";
+  EXPECT_TRUE(agree(FirstReading(6000), without, without));
+}
+
+TEST(FirstReading, TakesPositionsOf64Bits) {
+  EXPECT_TRUE(agree(FirstReading(1), of_bits(64, ~std::uint64_t{0}, {}), of_bits(64, 3, {})));
+  EXPECT_FALSE(agree(FirstReading(1), of_bits(64, ~std::uint64_t{0}, {}), of_bits(64, 4, {})));
+  EXPECT_FALSE(agree(FirstReading(1), of_bits(64, 0, {}), of_bits(64, std::uint64_t{1} << 63, never)));
+  EXPECT_TRUE(agree(FirstReading(10'000), of_bits(64, 0, {}), of_bits(64, std::uint64_t{15} << 59, 3s)));
+}
+
+TEST(FirstReading, OfACarriageByItsOwnSpeed) {
+  // 1 m/s: 1000 counts of 1 um in a millisecond.
+  const FirstReading first(Reach::of({.mm_s = 1000}, {.singleturn_bits = 26, .multiturn_bits = 0, .unit_um = 1}));
+  EXPECT_TRUE(agree(first, of_bits(26, 0, {}), of_bits(26, 1004, 1ms)));
+  EXPECT_FALSE(agree(first, of_bits(26, 0, {}), of_bits(26, 1006, 1ms)));
+}
+
+static_assert(agree(FirstReading(6000), of_bits(17, 1, {}), of_bits(17, 2, {})));
+
 TEST(FirstReading, WaitsUntilTheEncoderIsReady) {
-  FirstReading first(0);
+  FirstReading first(6000);
   Reading starting = reading_at(5, 5, {});
   starting.ready = false;
   EXPECT_FALSE(first.confirms(starting));

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "absenc/core/angle.hpp"
+#include "absenc/host/apart.hpp"
 #include "absenc/host/speed_limit.hpp"
 
 namespace absenc::host {
@@ -21,18 +22,15 @@ class Unwrapper {
     restarted,  // too late after the one before to know how often it turned: the position is the encoder's own again
   };
 
-  /// When a reading was latched: known, or only that it came then. Those that had to wait come together.
-  enum class Times : std::uint8_t { latched, arrived };
-
   explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
-      : limit_(limit), times_(times) {}
+      : limit_(limit), apart_(times) {}
 
   constexpr Joined add(const Reading& reading) {
     if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
     const bool joins = !first && is_near(reading);
     position_ = joins ? position_ + static_cast<std::uint64_t>(way(reading)) : absolute(reading);
-    if (!first) keep_wait(reading);
+    apart_.add(reading.latched);
     last_ = reading;
     started_ = true;
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
@@ -79,20 +77,7 @@ class Unwrapper {
     return apart(reading) < longest_gap(resolution_of(reading), limit_);
   }
 
-  // How long the two can have been apart at most. What came together after a wait was taken during that wait, or while
-  // it was handed over, which takes less long.
-  [[nodiscard]] constexpr Time apart(const Reading& reading) const {
-    return has_waited(reading) ? reading.latched - last_.latched : wait_;
-  }
-  [[nodiscard]] constexpr bool has_waited(const Reading& reading) const {
-    const Time apart = reading.latched - last_.latched;
-    return times_ == Times::latched || apart >= wait_ || reading.latched >= wait_counts_until_;
-  }
-  constexpr void keep_wait(const Reading& reading) {
-    if (!has_waited(reading)) return;
-    wait_ = reading.latched - last_.latched;
-    wait_counts_until_ = reading.latched + wait_;
-  }
+  [[nodiscard]] constexpr Time apart(const Reading& reading) const { return apart_.since_last(reading.latched); }
 
   [[nodiscard]] constexpr std::int64_t way(const Reading& reading) const {
     const bool with_turns = have_turns(reading);
@@ -103,9 +88,7 @@ class Unwrapper {
   }
 
   SpeedLimit limit_;
-  Times times_;
-  Time wait_{};
-  Time wait_counts_until_{};
+  Apart apart_;
   bool started_ = false;
   std::uint64_t position_ = 0;  // unsigned: what overflows after 2^63 counts goes round
   Reading last_{};

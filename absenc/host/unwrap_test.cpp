@@ -112,7 +112,7 @@ TEST(Unwrapper, OfALinearEncoderByItsOwnSpeed) {
 
 TEST(Unwrapper, ReadingsThatCameTogetherMayHaveBeenApart) {
   // Half a turn in 50 ms. A host that was held up for 100 ms finds four frames at once.
-  Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Unwrapper::Times::arrived);
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Times::arrived);
   unwrapper.add(singleturn(0, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 25ms)), Joined::continued);
   EXPECT_EQ(unwrapper.add(singleturn(20, 125ms)), Joined::restarted);

@@ -146,6 +146,7 @@ class Doctor {
     if (read_ == nullptr || read_->changes_encoder) {
       throw UsageError(fmt::format("{} has no command that reads the position", address.unit->id));
     }
+    seen_.limit = speed_limit(address);
   }
 
   Examination run() {

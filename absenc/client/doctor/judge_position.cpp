@@ -128,7 +128,7 @@ void judge_position(const Case& one, const std::vector<Attempted>& readings, boo
                     std::vector<Finding>& findings) {
   const Walk walk = walk_of(readings);
   if (walk.steps.empty()) return;
-  host::SpeedLimit limit = host::speed_limit(one.unit, one.options);
+  host::SpeedLimit limit = one.seen.limit;
   if (by_hand) limit.rpm = std::min(limit.rpm, hand_rpm);
   if (!by_hand) judge_noise(walk, findings);
   judge_jumps(walk, limit, findings);

@@ -9,6 +9,7 @@
 
 #include "absenc/capture/search/evidence.hpp"
 #include "absenc/client/doctor.hpp"
+#include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/port_facts.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -58,7 +59,8 @@ struct Observations {
   std::uint64_t late = 0;           // replies that came after their limit
   Time lateness{};                  // of the latest
   std::vector<Trial> trials{};
-  std::string clash{};  // "address 3": whatever answers there is damaged every time
+  host::SpeedLimit limit{};  // how fast it may move
+  std::string clash{};       // "address 3": whatever answers there is damaged every time
   bool complete = true;
 };
 

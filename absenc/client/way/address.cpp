@@ -86,6 +86,8 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
     uri.echo = modes[choice_of(setting, {"auto", "on", "off"})];
   } else if (setting.name == "max_rpm") {
     uri.maximum_rpm = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
+  } else if (setting.name == "max_mm_s") {
+    uri.maximum_mm_s = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
   } else if (setting.name == "motion") {
     uri.device.motion = value;
   } else if (setting.name == "singleturn") {
@@ -114,6 +116,17 @@ bool allowed(const LinkParameter& parameter, Place place) {
   }
 }
 
+// A limit in the other unit would be ignored.
+void check_speed_limit(const EncoderAddress& uri) {
+  const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
+  if (linear && uri.maximum_rpm != 0) {
+    throw UsageError("max_rpm cannot be set here, because the encoder is a linear one: set max_mm_s=MM/S");
+  }
+  if (!linear && uri.maximum_mm_s != 0) {
+    throw UsageError("max_mm_s cannot be set here, because it is for linear encoders: set max_rpm=RPM");
+  }
+}
+
 // Takes what is a link parameter; the rest are options of the unit, also its rate where its conversations depend on it.
 void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
@@ -136,6 +149,7 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   uri.options = require_options(*uri.unit, {}, options, names);
   uri.line = line_settings(*uri.unit, uri.options);
   for (const OptionText& setting : of_link) set_link_parameter(uri, setting);
+  check_speed_limit(uri);
   const bool any_rate_does =
       uri.place == Place::sim || (uri.place == Place::serial && os::is_pseudo_terminal(uri.path));
   if (any_rate_does) uri.line = uri.line.with_some_rate();
@@ -316,8 +330,9 @@ EncoderAddress parse_address(std::string_view text, std::span<const std::string>
 }
 
 host::SpeedLimit speed_limit(const EncoderAddress& uri) {
-  host::SpeedLimit limit = host::speed_limit(*uri.unit, uri.options);
+  host::SpeedLimit limit = host::speed_limit(uri.options);
   if (uri.maximum_rpm != 0) limit.rpm = uri.maximum_rpm;
+  if (uri.maximum_mm_s != 0) limit.mm_s = uri.maximum_mm_s;
   return limit;
 }
 

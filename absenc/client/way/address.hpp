@@ -34,7 +34,7 @@ struct LinkParameter {
   bool repeatable = false;
 };
 
-inline constexpr std::array<LinkParameter, 22> link_parameters{{
+inline constexpr std::array<LinkParameter, 23> link_parameters{{
     {rate_setting, "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan"},
     {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
@@ -51,8 +51,11 @@ inline constexpr std::array<LinkParameter, 22> link_parameters{{
     {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi"},
     {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi"},
     {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim"},
-    {"max_rpm", "RPM", "the fastest that the shaft turns: how long a pause may be to know its turns after it",
+    {"max_rpm", "RPM",
+     "the fastest that the shaft turns: farther than it gets no position is believed, nor turns after "
+     "too long a pause",
      "serial, tcp, spi, can, slcan, sim"},
+    {"max_mm_s", "MM/S", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
     {"multiturn", "TURNS", "turns at the start", "sim"},
@@ -89,7 +92,8 @@ struct EncoderAddress {
   std::uint32_t adapter_rate = 115'200;  // slcan: of the serial port, not of the bus
   std::string log;                       // "": none
   host::EchoMode echo = host::EchoMode::off;
-  std::uint32_t maximum_rpm = 0;  // 0: as option or model say
+  std::uint32_t maximum_rpm = 0;   // 0: as the model says, or as is usual
+  std::uint32_t maximum_mm_s = 0;  // of linear encoders; 0: as is usual
   DeviceSettings device;
 };
 

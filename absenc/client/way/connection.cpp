@@ -28,6 +28,7 @@ class ConnectionOn final : public Connection {
       : Connection(uri),
         storage_(std::make_unique<std::byte[]>(uri.unit->host_storage)),
         session_(*uri.unit, uri.options, port_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
+    session_.set_speed_limit(speed_limit(uri));
     session_.observe(&statistics_);
     port_.abort = [this] { return session_.abort(); };
   }
@@ -47,12 +48,12 @@ class ConnectionOn final : public Connection {
   bool connected() const override { return link_ != nullptr; }
   const std::vector<std::string>& notes() const override { return link_->link().notes; }
 
-  Outcome read(host::Take take, const IsPossible& is_possible) override {
+  Outcome read(host::Take take) override {
     const Command* command = find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     return outcome(*command, link_->take_turn([&] {
       return_to_rate();
-      return session_.read(*command, take, is_possible);
+      return session_.read(*command, take);
     }));
   }
 

@@ -40,12 +40,9 @@ class Connection {
 
   // All of the following only while it is connected, but for counters and statistics.
 
-  /// Whether a position can be, to those who know where it was before.
-  using IsPossible = std::function<bool(const Reading&)>;
-  static bool all_are_possible(const Reading&) { return true; }
   /// The position, with all the alarms the unit can tell; of those that an encoder transmits by itself, which. Throws
   /// UsageError when the unit has none.
-  virtual Outcome read(host::Take take = host::Take::newest, const IsPossible& is_possible = all_are_possible) = 0;
+  virtual Outcome read(host::Take take = host::Take::newest) = 0;
   /// `on_emit` is called for each result but the last; `report` then tells of it. What reaches the encoder by what the
   /// command sets reaches it by the new value from now on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
@@ -55,7 +52,7 @@ class Connection {
   virtual void report_left(FieldSink& sink) const = 0;
   /// Of the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
-  /// Whether two positions in a row agreed since the encoder was opened or silent.
+  /// Whether the last position was compared with another, and agreed as well as the fastest shaft allows.
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;

@@ -153,7 +153,7 @@ const Subcommand record_subcommand{
     "that --rate asked for and that could not be taken are a line with their number. A file that is removed or\n"
     "replaced ends the recording at once, with status 1.\n"
     "After a pause in which the shaft may have turned too far to know, the position starts again: the event of that\n"
-    "reading is restarted. max_rpm=RPM behind ? says how fast the shaft turns at most.\n"
+    "reading is restarted. max_rpm=RPM (linear encoders: max_mm_s=MM/S) behind ? says how fast it may move.\n"
     "In CSV, lines before the column names begin with #. HDF5 has a dataset for each column, with its unit, meaning\n"
     "and missing_value; rows reach it four times a second, and however the command ends it can be opened.",
     record_parameters,
