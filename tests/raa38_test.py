@@ -96,11 +96,9 @@ class Stream(RaaCase):
             result = absenc("read", f"raa38:{fake.path}")
         self.assert_trouble(result, "out_of_range", "more bits", "received FF 81 40 01", "set bits")
 
-    def test_a_speed_limit_needs_the_refresh_rate(self):
+    def test_the_speed_limit_is_that_of_every_encoder(self):
         with BabblingLine(pieces=[FRAME]) as fake:
-            result = absenc("read", f"raa38:{fake.path}?max_rpm=100")
-            self.assert_trouble(result, "invalid_argument", "how often", "refresh_hz")
-            self.assert_good(absenc("read", f"raa38:{fake.path}?max_rpm=100&refresh_hz=200"))
+            self.assert_good(absenc("read", f"raa38:{fake.path}?max_rpm=100"))
 
 
 class Bus(RaaCase):

@@ -21,7 +21,6 @@ enum class Role : std::uint8_t {
   identity,     // field: says which encoder it is: its type, its serial number
   clash,        // field of a scan: not 0: whatever answers there is damaged every time
   rate,         // option: bits a second
-  maximum_rpm,  // option: how fast the shaft turns at most; 0: not known
   // Of a check at the end of a word, as `crc find` finds one: options
   check_width,       // bits
   check_polynomial,  // without its highest power

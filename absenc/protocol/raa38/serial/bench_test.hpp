@@ -17,7 +17,6 @@ namespace absenc::raa38::serial {
                     static_cast<std::int64_t>(format.zeroing),
                     format.zero_unit,
                     format.refresh_millihertz,
-                    format.maximum_rpm,
                     format.acquisition.count(),
                     format.transmission.count()};
   return options;

@@ -11,8 +11,8 @@
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/bits.hpp"
-#include "absenc/protocol/author/confirm.hpp"
 #include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/dialog.hpp"
 #include "absenc/protocol/author/look.hpp"
 
 namespace absenc::raa38::serial {
@@ -76,7 +76,6 @@ struct Format {
   Zeroing zeroing = Zeroing::none;
   std::int32_t zero_unit = -1;          // the x of Cx; -1: that of Bx
   std::int64_t refresh_millihertz = 0;  // 0: not known
-  std::uint32_t maximum_rpm = 0;        // 0: positions may jump
   Time acquisition{};                   // T3, or from a request to its answer; 0: not known
   Time transmission{};                  // T1 - T3, of a frame; 0: as long as its characters take
 
@@ -174,17 +173,6 @@ struct Request {
                  static_cast<std::uint8_t>(bytes[2] & 0x0Fu)};
 }
 
-/// Whether a shaft can have turned so far in that time, with a little for noise.
-[[nodiscard]] constexpr bool is_possible(const Format& format, std::uint32_t from, std::uint32_t to, Time between) {
-  constexpr std::int64_t turn = Time(1min).count();
-  constexpr std::int64_t noise = 4;  // counts
-  // In turns of one a minute. Half a turn is as far as any position is; less than it has room in 64 bits.
-  const std::int64_t turned = format.maximum_rpm * std::min(between, Time(1min)).count();
-  if (turned >= turn / 2) return true;
-  const std::int64_t moved = wrapped_difference(to, from, format.bits);
-  return ((moved < 0 ? -moved : moved) - noise) * turn <= turned << format.bits;
-}
-
 /// What frames and commands are shown as, in this order.
 struct Values {
   std::optional<std::uint8_t> encoder_address{};
@@ -251,12 +239,6 @@ struct Protocol {
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }
-  /// The sum does not see swapped bytes; a speed that no shaft has shows them.
-  static constexpr bool needs_another(const Format& format, const Position&) { return format.maximum_rpm != 0; }
-  static constexpr Error agree(const Format& format, const Position& first, const Position& second, Time between) {
-    const bool possible = is_possible(format, first.singleturn, second.singleturn, between);
-    return possible ? Error::none : Error::cross_check_failed;
-  }
 };
 
 /// What asks this encoder for a position.
@@ -265,6 +247,6 @@ struct Protocol {
 }
 
 /// One position of an encoder that is asked.
-using ReadPosition = author::ReadConfirmed<Protocol>;
+using ReadPosition = author::ReadPosition<Protocol>;
 
 }  // namespace absenc::raa38::serial

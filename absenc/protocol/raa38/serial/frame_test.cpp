@@ -24,17 +24,6 @@ TEST(RaaFrame, TheFirstCheckThatFailsNamesTheError) {
   EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}), Error::none);
 }
 
-TEST(RaaFrame, OnlyTheSpeedTellsSwappedBytes) {
-  const Format settings{.bits = 16, .maximum_rpm = 6000};
-  EXPECT_FALSE(is_possible(settings, 383, 32513, 1ms)) << "01 7F and 7F 01";
-  EXPECT_TRUE(is_possible(settings, 383, 383 + 6553, 1ms));
-  EXPECT_FALSE(is_possible(settings, 383, 383 + 6560, 1ms));
-  EXPECT_TRUE(is_possible(settings, 2, 65534, Time(1))) << "over the zero";
-  EXPECT_FALSE(is_possible(settings, 0, 32768, 4999us)) << "less than half a turn";
-  EXPECT_TRUE(is_possible(settings, 0, 32768, 5ms));
-  EXPECT_TRUE(is_possible({.bits = 21, .maximum_rpm = 1'000'000}, 0, 1 << 20, never)) << "whatever the time";
-}
-
 // A standing shaft repeats its frame. With the sizes that the encoders have, no other place in the repetition gives
 // another position: a search can never settle there.
 TEST(RaaFrame, ARepeatedFrameReadElsewhereIsNoOtherPosition) {

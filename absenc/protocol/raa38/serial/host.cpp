@@ -60,9 +60,6 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
       if (format.mode == Mode::timing) return explain_stream(error);
       if (format.mode == Mode::bus) return {{}, "`scan` shows who answers; check supply, A/B polarity and baud"};
       return {"no frame followed the pulse", "check the wire to CLK, its level, the pulse's width, supply and baud"};
-    case Error::cross_check_failed:
-      return {"two positions in a row are farther apart than max_rpm allows",
-              "the checksum does not see swapped bytes: read again, and check shielding, bits and max_rpm"};
     default:
       return {};
   }
@@ -70,11 +67,7 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
 
 // ---- A stream
 
-Listen::Listen(const Format& format) : format_(format), decoder_(format) {
-  if (format.maximum_rpm == 0 || format.period() > Time{}) return;
-  fail(Error::invalid_argument, {"max_rpm needs to know how often the encoder transmits", "set refresh_hz as well"});
-  done_ = true;
-}
+Listen::Listen(const Format& format) : format_(format), decoder_(format) {}
 
 ByteStep Listen::next(Time now) {
   if (taken_ < waiting_.size()) {
@@ -116,39 +109,13 @@ void Listen::take(const Found& found) {
     frame_.append(decoder_.bad());
     return fail(found.error, {"a frame of the stream is damaged", {}});
   }
-  ++frame_number_;
   frame_ = encode_position(format_, {found.singleturn, format_.own_second_byte()});
   const Time latched = std::max(latched_time(found), reading_.latched);
-  if (is_plausible(found.singleturn, latched)) return accept(found, latched);
-  fail(Error::cross_check_failed,
-       {"the position jumped farther than max_rpm allows",
-        "the checksum does not see swapped bytes: read again, and check shielding, bits and max_rpm"});
-}
-
-void Listen::accept(const Found& found, Time latched) {
   reading_ = author::position_reading(found.singleturn, format_.bits);
   reading_.latched = latched;
   reading_.received = found.at;
-  last_good_at_ = latched;
-  last_good_ = found.singleturn;
-  last_number_ = frame_number_;
-  has_suspect_ = false;
   heard_ = false;
   ++good_;
-}
-
-// A position is compared with the last good one, or with the last that was refused: when two of these agree, the
-// first one was wrong, or the shaft was turned while nobody could see it.
-bool Listen::is_plausible(std::uint32_t singleturn, Time latched) {
-  if (format_.maximum_rpm == 0 || good_ == 0) return true;
-  // Frames that were lost in between are not counted: the clock knows better, but not by less than a frame.
-  const Time by_frames = format_.period() * static_cast<std::int64_t>(frame_number_ - last_number_);
-  const Time between = std::max(by_frames, latched - last_good_at_);
-  if (is_possible(format_, last_good_, singleturn, between)) return true;
-  if (has_suspect_ && is_possible(format_, suspect_, singleturn, format_.period())) return true;
-  has_suspect_ = true;
-  suspect_ = singleturn;
-  return false;
 }
 
 // The frames that came at once were sent one after the other.

@@ -27,11 +27,9 @@ inline constexpr auto fields = author::fields_of<Values>(
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
 /// Listens to an encoder that transmits by itself, as long as it is driven. Emits every frame, and every loss of the
-/// frames with its error. Ends only when nothing good comes any more: timeout, bad_framing, out_of_range. With a
-/// maximum speed a position that the shaft cannot have reached is cross_check_failed.
+/// frames with its error. Ends only when nothing good comes any more: timeout, bad_framing, out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// `format.maximum_rpm` needs the refresh rate: otherwise invalid_argument, because times of arrival are too rough.
   explicit Listen(const Format& format);
 
   void feed(const Event<std::uint8_t>& event) override;
@@ -51,8 +49,6 @@ class Listen final : public Conversation<std::uint8_t> {
   static constexpr std::size_t most_waiting = 1024;
 
   void take(const Found& found);
-  void accept(const Found& found, Time latched);
-  [[nodiscard]] bool is_plausible(std::uint32_t singleturn, Time latched);
   [[nodiscard]] Time latched_time(const Found& found) const;
   void give_up();
   void fail(Error error, const Explanation& words);
@@ -69,12 +65,6 @@ class Listen final : public Conversation<std::uint8_t> {
   Time heard_before_{};     // and of those before
   std::uint64_t good_ = 0;  // frames
   Reading reading_{};
-  Time last_good_at_{};
-  std::uint32_t last_good_ = 0;     // position that later ones must be reachable from
-  std::uint64_t frame_number_ = 0;  // of frames, good or not plausible,
-  std::uint64_t last_number_ = 0;   // and of the one with `last_good_`
-  bool has_suspect_ = false;
-  std::uint32_t suspect_ = 0;  // the last position that was not plausible
   FrameBytes frame_;
   Error error_ = Error::none;
   Explanation words_{};

@@ -59,22 +59,6 @@ TEST(RaaListen, ADamagedFrameIsOneErrorAndTheStreamGoesOn) {
   EXPECT_TRUE(results.end.has("skipped=9")) << results.end.fields;
 }
 
-TEST(RaaListen, SpeedRefusesAJumpUnlessItStays) {
-  Bench bench({.refresh_millihertz = 1'000'000, .maximum_rpm = 6000});
-  bench.encoder().set([&](unsigned frame, Wire& reply) {
-    if (frame == 5) reply = {0xFF, 0x81, 0x17, 0x0F, 0xA6};  // half a byte moved
-    if (frame == 9) bench.put(0x3000);                       // turned while nobody could see it
-  });
-  const Results results = listen(bench, 20);
-  EXPECT_EQ(results.errors, (std::vector{Error::cross_check_failed, Error::cross_check_failed}));
-  ASSERT_EQ(results.positions.size(), 18u);
-  for (std::size_t i = 0; i < 18; ++i) EXPECT_EQ(results.positions[i], i < 10 ? 383u : 0x3000u) << i;
-}
-
-TEST(RaaListen, SpeedNeedsTheRefreshRate) {
-  EXPECT_TRUE(ended(Bench({.maximum_rpm = 6000}).does("position"), Error::invalid_argument, "set refresh_hz as well"));
-}
-
 TEST(RaaListen, SaysWhyNothingGoodComes) {
   struct Row {
     std::function<void(Wire&)> change;

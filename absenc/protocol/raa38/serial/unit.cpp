@@ -39,9 +39,6 @@ constexpr auto options = author::OptionsOf{
     option<&Format::zero_unit>("zero_unit", "the x of Cx; -1: that of Bx", -1, unit_count - 1),
     decimal<3>(option<&Format::refresh_millihertz>(
         "refresh_hz", "timing: frames a second; 0: not known (the virtual encoder: 100)", 0, 100'000'000)),
-    with_role<Role::maximum_rpm>(option<&Format::maximum_rpm>(
-        "max_rpm", "refuse positions that a shaft so fast cannot reach; 0: none; timing: needs refresh_hz", 0,
-        1'000'000)),
     decimal<3>(option<&Format::acquisition>(
         "acquisition_us", "T3, from pulse or request to the frame, us; 0: not known (the virtual encoder: 100)", 0,
         most_us)),
