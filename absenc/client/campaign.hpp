@@ -27,6 +27,10 @@ struct CampaignChoices {
   std::vector<std::string> faults{};   // "bit=0.001": rates of 0 to 1, those not named 0; none: the usual rates of all
   std::uint64_t exchanges = 100'000;
   std::uint64_t seed = 1;
+  /// The shaft turns, so many revolutions a minute (of linear encoders so many mm/s), and positions are confirmed as
+  /// `absenc read` does it; none: it is put somewhere else before every reading, and none is confirmed.
+  std::optional<double> rpm{};
+  std::uint32_t maximum_rpm = 0;  // that the host is told, or mm/s; 0: as the model says, or as is usual
 };
 
 /// How many of how many, with the interval of 95 % confidence in which the true rate is (Wilson).
@@ -51,6 +55,14 @@ struct CheckWorth {
   double taken_deviation = 0;  // standard deviation of `taken`, which is drawn by chance
 };
 
+/// What comes of positions that are confirmed.
+struct Guarded {
+  Share confirmed{};       // readings: that were presented as confirmed
+  Share wrong{};           // of these: the position is not that of the shaft when it was taken
+  Share alone{};           // positions that passed every check of their frames: that are wrong, confirmed or not
+  double let_through = 0;  // computed: how many wrong ones frame checks and limit together let through
+};
+
 struct CampaignResult {
   std::string protocol{};
   std::string model{};  // or ""
@@ -63,6 +75,7 @@ struct CampaignResult {
   Share wrong{};                // exchanges: a position was taken that is not the encoder's
   Share changed{};  // exchanges: a request that was misheard changed the encoder; after it another took its place
   Share older{};    // exchanges: that was an earlier position, of a frame sent before the request
+  std::optional<Guarded> guarded{};   // of a shaft that turns
   std::optional<CheckWorth> worth{};  // none where the check has more than 16 bits, is no linear one, or CAN's
   double seconds = 0;                 // of processor time that the exchanges took
 };

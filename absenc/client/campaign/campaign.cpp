@@ -8,17 +8,15 @@
 #include <cmath>
 #include <ctime>
 #include <deque>
-#include <memory>
 #include <type_traits>
 
 #include "absenc/client/campaign/check_code.hpp"
-#include "absenc/client/emulation/virtual_device.hpp"
+#include "absenc/client/campaign/guarded.hpp"
+#include "absenc/client/campaign/rough_bench.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/host/session.hpp"
 #include "absenc/sim/place.hpp"
-#include "absenc/sim/rough_line.hpp"
 
 namespace absenc::client {
 
@@ -42,32 +40,6 @@ constexpr std::array<LineFault, 14> all_faults{{
     {"repeat", "a reply comes twice", 0.001},
     {"request_corrupt", "each byte of a request: 1 to 3 bits are flipped", 0.0005},
 }};
-
-struct Rates {
-  sim::RoughRates line;
-  sim::FaultRates device;
-  bool by_device = false;  // any of `device`
-
-  void set(std::string_view name, double rate) {
-    if (double* const own = of_line(name)) {
-      *own = rate;
-      return;
-    }
-    const auto found = std::find(sim::fault_names.begin(), sim::fault_names.end(), name);
-    device[static_cast<sim::FaultKind>(found - sim::fault_names.begin())] = rate;
-    by_device = by_device || rate > 0;
-  }
-
- private:
-  double* of_line(std::string_view name) {
-    if (name == "bit") return &line.bit;
-    if (name == "burst") return &line.burst;
-    if (name == "double") return &line.doubled;
-    if (name == "talker") return &line.talker;
-    if (name == "late") return &line.late;
-    return nullptr;
-  }
-};
 
 double require_rate(std::string_view text, std::string_view written) {
   const std::string number(written);
@@ -100,32 +72,18 @@ struct Hand final : Shaft {
   std::int64_t position = 0;
 };
 
-/// One unit's host and virtual encoder, and what came of it.
+/// What comes of readings of which each finds the shaft somewhere else.
 template <class Item>
-class Bench {
+class Campaign {
  public:
-  Bench(const Unit& unit, const Options& options, const Rates& rates, std::uint64_t seed)
-      : unit_(unit),
-        options_(options),
-        rates_(rates),
-        random_(seed),
-        device_storage_(unit.device_storage),
-        host_storage_(unit.host_storage),
-        device_(make_device()),
-        faulty_(device_, rates.device, seed + 1),
-        line_(unit.link, line_settings(unit, options).with_some_rate(),
-              rates.by_device ? static_cast<Machine<Item>&>(faulty_) : device_, seed + 2),
-        session_(unit, options, line_, host_storage_,
-                 unit.link == LinkKind::half_duplex ? host::EchoMode::automatic : host::EchoMode::off),
-        unasked_(unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options))) {
-    line_.set_rates(rates.line);
-  }
+  Campaign(const Unit& unit, const Options& options, const Rates& rates, std::uint64_t seed)
+      : unit_(unit), options_(options), bench_(unit, options, shaft_, rates, seed) {}
 
   void run(std::uint64_t exchanges, CampaignResult& result) {
     const Command* read = find_command(unit_, Verb::read);
     while (result.exchanges < exchanges) one(*read, result);
-    result.damaged = line_.counts().damaged + damaged_by_device();
-    const std::uint64_t errors = session_.counters().bad();
+    result.damaged = bench_.damaged();
+    const std::uint64_t errors = bench_.session.counters().bad();
     result.failed = {errors, result.exchanges};
     result.given_up.of = result.recovered.of = result.readings;
     result.wrong.of = result.older.of = result.changed.of = result.exchanges;
@@ -137,7 +95,7 @@ class Bench {
     if constexpr (!std::is_same_v<Item, CanFrame>) {
       for (unsigned i = 0; i < count; ++i) {
         move();
-        (void)session_.run(*find_command(unit_, Verb::read));
+        (void)bench_.session.run(*find_command(unit_, Verb::read));
         GoodReply good{{line_.request().begin(), line_.request().end()}, {line_.reply().begin(), line_.reply().end()}};
         if (unit_.link == LinkKind::clocked) {
           good.request.clear();
@@ -154,29 +112,15 @@ class Bench {
     Time since;
     std::int64_t position;
   };
-  using Faulty = std::conditional_t<std::is_same_v<Item, CanFrame>, sim::FaultyNode, sim::FaultyDevice>;
-
-  Device<Item>& make_device(Time now = {}) {
-    const Any<Device> made = unit_.device(options_, shaft_, device_storage_);
-    Device<Item>* device = nullptr;
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      device = made.frames;
-    } else {
-      device = made.bytes;
-    }
-    if (device == nullptr) throw UsageError(fmt::format("{} has no virtual encoder with these options", unit_.id));
-    device->power_on(now, Device<Item>::PowerOn::skip);
-    return *device;
-  }
 
   // Somewhere else: whatever is taken for this place was never another.
   void move() {
-    shaft_.position = static_cast<std::int64_t>(random_.next());
+    shaft_.position = static_cast<std::int64_t>(bench_.random.next());
     constexpr Time longest = 30s;  // nothing is later
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
     // What is sent unasked has said where it was before; a chip is not selected again at once.
-    if (unasked_) {
+    if (bench_.unasked) {
       line_.rest(line_.now() + 5ms);
       line_.drop();
     }
@@ -187,53 +131,27 @@ class Bench {
     move();
     line_.mark();
     const sim::RoughCounts before = line_.counts();
-    const std::uint64_t repeated = session_.counters().repeated;
-    const Conversation<Item>* ended = session_.run(read);
+    const std::uint64_t repeated = bench_.session.counters().repeated;
+    const Conversation<Item>* ended = bench_.session.run(read);
+    const auto is_right = [this](const Reading& reading) { return sim::is_at(reading, shaft_.position); };
     ++result.readings;
-    // What nobody asks for is counted by its frames.
-    const sim::RoughCounts& now = line_.counts();
-    const std::uint64_t asked = now.requests - before.requests;
-    result.exchanges += asked != 0 ? asked : std::max<std::uint64_t>(1, now.replies - before.replies);
+    result.exchanges += bench_.exchanges_since(before);
     if (ended->error() != Error::none) {
       ++result.given_up.count;
-      pause();
-      if (was_changed(read)) ++result.changed.count;
+      bench_.pause();
+      if (bench_.was_changed(read, is_right)) ++result.changed.count;
       return;
     }
-    if (session_.counters().repeated != repeated) ++result.recovered.count;
+    if (bench_.session.counters().repeated != repeated) ++result.recovered.count;
     const Reading* reading = ended->reading();
-    if (reading == nullptr || sim::is_at(*reading, shaft_.position)) return;
+    if (reading == nullptr || is_right(*reading)) return;
     const bool old = is_old(*reading);
-    if (was_changed(read)) {
+    if (bench_.was_changed(read, is_right)) {
       ++result.changed.count;
       return;
     }
     ++result.wrong.count;
     if (old) ++result.older.count;
-  }
-
-  // A request that was misheard may be one that changes the encoder, and what it says is so from then on: seen over a
-  // good line. Then another takes its place.
-  bool was_changed(const Command& read) {
-    if (rates_.device[sim::FaultKind::request_corrupt] <= 0) return false;
-    line_.set_rates({});
-    faulty_.set_rates({});
-    line_.rest(line_.now() + (unasked_ ? 11s : 20s));  // nothing is late any more
-    line_.drop();
-    const Conversation<Item>* now = session_.run(read);
-    const bool changed =
-        now->error() != Error::none || (now->reading() != nullptr && !sim::is_at(*now->reading(), shaft_.position));
-    if (changed) (void)make_device(line_.now());  // in the same place
-    line_.set_rates(rates_.line);
-    faulty_.set_rates(rates_.device);
-    return changed;
-  }
-
-  // Who has given up tries again after a while, of 10 us to 10 s, each decade as often: a line that holds up a reply
-  // holds up those behind it. What comes all the time holds up nobody so long.
-  void pause() {
-    const double decades = (unasked_ ? 4 : 6) * static_cast<double>(random_.next() >> 11) * 0x1p-53;
-    line_.rest(line_.now() + Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades))));
   }
 
   [[nodiscard]] bool is_old(const Reading& reading) const {
@@ -245,26 +163,11 @@ class Bench {
     });
   }
 
-  [[nodiscard]] std::uint64_t damaged_by_device() const {
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      return faulty_.damaged_frames();
-    } else {
-      return faulty_.damaged_replies();
-    }
-  }
-
   const Unit& unit_;
   const Options& options_;
-  Rates rates_;
-  sim::Random random_;
   Hand shaft_;
-  std::vector<std::byte> device_storage_;
-  std::vector<std::byte> host_storage_;
-  Device<Item>& device_;
-  Faulty faulty_;
-  sim::RoughLine<Item> line_;
-  host::Session<Item> session_;
-  bool unasked_;
+  RoughBench<Item> bench_;
+  sim::RoughLine<Item>& line_ = bench_.line;
   std::deque<Place> places_;
 };
 
@@ -272,7 +175,7 @@ std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, dou
   if (unit.link == LinkKind::can) return {};
   constexpr unsigned frames = 20'000;  // one that is moved passes always or never: many of them
   constexpr unsigned samples = 500'000;
-  const std::vector<GoodReply> replies = Bench<std::uint8_t>(unit, options, {}, 7).good_replies(frames);
+  const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);
   if (replies.empty()) return {};
   const std::optional<CheckCode> code = CheckCode::learn(unit, options, replies);
   if (!code) return {};
@@ -319,10 +222,12 @@ CampaignResult campaign(std::string_view protocol, const CampaignChoices& choice
   if (options.model != nullptr) result.model = options.model->name;
   result.worth = worth_of(unit, options, rates.line.bit);
   const std::clock_t begin = std::clock();
-  if (unit.link == LinkKind::can) {
-    Bench<CanFrame>(unit, options, rates, choices.seed).run(choices.exchanges, result);
+  if (choices.rpm) {
+    result.guarded = read_guarded(unit, options, rates, choices, result);
+  } else if (unit.link == LinkKind::can) {
+    Campaign<CanFrame>(unit, options, rates, choices.seed).run(choices.exchanges, result);
   } else {
-    Bench<std::uint8_t>(unit, options, rates, choices.seed).run(choices.exchanges, result);
+    Campaign<std::uint8_t>(unit, options, rates, choices.seed).run(choices.exchanges, result);
   }
   result.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   return result;

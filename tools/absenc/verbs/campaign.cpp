@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -24,12 +25,18 @@ Json share_json(const Share& share) {
   return Json::object().set("count", share.count).set("of", share.of).set("low", share.low()).set("high", share.high());
 }
 
+Json guarded_json(const Guarded& guarded) {
+  Json json = Json::object().set("confirmed", share_json(guarded.confirmed)).set("wrong", share_json(guarded.wrong));
+  return json.set("alone", share_json(guarded.alone)).set("let_through", guarded.let_through);
+}
+
 Json campaign_json(const CampaignResult& result) {
   Json json = Json::object().set("protocol", result.protocol).set("model", result.model);
   json.set("readings", result.readings).set("exchanges", result.exchanges).set("damaged", result.damaged);
   json.set("failed", share_json(result.failed)).set("given_up", share_json(result.given_up));
   json.set("recovered", share_json(result.recovered)).set("wrong", share_json(result.wrong));
   json.set("older", share_json(result.older)).set("changed", share_json(result.changed));
+  if (result.guarded) return json.set("guarded", guarded_json(*result.guarded));
   if (!result.worth) return json.set("check", Json());
   const CheckWorth& worth = *result.worth;
   Json check = Json::object().set("bits", worth.check_bits).set("frame_bits", worth.frame_bits);
@@ -46,12 +53,30 @@ std::string worth_text(const CheckWorth& worth) {
                      worth.distance == 1 ? "" : "s", worth.words);
 }
 
+using Rows = std::vector<std::vector<std::string>>;
+
+std::vector<std::string> share_row(std::string_view name, const Share& share, std::string_view of) {
+  return {std::string(name), fmt::format("{}", share.count), fmt::format("of {} {}", share.of, of),
+          share_interval(share)};
+}
+
+void print_guarded(const CampaignResult& result) {
+  const Guarded& guarded = *result.guarded;
+  print_line(table(Rows{
+      {"", "COUNT", "", "RATE, 95 %"},
+      share_row("failed", result.failed, "exchanges"),
+      share_row("wrong with good checks", guarded.alone, "positions"),
+      share_row("given up", result.given_up, "readings"),
+      share_row("confirmed", guarded.confirmed, "readings"),
+      share_row("wrong and confirmed", guarded.wrong, "confirmed"),
+  }));
+  print_line(fmt::format("computed  {:.3g} wrong ones agree by chance with the position before", guarded.let_through));
+}
+
 void print_campaign(const CampaignResult& result) {
-  const auto line = [](std::string_view name, const Share& share, std::string_view of) {
-    return std::vector<std::string>{std::string(name), fmt::format("{}", share.count),
-                                    fmt::format("of {} {}", share.of, of), share_interval(share)};
-  };
-  const std::vector<std::vector<std::string>> rows{
+  if (result.guarded) return print_guarded(result);
+  const auto line = share_row;
+  const Rows rows{
       {"", "COUNT", "", "RATE, 95 %"},
       line("failed", result.failed, "exchanges"),
       line("wrong position taken", result.wrong, "exchanges"),
@@ -90,6 +115,27 @@ std::vector<std::string> campaign_row(const CampaignResult& result) {
           worth ? fmt::format("{:.2g}", worth->taken) : "-"};
 }
 
+std::string rate_text(double rate) { return rate == 0 ? "0" : fmt::format("{:.2g}", rate); }
+
+std::vector<std::string> guarded_row(const CampaignResult& result) {
+  const Guarded& guarded = *result.guarded;
+  const auto confirmed = static_cast<double>(std::max<std::uint64_t>(1, guarded.confirmed.count));
+  return {result.protocol,
+          fmt::format("{:.2g} %", 100 * result.failed.rate()),
+          fmt::format("{:.4g} %", 100 * guarded.confirmed.rate()),
+          rate_text(guarded.alone.rate()),
+          fmt::format("{}", guarded.wrong.count),
+          rate_text(guarded.wrong.rate()),
+          share_interval(guarded.wrong),
+          rate_text(guarded.let_through / confirmed)};
+}
+
+const std::vector<std::string> campaign_heading{"PROTOCOL", "FAILED",   "RECOVERED",     "GIVEN UP",
+                                                "WRONG",    "OLDER",    "CHANGED",       "WRONG, 95 %",
+                                                "CHECK",    "DISTANCE", "PASS CHECKSUM", "PASS ALL"};
+const std::vector<std::string> guarded_heading{"PROTOCOL", "FAILED", "CONFIRMED",  "WRONG ALONE",
+                                               "WRONG",    "RATE",   "RATE, 95 %", "LET THROUGH"};
+
 CampaignChoices campaign_choices(const Invocation& invocation) {
   CampaignChoices choices{.model = std::string(invocation.text("--model"))};
   for (const std::string& text : invocation.texts("--option")) choices.options.push_back(text);
@@ -97,6 +143,11 @@ CampaignChoices campaign_choices(const Invocation& invocation) {
   choices.exchanges = static_cast<std::uint64_t>(
       invocation.number("--exchanges", static_cast<std::int64_t>(choices.exchanges), 1, 1'000'000'000'000));
   choices.seed = static_cast<std::uint64_t>(invocation.number("--seed", 1, 0, INT64_MAX));
+  if (invocation.has("--rpm")) choices.rpm = invocation.real("--rpm", 0, -100'000, 100'000);
+  if (invocation.has("--max-rpm")) {
+    if (!choices.rpm) throw UsageError("--max-rpm is for a shaft that turns: set --rpm as well");
+    choices.maximum_rpm = static_cast<std::uint32_t>(invocation.number("--max-rpm", 1, 1, 1'000'000));
+  }
   return choices;
 }
 
@@ -113,22 +164,20 @@ int run_campaign(const Invocation& invocation) {
     return exit_good;
   }
   if (!choices.model.empty() || !choices.options.empty()) throw UsageError("models and options belong to one protocol");
-  std::vector<std::vector<std::string>> rows{{"PROTOCOL", "FAILED", "RECOVERED", "GIVEN UP", "WRONG", "OLDER",
-                                              "CHANGED", "WRONG, 95 %", "CHECK", "DISTANCE", "PASS CHECKSUM",
-                                              "PASS ALL"}};
+  Rows rows{choices.rpm ? guarded_heading : campaign_heading};
   Progress progress;
   for (const Unit* unit : all_units()) {
     progress.show(unit->id);
     const CampaignResult result = campaign(unit->id, choices);
     progress.clear();
     if (json) print_line(campaign_json(result).line());
-    rows.push_back(campaign_row(result));
+    rows.push_back(choices.rpm ? guarded_row(result) : campaign_row(result));
   }
   if (!json) print_line(table(rows));
   return exit_good;
 }
 
-constexpr std::array<Parameter, 7> campaign_parameters{{
+constexpr std::array<Parameter, 9> campaign_parameters{{
     {"protocol", "", "see `absenc list`", "each, a line for each"},
     parameter::model,
     parameter::protocol_option,
@@ -137,15 +186,23 @@ constexpr std::array<Parameter, 7> campaign_parameters{{
      "(burst, "
      "double, talker, late, drop, corrupt, truncate, delay, echo, garbage, silence, repeat)",
      "a little of most", false, true},
+    {"--rpm", "R",
+     "how fast the shaft turns (linear encoders: R mm/s); positions are confirmed then, as `absenc read` does it, and "
+     "those that are wrong are counted",
+     "it is put somewhere else before every reading, and no position is confirmed"},
+    {"--max-rpm", "N", "the speed limit that the host is told (linear encoders: N mm/s)",
+     "that of the model, or 10000 rpm, or 20000 mm/s"},
     {"--exchanges", "N", "how many requests are sent", "100000"},
     {"--seed", "N", "of the faults: the same gives the same", "1"},
     parameter::json,
 }};
 
-constexpr std::array<Example, 3> campaign_examples{{
+constexpr std::array<Example, 4> campaign_examples{{
     {"absenc campaign tformat", "a little of everything that a line can do"},
     {"absenc campaign tformat --fault bit=0.01 --exchanges 1000000",
      "independent bit errors, beside what follows from the checksum"},
+    {"absenc campaign ssi --fault corrupt=0.1 --rpm 60 --max-rpm 100",
+     "wrong positions that the speed limit lets through, beside what follows from it"},
     {"absenc campaign --fault late=0.01", "late replies, to the encoders of every protocol"},
 }};
 

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// One unit's host and its virtual encoder on a line with faults, in virtual time.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "absenc/client/error.hpp"
+#include "absenc/host/session.hpp"
+#include "absenc/sim/faults.hpp"
+#include "absenc/sim/faulty_node.hpp"
+#include "absenc/sim/random.hpp"
+#include "absenc/sim/rough_line.hpp"
+
+namespace absenc::client {
+
+/// How often each fault is injected.
+struct Rates {
+  sim::RoughRates line;
+  sim::FaultRates device;
+  bool by_device = false;  // any of `device`
+
+  void set(std::string_view name, double rate) {
+    if (double* const own = of_line(name)) {
+      *own = rate;
+      return;
+    }
+    const auto found = std::find(sim::fault_names.begin(), sim::fault_names.end(), name);
+    device[static_cast<sim::FaultKind>(found - sim::fault_names.begin())] = rate;
+    by_device = by_device || rate > 0;
+  }
+
+ private:
+  double* of_line(std::string_view name) {
+    if (name == "bit") return &line.bit;
+    if (name == "burst") return &line.burst;
+    if (name == "double") return &line.doubled;
+    if (name == "talker") return &line.talker;
+    if (name == "late") return &line.late;
+    return nullptr;
+  }
+};
+
+template <class Item>
+struct RoughBench {
+  /// All must outlive it.
+  RoughBench(const Unit& what, const Options& how, const Shaft& measured, const Rates& often, std::uint64_t seed)
+      : unit(what),
+        options(how),
+        shaft(measured),
+        rates(often),
+        random(seed),
+        device_storage(unit.device_storage),
+        host_storage(unit.host_storage),
+        device(make_device()),
+        faulty(device, rates.device, seed + 1),
+        line(unit.link, line_settings(unit, options).with_some_rate(),
+             rates.by_device ? static_cast<Machine<Item>&>(faulty) : device, seed + 2),
+        session(unit, options, line, host_storage,
+                unit.link == LinkKind::half_duplex ? host::EchoMode::automatic : host::EchoMode::off),
+        unasked(host::sends_unasked(unit, options)) {
+    line.set_rates(rates.line);
+  }
+
+  Device<Item>& make_device(Time now = {}) {
+    const Any<Device> made = unit.device(options, shaft, device_storage);
+    Device<Item>* one = nullptr;
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      one = made.frames;
+    } else {
+      one = made.bytes;
+    }
+    if (one == nullptr) {
+      throw UsageError(std::string(unit.id) + " has no virtual encoder with these options");
+    }
+    one->power_on(now, Device<Item>::PowerOn::skip);
+    return *one;
+  }
+
+  /// So that nothing is damaged, or as it is given.
+  void set_faults(bool on) {
+    line.set_rates(on ? rates.line : sim::RoughRates{});
+    faulty.set_rates(on ? rates.device : sim::FaultRates{});
+  }
+
+  /// What nobody asks for is counted by its frames.
+  [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
+    const std::uint64_t asked = line.counts().requests - before.requests;
+    return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);
+  }
+
+  [[nodiscard]] std::uint64_t damaged() const {
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      return line.counts().damaged + faulty.damaged_frames();
+    } else {
+      return line.counts().damaged + faulty.damaged_replies();
+    }
+  }
+
+  // A request that was misheard may be one that changes the encoder, and what it says is so from then on: seen over a
+  // good line. Then another takes its place.
+  template <class IsRight>
+  bool was_changed(const Command& read, const IsRight& is_right) {
+    using namespace std::chrono_literals;
+    if (rates.device[sim::FaultKind::request_corrupt] <= 0) return false;
+    set_faults(false);
+    line.rest(line.now() + (unasked ? 11s : 20s));  // nothing is late any more
+    line.drop();
+    const Conversation<Item>* now = session.run(read);
+    const bool changed = now->error() != Error::none || (now->reading() != nullptr && !is_right(*now->reading()));
+    if (changed) (void)make_device(line.now());  // in the same place
+    set_faults(true);
+    return changed;
+  }
+
+  // Who has given up tries again after a while, of 10 us to 10 s, each decade as often: a line that holds up a reply
+  // holds up those behind it. What comes all the time holds up nobody so long.
+  void pause() {
+    const double decades = (unasked ? 4 : 6) * static_cast<double>(random.next() >> 11) * 0x1p-53;
+    line.rest(line.now() + Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades))));
+  }
+
+  using Faulty = std::conditional_t<std::is_same_v<Item, CanFrame>, sim::FaultyNode, sim::FaultyDevice>;
+
+  const Unit& unit;
+  const Options& options;
+  const Shaft& shaft;
+  Rates rates;
+  sim::Random random;
+  std::vector<std::byte> device_storage;
+  std::vector<std::byte> host_storage;
+  Device<Item>& device;
+  Faulty faulty;
+  sim::RoughLine<Item> line;
+  host::Session<Item> session;
+  bool unasked;
+};
+
+}  // namespace absenc::client
