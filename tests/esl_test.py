@@ -423,7 +423,7 @@ class TwoChannels(EslCase):
         encoder = self.fake(alarms_2=0x20)
         names, row = absenc("read", encoder, "--csv").stdout.splitlines()
         values = dict(zip(names.split(","), row.split(",")))
-        self.assertEqual((values["ch1_alarms"], values["ch2_alarms"]), ("", "singleturn_error"))
+        self.assertEqual((values["ch1_alarms"], values["ch2_alarms"]), ("none", "singleturn_error"))
         self.assertEqual((values["ch1_status"], values["ch2_status"]), ("ready", "channel_2 ready"))
         for path in (self.file("log.csv"), self.file("log.jsonl")):
             self.assert_good(absenc("record", encoder, "--output", path, "--rate", "5", "--for", "1"))
@@ -431,7 +431,7 @@ class TwoChannels(EslCase):
                 lines = [line.rstrip("\n") for line in file if not line.startswith("#")]
             if path.endswith("csv"):
                 last = dict(zip(lines[0].split(","), lines[-1].split(",")))
-                self.assertEqual((last["ch1_alarms"], last["ch2_alarms"]), ("", "singleturn_error"))
+                self.assertEqual((last["ch1_alarms"], last["ch2_alarms"]), ("none", "singleturn_error"))
                 self.assertEqual(len(lines[0].split(",")), len(lines[-1].split(",")))
             else:
                 self.assertEqual(json.loads(lines[-1])["ch2_alarms"], ["singleturn_error"])

@@ -90,9 +90,9 @@ class Info(EncoderCase):
     def test_readings_that_do_not_agree(self):
         address = "sim:tformat?motion=file=" + self.file("motion.csv", "0,0\n0.0001,0\n100,600000000\n")
         result = absenc("info", address)
-        self.assertRegex(result.stdout, r"position INVALID \(\d+\) .*\n  no two readings in a row agree")
+        self.assertRegex(result.stdout, r"position unconfirmed \(\d+\) .*\n  no two readings in a row agree")
         answer = json.loads(absenc("info", address, "--json").stdout)["answers"]["position"]
-        self.assertEqual((answer["singleturn_valid"], answer["angle_deg"], answer["confirmed"]), (False, None, False))
+        self.assertEqual((answer["singleturn_valid"], answer["angle_deg"], answer["confirmed"]), (None, None, False))
 
 
 class Alarms(EncoderCase):

@@ -39,7 +39,7 @@ class Reading(Case):
         header, row = absenc("read", SLOW, "--csv").stdout.splitlines()
         self.assertEqual(header, "time_s,position_mm,position_um,singleturn,singleturn_valid,multiturn,multiturn_valid,"
                                  "status,alarms,event")
-        self.assertEqual(row.split(",")[1:], ["78.96355", "78963.55", "1579271", "true", "", "", "", "", ""])
+        self.assertEqual(row.split(",")[1:], ["78.96355", "78963.55", "1579271", "true", "", "", "", "none", ""])
 
     def test_what_is_not_valid_is_no_number(self):
         address = SLOW + "&alarm=error"

@@ -49,7 +49,7 @@ class Readings(EncoderCase):
         self.assertEqual(header, ["time_s", "angle_deg", "singleturn", "singleturn_valid", "multiturn",
                                   "multiturn_valid", "status", "alarms", "event"])
         self.assertEqual(len(rows), 2)
-        self.assertEqual(rows[0][1:], ["0", "0", "true", "7", "false", "", "over_speed", ""])
+        self.assertEqual(rows[0][1:], ["0", "0", "true", "7", "false", "none", "over_speed", ""])
         self.assertEqual(result.stderr, "")
 
     def test_csv_has_a_row_for_a_failed_reading(self):

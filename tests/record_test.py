@@ -334,7 +334,7 @@ class Trouble(RecordCase):
         for number, row in enumerate(rows):
             if row["event"] == "":
                 self.assertEqual(row["singleturn"], "1000" if number < lost else "2000")
-                self.assertEqual(row["alarms"], "" if number < lost else "battery_alarm")
+                self.assertEqual(row["alarms"], "none" if number < lost else "battery_alarm")
 
     def test_full_disk(self):
         """A file system of 1 MB: mounted, as root or in a namespace of our own."""

@@ -164,8 +164,20 @@ struct Decoded::Work {
     for (const FieldValue& field : contents.fields) {
       const std::size_t place = place_of(*field.info);
       if (place == unit.fields.size()) continue;
-      const bool is_valid = contents.reading == nullptr || holds(*field.info, *contents.reading);
-      values[first_field + place] = is_valid ? value_of(field) : Value(Invalid{});
+      const Validity validity =
+          contents.reading == nullptr ? Validity::valid : validity_of(*field.info, *contents.reading);
+      values[first_field + place] = validity == Validity::valid     ? value_of(field)
+                                    : validity == Validity::unknown ? Value(Unknown{})
+                                                                    : Value(Invalid{});
+    }
+    if (contents.reading != nullptr) fill_alarms(*contents.reading, values);
+  }
+
+  // Also those that this reply does not carry, as far as earlier ones have reported them.
+  void fill_alarms(const Reading& reading, std::vector<Value>& values) const {
+    for (const Flags& flags : alarms_of(unit, reading)) {
+      const std::size_t place = place_of(*flags.field);
+      if (place != unit.fields.size()) values[first_field + place] = value_of(flags);
     }
   }
 

@@ -92,6 +92,11 @@ Reading Encoder::read() {
   return sample.reading;
 }
 
+Reading Encoder::read_alarms() {
+  if (!connection_->connected()) connect();
+  return client::read_alarms(*connection_);
+}
+
 Answer Encoder::run(std::string_view name, std::span<const std::int64_t> arguments) {
   const Command& command = require_command(unit(), name);
   if (!connection_->connected()) connect();

@@ -81,6 +81,8 @@ class Encoder {
   /// The position, with all alarms that the encoder can tell. A position that no second one confirmed is not valid. A
   /// port that was lost is opened again. Throws EncoderFailure, os::Failure, Cancelled.
   [[nodiscard]] Reading read();
+  /// The same for its alarms: where the reply of `read` does not report them all, what else reads them is asked too.
+  [[nodiscard]] Reading read_alarms();
   /// For a loop over samples that goes on when the port is lost and comes back. Ends after `count`, or by `cancel`.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
   /// One sample: reads once, or waits a quarter of a second and tries to open the port again. Throws os::Interrupted,

@@ -14,21 +14,43 @@ std::uint32_t flag_mask(const FieldInfo& field) {
   return static_cast<std::uint32_t>(low_mask(static_cast<unsigned>(field.flags.size())));
 }
 
-std::vector<Flags> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits) {
+// Those that every encoder has.
+std::uint32_t required(const FieldInfo& field) {
+  std::uint32_t mask = 0;
+  for (std::size_t i = 0; i < field.flags.size(); ++i) {
+    if (!field.flags[i].name.empty() && !field.flags[i].optional) mask |= std::uint32_t{1} << i;
+  }
+  return mask;
+}
+
+std::vector<Flags> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits, std::uint32_t reported) {
   std::vector<Flags> flags;
-  if (first != nullptr) flags.push_back({first, bits & flag_mask(*first)});
-  if (second != nullptr) flags.push_back({second, bits >> first->flags.size()});
+  if (first != nullptr) flags.push_back({first, bits & flag_mask(*first), reported & flag_mask(*first)});
+  if (second != nullptr) flags.push_back({second, bits >> first->flags.size(), reported >> first->flags.size()});
   return flags;
 }
 
 }  // namespace
 
+bool Flags::is_complete() const { return (required(*field) & ~reported) == 0; }
+
 std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading) {
-  return both(unit.alarms, unit.second_alarms, reading.alarms);
+  return both(unit.alarms, unit.second_alarms, reading.alarms, reading.alarms_reported);
 }
 
 std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
-  return both(unit.status, unit.second_status, reading.status);
+  return both(unit.status, unit.second_status, reading.status, reading.status_reported);
+}
+
+std::optional<Flags> joined_alarms(const Unit& unit, const Reading& reading) {
+  const std::vector<Flags> channels = alarms_of(unit, reading);
+  if (channels.empty()) return std::nullopt;
+  Flags joined = channels.front();
+  for (const Flags& flags : channels) {
+    joined.bits |= flags.bits;
+    joined.reported &= flags.reported;
+  }
+  return joined;
 }
 
 std::vector<Flags> flags_of(const Unit& unit, const Reading& reading) {
@@ -45,6 +67,8 @@ std::vector<Flags> flags_of(const Unit& unit, const Reading& reading) {
 Reading checked(Reading reading, bool confirmed) {
   if (confirmed || !reading.ready || !reading.singleturn_valid()) return reading;
   reading.singleturn_valid_bits = 0;
+  reading.singleturn_known = false;
+  if (reading.multiturn_valid) reading.multiturn_known = false;  // else the encoder has said that they do not hold
   reading.multiturn_valid = false;
   return reading;
 }

@@ -9,7 +9,8 @@ namespace {
 
 bool has_channels(const Unit& unit) { return unit.second_status != nullptr || unit.second_alarms != nullptr; }
 
-constexpr std::string_view flag_words = "names, separated by spaces";
+constexpr std::string_view flag_words =
+    "names, separated by spaces; none: all are clear; empty: nobody has reported whether";
 
 }  // namespace
 
@@ -44,7 +45,8 @@ void ReadingColumns::fill(const Reading& reading, std::span<Value> values) const
   std::size_t at = 0;
   const auto put = [&](bool is_carried, Value value) { values[at++] = is_carried ? std::move(value) : Value(); };
   const bool has_position = reading.singleturn_bits != 0;
-  const bool is_valid = reading.singleturn_valid() && reading.ready;
+  const Validity validity = reading.ready || !has_position ? reading.singleturn_validity() : Validity::invalid;
+  const bool is_valid = validity == Validity::valid;
   const auto put_position = [&](double position) { put(has_position, is_valid ? Value(position) : Value(Invalid{})); };
   if (columns_.front().name == "position_mm") {
     const double um = has_position ? micrometres(reading.singleturn, reading.unit_um) : 0;
@@ -55,24 +57,23 @@ void ReadingColumns::fill(const Reading& reading, std::span<Value> values) const
   }
   put(has_position, reading.singleturn);
   put(has_position, std::uint64_t{reading.singleturn_bits});
-  put(has_position, is_valid);
+  put(has_position, value_of(validity));
   put(has_position, std::uint64_t{reading.singleturn_valid_bits});
   const bool has_turns = reading.multiturn_bits != 0;
   put(has_turns, reading.multiturn);
   put(has_turns, std::uint64_t{reading.multiturn_bits});
-  put(has_turns, reading.multiturn_valid);
+  put(has_turns, value_of(reading.multiturn_validity()));
 
-  const auto put_first = [&](const std::vector<Flags>& flags) {
-    put(!flags.empty(), flags.empty() ? Value() : Value(flags.front()));
+  const auto put_flags = [&](const std::optional<Flags>& flags) {
+    put(flags.has_value(), flags ? value_of(*flags) : Value());
   };
-  if (!has_channels(*unit_)) {
-    put_first(status_of(*unit_, reading));
-    return put_first(alarms_of(*unit_, reading));
+  if (has_channels(*unit_)) {
+    for (const Flags& flags : flags_of(*unit_, reading)) put_flags(flags);
+  } else {
+    const std::vector<Flags> status = status_of(*unit_, reading);
+    put_flags(status.empty() ? std::nullopt : std::optional(status.front()));
   }
-  for (const Flags& flags : flags_of(*unit_, reading)) put(true, flags);
-  std::uint32_t either = 0;
-  for (const Flags& flags : alarms_of(*unit_, reading)) either |= flags.bits;
-  put(unit_->alarms != nullptr, Flags{unit_->alarms, either});
+  put_flags(joined_alarms(*unit_, reading));
 }
 
 }  // namespace absenc::client

@@ -18,7 +18,7 @@ class ReadingColumns {
 
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
   /// One value for each column: nothing for what the reading does not carry. In place of a position in degrees or
-  /// millimetres that does not hold there is `Invalid`.
+  /// millimetres that does not hold there is `Invalid`, of flags that nobody has reported `Unknown`.
   void fill(const Reading& reading, std::span<Value> values) const;
 
  private:

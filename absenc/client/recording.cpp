@@ -154,8 +154,10 @@ RecordHeader Recording::header() const {
 bool Recording::wanted(const Sample& sample) {
   if (sample.kind == Sample::Kind::absent) return false;
   if (sample.kind != Sample::Kind::reading) return true;
-  const bool other_alarms = sample.reading.alarms != alarms_;
-  alarms_ = sample.reading.alarms;
+  const Reading& reading = sample.reading;
+  const bool other_alarms = reading.alarms != alarms_ || reading.alarms_reported != alarms_reported_;
+  alarms_ = reading.alarms;
+  alarms_reported_ = reading.alarms_reported;
   return seen_++ % settings_.every == 0 || other_alarms;
 }
 

@@ -79,6 +79,7 @@ class Recording {
   std::uint64_t gap_ = 0;    // missed, and not written yet
   Time gap_at_{};
   std::uint32_t alarms_ = 0;
+  std::uint32_t alarms_reported_ = 0;
 };
 
 }  // namespace absenc::client

@@ -28,6 +28,7 @@ std::size_t index_of(std::span<const Column> columns, std::string_view name) {
 struct Text {
   std::string operator()(std::monostate) const { return {}; }
   std::string operator()(Invalid) const { return {}; }
+  std::string operator()(Unknown) const { return {}; }
   std::string operator()(bool value) const { return value ? "yes" : "no"; }
   std::string operator()(const Flags& flags) const {
     return fmt::format("{}", fmt::join(flag_names(*flags.field, flags.bits), " "));
@@ -41,6 +42,22 @@ struct Text {
 };
 
 }  // namespace
+
+Value value_of(const Flags& flags) {
+  const bool is_known = flags.is_complete() || !raised(*flags.field, flags.bits).empty();
+  return is_known ? Value(flags) : Value(Unknown{});
+}
+
+Value value_of(Validity validity) {
+  switch (validity) {
+    case Validity::absent:
+      return {};
+    case Validity::unknown:
+      return Unknown{};
+    default:
+      return validity == Validity::valid;
+  }
+}
 
 std::string to_text(const Value& value) { return std::visit(Text{}, value); }
 
@@ -94,7 +111,9 @@ void AnswerSink::put(const FieldValue& value) {
 
 void AnswerSink::put_reading(const Reading& reading) {
   for (std::size_t i = 0; i < fields_.size(); ++i) {
-    if (is_of_reading(fields_[i].role) && !holds(fields_[i], reading)) answer.values[i] = Invalid{};
+    const Validity validity = validity_of(fields_[i], reading);
+    if (validity == Validity::invalid) answer.values[i] = Invalid{};
+    if (validity == Validity::unknown) answer.values[i] = Unknown{};
   }
 }
 

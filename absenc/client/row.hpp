@@ -37,11 +37,26 @@ struct Invalid {
   friend bool operator==(const Invalid&, const Invalid&) = default;
 };
 
-/// In the order of `Type`, between nothing, which was not told, and `Invalid`.
-using Value =
-    std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector, Invalid>;
+/// In place of a value that no reply has reported so far: alarms that a reply does not carry, whether a position holds.
+struct Unknown {
+  friend bool operator==(const Unknown&, const Unknown&) = default;
+};
 
-/// "12.5", "yes", "over_heat battery_alarm", "1A 00"; "" for nothing and for what does not hold.
+/// In the order of `Type`, between nothing, which the row does not have, and `Invalid` and `Unknown`.
+using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector,
+                           Invalid, Unknown>;
+
+/// Whether it is one of the types of `Type`.
+[[nodiscard]] inline bool has_value(const Value& value) {
+  return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
+}
+
+/// Flags that are raised, or all clear; otherwise `Unknown`.
+[[nodiscard]] Value value_of(const Flags& flags);
+/// Yes or no, or `Unknown`; nothing of what is absent.
+[[nodiscard]] Value value_of(Validity validity);
+
+/// "12.5", "yes", "over_heat battery_alarm", "1A 00"; "" where there is no value, and of flags of which none is raised.
 [[nodiscard]] std::string to_text(const Value& value);
 /// The same with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);
@@ -73,8 +88,8 @@ struct Answer {
   [[nodiscard]] const Value& operator[](std::string_view name) const;
 };
 
-/// Makes an answer of fields; those of the position that does not hold are left empty. A field that comes again, as in
-/// a list, has its last value.
+/// Makes an answer of fields; those of a position that does not hold are `Invalid`, or `Unknown` where nobody has
+/// reported whether it does. A field that comes again, as in a list, has its last value.
 class AnswerSink final : public FieldSink {
  public:
   void put(const FieldValue& value) override;

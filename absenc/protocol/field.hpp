@@ -17,6 +17,7 @@ struct FlagInfo {
   std::string_view name;     // "" when the bit has no meaning
   std::string_view meaning;  // what has happened
   std::string_view action;   // what the operator must do; "" when nothing
+  bool optional = false;     // some encoders have no such flag: one that reports the others and not this one has none
 };
 
 struct FieldInfo {

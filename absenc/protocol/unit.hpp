@@ -268,6 +268,10 @@ struct Unit {
   /// of the bit in this reply with which the encoder says one too. Both together are decoded as request and reply, one
   /// bit for each frame. Nothing: this reply has none. Null: no reply of the unit has.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
+  /// Returns `now`, the reading of one reply, completed by what earlier replies of the same encoder reported since it
+  /// was switched on and this one does not carry. `before` is the reading before it, completed in the same way. Null:
+  /// each reply says all that there is to say.
+  Reading (*remembered)(const Reading& before, Reading now) = nullptr;
 };
 
 /// Whether a word format may stand in for some of its options.

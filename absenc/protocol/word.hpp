@@ -37,7 +37,7 @@ inline constexpr std::uint32_t word_warning = 2;
 
 inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"error", "the encoder says that its position is wrong", "see the encoder's manual: its status tells the cause"},
-    {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply"},
+    {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
 enum WordFieldIndex : std::size_t {
@@ -270,20 +270,38 @@ struct PositionBits {
   bool multiturn_first = true;
 };
 
-/// An error bit makes position and turns invalid.
+/// What a reading needs to know of its word.
+struct WordContents {
+  PositionBits bits{};
+  std::uint32_t reported = 0;  // the alarms for which the word has a bit
+};
+[[nodiscard]] constexpr WordContents contents_of(const WordFormat& format) {
+  WordContents contents;
+  for (const WordField& field : format.fields()) {
+    if (field.meaning == Meaning::position) contents.bits.position = field.bits;
+    if (field.meaning == Meaning::multiturn) contents.bits.multiturn = field.bits;
+    if (field.meaning == Meaning::error) contents.reported |= word_error;
+    if (field.meaning == Meaning::warning) contents.reported |= word_warning;
+  }
+  return contents;
+}
+
+/// An error bit makes position and turns invalid. Of a word without one nothing does.
 template <std::size_t size>
-[[nodiscard]] constexpr Reading to_reading(const PositionBits& bits, const WordWith<size>& word, const Scale& scale) {
+[[nodiscard]] constexpr Reading to_reading(const WordContents& contents, const WordWith<size>& word,
+                                           const Scale& scale) {
   return {.singleturn = word.position,
           .multiturn = word.multiturn,
-          .singleturn_bits = bits.position,
-          .multiturn_bits = bits.multiturn,
-          .singleturn_valid_bits = word.error ? 0 : bits.position,
-          .multiturn_valid = !word.error && bits.multiturn != 0,
+          .singleturn_bits = contents.bits.position,
+          .multiturn_bits = contents.bits.multiturn,
+          .singleturn_valid_bits = word.error ? 0 : contents.bits.position,
+          .multiturn_valid = !word.error && contents.bits.multiturn != 0,
           .unit_um = scale.linear ? scale.unit_um : 0,
-          .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0)};
+          .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0),
+          .alarms_reported = contents.reported};
 }
 [[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
-  return to_reading({format.bits_of(Meaning::position), format.bits_of(Meaning::multiturn)}, word, scale);
+  return to_reading(contents_of(format), word, scale);
 }
 
 /// Every field of the word and its reading.

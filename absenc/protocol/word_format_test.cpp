@@ -137,6 +137,15 @@ TEST(Word, ErrorBitMakesTheReadingInvalid) {
   EXPECT_EQ(to_reading(format, {}, {true, 0.05}).unit_um, 0.05);
 }
 
+TEST(Word, ReportsTheAlarmsForWhichItHasABit) {
+  const auto reported = [](const WordFormat& format) { return to_reading(format, {}, {}).alarms_reported; };
+  EXPECT_EQ(reported("position:12"_word), 0u);
+  EXPECT_EQ(reported("position:12 error:1"_word), word_error);
+  EXPECT_EQ(reported("warning:1 position:12 skip:3"_word), word_warning);
+  EXPECT_EQ(reported("position:12 error:1 warning:1 parity:1"_word), word_error | word_warning);
+  EXPECT_EQ(to_reading("position:12"_word, {}, {}).singleturn_validity(), Validity::valid) << "nothing takes it away";
+}
+
 TEST(Word, AShaftIsShownWithAnyNumberOfBits) {
   const ShaftState state{.position = (std::int64_t{-3} << 32) + 0x8000'0001};
   EXPECT_EQ(word_of("multiturn:4 position:1"_word, state, 0), (Word{.position = 1, .multiturn = 13}));

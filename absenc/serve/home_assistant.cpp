@@ -74,7 +74,8 @@ class Discovery {
   [[nodiscard]] Retained alarm() const {
     Json json = entity("alarm", "Alarm");
     json.set("state_topic", state_topic_).set("device_class", "problem");
-    json.set("value_template", "{{ 'ON' if value_json.alarms else 'OFF' }}");
+    // Home Assistant takes None for "unknown".
+    json.set("value_template", "{{ 'ON' if value_json.alarms else 'None' if value_json.alarms is none else 'OFF' }}");
     json.set("json_attributes_topic", state_topic_);
     return retained("binary_sensor", "alarm", json);
   }

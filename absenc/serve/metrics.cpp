@@ -47,13 +47,14 @@ struct Seen {
   Snapshot snapshot;
 };
 
-// All that the encoder can report: a series that ends with its alarm could not be told from one that is not known.
+// All that its replies report, raised or clear: a series that ends with its alarm could not be told from one that is
+// not known.
 void add_alarms(Page& page, const Seen& seen) {
   if (seen.snapshot.state != State::live) return;
   for (const Flags& flags : alarms_of(*seen.unit, seen.snapshot.last.reading)) {
     for (std::size_t bit = 0; bit < flags.field->flags.size(); ++bit) {
       const std::string_view name = flags.field->flags[bit].name;
-      if (name.empty()) continue;
+      if (name.empty() || (flags.reported >> bit & 1) == 0) continue;
       page.line("absenc_alarm", fmt::format("{},channel=\"{}\",alarm=\"{}\"", seen.label, flags.field->name, name),
                 flags.bits >> bit & 1);
     }
@@ -103,7 +104,9 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   for (const Seen& seen : all) add_latencies(page, seen);
   each("absenc_latency_longest_seconds", "gauge", "the longest of them",
        [](const Snapshot& s) { return seconds_of(s.latency.longest); });
-  page.metric("absenc_alarm", "gauge", "1 while the encoder reports this alarm, else 0; none while it is not live");
+  page.metric("absenc_alarm", "gauge",
+              "1 while the encoder reports this alarm, 0 while it reports it clear; none while it reports neither, or "
+              "is not live");
   for (const Seen& seen : all) add_alarms(page, seen);
   page.metric("absenc_streams", "gauge", "open event streams");
   page.line("absenc_streams", "", figures.streams);

@@ -94,6 +94,7 @@ std::string range_of(const Unit& unit, const Command& getter) {
 // Null: it does not hold.
 Json shown(const Column& column, const Value& value) {
   if (std::holds_alternative<Invalid>(value)) return {};
+  if (std::holds_alternative<Unknown>(value)) return "unknown";
   const std::string text = to_text(column, value);
   return text.empty() ? "none" : text;
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/serve/view.hpp"
 
+#include <algorithm>
+
 #include "absenc/client/reading.hpp"
+#include "absenc/client/row.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
@@ -14,9 +17,12 @@ namespace {
 
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
+// Null: not all of them are reported, and of those that are none is raised.
 Json alarms_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
+  const std::optional<Flags> joined = joined_alarms(unit, reading);
+  if (!joined || !has_value(value_of(*joined))) return {};
   for (const Flags& flags : channels) {
     for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
       Json one = flag_to_json(flag);
@@ -30,7 +36,11 @@ Json alarms_json(const Unit& unit, const Reading& reading) {
 // A status is no alarm, but of encoders without alarms it is what they tell.
 Json status_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
-  for (const Flags& flags : status_of(unit, reading)) {
+  const std::vector<Flags> channels = status_of(unit, reading);
+  const bool is_reported =
+      std::any_of(channels.begin(), channels.end(), [](const Flags& flags) { return has_value(value_of(flags)); });
+  if (!is_reported) return {};
+  for (const Flags& flags : channels) {
     for (const std::string_view name : flag_names(*flags.field, flags.bits)) all.append(name);
   }
   return all;
@@ -42,8 +52,11 @@ void set_place(Json& json, const Reading& reading, bool live) {
   json.set("angle_deg", holds && !linear ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
   json.set("position_mm", holds && linear ? Json(micrometres(reading.singleturn, reading.unit_um) / 1000) : Json());
   json.set("counts", holds ? Json(reading.singleturn) : Json());
+  const Validity singleturn = reading.ready ? reading.singleturn_validity() : Validity::invalid;
+  json.set("singleturn_valid", live ? to_json(value_of(singleturn)) : Json());
   const bool has_turns = live && reading.multiturn_bits != 0 && reading.multiturn_valid;
   json.set("turns", has_turns ? Json(reading.multiturn) : Json());
+  json.set("multiturn_valid", live ? to_json(value_of(reading.multiturn_validity())) : Json());
 }
 
 Json arguments_json(const Command& command) {

@@ -245,7 +245,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
       become(State::live, "");
       if (sample.restarted && !restarted_) tell("restarted", sample.message);
       restarted_ = sample.restarted;
-      if (sample.reading.alarms != alarms_) tell_alarms(sample.reading);
+      tell_alarms(sample.reading);
       break;
     }
     case Sample::Kind::failed:
@@ -334,12 +334,17 @@ void Watch::pass_on(const Sample& sample) {
   }
 }
 
+// What was raised is so until the encoder reports that it is not.
 void Watch::tell_alarms(const Reading& reading) {
+  const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
+  if (alarms == alarms_) return;
   const Unit& unit = *address_.unit;
   Reading before = reading;
-  before.alarms = std::exchange(alarms_, reading.alarms);
+  Reading after = reading;
+  before.alarms = std::exchange(alarms_, alarms);
+  after.alarms = alarms;
   const std::vector<Flags> then = alarms_of(unit, before);
-  const std::vector<Flags> now = alarms_of(unit, reading);
+  const std::vector<Flags> now = alarms_of(unit, after);
   for (std::size_t channel = 0; channel < now.size(); ++channel) {
     const FieldInfo& field = *now[channel].field;
     const std::uint32_t changed = then[channel].bits ^ now[channel].bits;

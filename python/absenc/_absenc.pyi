@@ -32,12 +32,19 @@ class Reading:
         """False while the encoder says that it is starting."""
     @property
     def valid(self) -> bool:
-        """Whether the position holds."""
+        """Whether the position is known to hold."""
     @property
-    def alarms(self) -> tuple[str, ...]:
-        """The names of those that are raised."""
+    def singleturn_valid(self) -> Optional[bool]:
+        """Whether the position holds; None: nobody has reported it."""
     @property
-    def status(self) -> tuple[str, ...]: ...
+    def multiturn_valid(self) -> Optional[bool]:
+        """Whether the revolutions hold; None: nobody has reported it, or there are none."""
+    @property
+    def alarms(self) -> Optional[list[str]]:
+        """The names of those that are raised; []: all are reported clear; None: not all are reported."""
+    @property
+    def status(self) -> Optional[list[str]]:
+        """The names of the status flags that are set; None: they are not reported."""
     @property
     def time_s(self) -> float:
         """When it was latched, seconds of time.monotonic()."""
@@ -82,6 +89,7 @@ class Encoder:
     def close(self) -> None: ...
     def stop(self, stopping: bool) -> None: ...
     def read(self) -> Reading: ...
+    def read_alarms(self) -> Reading: ...
     def samples(self, rate: float, count: int) -> Samples: ...
     def run(self, command: str, *values: int, **named: int) -> dict[str, Field]: ...
     def scan(self) -> list[dict[str, Field]]: ...

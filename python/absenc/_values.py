@@ -11,7 +11,7 @@ from .errors import UsageError
 #: Of an option; several of one name where it may be given more than once.
 Value = Union[str, int, float, bool, Iterable[str]]
 
-#: A number, a text, bytes, the names of flags; None: not told, or it does not hold.
+#: A number, a text, bytes, the names of flags; None: not told or not reported, or it does not hold.
 Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
 
 

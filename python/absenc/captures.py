@@ -63,7 +63,7 @@ class Table:
 
 class Capture(Table):
     """What was said on a line, exchange by exchange: `capture["angle_deg"]` is a column, `rows` all of them as one
-    structured masked array. Where nothing was told, or a position does not hold, it is masked (and NaN in floats).
+    structured masked array. Where nothing was reported, or a position does not hold, it is masked (and NaN in floats).
 
     Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; of CAN
     and clocked links text), `turnaround_us`, `angle_deg` (of linear encoders `position_mm`), each field of the unit,

@@ -185,10 +185,11 @@ class Encoder:
         what is written is read back."""
         return self._encoder.run(command, *values, **arguments)
 
-    def alarms(self) -> list[Alarm]:
-        """The alarms that are raised now, each with what it means and what must be done."""
-        reading = self.read()
-        return [flag for flag in self.protocol.alarms if flag.name in reading.alarms]
+    def alarms(self) -> Optional[list[Alarm]]:
+        """The alarms that are raised now, each with what it means and what must be done; []: all are reported clear;
+        None: the encoder does not report them all."""
+        names = self._encoder.read_alarms().alarms
+        return None if names is None else [flag for flag in self.protocol.alarms if flag.name in names]
 
     def info(self) -> Info:
         """Asks all that can be asked without an argument: who it is, its temperature, its settings."""

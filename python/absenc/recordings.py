@@ -16,7 +16,8 @@ from .captures import Column, Masked, Table
 from .errors import Failure, UsageError
 from .protocols import Protocol, protocol
 
-FLAG_WORDS = "names, separated by spaces"  # what a header says of flags
+FLAG_WORDS = "names, separated by spaces"  # how a header begins what it says of flags
+ALL_CLEAR = "none"  # of flags in CSV; an empty cell: they are not reported
 
 #: What a file tells of one row, by column; None: not told, or it does not hold.
 Cells = Mapping[str, Any]
@@ -30,7 +31,7 @@ class Recording(Table):
     `event` is "" of a reading and "restarted" of one whose `position` starts again; "lost" and "back" are of the port,
     "gap" has in `missed` how many readings were due and not taken, all others are errors that came in place of a
     reading. `header` has what the file begins with: "encoder", "protocol", "model", "options", "started" ... Flags are
-    numbers: `Protocol.flag_names` names them."""
+    numbers: `Protocol.flag_names` names them; 0: all are reported clear, masked: not all are reported."""
 
     def __init__(self, rows: Masked, columns: dict[str, Column], header: dict[str, str]) -> None:
         super().__init__(rows, columns)
@@ -59,11 +60,11 @@ _UNITS_BY_NAME = {"position": "counts", "singleturn": "counts", "multiturn": "re
 
 def _flags(unit: Protocol, field: str) -> _Kind:
     bits = {flag.name: 1 << flag.bit for flag in unit.flags if flag.field == field}
-    return _Kind("u4", 0, lambda names: sum(bits[name] for name in names.split()))
+    return _Kind("u4", 0, lambda names: 0 if names == ALL_CLEAR else sum(bits[name] for name in names.split()))
 
 
 def _kind(unit: Protocol, name: str, meaning: str) -> _Kind:
-    if meaning == FLAG_WORDS:
+    if meaning.startswith(FLAG_WORDS):
         return _flags(unit, name)
     if name.endswith("_valid"):
         return _BOOLEAN

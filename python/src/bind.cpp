@@ -74,7 +74,8 @@ void translate(std::exception_ptr thrown) {
 struct ToPython {
   py::object operator()(std::monostate) const { return py::none(); }
   py::object operator()(client::Invalid) const { return py::none(); }
-  py::object operator()(const client::Flags& flags) const { return names_of({flags}); }
+  py::object operator()(client::Unknown) const { return py::none(); }
+  py::object operator()(const client::Flags& flags) const { return py::tuple(names_of({flags})); }
   py::object operator()(const client::ByteVector& bytes) const { return to_bytes(bytes); }
   py::object operator()(const std::string& text) const { return py::str(text); }
   template <class Number>
@@ -102,14 +103,14 @@ py::dict to_python(const std::vector<client::Column>& columns, const std::vector
 
 py::dict to_python(const client::Answer& answer) { return to_python(answer.columns, answer.values); }
 
-py::tuple names_of(const std::vector<client::Flags>& flags) {
+py::list names_of(const std::vector<client::Flags>& flags) {
   py::list names;
   for (const client::Flags& channel : flags) {
     for (const std::string_view name : client::flag_names(*channel.field, channel.bits)) {
       names.append(py::str(std::string(name)));
     }
   }
-  return py::tuple(names);
+  return names;
 }
 
 }  // namespace absenc::python

@@ -38,13 +38,13 @@ void register_exceptions();
 /// The object of absenc.errors for a failed command.
 [[nodiscard]] py::object error_object(const client::Trouble& trouble);
 
-/// Numbers, texts and bytes; of flags the names; None for nothing and for what does not hold.
+/// Numbers, texts and bytes; of flags the names; None for nothing, for what does not hold and for what is not reported.
 [[nodiscard]] py::object to_python(const client::Value& value);
 /// A dict of them by column.
 [[nodiscard]] py::dict to_python(const client::Answer& answer);
 [[nodiscard]] py::dict to_python(const std::vector<client::Column>& columns, const std::vector<client::Value>& values);
-/// A tuple of names.
-[[nodiscard]] py::tuple names_of(const std::vector<client::Flags>& flags);
+/// The names of those that are raised, of all channels.
+[[nodiscard]] py::list names_of(const std::vector<client::Flags>& flags);
 
 [[nodiscard]] inline py::bytes to_bytes(Bytes bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};

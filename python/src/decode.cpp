@@ -26,7 +26,7 @@ struct Values {
   explicit Values(Type of_type) : type(of_type) {}
 
   void add(const Value& value) {
-    const bool is_there = value.index() != 0 && !std::holds_alternative<client::Invalid>(value);
+    const bool is_there = client::has_value(value);
     missing.push_back(is_there ? 0 : 1);
     switch (type) {
       case Type::real:

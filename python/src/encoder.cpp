@@ -283,6 +283,10 @@ void bind_encoder(py::module_& module) {
            [](PyEncoder& one) {
              return PyReading{&one.unit(), one.use([](client::Encoder& encoder) { return encoder.read(); })};
            })
+      .def("read_alarms",
+           [](PyEncoder& one) {
+             return PyReading{&one.unit(), one.use([](client::Encoder& encoder) { return encoder.read_alarms(); })};
+           })
       .def(
           "samples",
           [](PyEncoder& one, double rate, std::uint64_t count) {

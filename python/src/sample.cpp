@@ -20,9 +20,16 @@ void bind_sample(py::module_& module) {
       .def_property_readonly(
           "ready", [](const PyReading& one) { return one.reading.ready; },
           "False while the encoder says that it is starting.")
-      .def_property_readonly("valid", &PyReading::holds, "Whether the position holds.")
-      .def_property_readonly("alarms", &PyReading::alarms, "The names of those that are raised.")
-      .def_property_readonly("status", &PyReading::status, "The names of the status flags that are set.")
+      .def_property_readonly("valid", &PyReading::holds, "Whether the position is known to hold.")
+      .def_property_readonly("singleturn_valid", &PyReading::singleturn_valid,
+                             "Whether the position holds; None: nobody has reported it.")
+      .def_property_readonly("multiturn_valid", &PyReading::multiturn_valid,
+                             "Whether the revolutions hold; None: nobody has reported it, or there are none.")
+      .def_property_readonly(
+          "alarms", &PyReading::alarms,
+          "The names of those that are raised; []: all are reported clear; None: not all are reported.")
+      .def_property_readonly("status", &PyReading::status,
+                             "The names of the status flags that are set; None: they are not reported.")
       .def_property_readonly(
           "time_s", [](const PyReading& one) { return seconds(one.reading.latched); },
           "When it was latched, seconds of time.monotonic().")

@@ -2,7 +2,11 @@
 // What an encoder said, as Python sees it: a reading, and a sample of many.
 #pragma once
 
+#include <algorithm>
+#include <vector>
+
 #include "absenc/client/reading.hpp"
+#include "absenc/client/row.hpp"
 #include "python/src/bind.hpp"
 
 namespace absenc::python {
@@ -14,6 +18,10 @@ struct PyReading {
   Reading reading;
 
   [[nodiscard]] bool holds() const { return reading.ready && reading.singleturn_valid(); }
+  [[nodiscard]] py::object singleturn_valid() const {
+    return to_python(client::value_of(reading.ready ? reading.singleturn_validity() : Validity::invalid));
+  }
+  [[nodiscard]] py::object multiturn_valid() const { return to_python(client::value_of(reading.multiturn_validity())); }
   [[nodiscard]] std::optional<double> angle_deg() const {
     if (!holds() || reading.unit_um > 0) return {};
     return degrees(reading.singleturn, reading.singleturn_bits);
@@ -30,8 +38,15 @@ struct PyReading {
     if (!reading.ready || reading.multiturn_bits == 0 || !reading.multiturn_valid) return {};
     return reading.multiturn;
   }
-  [[nodiscard]] py::tuple alarms() const { return names_of(client::alarms_of(*unit, reading)); }
-  [[nodiscard]] py::tuple status() const { return names_of(client::status_of(*unit, reading)); }
+  [[nodiscard]] py::object alarms() const { return names_or_none(client::alarms_of(*unit, reading)); }
+  [[nodiscard]] py::object status() const { return names_or_none(client::status_of(*unit, reading)); }
+  // None: none of the flags is raised, and not all are reported.
+  [[nodiscard]] static py::object names_or_none(const std::vector<client::Flags>& channels) {
+    const py::list names = names_of(channels);
+    const bool is_complete = !channels.empty() && std::all_of(channels.begin(), channels.end(),
+                                                              [](const auto& flags) { return flags.is_complete(); });
+    return names.empty() && !is_complete ? py::object(py::none()) : py::object(names);
+  }
   [[nodiscard]] py::str text() const {
     const auto position =
         holds() ? py::object(py::cast(reading.unit_um > 0 ? position_mm() : angle_deg())) : py::none();

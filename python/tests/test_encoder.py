@@ -96,6 +96,23 @@ def test_an_alarm_is_told_once(absenc_emulate):
         assert [(alarm.field, alarm.name) for alarm in encoder.alarms()] == [("alarms", "counting_error")]
 
 
+def test_what_is_not_reported_is_none():
+    with absenc.open("sim:ssi") as encoder:
+        reading = encoder.read()
+        assert (reading.alarms, reading.status, encoder.alarms()) == (None, None, None)
+        assert reading.singleturn_valid is True
+    with absenc.open("sim:tformat") as encoder:
+        reading = encoder.read()
+        assert (reading.alarms, reading.status, encoder.alarms()) == ([], [], [])
+        assert (reading.singleturn_valid, reading.multiturn_valid) == (True, True)
+    with absenc.open("sim:tformat", alarm="battery_error") as encoder:
+        reading = encoder.read()
+        assert (reading.alarms, reading.singleturn_valid, reading.multiturn_valid) == (["battery_error"], True, False)
+    with absenc.open("sim:encolink", singleturn=77) as encoder:
+        assert encoder.read().alarms is None
+        assert encoder.alarms() == [], "they are asked for"
+
+
 def test_scan():
     assert [one["clash"] for one in absenc.scan("sim:esl")] == [False]
     with absenc.open("sim:tformat") as encoder, pytest.raises(absenc.UsageError, match="no addresses"):

@@ -80,6 +80,15 @@ def test_types_units_and_what_does_not_hold(tmp_path, name):
     assert recording.header["rate_hz"] == "0"
 
 
+@pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
+def test_alarms_are_clear_or_not_reported(tmp_path, name):
+    for encoder, reported in (("sim:tformat", True), ("sim:ssi", False)):
+        recording = absenc.load(record(tmp_path / (encoder[4:] + name), encoder, 3))
+        good = recording.good()
+        assert set(np.ma.getmaskarray(recording["alarms"])[good]) == {not reported}, encoder
+        assert set(recording.rows.data["alarms"][good]) == {0}
+
+
 def test_files_that_are_no_recordings(tmp_path):
     with pytest.raises(absenc.UsageError, match="csv"):
         absenc.load(tmp_path / "run.txt")

@@ -43,6 +43,12 @@ namespace absenc::kit {
 /// tells something else than normally, at once, after the power was away, or of alarms and resets.
 [[nodiscard]] Findings check_conditions(const Unit& unit);
 
+/// Every alarm raised in the virtual encoder, and every command: what a reading says of the alarm, live and of the
+/// captured reply, is that it is raised, or nothing; without it, that it is clear, or nothing. Bits that are raised are
+/// reported, and so are flags that a reply carries. A part of a position is valid only where the whole reading says so
+/// too.
+[[nodiscard]] Findings check_states(const Unit& unit);
+
 /// On an undamaged line each command ends well, in each configuration of the unit, and positions are where the shaft
 /// stands.
 [[nodiscard]] Findings check_commands(const Unit& unit);

@@ -55,6 +55,12 @@ TEST_P(Kit, CommandsEndWell) {
   expect_none(findings);
 }
 
+TEST_P(Kit, AlarmsHaveThreeStates) {
+  const Findings findings = check_states(unit);
+  EXPECT_EQ(findings.looks() > 20, unit.alarms != nullptr) << findings.looks();
+  expect_none(findings);
+}
+
 TEST_P(Kit, DeclaresWhatIsThere) { expect_none(check_declarations(unit)); }
 TEST_P(Kit, RequestsHaveTheirArguments) { expect_none(check_requests(unit, 1)); }
 TEST_P(Kit, StorageIsEnough) { expect_none(check_storage(unit)); }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/capture/annotate/annotate_frames.hpp"
 #include "absenc/capture/annotate/conversation_test.hpp"
+#include "absenc/capture/annotate/remembering.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::capture {
@@ -322,6 +324,38 @@ TEST(Can, NodesAnswerInAnyOrder) {
   expect(5, Kind::request, Error::timeout, Remark::unanswered, 70);
   expect(6, Kind::request, Error::none, Remark::cut, 2000);
   EXPECT_EQ(finder.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
+}
+
+// A toy whose replies with bit 0 report its one alarm, and hold then; those without need an earlier one of the same
+// node.
+TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
+  static constexpr std::array<FieldInfo, 1> fields{
+      {{.name = "node", .kind = FieldInfo::Kind::number, .unit = "", .meaning = "", .role = Role::encoder}}};
+  Unit unit = toy();
+  unit.remembered = [](const Reading& before, Reading now) {
+    now.alarms_reported |= before.alarms_reported;
+    now.singleturn_known = now.alarms_reported != 0;
+    return now;
+  };
+  struct Last final : AnnotationSink {
+    void put(const Annotation& one) override {
+      if (one.contents.reading != nullptr) known = one.contents.reading->singleturn_known;
+    }
+    bool known = false;
+  } last;
+  Remembering remembering(unit, last);
+  const auto is_known_after = [&](std::int64_t node, std::uint32_t reported, Error error = Error::none) {
+    const Reading reading{.singleturn_known = false, .alarms_reported = reported};
+    const FieldValue value{.info = &fields[0], .number = node};
+    remembering.put({.kind = Kind::reply, .error = error, .contents = {{&value, 1}, &reading}});
+    return last.known;
+  };
+  EXPECT_FALSE(is_known_after(1, 0));
+  EXPECT_FALSE(is_known_after(1, 1, Error::sequence_mismatch)) << "nothing of a bad reply counts";
+  EXPECT_FALSE(is_known_after(1, 0));
+  EXPECT_TRUE(is_known_after(1, 1));
+  EXPECT_TRUE(is_known_after(1, 0));
+  EXPECT_FALSE(is_known_after(2, 0)) << "another encoder";
 }
 
 // Who asks again has given the others up, and what answers badly has answered.

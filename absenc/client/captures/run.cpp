@@ -11,6 +11,7 @@
 
 #include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/capture/annotate/annotate_frames.hpp"
+#include "absenc/capture/annotate/remembering.hpp"
 #include "absenc/capture/files/open.hpp"
 #include "absenc/capture/lines/blocks.hpp"
 #include "absenc/capture/lines/can_line.hpp"
@@ -146,7 +147,8 @@ CaptureRun::~CaptureRun() = default;
 
 std::uint64_t CaptureRun::ticks_per_second() const { return reader_->layout().ticks_per_second; }
 
-CaptureOutcome CaptureRun::run(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
+CaptureOutcome CaptureRun::run(capture::AnnotationSink& all, const std::function<void(Tick)>& progress) {
+  capture::Remembering sink(unit_, all);
   const Content content = reader_->layout().content;
   const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi;
   CaptureOutcome outcome = content == Content::bytes     ? run_bytes(sink, progress)

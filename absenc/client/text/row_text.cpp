@@ -28,6 +28,7 @@ struct Cell {
 
   void operator()(std::monostate) const {}
   void operator()(Invalid) const {}
+  void operator()(Unknown) const {}
   void operator()(bool value) const { line += value ? "true" : "false"; }
   void operator()(std::int64_t value) const { fmt::format_to(std::back_inserter(line), "{}", value); }
   void operator()(std::uint64_t value) const { fmt::format_to(std::back_inserter(line), "{}", value); }
@@ -35,6 +36,11 @@ struct Cell {
     fmt::format_to(std::back_inserter(line), fmt::runtime(format.empty() ? "{}" : format), value);
   }
   void operator()(const std::string& text) const { append_quoted(line, text); }
+  // An empty cell says that nobody has reported them.
+  void operator()(const Flags& flags) const {
+    const std::string names = to_text(Value(flags));
+    append_quoted(line, names.empty() ? "none" : names);
+  }
   template <class Other>
   void operator()(const Other& other) const {
     append_quoted(line, to_text(Value(other)));
@@ -78,6 +84,7 @@ Json to_json(const Value& value) {
   struct Visitor {
     Json operator()(std::monostate) const { return {}; }
     Json operator()(Invalid) const { return {}; }
+    Json operator()(Unknown) const { return {}; }
     Json operator()(const Flags& flags) const { return flags_to_json(*flags.field, flags.bits); }
     Json operator()(const ByteVector& bytes) const { return fmt::format("{:02x}", fmt::join(bytes, "")); }
     Json operator()(const std::string& text) const { return text; }

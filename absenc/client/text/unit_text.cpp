@@ -282,14 +282,20 @@ std::string to_text(const FieldValue& value) {
   return fmt::format("{}", value.number);
 }
 
-bool holds(const FieldInfo& field, const Reading& reading) {
-  if (field.role != Role::turns && is_of_reading(field.role) && reading.singleturn_bits != 0)
-    return reading.ready && reading.singleturn_valid();
-  return field.role != Role::turns || reading.multiturn_bits == 0 || reading.multiturn_valid;
+Validity validity_of(const FieldInfo& field, const Reading& reading) {
+  if (!is_of_reading(field.role)) return Validity::valid;
+  const bool turns = field.role == Role::turns;
+  if (!turns && reading.singleturn_bits != 0 && !reading.ready) return Validity::invalid;
+  const Validity validity = turns ? reading.multiturn_validity() : reading.singleturn_validity();
+  return validity == Validity::absent ? Validity::valid : validity;
 }
 
+bool holds(const FieldInfo& field, const Reading& reading) { return validity_of(field, reading) == Validity::valid; }
+
 std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading) {
-  if (holds(field, reading)) return value;
+  const Validity validity = validity_of(field, reading);
+  if (validity == Validity::valid) return value;
+  if (validity == Validity::unknown) return fmt::format("unknown ({})", value);
   if (!reading.ready) return fmt::format("INVALID ({}: the encoder is starting)", value);
   const unsigned valid = reading.singleturn_valid_bits;
   if (field.role == Role::turns || valid == 0) return fmt::format("INVALID ({})", value);

@@ -90,10 +90,11 @@ struct RoleArgument {
 [[nodiscard]] std::string line_of(LinkKind link, const LineSettings& line);
 [[nodiscard]] std::string_view name_of(Verb verb);
 
-/// Whether what this field shows of the position holds, by the reading of the same frame; what is no part of it does.
-/// The one rule for all that shows fields.
+/// Whether what this field shows of the position holds, by the reading of the same frame; what is no part of it is
+/// `valid`. The one rule for all that shows fields.
+[[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
-/// The value of such a field: as it is, or "INVALID (74565 counts)".
+/// The value of such a field: as it is, "INVALID (74565 counts)", or "unknown (74565 counts)".
 [[nodiscard]] std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading);
 
 }  // namespace absenc::client

@@ -7,6 +7,7 @@
 
 #include "absenc/client/doctor/observations.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/reading.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/client/way/diagnosis.hpp"
@@ -277,6 +278,29 @@ std::unique_ptr<Connection> Connection::open(const EncoderAddress& uri) {
   std::unique_ptr<Connection> encoder = make(uri);
   encoder->connect();
   return encoder;
+}
+
+Reading read_alarms(Connection& connection) {
+  const Unit& unit = connection.unit();
+  const auto reports_all = [&](const Reading& reading) {
+    const std::optional<Flags> alarms = joined_alarms(unit, reading);
+    return !alarms || alarms->is_complete();
+  };
+  const Outcome outcome = connection.read();
+  if (outcome.error != Error::none) throw EncoderFailure(connection.trouble(outcome));
+  if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no alarms");
+  const Reading first = *outcome.reading;
+  if (unit.streams != nullptr && unit.streams(connection.uri().options)) return first;  // it cannot be asked
+  Reading reading = first;
+  for (const Command& command : unit.commands) {
+    if (reports_all(reading)) return reading;
+    if (command.verb != Verb::read_part || !command.arguments.empty() || command.changes_encoder) continue;
+    const Outcome part = connection.run(command, {});
+    if (part.error == Error::unsupported) continue;
+    if (part.error != Error::none) throw EncoderFailure(connection.trouble(part));
+    if (part.reading != nullptr) reading = *part.reading;
+  }
+  return reports_all(reading) ? reading : first;
 }
 
 void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink) {

@@ -82,6 +82,10 @@ class Connection {
   EncoderAddress uri_;
 };
 
+/// A reading for its alarms. One that does not report all of them is followed by the commands that read another part,
+/// because one of them may. Throws EncoderFailure, Failure, and as Connection::run.
+[[nodiscard]] Reading read_alarms(Connection& connection);
+
 /// The fields that a command tells, into `sink`. Throws EncoderFailure, and as Connection::run.
 void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink);
 

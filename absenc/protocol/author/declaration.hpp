@@ -67,6 +67,7 @@ struct Declaration {
   bool (*streams)(const Options&) = nullptr;
   ExtraWires (*extra_wires)(const Options&) = nullptr;
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
+  Reading (*remembered)(const Reading& before, Reading now) = nullptr;
   const FieldInfo* status = nullptr;
   const FieldInfo* alarms = nullptr;
   const FieldInfo* second_status = nullptr;

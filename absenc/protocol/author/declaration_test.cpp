@@ -109,6 +109,7 @@ bool probe(Options&, std::span<const Capture>, EvidenceSink&) { return true; }
 bool streams(const Options&) { return true; }
 ExtraWires wires(const Options&) { return {}; }
 std::optional<std::size_t> control_bit(const Options&, Frame) { return 7; }
+Reading remembered(const Reading& before, Reading) { return before; }
 constexpr std::array<MemoryArea, 1> memory{{{0, 0, 1, "a byte"}}};
 constexpr std::array<RegisterInfo, 1> registers{{{"one", 1, 2}}};
 constexpr std::array<Condition, 1> conditions{{{"battery", "", "there", 0, 1, 1}}};
@@ -144,6 +145,7 @@ constexpr Declaration<Toy, Encoder> whole{
     .streams = streams,
     .extra_wires = wires,
     .control_bit = control_bit,
+    .remembered = remembered,
     .status = &fields.infos[0],
     .alarms = &fields.infos[1],
     .second_status = &fields.infos[1],
@@ -178,6 +180,7 @@ TEST(Declaration, LeavesOutWhatTheUnitDoesNotHave) {
   EXPECT_EQ(unit.streams, nullptr);
   EXPECT_EQ(unit.extra_wires, nullptr);
   EXPECT_EQ(unit.control_bit, nullptr);
+  EXPECT_EQ(unit.remembered, nullptr);
   EXPECT_EQ(unit.over_spi, nullptr);
   EXPECT_TRUE(unit.memory.empty() && unit.registers.empty() && unit.conditions.empty());
   EXPECT_EQ(unit.models[0].values[0].value, 16);
@@ -211,6 +214,7 @@ TEST(Declaration, GivesTheUnitEachMember) {
   EXPECT_EQ(whole_unit.streams, streams);
   EXPECT_EQ(whole_unit.extra_wires, wires);
   EXPECT_EQ(whole_unit.control_bit, control_bit);
+  EXPECT_EQ(whole_unit.remembered, remembered);
   EXPECT_EQ(whole_unit.status, &fields.infos[0]);
   EXPECT_EQ(whole_unit.alarms, &fields.infos[1]);
   EXPECT_EQ(whole_unit.second_status, &fields.infos[1]);

@@ -64,6 +64,8 @@ void expect_known_as_any(const std::vector<std::uint8_t>& good) {
       EXPECT_EQ(known.reading()->ready, any.reading()->ready);
       EXPECT_EQ(known.reading()->status, any.reading()->status);
       EXPECT_EQ(known.reading()->alarms, any.reading()->alarms);
+      EXPECT_EQ(known.reading()->status_reported, any.reading()->status_reported);
+      EXPECT_EQ(known.reading()->alarms_reported, any.reading()->alarms_reported);
       EXPECT_EQ(known.reading()->latched, any.reading()->latched);
       EXPECT_EQ(known.reading()->received, any.reading()->received);
     }

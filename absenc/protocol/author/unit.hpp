@@ -299,7 +299,8 @@ struct Descriptor {
               .streams = declared.streams,
               .is_answered = declared.is_answered,
               .conditions = declared.conditions,
-              .control_bit = declared.control_bit};
+              .control_bit = declared.control_bit,
+              .remembered = declared.remembered};
     if constexpr (declared.report.explain != nullptr) unit.explain = explain;
     if constexpr (has_requests && declared.is_answered == nullptr) unit.is_answered = is_answered;
     if constexpr (has_requests) unit.pause = pause;

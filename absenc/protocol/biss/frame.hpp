@@ -223,8 +223,8 @@ template <const Format& format>
 }
 template <const Format& format>
 [[nodiscard]] constexpr Reading reading_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
-  constexpr PositionBits bits{format.word.bits_of(Meaning::position), format.word.bits_of(Meaning::multiturn)};
-  return to_reading(bits, reply.word, format.scale);
+  constexpr WordContents contents = contents_of(format.word);
+  return to_reading(contents, reply.word, format.scale);
 }
 
 /// Whether these samples end before a frame does, whose encoder or line may need longer than was thought.

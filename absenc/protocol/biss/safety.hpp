@@ -129,7 +129,9 @@ constexpr void show(const SafetyFormat& format, const ShaftState& state, std::ui
   Word word = reply.cpw.word;
   word.error = word.error || reply.spw.word.error;
   word.warning = word.warning || reply.spw.word.warning;
-  return to_reading(format.cpw.word, word, {});
+  WordContents contents = contents_of(format.cpw.word);
+  contents.reported |= contents_of(format.spw.word).reported;
+  return to_reading(contents, word, {});
 }
 
 }  // namespace absenc::biss

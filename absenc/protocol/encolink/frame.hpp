@@ -291,7 +291,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return position.singleturn == 0 && position.multiturn == 0;
 }
 
-/// `detailed`: the status of a cycle, where there was one.
+/// `detailed`: the status of a cycle, where there was one; otherwise no alarm is reported by name, only the two bits of
+/// the frame.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position,
                                            std::optional<std::uint16_t> detailed = {}) {
   const std::uint16_t alarms = detailed.value_or(0);
@@ -305,6 +306,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   reading.multiturn_valid = format.multiturn_bits > 0 && !position.error && (alarms & status::multiturn_mismatch) == 0;
   reading.status = (position.error ? general::error : 0) | (position.warning ? general::warning : 0);
   reading.alarms = alarms;
+  reading.status_reported = general::error | general::warning;
+  reading.alarms_reported = detailed ? 0xFFFF : 0;
   return reading;
 }
 

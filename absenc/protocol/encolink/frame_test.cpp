@@ -61,6 +61,13 @@ TEST(EncolinkFrame, WhatOfAReadingHolds) {
   EXPECT_FALSE(to_reading(single, {}).multiturn_valid);
 }
 
+// A frame has two bits, and no alarm by name: a cycle of channel 2 has these.
+TEST(EncolinkFrame, OnlyChannelTwoReportsAlarms) {
+  EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
+  EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0u);
+  EXPECT_EQ(to_reading(multi, {}, std::uint16_t{0}).alarms_reported, 0xFFFFu);
+}
+
 TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
   ReplyBytes padded = encode_identity({.frame_bytes = 7, .resolution = 18});
   padded.push_back(0x5A);

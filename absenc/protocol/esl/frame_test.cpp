@@ -208,6 +208,24 @@ TEST(EslFrame, ValidityOfEachPart) {
   EXPECT_EQ(to_reading({.id = DataId::temperature}).singleturn_bits, 0u);
 }
 
+// SF comes with every reading, ALM only with some, of each channel its own.
+TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
+  struct Row {
+    DataId id;
+    std::uint32_t status;
+    std::uint32_t alarms;
+  };
+  for (const Row& row : {Row{DataId::position, 0xFFFF, 0xFFFF}, Row{DataId::singleturn, 0xFFFF, 0xFFFF},
+                         Row{DataId::position_short, 0xFF, 0}, Row{DataId::singleturn_short, 0xFF, 0},
+                         Row{DataId::calibration, 0xFFFF, 0}, Row{DataId::zero, 0xFFFF, 0xFFFF},
+                         Row{DataId::clear_alarms, 0xFFFF, 0xFFFF}, Row{DataId::reset_multiturn, 0xFF, 0xFF},
+                         Row{DataId::read_memory, 0, 0}}) {
+    const Reading reading = to_reading({.id = row.id});
+    EXPECT_EQ(reading.status_reported, row.status) << static_cast<int>(row.id);
+    EXPECT_EQ(reading.alarms_reported, row.alarms) << static_cast<int>(row.id);
+  }
+}
+
 TEST(EslUnit, SaysNothingOfWhatIsNoFrame) {
   EXPECT_EQ(decode_request({}, {}).error(), Error::wrong_length);
   const Options values = author::testing::options_of(unit, "");

@@ -283,6 +283,9 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
   Reading reading;
   reading.status = reply.one.status | (layout.has_two() ? std::uint32_t{second} << 8 : 0);
   reading.alarms = reply.one.alarms | std::uint32_t{reply.two.alarms} << 8;
+  reading.status_reported = (layout.has(part::status) ? 0xFFu : 0u) | (layout.has_two() ? 0xFF00u : 0u);
+  reading.alarms_reported =
+      ((layout.one & part::alarms) != 0 ? 0xFFu : 0u) | ((layout.two & part::alarms) != 0 ? 0xFF00u : 0u);
   reading.ready = (reply.one.status & second & status::ready) != 0;
   if (layout.has(part::singleturn)) {
     const bool valid = reading.ready && (either & status::safety_error) == 0 && (raised & alarms::unsafe) == 0;

@@ -22,7 +22,9 @@ struct Protocol {
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
   static constexpr Result<Word> decode(const Format& format, BitView bits) { return ssi::decode(format, bits); }
   static constexpr Reading reading(const Format& format, const Word& word) {
-    return to_reading(format.word, word, format.scale);
+    WordContents contents = contents_of(format.word);
+    if (format.error_parity) contents.reported |= word_error;
+    return to_reading(contents, word, format.scale);
   }
 };
 

@@ -336,37 +336,86 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
   return reply;
 }
 
-/// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. Other replies need what
-/// ID 3 said since the encoder was switched on (`known_alarms`), since SF hides over_speed and full_absolute_status:
-/// without it no more is promised than what holds even with these set.
+/// What replies have reported of the alarms since the encoder was switched on: bits of ALMC.
+struct KnownAlarms {
+  std::uint8_t reported = 0;
+  std::uint8_t raised = 0;
+
+  /// As an ID 3 reply reports them: all.
+  [[nodiscard]] static constexpr KnownAlarms all(std::uint8_t almc) { return {0xFF, almc}; }
+};
+
+/// Returns what is known after a reply that carries SF and no ALMC. SF has counting_error, and one bit for over_heat,
+/// multiturn_error, battery_error and battery_alarm together: 0 reports all four clear. 1 says nothing new where one of
+/// them is known to be raised; otherwise one is raised, and nobody knows which.
+[[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf) {
+  constexpr unsigned together = alarms::shown_in_status;
+  unsigned reported = before.reported | alarms::counting_error;
+  unsigned raised = before.raised & ~unsigned{alarms::counting_error};
+  if ((sf & status::counting_error) != 0) raised |= alarms::counting_error;
+  if ((sf & status::alarm) == 0) {
+    reported |= together;
+    raised &= ~together;
+  } else if ((before.raised & together) == 0) {
+    reported &= ~together;
+  }
+  return {static_cast<std::uint8_t>(reported), static_cast<std::uint8_t>(raised)};
+}
+
+namespace detail {
+
+// Which parts of a position hold. Without full_absolute_status the top bits hold all the same.
+constexpr void judge(Reading& reading, const KnownAlarms& known) {
+  reading.alarms = known.raised;
+  reading.alarms_reported = known.reported;
+  const bool counting_error =
+      (reading.status & status::counting_error) != 0 || (known.raised & alarms::counting_error) != 0;
+  const bool is_full = (known.reported & ~known.raised & alarms::full_absolute_status) != 0;
+  const bool is_full_known = (known.reported & alarms::full_absolute_status) != 0;
+  const unsigned bits = reading.singleturn_bits;
+  const unsigned holding = is_full ? bits : std::min(bits, full_absolute_bits);
+  reading.singleturn_valid_bits = counting_error ? 0 : holding;
+  reading.singleturn_known = counting_error || is_full_known || holding == bits;
+  const bool lost = (known.raised & alarms::turns_lost) != 0;
+  const bool all_reported = (known.reported & alarms::turns_lost) == alarms::turns_lost;
+  reading.multiturn_valid = reading.multiturn_bits != 0 && all_reported && !lost;
+  reading.multiturn_known = reading.multiturn_bits == 0 || all_reported || lost;
+}
+
+}  // namespace detail
+
+/// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. SF of the other replies
+/// hides over_speed and full_absolute_status: they need what ID 3 said since the encoder was switched on
+/// (`known_alarms`), or it is unknown whether the position holds.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = id == DataId::everything;
+  const bool has_status = !is_memory_access(id);
   const bool has_turns = has_all || id == DataId::multiturn;
-  const bool has_position = has_all || (id != DataId::multiturn && id != DataId::encoder_id && !is_memory_access(id));
-  const bool alarms_known = has_all || known_alarms.has_value();
-  const std::uint8_t almc = has_all ? reply.alarms : known_alarms.value_or(alarms::full_absolute_status);
-  const bool counting_error = (reply.status & status::counting_error) != 0 || (almc & alarms::counting_error) != 0;
-
-  const unsigned singleturn_bits = has_position ? format.singleturn_bits : 0;
-  const unsigned multiturn_bits = has_turns ? format.multiturn_bits : 0;
-  unsigned valid_bits = singleturn_bits;
-  if ((almc & alarms::full_absolute_status) != 0) valid_bits = std::min(valid_bits, full_absolute_bits);
-  if (counting_error) valid_bits = 0;
-  // SF may have got an alarm that `known_alarms` is too old to have.
-  const bool late_alarm = !has_all && (reply.status & status::alarm) != 0;
-  return {.singleturn = reply.singleturn,
-          .multiturn = reply.multiturn,
-          .singleturn_bits = singleturn_bits,
-          .multiturn_bits = multiturn_bits,
-          .singleturn_valid_bits = valid_bits,
-          .multiturn_valid = multiturn_bits != 0 && alarms_known && (almc & alarms::turns_lost) == 0 && !late_alarm,
-          .status = reply.status,
-          .alarms = alarms_known ? almc : 0u};
+  const bool has_position = has_all || (id != DataId::multiturn && id != DataId::encoder_id && has_status);
+  Reading reading{.singleturn = reply.singleturn,
+                  .multiturn = reply.multiturn,
+                  .singleturn_bits = has_position ? format.singleturn_bits : 0,
+                  .multiturn_bits = has_turns ? format.multiturn_bits : 0,
+                  .status = reply.status,
+                  .status_reported = has_status ? 0xFFu : 0u};
+  const KnownAlarms before = known_alarms ? KnownAlarms::all(*known_alarms) : KnownAlarms{};
+  detail::judge(reading, has_all      ? KnownAlarms::all(reply.alarms)
+                         : has_status ? known_after(before, reply.status)
+                                      : before);
+  return reading;
 }
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   return to_reading(format, reply.id, reply, known_alarms);
+}
+
+/// See Unit.
+[[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
+  if (now.alarms_reported == 0xFF) return now;  // an ID 3 reply
+  const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
+  detail::judge(now, known_after(known, static_cast<std::uint8_t>(now.status)));
+  return now;
 }
 
 // ---- As the engine and the virtual encoder use it

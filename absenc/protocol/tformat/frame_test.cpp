@@ -131,14 +131,77 @@ TEST(TformatFrame, ValidityOfEachPart) {
 TEST(TformatFrame, PartialRepliesPromiseNoMoreThanIsKnown) {
   const Reply part{.id = DataId::singleturn, .singleturn = 77};
   EXPECT_EQ(to_reading({}, part).singleturn_valid_bits, 5u);
+  EXPECT_EQ(to_reading({}, part).singleturn_validity(), Validity::unknown);
+  EXPECT_EQ(to_reading({.singleturn_bits = 5}, part).singleturn_validity(), Validity::valid);
+  EXPECT_EQ(to_reading({}, part, alarms::full_absolute_status).singleturn_validity(), Validity::invalid);
   EXPECT_EQ(to_reading({}, part, 0).singleturn_valid_bits, 17u);
   EXPECT_EQ(to_reading({}, part).multiturn_bits, 0u);
   const Reply turns{.id = DataId::multiturn, .multiturn = 5};
   EXPECT_FALSE(to_reading({}, turns).multiturn_valid);
   EXPECT_TRUE(to_reading({}, turns, 0).multiturn_valid);
   EXPECT_FALSE(to_reading({}, turns, alarms::over_speed).multiturn_valid);
+  EXPECT_EQ(to_reading({}, turns).multiturn_validity(), Validity::unknown);
+  EXPECT_EQ(to_reading({}, turns, alarms::over_speed).multiturn_validity(), Validity::invalid);
   const Reply alarmed{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
   EXPECT_FALSE(to_reading({}, alarmed, 0).multiturn_valid);
+  EXPECT_EQ(to_reading({}, alarmed, 0).multiturn_validity(), Validity::unknown);
+}
+
+// SF says only that one of four alarms is raised: one that an ID 3 reply has told explains it.
+TEST(TformatFrame, KnownAlarmExplainsStatus) {
+  const Reply turns{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
+  for (const std::uint8_t harmless : {alarms::over_heat, alarms::battery_alarm}) {
+    EXPECT_EQ(to_reading({}, turns, harmless).multiturn_validity(), Validity::valid) << int{harmless};
+    EXPECT_EQ(to_reading({}, turns, harmless).alarms, harmless);
+    EXPECT_EQ(to_reading({}, turns, harmless).alarms_reported, 0xFFu);
+  }
+  EXPECT_EQ(to_reading({}, turns, alarms::battery_error).multiturn_validity(), Validity::invalid);
+}
+
+// 6.3.2: SF has counting_error, and four others together.
+TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
+  constexpr std::uint8_t in_status = alarms::counting_error | alarms::shown_in_status;
+  struct Row {
+    std::uint8_t status;
+    std::uint8_t reported;
+    std::uint8_t raised;
+  };
+  for (const DataId id :
+       {DataId::singleturn, DataId::multiturn, DataId::clear_alarms, DataId::zero, DataId::reset_multiturn}) {
+    for (const Row& row :
+         {Row{0, in_status, 0}, Row{status::counting_error, in_status, alarms::counting_error},
+          Row{status::alarm, alarms::counting_error, 0},
+          Row{status::alarm | status::counting_error, alarms::counting_error, alarms::counting_error}}) {
+      const Reading reading = to_reading({}, {.id = id, .status = row.status});
+      EXPECT_EQ(reading.alarms_reported, row.reported) << static_cast<int>(id) << " " << int{row.status};
+      EXPECT_EQ(reading.alarms, row.raised) << static_cast<int>(id) << " " << int{row.status};
+      EXPECT_EQ(reading.status_reported, 0xFFu);
+    }
+  }
+  EXPECT_EQ(to_reading({}, {.id = DataId::everything}).alarms_reported, 0xFFu);
+  EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
+}
+
+// What one reply after the other leaves known, as in a capture.
+TEST(TformatFrame, LaterRepliesCompleteWhatEarlierOnesReported) {
+  const auto part = [](std::uint8_t sf) { return to_reading({}, {.id = DataId::singleturn, .status = sf}); };
+  const auto whole = [](std::uint8_t almc) {
+    return to_reading({}, {.id = DataId::everything, .status = status_for(almc), .alarms = almc});
+  };
+  EXPECT_EQ(remembered({}, part(0)).singleturn_validity(), Validity::unknown);
+  const Reading clear = remembered(whole(0), part(0));
+  EXPECT_EQ(clear.singleturn_validity(), Validity::valid);
+  EXPECT_EQ(clear.alarms_reported, 0xFFu);
+  const Reading one_of_four = remembered(clear, part(status::alarm));
+  EXPECT_EQ(one_of_four.singleturn_validity(), Validity::valid);
+  EXPECT_EQ(one_of_four.alarms_reported, 0xFFu & ~alarms::shown_in_status);
+  EXPECT_EQ(remembered(one_of_four, part(status::alarm)).alarms_reported, one_of_four.alarms_reported);
+  EXPECT_EQ(remembered(one_of_four, part(0)).alarms_reported, 0xFFu);
+  const Reading coarse = remembered(whole(alarms::full_absolute_status | alarms::over_heat), part(status::alarm));
+  EXPECT_EQ(coarse.singleturn_validity(), Validity::invalid);
+  EXPECT_EQ(coarse.alarms, alarms::full_absolute_status | alarms::over_heat);
+  EXPECT_EQ(remembered(coarse, part(0)).alarms, alarms::full_absolute_status);
+  EXPECT_EQ(remembered(coarse, whole(0)).alarms, 0u);
 }
 
 }  // namespace

@@ -78,6 +78,19 @@ TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
   EXPECT_EQ(id.numbers.at("encoder_id"), 0x11);
 }
 
+TEST(TformatHost, TurnsHoldUnderAlarmsThatAreNotOfTheTurns) {
+  Bench bench;
+  bench.shaft.put(12, 0);
+  bench.encoder.raise_alarms(alarms::over_heat | alarms::battery_alarm);
+  ReadPosition turns({}, DataId::multiturn);
+  EXPECT_EQ(bench.run(turns).reading()->multiturn_validity(), Validity::valid);
+  EXPECT_EQ(turns.reading()->alarms, alarms::over_heat | alarms::battery_alarm);
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);
+  bench.encoder.raise_alarms(alarms::multiturn_error);
+  ReadPosition lost({}, DataId::multiturn);
+  EXPECT_EQ(bench.run(lost).reading()->multiturn_validity(), Validity::invalid);
+}
+
 TEST(TformatHost, SilenceIsATimeoutAndNothingIsRepeated) {
   Bench bench;
   bench.encoder.power_off(Time{});

@@ -405,6 +405,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .reply_size = size_of_reply,
     .answer_to_bad = answer_to_bad,
     .bits = bits_in,
+    .remembered = remembered,
     .status = fields.of<&Values::status>(),
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,

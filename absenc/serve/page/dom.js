@@ -79,7 +79,13 @@ export function duration(seconds) {
 export function positionText(one) {
   if (one.angle_deg !== null) return `${one.angle_deg.toFixed(3)}°`;
   if (one.position_mm !== null) return `${one.position_mm.toFixed(4)} mm`;
-  return one.state === "live" ? "INVALID" : NOTHING;
+  if (one.state !== "live") return NOTHING;
+  return one.singleturn_valid === null ? "unknown" : "INVALID";
+}
+
+export function turnsText(one) {
+  if (one.turns !== null) return String(one.turns);
+  return one.multiturn_valid === false ? "INVALID" : NOTHING;
 }
 
 export function speedText(one) {
@@ -95,9 +101,20 @@ export function alarmText(alarm) {
   return `${alarm.channel ? alarm.channel + " " : ""}${alarm.name}: ${alarm.meaning}.${action}`;
 }
 
+/** [class, text] of each line below an encoder: alarms, or that nobody has reported them, and why it is not live. */
+export function wordsOf(one) {
+  const words = (one.alarms ?? []).map((alarm) => ["alarm", alarmText(alarm)]);
+  if (one.state === "live" && one.alarms === null) {
+    if (one.status?.length) words.push(["alarm", `status: ${one.status.join(" ")}`]);
+    words.push(["faint", "alarms not reported"]);
+  }
+  if (one.message) words.push(["why", one.message]);
+  return words;
+}
+
 /** A value of a reply: flags are a list of names, and what does not hold is null. */
-export function fieldText(value) {
-  if (value === null) return "INVALID";
+export function fieldText(value, missing = "INVALID") {
+  if (value === null) return missing;
   return Array.isArray(value) ? value.join(" ") || "none" : String(value);
 }
 

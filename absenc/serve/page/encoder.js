@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Everything about one encoder: live trace, history, errors, commands.
 /* global Dygraph */
-import {NOTHING, alarmText, ask, dial, duration, element, fieldText, histogram, positionText, setText, speedText, stateText, table} from "./dom.js";
+import {NOTHING, ask, dial, duration, element, fieldText, histogram, positionText, setText, speedText, stateText, table, turnsText, wordsOf} from "./dom.js";
 import {Examine} from "./examine.js";
 import {download, hasToken, request, setToken} from "./server.js";
 
@@ -156,13 +156,11 @@ export class One {
     this.live = one.state === "live";
     for (const node of [this.placePlot, this.speedPlot]) node.classList.toggle("stale", !this.live);
     this.facts.replaceChildren(...[
-      ["position", positionText(one)], ["turns", one.turns === null ? NOTHING : String(one.turns)],
+      ["position", positionText(one)], ["turns", turnsText(one)],
       ["speed", speedText(one)], ["readings a second", this.live ? one.rate_hz.toFixed(1) : NOTHING],
       ["errors, last minute", String(one.errors_last_minute)], ["address", one.address],
     ].flatMap(([label, value]) => [element("dt", {}, label), element("dd", {}, value)]));
-    const words = (one.alarms ?? []).map((alarm) => element("p", {class: "alarm"}, alarmText(alarm)));
-    if (one.message) words.push(element("p", {class: "why"}, one.message));
-    this.words.replaceChildren(...words);
+    this.words.replaceChildren(...wordsOf(one).map(([kind, text]) => element("p", {class: kind}, text)));
     this.examine.show(one);
   }
 
@@ -213,7 +211,8 @@ export class One {
     }
     if (this.closed || this.word !== word || answer.status !== 200) return;  // not what was before a loss
     const one = answer.body;
-    const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, fieldText(value)]);
+    const missing = one.singleturn_valid === false || one.multiturn_valid === false ? "INVALID" : "unknown";
+    const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, fieldText(value, missing)]);
     this.examine.describe(one.readable);
     const latency = one.latency_us;
     fields.push(["latency", `50 % ${latency.p50.toFixed(0)} µs, 99 % ${latency.p99.toFixed(0)} µs, longest ${latency.max.toFixed(0)} µs`]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // All encoders at a glance: a card for each.
-import {NOTHING, alarmText, dial, element, positionText, setText, speedText, stateText} from "./dom.js";
+import {NOTHING, dial, element, positionText, setText, speedText, stateText, turnsText, wordsOf} from "./dom.js";
 
 class Card {
   constructor(name) {
@@ -22,15 +22,15 @@ class Card {
   show(one) {
     this.dial.svg.toggleAttribute("hidden", one.linear);
     this.dial.turn(one.angle_deg);
-    this.node.classList.toggle("bad", one.state !== "live" || (one.alarms ?? []).length > 0);
+    const flagged = one.alarms ?? one.status ?? [];
+    this.node.classList.toggle("bad", one.state !== "live" || flagged.length > 0);
     this.state.className = `state ${one.state}`;
     setText(this.state, stateText(one));
     setText(this.values.position, positionText(one));
-    setText(this.values.turns, one.turns === null ? NOTHING : String(one.turns));
+    setText(this.values.turns, turnsText(one));
     setText(this.values.speed, speedText(one));
     setText(this.values["errors, last minute"], String(one.errors_last_minute));
-    const words = (one.alarms ?? []).map((alarm) => ["alarm", alarmText(alarm)]);
-    if (one.message) words.push(["why", one.message]);
+    const words = wordsOf(one);
     const shown = JSON.stringify(words);
     if (shown === this.shown) return;
     this.shown = shown;

@@ -55,8 +55,8 @@ std::string short_text(double value, int decimals, std::size_t width = 9) {
 
 std::string position_text(const Snapshot& snapshot) {
   if (!is_live(snapshot)) return "-";
-  if (!has_position(snapshot)) return "INVALID";
   const Reading& reading = snapshot.last.reading;
+  if (!has_position(snapshot)) return reading.ready && !reading.singleturn_known ? "unknown" : "INVALID";
   if (reading.unit_um == 0) return fmt::format("{:.3f}", degrees(reading.singleturn, reading.singleturn_bits));
   return short_text(micrometres(reading.singleturn, reading.unit_um) / 1000, 3);
 }
@@ -64,7 +64,8 @@ std::string position_text(const Snapshot& snapshot) {
 std::string turns_text(const Snapshot& snapshot) {
   const Reading& reading = snapshot.last.reading;
   if (!is_live(snapshot) || reading.multiturn_bits == 0) return "-";
-  return reading.multiturn_valid ? short_text(static_cast<double>(reading.multiturn), 0, 7) : "INVALID";
+  if (!reading.multiturn_valid) return reading.multiturn_known ? "INVALID" : "unknown";
+  return short_text(static_cast<double>(reading.multiturn), 0, 7);
 }
 
 std::string speed_text(const Snapshot& snapshot) {
@@ -73,18 +74,21 @@ std::string speed_text(const Snapshot& snapshot) {
   return short_text(speed, 1);
 }
 
-std::string alarm_names(const Shown& shown) {
+// An alarm, or a flag of the status about which something must be done, where not all alarms are reported.
+bool has_alarm(const Shown& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
-  const std::vector<Flags> channels = unit.alarms != nullptr ? alarms_of(unit, reading) : status_of(unit, reading);
-  std::string text;
-  for (const Flags& flags : channels) {
-    const std::vector<std::string_view> names = flag_names(*flags.field, flags.bits);
-    if (names.empty()) continue;
-    if (channels.size() > 1) text += fmt::format("{}{}:", text.empty() ? "" : " ", flags.field->name);
-    for (const std::string_view name : names) text += fmt::format("{}{}", text.empty() ? "" : " ", name);
+  bool is_complete = unit.alarms != nullptr;
+  for (const Flags& flags : alarms_of(unit, reading)) {
+    if (!raised(*flags.field, flags.bits).empty()) return true;
+    is_complete = is_complete && flags.is_complete();
   }
-  return text;
+  if (is_complete) return false;
+  const std::vector<Flags> status = status_of(unit, reading);
+  return std::any_of(status.begin(), status.end(), [](const Flags& flags) {
+    const std::vector<const FlagInfo*> set = raised(*flags.field, flags.bits);
+    return std::any_of(set.begin(), set.end(), [](const FlagInfo* flag) { return !flag->action.empty(); });
+  });
 }
 
 std::uint64_t failures(const Snapshot& snapshot) { return snapshot.counters.bad(); }
@@ -115,7 +119,7 @@ void draw_list_line(Screen& screen, int row, const Shown& shown, const std::stri
              fmt::format("{:>9} {:>{}} {:>9} {:>8} {:>{}}", position_text(snapshot), turns_text(snapshot), turns_width,
                          speed_text(snapshot), short_text(snapshot.rate, 1, 8), short_text(failed, 0, failures_width),
                          failures_width));
-  if (is_live(snapshot) && !alarm_names(shown).empty()) {
+  if (is_live(snapshot) && has_alarm(shown)) {
     screen.put(row, width + 12 + values_width, "!", Style::bad);
   }
 }
@@ -178,7 +182,9 @@ void draw_position(Screen& screen, int row, const Shown& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
     const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;  // or else they are below
-    const std::string text = has_room ? reading_text(unit, snapshot.last.reading) : place_text(snapshot.last.reading);
+    const Reading& reading = snapshot.last.reading;
+    const Doubt doubt = doubt_of(snapshot.last);
+    const std::string text = has_room ? reading_text(unit, reading, doubt) : place_text(reading, doubt);
     const bool good = has_position(snapshot);
     return screen.put(row, 2, text, good ? Style::bold : Style::bad);
   }
@@ -351,7 +357,8 @@ std::string to_line(const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   std::string text = fmt::format("{}: ", shown.watch->name());
   if (is_live(snapshot)) {
-    text += fmt::format("{}   {} {}", reading_text(*shown.watch->uri().unit, snapshot.last.reading),
+    text += fmt::format("{}   {} {}",
+                        reading_text(*shown.watch->uri().unit, snapshot.last.reading, doubt_of(snapshot.last)),
                         speed_text(snapshot), speed_unit(snapshot.last.reading));
   } else {
     text += fmt::format("{}, no reading for {}", name_of(snapshot.state), to_text(snapshot.age));

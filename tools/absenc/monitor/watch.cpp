@@ -205,11 +205,13 @@ void Watch::trace(const Encoder& live, const Sample& sample) {
     case Sample::Kind::reading: {
       if (sample.restarted && !restarted_) add_line(sample.at, sample.message);
       restarted_ = sample.restarted;
-      const bool other_alarms = sample.reading.alarms != alarms_;
+      const Reading& reading = sample.reading;
+      const bool other_alarms = reading.alarms != alarms_ || reading.alarms_reported != alarms_reported_;
       if (!other_alarms && sample.at < next_line_) return;
-      alarms_ = sample.reading.alarms;
+      alarms_ = reading.alarms;
+      alarms_reported_ = reading.alarms_reported;
       next_line_ = sample.at + between_lines;
-      return add_line(sample.at, reading_text(unit, sample.reading));
+      return add_line(sample.at, reading_text(unit, reading, doubt_of(sample)));
     }
     case Sample::Kind::failed: {
       std::string text = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);

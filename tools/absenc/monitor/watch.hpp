@@ -98,6 +98,7 @@ class Watch {
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
+  std::uint32_t alarms_reported_ = 0;
   bool restarted_ = false;     // by the reading before
   bool command_runs_ = false;  // it is not broken off
 

@@ -28,14 +28,18 @@ using Kind = Annotation::Kind;
 
 constexpr std::size_t enough_to_print = 1 << 16;
 
-// "data_id=3 singleturn=74565"; "singleturn=INVALID(74565)" where it does not hold.
+// "data_id=3 singleturn=74565"; "singleturn=INVALID(74565)" where it does not hold, "singleturn=unknown(74565)" where
+// nobody has reported whether it does.
 std::string field_words(const capture::Contents& contents) {
   std::string words;
   for (const FieldValue& field : contents.fields) {
-    const bool is_valid = contents.reading == nullptr || holds(*field.info, *contents.reading);
+    const Validity validity =
+        contents.reading == nullptr ? Validity::valid : validity_of(*field.info, *contents.reading);
+    const std::string_view mark = validity == Validity::valid     ? ""
+                                  : validity == Validity::unknown ? "unknown("
+                                                                  : "INVALID(";
     if (!words.empty()) words += ' ';
-    const std::string value = to_text(field);
-    words.append(field.info->name).append(is_valid ? "=" : "=INVALID(").append(value).append(is_valid ? "" : ")");
+    words.append(field.info->name).append("=").append(mark).append(to_text(field)).append(mark.empty() ? "" : ")");
   }
   return words;
 }
@@ -140,7 +144,7 @@ std::string AnnotationPrinter::json(const Annotation& annotation) const {
     json.set(linear ? "position_mm" : "angle_deg", valid ? Json(position) : Json());
     if (reading.multiturn_bits != 0) json.set("turns", reading.multiturn_valid ? Json(reading.multiturn) : Json());
   }
-  if (annotation.contents.reading != nullptr) set_validity(json, *annotation.contents.reading);
+  if (annotation.contents.reading != nullptr) set_state(json, unit_, *annotation.contents.reading);
   if (annotation.error != Error::none) json.set("error", text_of(annotation.error).name);
   const std::string message = message_of(unit_, options_, annotation);
   if (!message.empty()) json.set("message", message);

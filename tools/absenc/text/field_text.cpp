@@ -25,13 +25,15 @@ Json options_to_json(const Unit& unit, const Options& options) {
 
 void JsonFields::put(const FieldValue& value) {
   fields.set(value.info->name, to_json(value_of(value)));
-  if (is_of_reading(value.info->role)) judged_.push_back({value.info, true});
+  if (is_of_reading(value.info->role)) judged_.push_back({value.info, Validity::valid});
 }
 
 void JsonFields::put_reading(const Reading& reading) {
   for (Judged& judged : judged_) {
-    judged.holds = judged.holds && holds(*judged.info, reading);
-    if (!judged.holds) fields.set(fmt::format("{}_valid", judged.info->name), false);
+    const Validity validity = validity_of(*judged.info, reading);
+    if (judged.validity == Validity::valid || validity == Validity::invalid) judged.validity = validity;
+    if (judged.validity == Validity::valid) continue;
+    fields.set(fmt::format("{}_valid", judged.info->name), to_json(client::value_of(judged.validity)));
   }
 }
 

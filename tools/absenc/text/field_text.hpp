@@ -18,8 +18,8 @@ using namespace client;
 /// {"singleturn_bits":17,...}
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 
-/// Puts fields into a JSON object; with a reading, behind what it knows not to hold `singleturn_valid` and the like,
-/// false. What has no such field holds.
+/// Puts fields into a JSON object; with a reading, behind what does not hold `singleturn_valid` and the like: false, or
+/// null where nobody has reported whether it holds. What has no such field holds.
 struct JsonFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -28,7 +28,7 @@ struct JsonFields final : FieldSink {
  private:
   struct Judged {
     const FieldInfo* info;
-    bool holds;
+    Validity validity;
   };
   std::vector<Judged> judged_;
 };

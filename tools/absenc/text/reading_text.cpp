@@ -8,6 +8,8 @@
 #include <array>
 #include <cmath>
 
+#include "absenc/client/row.hpp"
+#include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/core/bits.hpp"
 #include "tools/absenc/text/field_text.hpp"
@@ -35,10 +37,6 @@ int linear_decimals(double unit_um) {
 // The digits of the largest number of so many bits.
 int digits(unsigned bits) { return static_cast<int>(fmt::formatted_size("{}", low_mask(bits))); }
 
-std::string flags_text(const Flags& flags) {
-  return fmt::format("{}", fmt::join(flag_names(*flags.field, flags.bits), " "));
-}
-
 std::string linear_text(const Reading& reading) {
   const unsigned bits = reading.singleturn_bits;
   const double most = micrometres(low_mask(bits), reading.unit_um);
@@ -51,10 +49,13 @@ std::string linear_text(const Reading& reading) {
                      behind_um, reading.singleturn, digits(bits));
 }
 
-std::string position_text(const Reading& reading) {
+std::string_view unknown_word(Doubt doubt) { return doubt == Doubt::unconfirmed ? "unconfirmed" : "unknown"; }
+
+std::string position_text(const Reading& reading, Doubt doubt) {
   const unsigned bits = reading.singleturn_bits;
   const unsigned valid = reading.singleturn_valid_bits;
   if (!reading.ready) return fmt::format("position INVALID ({}: the encoder is starting)", reading.singleturn);
+  if (!reading.singleturn_known) return fmt::format("position {} ({})", unknown_word(doubt), reading.singleturn);
   if (valid == 0) return fmt::format("position INVALID ({})", reading.singleturn);
   if (reading.unit_um > 0) return linear_text(reading);
   const std::string angle = fmt::format("{:.{}f}", degrees(reading.singleturn, bits), decimals(valid));
@@ -64,36 +65,48 @@ std::string position_text(const Reading& reading) {
   return fmt::format("{:>{}} deg   {:>{}} counts", angle, width, reading.singleturn, digits(bits));
 }
 
-std::string turns_text(const Reading& reading) {
+std::string turns_text(const Reading& reading, Doubt doubt) {
+  if (!reading.multiturn_known) return fmt::format("turns {} ({})", unknown_word(doubt), reading.multiturn);
   if (!reading.multiturn_valid) return fmt::format("turns INVALID ({})", reading.multiturn);
   return fmt::format("{:>{}} turns", reading.multiturn, digits(reading.multiturn_bits));
 }
 
-}  // namespace
-
-namespace {
-
-// The alarms, of encoders without any the status; of two channels both.
+// The alarms, and the status where they do not say all; of two channels both.
 std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   if (unit.second_status != nullptr || unit.second_alarms != nullptr) return flags_of(unit, reading);
-  return unit.alarms != nullptr ? alarms_of(unit, reading) : status_of(unit, reading);
+  const std::vector<Flags> alarms = alarms_of(unit, reading);
+  if (!alarms.empty() && alarms.front().is_complete()) return alarms;
+  return flags_of(unit, reading);
 }
 
 }  // namespace
 
-std::string place_text(const Reading& reading) {
+std::string place_text(const Reading& reading, Doubt doubt) {
   std::string text;
-  if (reading.singleturn_bits != 0) text = position_text(reading);
-  if (reading.multiturn_bits != 0) text += (text.empty() ? "" : "   ") + turns_text(reading);
+  if (reading.singleturn_bits != 0) text = position_text(reading, doubt);
+  if (reading.multiturn_bits != 0) text += (text.empty() ? "" : "   ") + turns_text(reading, doubt);
   return text;
 }
 
-std::string reading_text(const Unit& unit, const Reading& reading) {
-  std::string text = place_text(reading);
+std::string flags_text(const Unit& unit, const Flags& flags) {
+  const std::vector<std::string_view> names = flag_names(*flags.field, flags.bits);
+  std::vector<std::string_view> open;
+  if (!flags.is_complete()) open = flag_names(*flags.field, ~flags.reported);
+  const std::string_view name = flags.field->name;
+  const bool is_status = flags.field == unit.status || flags.field == unit.second_status;
+  if (names.empty() && open.empty()) return is_status ? fmt::format("{} clear", name) : fmt::format("no {}", name);
+  constexpr std::size_t most_named = 4;
+  const bool is_named = open.size() <= most_named && open.size() < flag_names(*flags.field, ~0ull).size();
+  const std::string which = is_named ? fmt::format(": {}", fmt::join(open, " ")) : "";
+  if (names.empty()) return fmt::format("{} not reported{}", name, which);
+  const std::string text = fmt::format("{}: {}", name, fmt::join(names, " "));
+  return open.empty() ? text : fmt::format("{} ({}not reported{})", text, is_named ? "" : "others ", which);
+}
+
+std::string reading_text(const Unit& unit, const Reading& reading, Doubt doubt) {
+  std::string text = place_text(reading, doubt);
   for (const Flags& flags : flags_in_line(unit, reading)) {
-    const std::string names = flags_text(flags);
-    if (!text.empty()) text += "   ";
-    text += names.empty() ? fmt::format("no {}", flags.field->name) : fmt::format("{}: {}", flags.field->name, names);
+    text += (text.empty() ? "" : "   ") + flags_text(unit, flags);
   }
   return text;
 }
@@ -127,9 +140,11 @@ std::string alarms_in_words(const Unit& unit, const Reading& reading) {
   return lines;
 }
 
-void set_validity(Json& json, const Reading& reading) {
-  if (reading.singleturn_bits != 0) json.set("singleturn_valid", reading.singleturn_valid() && reading.ready);
-  if (reading.multiturn_bits != 0) json.set("multiturn_valid", reading.multiturn_valid);
+void set_state(Json& json, const Unit& unit, const Reading& reading) {
+  const Validity singleturn = reading.ready ? reading.singleturn_validity() : Validity::invalid;
+  if (reading.singleturn_bits != 0) json.set("singleturn_valid", to_json(value_of(singleturn)));
+  if (reading.multiturn_bits != 0) json.set("multiturn_valid", to_json(value_of(reading.multiturn_validity())));
+  if (const std::optional<Flags> alarms = joined_alarms(unit, reading)) json.set("alarms", to_json(value_of(*alarms)));
 }
 
 }  // namespace absenc::tool

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
+#include <vector>
 
+#include "absenc/client/row.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
@@ -19,33 +23,59 @@ namespace absenc::tool {
 
 namespace {
 
-struct ShownAlarms {
-  Flags flags;
-  bool told_when_none;
-};
-
-// Alarms first. Of encoders without alarms the status says that there is nothing.
-std::vector<ShownAlarms> flags_of(const Unit& unit, const Reading& reading) {
-  std::vector<ShownAlarms> all;
-  for (const Flags& flags : alarms_of(unit, reading)) all.push_back({flags, true});
-  for (const Flags& flags : status_of(unit, reading)) all.push_back({flags, unit.alarms == nullptr});
-  return all;
+bool reports_any(const std::vector<Flags>& all) {
+  return std::any_of(all.begin(), all.end(),
+                     [](const Flags& flags) { return !flag_names(*flags.field, flags.reported).empty(); });
 }
 
+bool reports_all(const std::vector<Flags>& all) {
+  return std::all_of(all.begin(), all.end(), [](const Flags& flags) { return flags.is_complete(); });
+}
+
+// Alarms first. Where they were not all reported, the status says what it can.
 void show_alarms(const Unit& unit, const Reading& reading) {
-  for (const auto& [flags, told_when_none] : flags_of(unit, reading)) {
+  const auto show = [&](const Flags& flags, bool also_clear) {
     const std::string words = flags_in_words(flags);
     if (!words.empty()) print_line(fmt::format("{}:\n{}", flags.field->name, words));
-    if (words.empty() && told_when_none) print_line(fmt::format("no {}", flags.field->name));
-  }
+    if (!also_clear) return;
+    if (!flags.is_complete()) {
+      const std::vector<std::string_view> clear = flag_names(*flags.field, flags.reported & ~flags.bits);
+      if (!clear.empty()) print_line(fmt::format("{} clear: {}", flags.field->name, fmt::join(clear, " ")));
+      print_line(flags_text(unit, {flags.field, 0, flags.reported}));
+    } else if (words.empty()) {
+      print_line(flags_text(unit, flags));
+    }
+  };
+  const std::vector<Flags> alarms = alarms_of(unit, reading);
+  for (const Flags& flags : alarms) show(flags, true);
+  for (const Flags& flags : status_of(unit, reading)) show(flags, alarms.empty() || !reports_all(alarms));
 }
 
 void show_json(const Unit& unit, const Reading& reading) {
   Json json = Json::object().set("ok", true).set("protocol", unit.id);
-  for (const auto& [flags, told] : flags_of(unit, reading)) {
-    json.set(flags.field->name, Json::list(raised(*flags.field, flags.bits), flag_to_json));
+  for (const std::vector<Flags>& all : {alarms_of(unit, reading), status_of(unit, reading)}) {
+    for (const Flags& flags : all) {
+      const bool is_known = has_value(value_of(flags));
+      json.set(flags.field->name, is_known ? Json::list(raised(*flags.field, flags.bits), flag_to_json) : Json());
+    }
   }
   print_line(json.line());
+}
+
+[[noreturn]] void refuse(const Unit& unit, const Reading& reading) {
+  const std::string names = unit.alarms != nullptr ? fmt::format("{}", fmt::join(flag_names(*unit.alarms, ~0ull), ", "))
+                                                   : std::string(unit.status->name);
+  const std::string advice =
+      takes_word(unit)
+          ? fmt::format("if its word has bits for them, say where: {}=... or the options of `absenc list {}`",
+                        word_option_name, unit.id)
+          : fmt::format("`absenc list {}` shows its options and commands", unit.id);
+  std::string place = place_text(reading);
+  place.erase(0, place.find_first_not_of(' '));
+  throw Failure(
+      fmt::format("the alarms are not known: a reply of {} with these options reports none of {}\n"
+                  "  it reported only {}\n  Try: {}",
+                  unit.id, names, place, advice));
 }
 
 int run_alarms(const Invocation& invocation) {
@@ -55,13 +85,12 @@ int run_alarms(const Invocation& invocation) {
     throw UsageError(fmt::format("the encoders of {} have no alarms", uri.unit->id));
   }
   const std::unique_ptr<Connection> encoder = open_connection(uri);
-  const Outcome outcome = encoder->read();
-  if (outcome.error != Error::none) throw EncoderFailure(encoder->trouble(outcome));
-  if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no alarms");
+  const Reading reading = client::read_alarms(*encoder);
+  if (!reports_any(flags_of(*uri.unit, reading))) refuse(*uri.unit, reading);
   if (invocation.has("--json")) {
-    show_json(*uri.unit, *outcome.reading);
+    show_json(*uri.unit, reading);
   } else {
-    show_alarms(*uri.unit, *outcome.reading);
+    show_alarms(*uri.unit, reading);
   }
   return exit_good;
 }
@@ -83,7 +112,9 @@ const Subcommand alarms_subcommand{
     "alarms",
     "say in words which alarms the encoder has and what to do",
     "Alarms and status flags of one reading. `absenc list <protocol>` shows all that there are.\n"
-    "Exit status 0 when the encoder could be read, with alarms or without; scripts look at --json.",
+    "Exit status 0 when the encoder has reported alarms or that there are none; scripts look at --json, where [] "
+    "means\n"
+    "that all are clear and null that nobody has reported them. Exit status 1 when nothing could be found out.",
     alarms_parameters,
     alarms_examples,
     run_alarms};

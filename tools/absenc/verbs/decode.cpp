@@ -54,7 +54,7 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
       for (const FieldValue& field : contents.fields) fields.put(field);
       Json good = Json::object().set("protocol", unit.id).set("ok", true).set("fields", fields.fields);
       if (bits) good.set("bits", places.json());
-      if (contents.reading != nullptr) set_validity(good, *contents.reading);
+      if (contents.reading != nullptr) set_state(good, unit, *contents.reading);
       print_line(good.line());
     } else {
       FieldTable rows;

@@ -104,9 +104,10 @@ class Survey {
     Json json = to_json(Row{columns.columns(), std::move(values)});
     answers.set(command.name, json.set("confirmed", encoder_->confirmed()).set("ok", true));
     add_heading(command);
-    position = "  " + reading_text(unit, reading);
+    const bool is_doubtful = reading.singleturn_valid() != outcome.reading->singleturn_valid();
+    position = "  " + reading_text(unit, reading, is_doubtful ? Doubt::unconfirmed : Doubt::none);
     if (const std::string alarms = alarms_in_words(unit, reading); !alarms.empty()) position += '\n' + alarms;
-    if (reading.singleturn_valid() != outcome.reading->singleturn_valid()) {
+    if (is_doubtful) {
       position += "\n  no two readings in a row agree as well as the fastest shaft allows";
     }
   }

@@ -69,11 +69,14 @@ class Display {
     }
     told_doubt_ = sample.doubtful;
     if (format_ != Format::human) return show_row(sample);
-    print_line(reading_text(unit, reading));
-    if (reading.alarms != alarms_) {
-      print_note(reading.alarms != 0 ? alarms_in_words(unit, reading) : "  the alarms are gone");
-      alarms_ = reading.alarms;
-    }
+    print_line(reading_text(unit, reading, doubt_of(sample)));
+    // What was raised is so until the encoder reports that it is not.
+    const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
+    if (alarms == alarms_) return;
+    alarms_ = alarms;
+    print_note(reading.alarms != 0 ? alarms_in_words(unit, reading)
+               : alarms == 0       ? "  the alarms are gone"
+                                   : "  the other alarms are gone");
   }
 
   void show_trouble(const Sample& sample) {
@@ -166,7 +169,9 @@ const Subcommand read_subcommand{
     "read",
     "read the position, the turns and the alarms",
     "Readings go to standard output, messages to standard error. What the encoder says is not valid is\n"
-    "shown as INVALID, and in JSON and CSV by the _valid fields; there the angle is then null or empty.\n"
+    "shown as INVALID, what nobody has reported as unknown; in JSON and CSV the _valid fields say so: false,\n"
+    "and null or empty. There the angle is then null or empty too. Alarms are [] or none only where the\n"
+    "encoder has reported all of them clear, and null or empty where it has not reported them.\n"
     "In CSV, event is empty for a reading; otherwise the row stands for the error of that name that came in its\n"
     "place, or for the port: lost, back.\n"
     "Linear encoders, those with a unit_um, have millimetres and micrometres in place of degrees.\n"

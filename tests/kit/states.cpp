@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// Three states of an alarm: reported and clear, reported and raised, not reported.
+#include <algorithm>
+
+#include "tests/kit/kit.hpp"
+#include "tests/kit/world.hpp"
+
+namespace absenc::kit {
+namespace {
+
+/// What one field of flags of a reading says, whichever channel it is of.
+struct State {
+  const FieldInfo* field;
+  std::uint32_t bits;
+  std::uint32_t reported;
+};
+
+std::vector<State> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits, std::uint32_t reported) {
+  std::vector<State> states;
+  if (first != nullptr) states.push_back({first, bits, reported});
+  if (second != nullptr) states.push_back({second, bits >> first->flags.size(), reported >> first->flags.size()});
+  return states;
+}
+
+std::vector<State> alarms_of(const Unit& unit, const Reading& reading) {
+  return both(unit.alarms, unit.second_alarms, reading.alarms, reading.alarms_reported);
+}
+std::vector<State> status_of(const Unit& unit, const Reading& reading) {
+  return both(unit.status, unit.second_status, reading.status, reading.status_reported);
+}
+
+std::uint32_t named(const FieldInfo& field) {
+  std::uint32_t mask = 0;
+  for (std::size_t i = 0; i < field.flags.size(); ++i) {
+    if (!field.flags[i].name.empty()) mask |= 1u << i;
+  }
+  return mask;
+}
+
+/// A command's reading, and the fields and the reading of its last reply as a capture has them.
+struct Said {
+  std::optional<Reading> live;
+  Seen captured;
+};
+
+/// One virtual encoder, with an alarm or without.
+template <class Item>
+class Raised {
+ public:
+  Raised(const Unit& unit, const Options& options, std::uint32_t alarm) : unit_(unit), world_(unit, options, 1) {
+    if (made()) world_.device().raise_alarms(alarm);
+    if (made()) world_.move(0x4000'0000);
+  }
+  [[nodiscard]] bool made() const { return world_.made(); }
+
+  [[nodiscard]] Said ask(const Command& command) {
+    Said said;
+    const Ended result = world_.run(command, least_arguments(command));
+    if (!result.good()) return said;
+    said.live = result.seen.reading;
+    if (result.received.empty()) return said;
+    const std::size_t bits = unit_.link == LinkKind::clocked ? 8 * result.received.size() : 0;
+    if (unit_.decode(world_.options(), {.bytes = result.sent}, {.bytes = result.received, .bits = bits},
+                     said.captured) != Error::none) {
+      said.captured = {};
+    }
+    return said;
+  }
+
+ private:
+  const Unit& unit_;
+  World<Item> world_;
+};
+
+template <class Item>
+class States {
+ public:
+  States(const Unit& unit, const Configuration& way, Findings& findings)
+      : unit_(unit), way_(way), findings_(findings) {}
+
+  void look() {
+    const Command& whole = *find_command(unit_, Verb::read);
+    for (const Command& command : unit_.commands) {
+      if (command.changes_encoder || command.verb == Verb::scan) continue;
+      Raised<Item> normal(unit_, way_.options, 0);
+      if (!normal.made()) return;
+      const Said before = normal.ask(whole);
+      const Said clear = normal.ask(command);
+      for (std::size_t bit = 0; bit < unit_.alarms->flags.size(); ++bit) {
+        if (unit_.alarms->flags[bit].name.empty()) continue;
+        what_ = std::string(command.name) + ", " + std::string(unit_.alarms->flags[bit].name);
+        look(before, clear, bit, false);
+        Raised<Item> alarmed(unit_, way_.options, 1u << bit);
+        const Said before_raised = alarmed.ask(whole);
+        look(before_raised, alarmed.ask(command), bit, true);
+      }
+    }
+  }
+
+ private:
+  template <class Text>
+  void require(bool holds, Text&& text) {
+    findings_.require(holds, [&] { return way_.text + ", " + what_ + ": " + std::string(text); });
+  }
+
+  void look(const Said& whole, const Said& said, std::size_t bit, bool is_raised) {
+    judge(said.live, bit, is_raised);
+    judge(said.captured.reading, bit, is_raised);
+    carries(said.captured);
+    promises(said.live, whole.live);
+    promises(said.captured.reading, whole.live);
+    completed(whole, said, bit, is_raised);
+  }
+
+  void judge(const std::optional<Reading>& reading, std::size_t bit, bool is_raised) {
+    if (!reading) return;
+    bool is_reported = false;
+    bool is_shown = false;
+    for (const State& state : alarms_of(unit_, *reading)) {
+      require((state.bits & ~state.reported & named(*state.field)) == 0, "an alarm is raised and not reported");
+      is_reported = is_reported || (state.reported >> bit & 1) != 0;
+      is_shown = is_shown || (state.bits >> bit & 1) != 0;
+    }
+    for (const State& state : status_of(unit_, *reading)) {
+      require((state.bits & ~state.reported & named(*state.field)) == 0, "a status is set and not reported");
+    }
+    if (is_raised) require(is_shown || !is_reported, "it is raised and reported clear");
+    if (!is_raised) require(!is_shown, "it is reported raised and is not");
+  }
+
+  // What a reply shows as a field, its reading reports.
+  void carries(const Seen& seen) {
+    if (!seen.reading) return;
+    const auto agrees = [&](const State& state) {
+      const auto field = seen.fields.find(std::string(state.field->name));
+      if (field == seen.fields.end()) return;
+      const std::uint32_t mask = named(*state.field);
+      require((~state.reported & mask) == 0, "a reply carries flags that its reading does not report");
+      require(((static_cast<std::uint32_t>(field->second.number) ^ state.bits) & mask) == 0,
+              "a reply carries other flags than its reading");
+    };
+    for (const State& state : alarms_of(unit_, *seen.reading)) agrees(state);
+    for (const State& state : status_of(unit_, *seen.reading)) agrees(state);
+  }
+
+  void promises(const std::optional<Reading>& part, const std::optional<Reading>& whole) {
+    if (!part || !whole) return;
+    const auto is_more = [](Validity one, Validity all) { return one == Validity::valid && all == Validity::invalid; };
+    require(!is_more(part->singleturn_validity(), whole->singleturn_validity()), "a part says that the position holds");
+    require(!is_more(part->multiturn_validity(), whole->multiturn_validity()), "a part says that the turns hold");
+  }
+
+  // In a capture, behind the reply to `read`.
+  void completed(const Said& before, const Said& now, std::size_t bit, bool is_raised) {
+    if (unit_.remembered == nullptr || !before.captured.reading || !now.captured.reading) return;
+    const Reading reading = unit_.remembered(*before.captured.reading, *now.captured.reading);
+    judge(reading, bit, is_raised);
+    const std::uint32_t known = before.captured.reading->alarms_reported;
+    require((known & ~reading.alarms_reported) == 0, "what an earlier reply reported is forgotten");
+    require(reading.singleturn_known && reading.multiturn_known, "what an earlier reply reported does not count");
+    promises(reading, before.captured.reading);
+  }
+
+  const Unit& unit_;
+  const Configuration& way_;
+  Findings& findings_;
+  std::string what_;
+};
+
+}  // namespace
+
+Findings check_states(const Unit& unit) {
+  Findings findings;
+  if (unit.alarms == nullptr) return findings;
+  for (const Configuration& way : configurations(unit)) {
+    if (unit.link == LinkKind::can) {
+      States<CanFrame>(unit, way, findings).look();
+    } else {
+      States<std::uint8_t>(unit, way, findings).look();
+    }
+  }
+  return findings;
+}
+
+}  // namespace absenc::kit
