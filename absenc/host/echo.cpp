@@ -23,6 +23,7 @@ ByteStep EchoFilter::next(Time now) {
   if (step.kind == ByteStep::Kind::transfer) {
     sent_.clear();
     held_.clear();
+    echoed_ = 0;
     // A request longer than any protocol's is passed on unfiltered.
     if (!sent_.append(step.out)) return step;
     reply_due_ = step.expect;
@@ -70,6 +71,7 @@ void EchoFilter::strip(const ByteEvent& event) {
   const std::size_t at = sent_.size() - echo_due_;
   const Bytes wanted = sent_.view().subspan(at, echoed);
   echo_due_ -= echoed;
+  echoed_ += echoed;
   if (!std::equal(wanted.begin(), wanted.end(), event.items.begin())) {
     inner_->feed({.kind = ByteEvent::Kind::line_error, .at = event.at});
   }
@@ -86,21 +88,32 @@ void EchoFilter::hold(const ByteEvent& event) {
   if (reply_due_ != 0 && held_.size() >= reply_due_ + sent_.size()) decide(event.at);
 }
 
-// What is held begins like the request: an echo, or a reply that begins like it. Their number tells.
+bool EchoFilter::is_reply(Bytes bytes) const {
+  NoFields nowhere;
+  return unit_ != nullptr && unit_->decode(*options_, {.bytes = sent_}, {.bytes = bytes}, nowhere) == Error::none;
+}
+
+// What is held begins like the request: an echo, or a reply that begins like it. Their number tells, or which of both
+// is a good reply.
 void EchoFilter::decide(Time at) {
   const std::size_t echo = sent_.size();
   const bool echo_and_reply = held_.size() >= reply_due_ + echo;
   const bool echo_alone = held_.size() == echo && reply_due_ != echo;
   const ByteBuffer<capacity> held = held_;
   held_.clear();
-  if (echo_and_reply || echo_alone) {
+  const Bytes bytes = held;
+  const std::size_t reply = reply_due_ != 0 ? std::min(reply_due_, bytes.size()) : bytes.size();
+  const bool has_no_echo = echo_and_reply && is_reply(bytes.first(reply)) && !is_reply(bytes.subspan(echo));
+  if ((echo_and_reply || echo_alone) && !has_no_echo) {
     found_ = EchoMode::on;
     echo_due_ = 0;
-    pass(at, held.view().subspan(echo));
-  } else {
-    found_ = EchoMode::off;
-    pass(at, held);
+    echoed_ = echo;
+    return pass(at, bytes.subspan(echo));
   }
+  found_ = EchoMode::off;
+  if (!has_no_echo) return pass(at, bytes);
+  pass(at, bytes.first(reply));  // and what is behind it is not part of it
+  pass(at, bytes.subspan(reply));
 }
 
 void EchoFilter::pass(Time at, Bytes bytes) {

@@ -282,10 +282,12 @@ void ReplyGuard<Item>::strip_late(Time at) {
 
 template <class Item>
 void ReplyGuard<Item>::count_late(Owed* owed, Time at) {
-  ++late_;
   Time sent_at = sent_at_;
   if (owed != nullptr) sent_at = owed->sent_at.empty() ? owed->lost_last : owed->sent_at[0];
   lateness_ = std::max(lateness_, std::min(at - sent_at, longest_way));
+  // One too many, where nothing was late yet, is more likely to have come twice.
+  if (owed == nullptr && late_ == 0) return;
+  ++late_;
   if (phase_ == Phase::holding) lateness_ = std::max(lateness_, suspected_);  // another one comes: it was
   latest_reply_ = std::max(latest_reply_, lateness_);
   if (owed != nullptr) owed_.came(*owed);

@@ -21,9 +21,10 @@
 namespace absenc::host {
 
 struct Counters {
-  std::uint64_t good = 0;                                  // conversations that ended well
-  std::uint64_t repeated = 0;                              // attempts after an error
-  std::uint64_t late = 0;                                  // replies that came after their time and were dropped
+  std::uint64_t good = 0;       // conversations that ended well
+  std::uint64_t repeated = 0;   // attempts after an error
+  std::uint64_t late = 0;       // replies that came after their time and were dropped
+  std::uint64_t discarded = 0;  // damaged frames of streams, whether an error reported them or not
   std::array<std::uint64_t, error_texts.size()> errors{};  // of each kind, repeated ones included
 
   [[nodiscard]] constexpr std::uint64_t bad() const {
@@ -31,6 +32,17 @@ struct Counters {
     for (const std::uint64_t count : errors) sum += count;
     return sum;
   }
+};
+
+/// Stands between a conversation and what removes its echo: sees what is sent for it and all that comes, late replies
+/// too, and may change it.
+template <class Item>
+struct Filter : Machine<Item> {
+  /// What it serves from now on.
+  virtual void attach(Machine<Item>& inner) = 0;
+
+ protected:
+  ~Filter() = default;
 };
 
 /// Of an encoder that transmits by itself. Whoever reads at a rate of his own wants the newest: what waits in the port
@@ -68,6 +80,12 @@ class Session {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
+  /// As `run`, but a conversation that streams goes on where it stopped.
+  const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
+    if (command_ != &command) streaming_ = false;
+    return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
+  }
+
   /// The position, and whether it is confirmed: compared with the one before, and as near as the limit of the speed
   /// allows. Where there is none before (after opening and after silence), where it is too far away, or where the time
   /// between was too long to tell, it is read again until two in a row agree; when none of ten does, the last one is
@@ -83,7 +101,7 @@ class Session {
     constexpr unsigned most = 11;
     for (unsigned number = 1;; ++number) {
       confirmed_ = false;
-      const Conversation<Item>* conversation = read_once(command);
+      const Conversation<Item>* conversation = next(command);
       if (conversation == nullptr || conversation->error() != Error::none) return conversation;
       const Reading* reading = conversation->reading();
       if (reading == nullptr) return conversation;
@@ -113,6 +131,10 @@ class Session {
   /// What is known of late replies belongs to the line: sessions of encoders on one line share it. It must outlive
   /// them.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
+  /// Late replies are not kept away: for who does not know whose replies they are.
+  void leave_unguarded() { guard_ = nullptr; }
+  /// From the next command on; null: none. It must outlive this.
+  void set_filter(Filter<Item>* filter) { filter_ = filter; }
   /// How late a reply came on this line at the most, until the last command ended; 0: none did.
   [[nodiscard]] Time lateness() const { return lateness_; }
 
@@ -144,10 +166,6 @@ class Session {
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
-  const Conversation<Item>* read_once(const Command& command) {
-    return attempt(command, {}, [](const Conversation<Item>&) { return true; });
-  }
-
   // Another resolution, or other units: nothing before can be compared.
   void follow_options() {
     first_ = FirstReading(reach());
@@ -186,7 +204,8 @@ class Session {
   template <class OnEmit>
   const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     const unsigned attempts = command.repeatable ? attempts_ : 1;
-    const std::uint64_t late_before = guard_->late();
+    command_ = &command;
+    const std::uint64_t late_before = late();
     for (unsigned number = 1;; ++number) {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
@@ -195,6 +214,7 @@ class Session {
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
+      count_discarded(*conversation);
       if (statistics_ != nullptr) statistics_->add(*conversation);
       if (error == Error::none) {
         ++counters_.good;
@@ -203,12 +223,23 @@ class Session {
       ++counters_.errors[static_cast<std::size_t>(error)];
       if (error == Error::timeout) doubt();  // it may have been switched off
       if (number >= attempts || error == Error::invalid_argument) return conversation;
-      if (error == Error::timeout && guard_->late() != late_before) return conversation;  // it would be late again
+      if (error == Error::timeout && late() != late_before) return conversation;  // it would be late again
       ++counters_.repeated;
     }
   }
 
+  [[nodiscard]] std::uint64_t late() const { return guard_ != nullptr ? guard_->late() : 0; }
+
+  // `catch_up` drops frames, not their damage.
+  void count_discarded(const Conversation<Item>& conversation) {
+    const StreamCounts* stream = conversation.stream();
+    if (stream == nullptr) return;
+    counters_.discarded += stream->discarded - discarded_before_;
+    discarded_before_ = stream->discarded;
+  }
+
   Conversation<Item>* make(const Command& command, Arguments arguments) {
+    discarded_before_ = 0;
     const Any<Conversation> made = unit_->host(options_, command, arguments, storage_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
       current_ = made.frames;
@@ -221,6 +252,7 @@ class Session {
   // On a link whose clock is the host's nothing comes late. On a CAN bus others send too: what listens to all of them
   // hears everything.
   [[nodiscard]] bool guarded(const Command& command) const {
+    if (guard_ == nullptr) return false;
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
   }
@@ -230,6 +262,10 @@ class Session {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (echo_.mode() != EchoMode::off) return echo_;
     }
+    return behind_echo();
+  }
+  Machine<Item>& behind_echo() {
+    if (filter_ != nullptr) return *filter_;
     return inner();
   }
   Machine<Item>& inner() {
@@ -243,12 +279,18 @@ class Session {
     if (!again) {
       guarded_ = guarded(command);
       if (guarded_) guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
-      if constexpr (std::is_same_v<Item, std::uint8_t>) echo_.attach(inner());
+      if (filter_ != nullptr) filter_->attach(inner());
+      if constexpr (std::is_same_v<Item, std::uint8_t>) {
+        echo_.judge_by(*unit_, options_);
+        echo_.attach(behind_echo());
+      }
     }
     const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
     // Copied: the guard may be others' by the time anybody asks.
-    counters_.late = guard_->late();
-    lateness_ = guard_->lateness();
+    if (guard_ != nullptr) {
+      counters_.late = guard_->late();
+      lateness_ = guard_->lateness();
+    }
     return ended;
   }
 
@@ -257,9 +299,11 @@ class Session {
   Port<Item>* port_;
   std::span<std::byte> storage_;
   Conversation<Item>* current_ = nullptr;  // in `storage_`
+  const Command* command_ = nullptr;       // of `current_`
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
   bool guarded_ = false;  // the present conversation
+  Filter<Item>* filter_ = nullptr;
   Time lateness_{};
   EchoFilter echo_;
   unsigned attempts_;
@@ -270,6 +314,7 @@ class Session {
   bool confirmed_ = false;  // the last reading
   bool known_ = false;      // any reading since there was doubt
   bool streaming_ = false;  // `current_` has stopped at a result and can go on
+  std::uint64_t discarded_before_ = 0;  // of the present stream, when it stopped last
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;
 };

@@ -29,6 +29,12 @@ struct Explanation {
   std::string_view advice{};  // what to do, in place of the error's own advice
 };
 
+/// What a conversation has taken from an encoder that transmits by itself.
+struct StreamCounts {
+  /// Frames so far that were damaged, or could not be told from damaged ones, whether an error reported them or not.
+  std::uint64_t discarded = 0;
+};
+
 /// Host side. At `emit` and `done` the accessors describe the result; they stay valid until the next feed.
 template <class Item>
 struct Conversation : Machine<Item> {
@@ -40,8 +46,10 @@ struct Conversation : Machine<Item> {
   [[nodiscard]] virtual std::string_view advice() const { return {}; }
   /// The position, when the result is one and there was no error; otherwise null.
   [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
-  /// Whether each `emit` is a result like that of `done`, and the next one follows for as long as this is driven.
-  [[nodiscard]] virtual bool streams() const { return false; }
+  /// Null: it ends by itself. Else each `emit` is a result like that of `done`, and the next one follows for as long as
+  /// this is driven.
+  [[nodiscard]] virtual const StreamCounts* stream() const { return nullptr; }
+  [[nodiscard]] bool streams() const { return stream() != nullptr; }
   /// Every named value of the result. Nothing is put when there was an error.
   virtual void report(FieldSink& sink) const = 0;
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;

@@ -12,10 +12,9 @@
 #include <utility>
 
 #include "absenc/client/conform/changes.hpp"
-#include "absenc/client/conform/edited_port.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/host/session.hpp"
+#include "absenc/client/way/runner.hpp"
 #include "absenc/protocol/clause.hpp"
 
 namespace absenc::client {
@@ -24,14 +23,6 @@ namespace {
 
 constexpr Time listening = std::chrono::milliseconds(20);  // for what comes though nobody waits for it any more
 constexpr std::size_t longest_request = 64;
-
-struct Exchange {
-  Error error = Error::none;
-  std::string detail;
-  bool came = false;
-  Time after{};
-  Time limit{};
-};
 
 bool breaks(Demand demand, Error error) {
   switch (demand) {
@@ -54,33 +45,27 @@ class Tester {
       : unit_(*address.unit),
         options_(address.options),
         latency_(latency),
-        echo_(address.echo),
-        port_(port),
-        storage_(unit_.host_storage),
-        read_(*find_command(unit_, Verb::read)) {
-    if (unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex) {
-      port_.character = address.line.with_some_rate().character();
-    }
-    port_.over = choices.over;
-    watched_.attach(port_);
-    watched_.abort = [this] { return session_ != nullptr && session_->abort(); };
+        runner_(address),
+        read_(*find_command(unit_, Verb::read)),
+        count_(std::max<std::size_t>(1, choices.readings)) {
+    runner_.attach(port, latency);
+    // Once, so that what was changed can still be put back.
+    runner_.port().over = [this, over = choices.over] {
+      if (!over || ended_ || !over()) return false;
+      ended_ = true;
+      throw os::Interrupted{};
+    };
   }
 
-  void read(std::size_t count) {
-    find_echo();
-    for (std::size_t i = 0; i < count; ++i) exchanges_.push_back(once(options_));
-  }
+  void read() { exchanges_ = read_all(options_); }
 
-  [[nodiscard]] bool ended() const { return port_.ended; }
+  [[nodiscard]] bool ended() const { return ended_; }
 
   [[nodiscard]] ChangesLine line() {
     return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments); },
-            .rest = [this](Time time) { port_.listen(time); },
-            .follow =
-                [this](const Command& setter, std::int64_t value) {
-                  options_ = options_behind(unit_, options_, setter, value);
-                  watched_.return_to(line_settings(unit_, options_).rate);
-                }};
+            .rest = [this](Time time) { runner_.listen(time); },
+            .follow = [this](const Command& setter,
+                             std::int64_t value) { options_ = options_behind(unit_, options_, setter, value); }};
   }
 
   void test(const Clause& clause, ClauseResult& result) {
@@ -109,15 +94,11 @@ class Tester {
  private:
   // A conversation that changes the encoder for its own use leaves it as it was when somebody asks to end.
   Ran run(const Command& command, Arguments arguments) {
-    host::Session<Item> session(unit_, options_, watched_, storage_, echo_);
-    session_ = &session;
-    watched_.return_to(line_settings(unit_, options_).rate);
-    struct Forget {
-      host::Session<Item>*& session;
-      ~Forget() { session = nullptr; }
-    } const forget{session_};
-    const Conversation<Item>* ended = session.run(command, arguments);
-    if (watched_.take_aborted()) throw os::Interrupted{};
+    constexpr unsigned attempts = 3;
+    runner_.set_options(options_);
+    runner_.start_again(attempts);
+    const Conversation<Item>* ended = runner_.run(command, arguments);
+    if (runner_.port().take_aborted()) throw os::Interrupted{};
     if (ended == nullptr) throw UsageError(fmt::format("{} cannot run {} with these options", unit_.id, command.name));
     Ran ran{.error = ended->error(), .detail = std::string(ended->detail())};
     if (ran.error != Error::none) return ran;
@@ -138,85 +119,87 @@ class Tester {
     AnswerSink sink;
   };
 
-  // Whether the adapter echoes, from a good exchange; where none is, it does not.
-  void find_echo() {
-    constexpr unsigned attempts = 5;
-    for (unsigned i = 0; i < attempts && echo_ == host::EchoMode::automatic; ++i) {
-      host::Session<Item> session(unit_, options_, port_, storage_, echo_, 1);
-      (void)session.run(read_);
-      echo_ = session.echo().mode();
+  // What one request owes is nothing to the next. What comes when the host has asked again is late, not missing.
+  Attempted once(const Options& options) {
+    runner_.set_options(options);
+    if (!is_streamed(options)) runner_.start_again();
+    Attempted one = runner_.once(read_);
+    if (!one.possible) {
+      throw UsageError(fmt::format("{} cannot be read with these options", unit_.id));
     }
-    if (echo_ == host::EchoMode::automatic) echo_ = host::EchoMode::off;
-    port_.echoes = echo_ == host::EchoMode::on;
-  }
-
-  // With a session of its own: what one owes is nothing to the next.
-  Exchange once(const Options& options) {
-    host::Session<Item> session(unit_, options, port_, storage_, echo_, 1);
-    port_.forget();
-    const Conversation<Item>* ended = session.run(read_);
-    if (ended == nullptr) throw UsageError(fmt::format("{} cannot be read with these options", unit_.id));
-    Exchange one{.error = ended->error(), .detail = std::string(ended->detail())};
+    if (one.error == Error::none || !is_asked() || is_streamed(options)) return one;
     // What a host makes of silence is no matter of what came.
-    if (one.error != Error::none && is_asked() && port_.received.empty()) one.error = Error::timeout;
-    if (one.error != Error::none && is_asked()) port_.listen(listening);
-    // One that comes when the host has asked again is late, not missing.
-    const bool late = port_.after > port_.answer + latency_;
-    one.came = !port_.received.empty() && (port_.unanswered == 0 || late) && one.error != Error::line_stuck;
-    one.after = port_.after;
-    one.limit = port_.answer + latency_;
+    if (!one.answered) one.error = Error::timeout;
+    runner_.listen(listening);
+    runner_.keep_exchange(one);
     return one;
+  }
+  [[nodiscard]] std::vector<Attempted> read_all(const Options& options) {
+    std::vector<Attempted> exchanges;
+    runner_.repeat(
+        {.count = count_}, [&] { return once(options); }, exchanges);
+    return exchanges;
+  }
+  [[nodiscard]] static bool came(const Attempted& one) {
+    return one.answered && (one.unanswered == 0 || one.is_late()) && one.error != Error::line_stuck;
+  }
+  [[nodiscard]] bool is_streamed(const Options& options) const {
+    return unit_.streams != nullptr && unit_.streams(options);
   }
   // Else the host is the clock.
   [[nodiscard]] bool is_asked() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
 
   void test_answered(ClauseResult& result) const {
-    const auto came = std::count_if(exchanges_.begin(), exchanges_.end(), [](const Exchange& one) { return one.came; });
-    conclude(result, came == std::ssize(exchanges_), fmt::format("{} of {} answered", came, exchanges_.size()));
+    const auto answered = std::count_if(exchanges_.begin(), exchanges_.end(), came);
+    conclude(result, answered == std::ssize(exchanges_), fmt::format("{} of {} answered", answered, exchanges_.size()));
   }
 
   void test_time(ClauseResult& result) const {
-    std::optional<Exchange> worst;
-    for (const Exchange& one : exchanges_) {
-      if (one.came && one.limit > Time{} && (!worst || one.after > worst->after)) worst = one;
+    const Attempted* worst = nullptr;
+    for (const Attempted& one : exchanges_) {
+      if (!came(one) || one.limit == Time{}) continue;
+      if (worst == nullptr || one.answered_after > worst->answered_after) worst = &one;
     }
-    if (!worst) return;
+    if (worst == nullptr) return;
     const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
     std::string seen =
-        fmt::format("at most {:.1f} us, of {:.1f} us that a host waits", us(worst->after), us(worst->limit));
+        fmt::format("at most {:.1f} us, of {:.1f} us that a host waits", us(worst->answered_after), us(worst->limit));
     if (latency_ > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(latency_));
-    conclude(result, worst->after <= worst->limit, std::move(seen));
+    conclude(result, worst->answered_after <= worst->limit, std::move(seen));
   }
 
-  [[nodiscard]] std::vector<Exchange> read_with(std::string_view option, std::int64_t value) {
+  [[nodiscard]] std::vector<Attempted> read_with(std::string_view option, std::int64_t value) {
     Options other = options_;
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       if (unit_.options[i].name == option) other.values[i] = value;
     }
-    std::vector<Exchange> exchanges;
-    for (std::size_t i = 0; i < exchanges_.size(); ++i) exchanges.push_back(once(other));
-    return exchanges;
+    return read_all(other);
   }
 
   void test_frames(const Clause& clause, ClauseResult& result) {
-    const std::vector<Exchange> exchanges = clause.option.empty() ? exchanges_ : read_with(clause.option, clause.value);
-    std::size_t came = 0;
+    const std::vector<Attempted> exchanges =
+        clause.option.empty() ? exchanges_ : read_with(clause.option, clause.value);
+    std::size_t replies = 0;
     std::size_t bad = 0;
+    std::uint64_t discarded = 0;
     std::string first;
-    for (const Exchange& one : exchanges) {
-      came += one.came ? 1 : 0;
+    for (const Attempted& one : exchanges) {
+      replies += came(one) ? 1 : 0;
+      discarded += one.discarded;
       if (!breaks(clause.demand, one.error)) continue;
       if (++bad == 1) first = fmt::format(": {} {}", name_of_error(one.error), one.detail);
     }
-    if (came == 0 && bad == 0) return;
-    conclude(result, bad == 0, fmt::format("{} of {} replies break it{}", bad, came, first));
+    if (replies == 0 && bad == 0) return;
+    std::string seen = fmt::format("{} of {} replies break it{}", bad, replies, first);
+    if (discarded != 0) seen += fmt::format("; {} frames of the stream were discarded", discarded);
+    conclude(result, bad == 0, std::move(seen));
   }
   static std::string_view name_of_error(Error error) { return error_texts[static_cast<std::size_t>(error)].name; }
 
   // Silence tells only of an encoder that answers else.
   [[nodiscard]] bool answers() const {
     return std::any_of(exchanges_.begin(), exchanges_.end(),
-                       [](const Exchange& one) { return one.error == Error::none; });
+                       [](const Attempted& one) { return one.error == Error::none; });
   }
 
   void test_foreign(ClauseResult& result) {
@@ -226,43 +209,40 @@ class Tester {
       const Option& option = unit_.options[i];
       if (option.role != Role::encoder) continue;
       other.values[i] = option.maximum == options_.values[i] ? option.minimum : option.maximum;
-      std::vector<Item> sent;
-      port_.edit = [&](std::vector<Item>& request) { sent = request; };
-      const Exchange one = once(other);
-      port_.edit = {};
+      const Attempted one = once(other);
       // On CAN not what comes counts, but what would be an answer: a node may say something else at any time.
       if constexpr (std::is_same_v<Item, CanFrame>) {
         conclude(result, one.error == Error::timeout,
                  fmt::format("address {}: {}", other.values[i], name_of_error(one.error)));
       } else {
-        conclude(result, port_.received.empty(), what_came(sent, port_.received));
+        conclude(result, !one.answered, what_came(one));
       }
       return;
     }
   }
 
-  static std::string what_came(Bytes sent, Bytes came) {
-    return fmt::format("to {:02x} came {}", fmt::join(sent, " "),
-                       came.empty() ? "nothing" : fmt::format("{:02x}", fmt::join(came, " ")));
+  static std::string what_came(const Attempted& one) {
+    const Bytes reply = one.exchange.reply.bytes;
+    return fmt::format("to {:02x} came {}", fmt::join(one.exchange.request.bytes, " "),
+                       reply.empty() ? "nothing" : fmt::format("{:02x}", fmt::join(reply, " ")));
+  }
+  Attempted send_instead(const std::function<void(std::vector<Item>&)>& edit) {
+    runner_.edit = edit;
+    Attempted one = once(options_);
+    runner_.edit = {};
+    return one;
   }
 
   void test_request(const Clause& clause, ClauseResult& result) {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (!answers()) return;
-      std::vector<std::uint8_t> sent;
-      port_.edit = [&](std::vector<std::uint8_t>& request) {
+      const Attempted one = send_instead([&](std::vector<std::uint8_t>& request) {
         if (clause.demand != Demand::damaged_silent) request.assign(1, clause.request);
         if (clause.demand == Demand::damaged_silent && !request.empty()) request.back() ^= 1;
-        sent = request;
-      };
-      once(options_);
-      port_.edit = {};
-      const std::vector<std::uint8_t>& came = port_.received;
-      if (clause.demand == Demand::unknown_reported) {
-        conclude(result, came.size() == clause.reply_size, what_came(sent, came));
-      } else {
-        conclude(result, came.empty(), what_came(sent, came));
-      }
+      });
+      const bool reported = clause.demand == Demand::unknown_reported;
+      const std::size_t wanted = reported ? clause.reply_size : 0;
+      conclude(result, one.exchange.reply.bytes.size() == wanted, what_came(one));
     }
   }
 
@@ -279,11 +259,9 @@ class Tester {
       const auto size = unit_.encode(options_, *find_command(unit_, clause.command), {}, sent);
       if (!size) return;
       sent.resize(*size);
-      port_.edit = [&](std::vector<std::uint8_t>& request) { request = sent; };
-      once(options_);
-      port_.edit = {};
-      const bool silent = !once(options_).came;
-      port_.listen(std::chrono::milliseconds(clause.value) + listening);
+      send_instead([&](std::vector<std::uint8_t>& request) { request = sent; });
+      const bool silent = !came(once(options_));
+      runner_.listen(std::chrono::milliseconds(clause.value) + listening);
       const Ran after = run(read_, {});
       const bool there = after.reading && is_near(*after.reading, before.reading->singleturn);
       conclude(result, silent && there,
@@ -297,13 +275,11 @@ class Tester {
   const Unit& unit_;
   Options options_;
   Time latency_;
-  host::EchoMode echo_;
-  EditedPort<Item> port_;
-  WatchedPort<Item> watched_;
-  host::Session<Item>* session_ = nullptr;  // of the command that runs
-  std::vector<std::byte> storage_;
+  Runner<Item> runner_;
   const Command& read_;
-  std::vector<Exchange> exchanges_;
+  std::size_t count_;
+  bool ended_ = false;  // because of the choice `over`
+  std::vector<Attempted> exchanges_;
 };
 
 ClauseResult untested(const Unit& unit, const Clause& clause) {
@@ -325,7 +301,7 @@ void test_all(const EncoderAddress& address, Port<Item>& port, Time latency, con
   Tester<Item> tester(address, port, latency, choices);
   Changes changes(*address.unit, name, tester.line());
   try {
-    tester.read(std::max<std::size_t>(1, choices.readings));
+    tester.read();
     for (const Clause& clause : clauses_of(*address.unit)) {
       if (changes_encoder(clause.demand) && !choices.changes) continue;
       ClauseResult result = untested(*address.unit, clause);

@@ -338,7 +338,7 @@ TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
       const std::uint64_t seed = random();
       const std::string motion = seed % 2 == 0 ? "" : "?motion=rpm=" + std::to_string(seed % 97);
       const EncoderAddress address = parse_address("sim:" + std::string(unit->id) + motion);
-      const Surroundings surroundings{[seed](const EncoderAddress& to) { return virtual_link(to, seed); },
+      const Surroundings surroundings{[seed](const EncoderAddress& to) { return virtual_link(to, {.pauses = seed}); },
                                       [](const std::string&) { return os::PortFacts{}; }};
       const Examination examination = examine(address, {.readings = 60, .limit = 30s}, surroundings);
       EXPECT_THAT(ids(examination), IsEmpty())

@@ -200,7 +200,7 @@ class Doctor {
           tell("turn the shaft by hand now");
           examiner.read(*read_, most_turned, choices_.turning, seen_.turned);
         }
-        if (wired && !any_heard() && seen_.unasked.empty()) examiner.listen_for_late(seen_);
+        if (wired && !any_heard() && seen_.unasked.empty()) examiner.listen_for_late();
         if (!any_good() && any_heard()) scan(examiner);
       } catch (...) {
         examiner.conclude(seen_);

@@ -12,7 +12,7 @@
 namespace absenc::client {
 
 struct Surroundings {
-  std::function<Link(const EncoderAddress& address)> open = open_link;
+  OpenLink open = open_link;
   std::function<os::PortFacts(const std::string& path)> facts = [](const std::string& path) {
     return os::port_facts(path);
   };

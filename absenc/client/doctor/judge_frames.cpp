@@ -226,9 +226,19 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
   return is_usual ? usual->first : ByteList{};
 }
 
+// A stream goes on to its next good frame: more of them may be damaged than were reported.
+std::size_t unreported(const std::vector<Attempted>& readings) {
+  std::size_t count = 0;
+  for (const Attempted& one : readings) {
+    count += one.discarded - std::min<std::uint64_t>(one.discarded, is_damaged(one) ? 1 : 0);
+  }
+  return count;
+}
+
 Finding some_damage(const Case& one, const All& all) {
-  std::vector<std::string> values{fmt::format("{}", all.size()), fmt::format("{}", one.seen.readings.size()),
-                                  errors_of(one.seen.readings)};
+  const std::size_t more = unreported(one.seen.readings);
+  std::vector<std::string> values{fmt::format("{}", all.size() + more),
+                                  fmt::format("{}", one.seen.readings.size() + more), errors_of(one.seen.readings)};
   const ByteList usual = usual_reply(one.seen.readings);
   if (usual.empty()) return finding(Ailment::sometimes_damaged, values);
   constexpr std::size_t few = 3;  // bits that a disturbance of one bit's length changes, at most
@@ -284,6 +294,12 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   const All all = damaged(one);
   if (std::optional<Finding> two = two_frames(one, all); two && all.size() * 4 > one.seen.readings.size()) {
     findings.push_back(std::move(*two));
+  } else if (one.seen.overfull * 4 > one.seen.readings.size()) {
+    constexpr std::size_t most_shown = 32;
+    const Bytes example = one.seen.overfull_example;
+    findings.push_back(
+        finding(Ailment::two_answer, {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
+                                      to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (!all.empty()) {
     findings.push_back(some_damage(one, all));
   }

@@ -1,76 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests of what is found: virtual encoders in virtual time, with random pauses, and lines that follow a script.
+// For tests of what is found: lines that follow a script.
 #pragma once
 
 #include <algorithm>
 #include <deque>
 #include <functional>
 #include <memory>
-#include <optional>
-#include <random>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
-#include "absenc/client/way/link.hpp"
-#include "absenc/sim/sim_port.hpp"
+#include "absenc/client/virtual_link_test.hpp"
 
 namespace absenc::client {
 
 using namespace std::chrono_literals;
-
-/// Begins each request a random while later.
-template <class Item>
-class UnevenPort final : public Port<Item> {
- public:
-  UnevenPort(Port<Item>& port, std::uint64_t seed) : port_(&port), random_(seed) {}
-  Time now() override { return port_->now(); }
-  void begin(const Step<Item>& step) override {
-    Step<Item> later = step;
-    // On SPI and clocked links pauses have a meaning; so they have within a procedure.
-    if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
-      later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
-    }
-    port_->begin(later);
-  }
-  Event<Item> wait(const Step<Item>& step) override { return port_->wait(step); }
-
- private:
-  Port<Item>* port_;
-  std::mt19937_64 random_;
-};
-
-template <class Item>
-void put_on_line(Link& link, const EncoderAddress& address, Machine<Item>& device, Port<Item>*& port,
-                 std::optional<std::uint64_t> seed) {
-  struct Both {
-    sim::SimPort<Item> line;
-    UnevenPort<Item> uneven;
-    Both(const EncoderAddress& to, Machine<Item>& machine, std::uint64_t number)
-        : line(to.unit->link, to.line.with_some_rate(), machine), uneven(line, number) {}
-  };
-  const auto both = std::make_shared<Both>(address, device, seed.value_or(0));
-  if (seed) {
-    port = &both->uneven;
-  } else {
-    port = &both->line;
-  }
-  link.owner = both;
-}
-
-/// A virtual encoder in virtual time, as its address describes it; `seed`: with random pauses.
-inline Link virtual_link(const EncoderAddress& address, std::optional<std::uint64_t> seed = {}) {
-  Link link;
-  link.place = "here";
-  link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
-  link.device->power_on(Time{});
-  if (link.device->bytes() != nullptr) {
-    put_on_line(link, address, *link.device->bytes(), link.bytes, seed);
-  } else {
-    put_on_line(link, address, *link.device->frames(), link.frames, seed);
-  }
-  return link;
-}
 
 /// A line on which a request is answered by a function, and on which somebody may talk all the time.
 template <class Item>
@@ -146,6 +90,7 @@ class ScriptedPort final : public Port<Item> {
 inline Link link_to(std::shared_ptr<ScriptedPort<std::uint8_t>> port) {
   Link link;
   link.place = "here";
+  link.latency = port->latency;
   link.bytes = port.get();
   link.owner = std::move(port);
   return link;

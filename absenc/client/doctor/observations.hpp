@@ -7,27 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "absenc/capture/search/evidence.hpp"
 #include "absenc/client/doctor.hpp"
+#include "absenc/client/way/runner.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/port_facts.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
-
-/// One reading that was tried, once.
-struct Attempted {
-  Error error = Error::none;
-  std::string detail{};               // in the words of the unit
-  std::string advice{};               // of the unit; "": none
-  capture::HeardExchange exchange{};  // the last one, without echo
-  std::vector<std::uint8_t> raw{};    // all bytes that came, echo included
-  bool heard = false;                 // something came
-  Time after{};                       // from the end of the request to the end of the reply
-  Time allowed{};                     // that the protocol and the characters of the reply take at most
-  std::optional<Reading> reading{};
-};
 
 /// A setting that was tried in place of that of the user.
 struct Trial {
@@ -58,6 +45,8 @@ struct Observations {
   std::uint64_t line_errors = 0;    // of a CAN bus
   std::uint64_t late = 0;           // replies that came after their limit
   Time lateness{};                  // of the latest
+  std::uint64_t overfull = 0;       // good replies behind which more came
+  std::vector<std::uint8_t> overfull_example{};
   std::vector<Trial> trials{};
   host::SpeedLimit limit{};  // how fast it may move
   std::string clash{};       // "address 3": whatever answers there is damaged every time

@@ -11,6 +11,7 @@
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/client/way/diagnosis.hpp"
+#include "absenc/client/way/runner.hpp"
 #include "absenc/client/way/shared_link.hpp"
 
 namespace absenc::client {
@@ -25,21 +26,18 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
 template <class Item>
 class ConnectionOn final : public Connection {
  public:
-  explicit ConnectionOn(const EncoderAddress& uri)
-      : Connection(uri),
-        storage_(std::make_unique<std::byte[]>(uri.unit->host_storage)),
-        session_(*uri.unit, uri.options, port_, {storage_.get(), uri.unit->host_storage}, uri.echo) {
+  ConnectionOn(const EncoderAddress& uri, OpenLink open)
+      : Connection(uri), open_(std::move(open)), runner_(uri, attempts) {
     session_.set_speed_limit(speed_limit(uri));
     session_.observe(&statistics_);
-    port_.abort = [this] { return session_.abort(); };
   }
 
   void connect() override {
-    link_ = connect_link(uri());
+    link_ = connect_link(uri(), open_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
-      port_.attach(*link_->link().frames);
+      runner_.attach(*link_->link().frames, link_->link().latency);
     } else {
-      port_.attach(*link_->link().bytes);
+      runner_.attach(*link_->link().bytes, link_->link().latency);
     }
     session_.share(link_->guard<Item>());
     session_.doubt();
@@ -53,19 +51,19 @@ class ConnectionOn final : public Connection {
     const Command* command = find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     return outcome(*command, link_->take_turn([&] {
-      return_to_rate();
-      return session_.read(*command, take);
+      return runner_.converse([&](host::Session<Item>& session) { return session.read(*command, take); });
     }));
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
     if (link_.use_count() > 1) tell_of_company();
     const Outcome ended = outcome(command, link_->take_turn([&] {
-      return_to_rate();
-      return session_.run(command, arguments, [&](const Conversation<Item>& conversation) {
-        last_ = &conversation;
-        if (on_emit) on_emit();
-        return true;
+      return runner_.converse([&](host::Session<Item>& session) {
+        return session.run(command, arguments, [&](const Conversation<Item>& conversation) {
+          last_ = &conversation;
+          if (on_emit) on_emit();
+          return true;
+        });
       });
     }));
     if (ended.error == Error::none && !ended.aborted && !command.changes_option.empty()) {
@@ -76,7 +74,7 @@ class ConnectionOn final : public Connection {
 
   void set_options(const Options& options) override {
     Connection::set_options(options);
-    session_.set_options(options);
+    runner_.set_options(options);
   }
 
   void end_when(std::function<bool()> over) override { port_.over = std::move(over); }
@@ -122,12 +120,12 @@ class ConnectionOn final : public Connection {
       trouble.advice = outcome.advice;
       return trouble;
     }
-    if (port_.sent.empty() && port_.clocks == 0) return unasked_trouble(outcome);
+    if (line_.request.empty() && line_.clocks == 0) return unasked_trouble(outcome);
     trouble.finding = finding_text(outcome);
     const Diagnosis diagnosis = diagnose_last();
     trouble.message = describe(outcome.error, outcome.detail, diagnosis.finding);
-    trouble.sent = wire_text(port_.sent);
-    trouble.received = port_.clocks == 0 ? wire_text(port_.received) : clocked_text();
+    trouble.sent = wire_text(line_.request);
+    trouble.received = line_.clocks == 0 ? wire_text(line_.received) : clocked_text();
     trouble.exchange = exchange(trouble);
     const std::string_view advice = outcome.advice.empty() ? text_of(outcome.error).advice : outcome.advice;
     trouble.advice = diagnosis.advice.empty() ? std::string(advice) : diagnosis.advice;
@@ -136,8 +134,6 @@ class ConnectionOn final : public Connection {
   }
 
  private:
-  void return_to_rate() { port_.return_to(line_settings(unit(), uri().options).rate); }
-
   // Others have the same line open.
   void tell_of_company() {
     Options options = uri().options;
@@ -169,14 +165,8 @@ class ConnectionOn final : public Connection {
 
   // As `absenc doctor` would call it.
   [[nodiscard]] std::string finding_text(const Outcome& outcome) const {
-    Attempted last{.error = outcome.error, .detail = std::string(outcome.detail), .heard = !port_.received.empty()};
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      if (!port_.received.empty()) last.exchange.reply.can = port_.received.back();
-    } else {
-      last.raw = port_.received;
-      last.exchange.request.bytes = port_.sent;
-      last.exchange.reply = {port_.received, std::min(port_.clocks, port_.received.size() * 8)};
-    }
+    Attempted last{.error = outcome.error, .detail = std::string(outcome.detail)};
+    runner_.keep_exchange(last);
     const host::Counters& counters = session_.counters();
     const bool usually_good = counters.good > counters.bad();
     const Finding found = finding_of(unit(), uri().options, last, usually_good, session_.lateness() != Time{});
@@ -186,7 +176,7 @@ class ConnectionOn final : public Connection {
   // Of a conversation that sent nothing.
   [[nodiscard]] Trouble unasked_trouble(const Outcome& outcome) const {
     const std::span<const Item> damaged = last_->exchange().received;
-    const std::span<const Item> received = damaged.empty() ? std::span<const Item>(port_.received) : damaged;
+    const std::span<const Item> received = damaged.empty() ? std::span<const Item>(line_.received) : damaged;
     Trouble trouble{.error = outcome.error, .message = describe(outcome.error, outcome.detail, {})};
     trouble.received = wire_text(received);
     trouble.exchange = received.empty() ? fmt::format("nothing came from {}", link_->link().place)
@@ -196,39 +186,37 @@ class ConnectionOn final : public Connection {
   }
 
   [[nodiscard]] Diagnosis diagnose_last() const {
-    const Frame sent = to_frame(std::span<const Item>(port_.sent));
-    const std::span<const Item> received(port_.received);
+    const Frame sent = to_frame(std::span<const Item>(line_.request));
     const auto diagnosed = [&](std::span<const Item> reply) {
-      return diagnose(unit(), uri().options, sent, to_frame(reply, port_.clocks));
+      return diagnose(unit(), uri().options, sent, to_frame(reply, line_.clocks));
     };
-    const bool takes_echo = session_.echo().mode() == host::EchoMode::on && received.size() > port_.sent.size();
-    if (!takes_echo) return diagnosed(received);
+    if (line_.echo == 0 || line_.reply().empty()) return diagnosed(line_.received);
     NoFields ignored;
-    if (unit().decode(uri().options, sent, to_frame(received), ignored) == Error::none) {
+    if (unit().decode(uri().options, sent, to_frame(std::span<const Item>(line_.received)), ignored) == Error::none) {
       return {"it is a good reply if no echo is taken from it", "set echo=off or echo=auto"};
     }
-    return diagnosed(received.subspan(port_.sent.size()));
+    return diagnosed(line_.reply());
   }
 
   [[nodiscard]] std::string exchange(const Trouble& trouble) const {
-    if (port_.clocks != 0) {
-      const std::string came = port_.received.empty() ? "nothing" : trouble.received;
-      return fmt::format("{} clocks to {}; received {}", port_.clocks, link_->link().place, came);
+    if (line_.clocks != 0) {
+      const std::string came = line_.received.empty() ? "nothing" : trouble.received;
+      return fmt::format("{} clocks to {}; received {}", line_.clocks, link_->link().place, came);
     }
     const std::string sent = fmt::format("sent {} to {}", trouble.sent, link_->link().place);
-    if (port_.received.empty()) {
+    if (line_.received.empty()) {
       const std::string latency =
           link_->link().latency > Time{} ? fmt::format(" + {} for the way", to_text(link_->link().latency)) : "";
-      return fmt::format("{}; nothing came back within {}{}", sent, to_text(port_.answer), latency);
+      return fmt::format("{}; nothing came back within {}{}", sent, to_text(line_.answer), latency);
     }
-    const Time after = port_.first_received_at - port_.sent_at;
+    const Time after = line_.marks.front().at - line_.sent_at;
     const std::string later = after > Time{} ? fmt::format(" {} later", to_text(after)) : "";
     return fmt::format("{}; received {}{}", sent, trouble.received, later);
   }
 
   // What the last clocks brought.
   [[nodiscard]] std::string clocked_text() const {
-    return to_wire_text(unit().link, to_frame(std::span<const Item>(port_.received), port_.clocks));
+    return to_wire_text(unit().link, to_frame(std::span<const Item>(line_.received), line_.clocks));
   }
 
   [[nodiscard]] std::string wire_text(std::span<const Item> items) const {
@@ -245,10 +233,14 @@ class ConnectionOn final : public Connection {
     }
   }
 
+  static constexpr unsigned attempts = 3;
+
+  OpenLink open_;
   std::shared_ptr<SharedLink> link_;
-  WatchedPort<Item> port_;
-  std::unique_ptr<std::byte[]> storage_;
-  host::Session<Item> session_;
+  Runner<Item> runner_;
+  host::Session<Item>& session_ = runner_.session();
+  WatchedPort<Item>& port_ = runner_.port();
+  const LineExchange<Item>& line_ = runner_.last();
   host::Statistics<Item> statistics_;
   const Conversation<Item>* last_ = nullptr;
 };
@@ -269,9 +261,9 @@ void Connection::set_options(const Options& options) {
   uri_.options = options;
 }
 
-std::unique_ptr<Connection> Connection::make(const EncoderAddress& uri) {
-  if (uri.unit->link == LinkKind::can) return std::make_unique<ConnectionOn<CanFrame>>(uri);
-  return std::make_unique<ConnectionOn<std::uint8_t>>(uri);
+std::unique_ptr<Connection> Connection::make(const EncoderAddress& uri, OpenLink open) {
+  if (uri.unit->link == LinkKind::can) return std::make_unique<ConnectionOn<CanFrame>>(uri, std::move(open));
+  return std::make_unique<ConnectionOn<std::uint8_t>>(uri, std::move(open));
 }
 
 std::unique_ptr<Connection> Connection::open(const EncoderAddress& uri) {

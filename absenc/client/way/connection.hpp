@@ -26,7 +26,7 @@ struct Outcome {
 class Connection {
  public:
   /// Not connected yet.
-  [[nodiscard]] static std::unique_ptr<Connection> make(const EncoderAddress& uri);
+  [[nodiscard]] static std::unique_ptr<Connection> make(const EncoderAddress& uri, OpenLink open = open_link);
   /// Connected. Throws as `connect`.
   [[nodiscard]] static std::unique_ptr<Connection> open(const EncoderAddress& uri);
   virtual ~Connection() = default;

@@ -98,7 +98,7 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
   }
 }
 
-std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri) {
+std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open) {
   Registry& all = registry();
   const std::lock_guard lock(all.mutex);
   std::erase_if(all.opened, [](const Opened& opened) { return opened.link.expired(); });
@@ -106,7 +106,7 @@ std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri) {
     std::shared_ptr<SharedLink> link = opened.link.lock();
     if (link != nullptr && !link->lost() && share_line(opened.uri, uri)) return link;
   }
-  auto link = std::make_shared<SharedLink>(open_link(uri));
+  auto link = std::make_shared<SharedLink>(open(uri));
   all.opened.push_back({uri, link});
   return link;
 }

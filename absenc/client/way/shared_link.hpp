@@ -103,6 +103,6 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
 
 /// The link to this encoder: that of an encoder on the same line, if there is one and it is not lost. Throws
 /// os::Failure, UsageError.
-[[nodiscard]] std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri);
+[[nodiscard]] std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open = open_link);
 
 }  // namespace absenc::client

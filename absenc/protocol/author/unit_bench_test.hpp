@@ -203,7 +203,7 @@ struct UnitBench {
     line.on_emit = [&] {
       ++told.emits;
       if (on_emit) on_emit(conversation);
-      return true;
+      return !conversation.streams();
     };
     told.finished = line.converse(conversation);
     line.on_emit = {};
@@ -211,6 +211,12 @@ struct UnitBench {
     told.frames = device.answer_count() - before;
     told.took = line.now() - begin;
     return told;
+  }
+  /// One that streams: `go_on()` is called for each of its results.
+  void listen(Conversation<std::uint8_t>& conversation, const std::function<bool()>& go_on) {
+    line.on_emit = go_on;
+    line.converse(conversation);
+    line.on_emit = {};
   }
   /// These bytes, at once; and what comes back until the line is silent.
   sim::testing::RawHost raw(Wire request, Time answer = 50ms, Time gap = 5ms) {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/encolink/listen.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "absenc/protocol/encolink/fields.hpp"
 
 namespace absenc::encolink {
 
-Listen::Listen(const Format& format, std::uint32_t count) : format_(format), count_(count) {
+Listen::Listen(const Format& format) : format_(format), discarded_(format.frame_bytes()) {
   if (!format.known()) {
     end(Error::invalid_argument,
         "an encoder that transmits by itself cannot be asked: set resolution and multiturn_bits");
@@ -21,13 +22,14 @@ void Listen::end(Error error, std::string_view detail) {
 }
 
 ByteStep Listen::next(Time now) {
-  if (std::exchange(emit_pending_, false)) {
+  if (!done_ && find()) {
     deadline_ = Time{};  // what happens meanwhile is not the encoder's doing
     return {.kind = ByteStep::Kind::emit};
   }
   if (deadline_ == Time{}) deadline_ = now + listen_limit;
   if (!done_ && now >= deadline_) {  // bytes that are no frames may come before every timer
-    if (skipped_ == 0 && bytes_.empty()) {
+    frame_.clear();
+    if (!heard_) {
       end(Error::timeout, "nothing comes: the encoder does not transmit by itself, or it was unplugged");
     } else {
       end(last_bad_, last_bad_ == Error::out_of_range
@@ -40,50 +42,74 @@ ByteStep Listen::next(Time now) {
 }
 
 void Listen::feed(const ByteEvent& event) {
-  if (event.kind == ByteEvent::Kind::received) {
+  const bool damaged = event.kind == ByteEvent::Kind::line_error;
+  if (done_ || (!damaged && event.kind != ByteEvent::Kind::received)) return;
+  heard_ = true;
+  if (damaged) {
+    disturbed_ = std::exchange(in_step_, false);
+    discarded_.skip(waiting().size() + 1);
+    begin_ = end_ = 0;
+  } else {
     received_at_ = event.at;
-    for (const std::uint8_t byte : event.items) byte_received(byte);
-  } else if (event.kind == ByteEvent::Kind::line_error) {
-    in_step_ = false;
-    skipped_ += bytes_.size() + 1;
-    bytes_.clear();
+    std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(begin_), end_ - begin_, bytes_.begin());
+    end_ -= std::exchange(begin_, 0);
+    const std::size_t fitting = std::min(event.items.size(), bytes_.size() - end_);
+    std::copy_n(event.items.begin(), fitting, bytes_.begin() + static_cast<std::ptrdiff_t>(end_));
+    end_ += fitting;
+    discarded_.skip(event.items.size() - fitting);
   }
+  counts_.discarded = discarded_.count();
 }
 
-void Listen::drop(std::size_t count) {
-  const auto all = bytes_;
-  bytes_.clear();
-  bytes_.append(all.view().subspan(count));
-}
-
-void Listen::byte_received(std::uint8_t byte) {
-  if (done_) return;
-  bytes_.push_back(byte);
+// The next frame, or the loss of them.
+bool Listen::find() {
+  if (std::exchange(disturbed_, false)) {
+    lose(Error::bad_framing, {});
+    return true;
+  }
   const std::size_t size = format_.frame_bytes();
-  while (bytes_.size() >= (in_step_ ? size : 2 * size)) {
-    const Bytes last = bytes_.view().subspan(in_step_ ? 0 : size, size);
-    Result<Position> position = decode_position(format_, bytes_.view().first(size));
-    if (position && !in_step_) position = decode_position(format_, last);
-    in_step_ = position.has_value();
-    if (!position) {
-      last_bad_ = position.error();
-      ++skipped_;
-      drop(1);
-      continue;
+  while (waiting().size() >= (in_step_ ? size : 2 * size)) {
+    const Bytes first = waiting().first(size);
+    const Result<Position> position = decode_position(format_, first);
+    const bool good = position && (in_step_ || decode_position(format_, waiting().subspan(size, size)));
+    if (good) {
+      in_step_ = true;
+      discarded_.found();
+      take(first, *position);
+      begin_ += size;
+      return true;
     }
-    position_ = *position;
-    frame_.clear();
-    frame_.append(last);
-    drop(static_cast<std::size_t>(last.data() - bytes_.view().data()) + size);
-    reading_ = to_reading(format_, position_);
-    reading_.latched = reading_.received = received_at_;  // when it was taken is not known
-    done_ = ++found_ == count_;
-    emit_pending_ = !done_;
+    if (!position) last_bad_ = position.error();
+    const bool lost = std::exchange(in_step_, false);
+    if (lost) lose(last_bad_, first);
+    discarded_.skip(1);
+    ++begin_;
+    counts_.discarded = discarded_.count();
+    if (lost) return true;
   }
+  return false;
+}
+
+void Listen::take(Bytes frame, const Position& position) {
+  error_ = Error::none;
+  detail_ = {};
+  heard_ = false;
+  position_ = position;
+  frame_.clear();
+  frame_.append(frame);
+  reading_ = to_reading(format_, position_);
+  reading_.latched = reading_.received = received_at_;  // when it was taken is not known
+}
+
+void Listen::lose(Error error, Bytes frame) {
+  error_ = error;
+  detail_ = "a frame of the stream is damaged";
+  frame_.clear();
+  frame_.append(frame);
 }
 
 void Listen::report(FieldSink& sink) const {
-  if (error_ == Error::none && found_ > 0) put_position(sink, format_, position_);
+  if (reading() != nullptr) put_position(sink, format_, position_);
 }
 
 }  // namespace absenc::encolink

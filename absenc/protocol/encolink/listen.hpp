@@ -2,50 +2,58 @@
 // The conversation that only listens.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string_view>
 
 #include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/discarded.hpp"
 #include "absenc/protocol/encolink/frame.hpp"
 
 namespace absenc::encolink {
 
-/// For encoders that transmit by themselves: sends nothing, finds the frames by their checksums and emits each. Where
-/// a frame begins is believed after two good ones in a row. Ends after `count` frames (0: never).
+/// For encoders that transmit by themselves: sends nothing, finds the frames by their checksums and emits each, and
+/// each loss of the frames with its error. Where a frame begins is believed after two good ones in a row. Ends only
+/// when nothing good comes any more.
 class Listen final : public Conversation<std::uint8_t> {
  public:
   /// `format` must be known: nobody can be asked. Errors: invalid_argument, timeout, bad_checksum.
-  explicit Listen(const Format& format, std::uint32_t count = 1);
+  explicit Listen(const Format& format);
 
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
+  [[nodiscard]] const StreamCounts* stream() const override { return &counts_; }
   [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return detail_; }
   [[nodiscard]] const Reading* reading() const override {
-    return error_ == Error::none && found_ > 0 ? &reading_ : nullptr;
+    return error_ == Error::none && !frame_.empty() ? &reading_ : nullptr;
   }
   void report(FieldSink& sink) const override;
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
-    return {{}, frame_.empty() ? bytes_.view() : frame_.view(), received_at_, received_at_};
+    return {{}, frame_.empty() ? waiting() : frame_.view(), received_at_, received_at_};
   }
   /// Bytes that belong to no good frame.
-  [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
+  [[nodiscard]] std::uint64_t skipped() const { return discarded_.skipped(); }
 
  private:
-  void byte_received(std::uint8_t byte);
-  void drop(std::size_t count);
+  [[nodiscard]] Bytes waiting() const { return Bytes(bytes_).subspan(begin_, end_ - begin_); }
+  bool find();
+  void take(Bytes frame, const Position& position);
+  void lose(Error error, Bytes frame);
   void end(Error error, std::string_view detail);
 
   Format format_;
-  std::uint32_t count_;
-  std::uint32_t found_ = 0;
-  std::uint64_t skipped_ = 0;
+  DiscardedFrames discarded_;
+  StreamCounts counts_{};
   bool in_step_ = false;
-  bool emit_pending_ = false;
+  bool disturbed_ = false;  // a damaged character came while in step
+  bool heard_ = false;      // anything, since the last good frame
   bool done_ = false;
   Error last_bad_ = Error::wrong_length;
-  ByteBuffer<2 * reply_capacity> bytes_;
-  ReplyBytes frame_;  // the last good one
+  std::array<std::uint8_t, 1024> bytes_{};  // as many as a port hands out at once
+  std::size_t begin_ = 0;                   // of those that were not looked at
+  std::size_t end_ = 0;
+  ReplyBytes frame_;  // the last good or damaged one
   Position position_{};
   Reading reading_{};
   Time deadline_{};

@@ -245,11 +245,8 @@ constexpr CommandOf<Protocol> position(const Command& info) {
 constexpr CommandOf<Protocol> listen(const Command& info) {
   return {.info = info,
           .request = not_known,
-          .make =
-              [](const Format& format, Arguments arguments, std::span<std::byte> storage) {
-                const std::int64_t count = arguments.empty() ? 1 : arguments[0];
-                return make_host<Listen>(storage, format, static_cast<std::uint32_t>(count));
-              },
+          .make = [](const Format& format, Arguments,
+                     std::span<std::byte> storage) { return make_host<Listen>(storage, format); },
           .size = sizeof(Listen)};
 }
 
@@ -391,7 +388,10 @@ constexpr Resolution resolution_of(const Format& format) {
 constexpr Error decode_frames(const Format& format, Frame asked, Frame reply, FieldSink& sink) {
   return decode(format, asked.bytes, reply.bytes, sink);
 }
-constexpr bool is_streaming(const Options& values) { return options.format(values).stream_rate > 0; }
+template <Interface interface>
+constexpr bool is_streaming(const Options& values) {
+  return streams(format_of<interface>(values));
+}
 template <Interface interface>
 BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
   return bits_of(format_of<interface>(values), reply.bytes, field);
@@ -420,7 +420,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
     .is_checked = is_checked,
     .bits = bits_in<interface>,
     .probe = probe,
-    .streams = is_streaming,
+    .streams = is_streaming<interface>,
     .status = &general_status_field,
     .alarms = frame_fields.of<detail::alarms_of>(),
     .registers = register_infos,

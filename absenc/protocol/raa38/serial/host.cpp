@@ -99,6 +99,7 @@ void Listen::feed(const ByteEvent& event) {
     heard_ = true;
     decoder_.disturbed(keep);
   }
+  counts_.discarded = decoder_.discarded();
 }
 
 void Listen::take(const Found& found) {

@@ -34,7 +34,7 @@ class Listen final : public Conversation<std::uint8_t> {
 
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
-  [[nodiscard]] bool streams() const override { return true; }
+  [[nodiscard]] const StreamCounts* stream() const override { return &counts_; }
   [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return words_.detail; }
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
@@ -64,6 +64,7 @@ class Listen final : public Conversation<std::uint8_t> {
   Time heard_at_{};         // of the bytes that are being worked on,
   Time heard_before_{};     // and of those before
   std::uint64_t good_ = 0;  // frames
+  StreamCounts counts_{};
   Reading reading_{};
   FrameBytes frame_;
   Error error_ = Error::none;

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "absenc/protocol/discarded.hpp"
 #include "absenc/protocol/raa38/serial/frame.hpp"
 
 namespace absenc::raa38::serial {
@@ -26,7 +27,10 @@ class StreamDecoder {
  public:
   /// Of what nobody asks an encoder of this format for.
   explicit constexpr StreamDecoder(const Format& format)
-      : format_(format), frame_(format.frame_bytes()), second_byte_(format.own_second_byte()) {}
+      : format_(format),
+        frame_(format.frame_bytes()),
+        second_byte_(format.own_second_byte()),
+        discarded_(format.frame_bytes()) {}
 
   /// `at`: when these bytes were there. Calls `on_frame(const Found&)` in the order of the line.
   template <class OnFrame>
@@ -42,7 +46,7 @@ class StreamDecoder {
   /// A character came that cannot be used.
   template <class OnFrame>
   constexpr void disturbed(OnFrame&& on_frame) {
-    skipped_ += size_ + 1;
+    discarded_.skip(size_ + 1);
     size_ = 0;
     if (!in_step_) return;
     in_step_ = false;
@@ -53,7 +57,9 @@ class StreamDecoder {
   /// Whether the next frame is known to begin where the last one ended.
   [[nodiscard]] constexpr bool in_step() const { return in_step_; }
   /// Bytes that belong to no frame.
-  [[nodiscard]] constexpr std::uint64_t skipped() const { return skipped_; }
+  [[nodiscard]] constexpr std::uint64_t skipped() const { return discarded_.skipped(); }
+  /// Frames that were damaged, or could not be told from damaged ones.
+  [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
   /// Whether something looked like a frame but for a position with too many bits.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
   /// The bytes of the last frame that was none.
@@ -98,7 +104,7 @@ class StreamDecoder {
       hand_out(on_frame);
       hand_out(on_frame);
     } else {
-      ++skipped_;
+      discarded_.skip(1);
       remove(1);
     }
     return true;
@@ -113,6 +119,7 @@ class StreamDecoder {
   template <class OnFrame>
   constexpr void hand_out(OnFrame& on_frame) {
     const Found found{.singleturn = frame_at(0)->singleturn, .at = times_[frame_ - 1]};
+    discarded_.found();
     remove(frame_);
     on_frame(found);
   }
@@ -138,7 +145,7 @@ class StreamDecoder {
   std::uint8_t second_byte_;
   bool in_step_ = false;
   bool saw_larger_positions_ = false;
-  std::uint64_t skipped_ = 0;
+  DiscardedFrames discarded_;
   std::array<std::uint8_t, 2 * frame_capacity> window_{};  // what may still become a frame
   std::array<Time, 2 * frame_capacity> times_{};
   std::size_t size_ = 0;
