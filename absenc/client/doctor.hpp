@@ -45,21 +45,29 @@ enum class Ailment : std::uint8_t {
   baud_pattern,
   // The frames
   two_answer,
+  extra_bytes,
+  bytes_missing,
   same_address,
   wrong_settings,
   other_checksum,
+  contradictory,
   always_damaged,
   damaged_bits,
   damaged_bursts,
   sometimes_damaged,
   sometimes_silent,
+  requests_damaged,
   refused,
+  counter_stands,
   // The time
   reply_late,
+  sometimes_late,
   reply_slow,
   // What the encoder says
   starting,
   alarm,
+  status,
+  position_invalid,
   // The position
   position_noise,
   position_jumps,
@@ -85,11 +93,19 @@ struct Finding {
   [[nodiscard]] std::string sentence() const;
 };
 
+/// How much the readings reported: what none of them reports cannot be called good.
+struct Reported {
+  std::size_t alarms = 0;  // readings that report every alarm of the protocol
+  std::size_t valid = 0;   // readings that report that their position holds
+  std::string missing{};   // the alarms that no reading reports, as "over_speed, over_heat"
+};
+
 struct Examination {
   std::vector<Finding> findings{};  // in the order in which they are to be mended
   std::size_t tried = 0;            // readings
   std::size_t good = 0;             // of them
-  bool complete = true;             // false: it was interrupted
+  Reported reported{};
+  bool complete = true;  // false: it was interrupted
 
   /// Whether nothing is to be mended.
   [[nodiscard]] bool healthy() const;

@@ -16,8 +16,9 @@ namespace absenc {
 struct FlagInfo {
   std::string_view name;     // "" when the bit has no meaning
   std::string_view meaning;  // what has happened
-  std::string_view action;   // what the operator must do; "" when nothing
+  std::string_view action;   // what the operator must do; "" when nothing: it is no ailment
   bool optional = false;     // some encoders have no such flag: one that reports the others and not this one has none
+  bool is_summary = false;   // of a status: raised because alarms are, where the reply carries those they tell more
 };
 
 struct FieldInfo {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
@@ -92,11 +93,14 @@ void judge_silence(const Case& one, std::vector<Finding>& findings) {
 void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   const std::size_t tried = seen.readings.size();
-  // One now and then is a busy computer.
-  if (seen.late == 0 || (one.good > 0 && seen.late * 10 < tried)) return;
+  if (seen.late == 0) return;
+  // A single one may be this computer, which was busy. The verdict counts it all the same.
+  const bool often = one.good == 0 || seen.late * 10 >= tried;
+  if (!often && seen.late < 2) return;
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
-  findings.push_back(finding(Ailment::reply_late, {fmt::format("{}", seen.late), fmt::format("{}", tried),
-                                                   to_text(seen.lateness), fmt::format("{}", allowance)}));
+  findings.push_back(finding(often ? Ailment::reply_late : Ailment::sometimes_late,
+                             {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
+                              to_text(seen.lateness), fmt::format("{}", allowance)}));
 }
 
 void judge_slowness(const Case& one, std::vector<Finding>& findings) {
@@ -158,29 +162,144 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   judge_slowness(one, findings);
 }
 
-void judge_state(const Case& one, std::vector<Finding>& findings) {
-  std::size_t starting = 0;
-  std::size_t read = 0;
-  const Reading* last = nullptr;
-  for (const Attempted& attempt : one.seen.readings) {
-    if (!attempt.reading) continue;
-    ++read;
-    last = &*attempt.reading;
-    starting += last->ready ? 0 : 1;
-  }
-  if (last == nullptr) return;
-  if (starting > 0) {
-    findings.push_back(finding(Ailment::starting, {fmt::format("{}", starting), fmt::format("{}", read),
-                                                   last->ready ? ", and at the end no more" : ""}));
-  }
-  for (const Flags& flags : one.unit.alarms != nullptr ? alarms_of(one.unit, *last) : status_of(one.unit, *last)) {
+namespace {
+
+// A flag that some reading reported as raised.
+struct RaisedFlag {
+  const FlagInfo* flag = nullptr;
+  bool is_alarm = false;
+  std::size_t readings = 0;
+  std::size_t invalid = 0;  // of them, with a position or turns that do not hold
+};
+
+bool is_invalid(const Reading& reading) {
+  return reading.singleturn_validity() == Validity::invalid || reading.multiturn_validity() == Validity::invalid;
+}
+
+void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& reading,
+                 std::vector<RaisedFlag>& counts) {
+  for (const Flags& flags : all) {
     for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
-      const std::string_view action = flag->action.empty() ? "what the encoder's document says of it" : flag->action;
-      findings.push_back(
-          finding(Ailment::alarm, {std::string(flag->name), std::string(flag->meaning), std::string(action)}));
+      if (!is_alarm && (flag->action.empty() || (flag->is_summary && reading.alarms != 0))) continue;
+      // Channels have fields of their own with the same words.
+      auto count = std::ranges::find_if(counts, [&](const RaisedFlag& known) {
+        return known.is_alarm == is_alarm && known.flag->name == flag->name;
+      });
+      if (count == counts.end()) count = counts.insert(counts.end(), {.flag = flag, .is_alarm = is_alarm});
+      ++count->readings;
+      count->invalid += is_invalid(reading) ? 1 : 0;
     }
   }
 }
+
+std::string share(std::size_t some, std::size_t all) {
+  return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
+}
+
+// What position and turns of these readings were invalid without an alarm that says why.
+void judge_validity(const std::vector<const Reading*>& readings, bool is_explained, std::vector<Finding>& findings) {
+  std::size_t position = 0;
+  std::size_t turns = 0;
+  std::size_t usable_bits = 0;
+  for (const Reading* reading : readings) {
+    if (reading->singleturn_validity() == Validity::invalid) {
+      ++position;
+      usable_bits = std::max<std::size_t>(usable_bits, reading->singleturn_valid_bits);
+    }
+    turns += reading->multiturn_validity() == Validity::invalid ? 1 : 0;
+  }
+  if (is_explained || (position == 0 && turns == 0)) return;
+  const std::string upper = usable_bits != 0 ? fmt::format(", but for its upper {} bits", usable_bits) : "";
+  findings.push_back(finding(Ailment::position_invalid,
+                             {fmt::format("{}", std::max(position, turns)), fmt::format("{}", readings.size()),
+                              position > 0 ? "position" : "number of turns", position > 0 ? upper : ""}));
+}
+
+}  // namespace
+
+void judge_state(const Case& one, std::vector<Finding>& findings) {
+  std::vector<const Reading*> readings;
+  std::vector<const Reading*> ready;  // of one that starts nothing else counts
+  for (const Attempted& attempt : one.seen.readings) {
+    if (!attempt.reading) continue;
+    readings.push_back(&*attempt.reading);
+    if (attempt.reading->ready) ready.push_back(&*attempt.reading);
+  }
+  if (readings.empty()) return;
+  if (ready.size() < readings.size()) {
+    findings.push_back(finding(Ailment::starting,
+                               {fmt::format("{}", readings.size() - ready.size()), fmt::format("{}", readings.size()),
+                                readings.back()->ready ? ", and at the end no more" : ""}));
+  }
+  std::vector<RaisedFlag> flags;
+  for (const Reading* reading : ready) {
+    count_flags(alarms_of(one.unit, *reading), true, *reading, flags);
+    count_flags(status_of(one.unit, *reading), false, *reading, flags);
+  }
+  std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
+    return (before.invalid > 0) > (after.invalid > 0);  // what makes the position invalid is mended first
+  });
+  bool is_explained = false;
+  for (const RaisedFlag& raised : flags) {
+    const std::string_view action =
+        raised.flag->action.empty() ? "what the encoder's document says of it" : raised.flag->action;
+    std::string evidence = fmt::format("{} in {} readings", raised.flag->name, share(raised.readings, ready.size()));
+    if (raised.invalid > 0)
+      evidence += fmt::format(", whose position is invalid in {}", share(raised.invalid, raised.readings));
+    findings.push_back(finding(raised.is_alarm ? Ailment::alarm : Ailment::status,
+                               {evidence, std::string(raised.flag->meaning), std::string(action)}));
+    if (raised.invalid > 0) findings.back().severity = Severity::fault;
+    is_explained = is_explained || raised.invalid > 0;
+  }
+  judge_validity(ready, is_explained, findings);
+}
+
+namespace {
+
+// A counter that every reply carries and that never moved.
+void judge_counter(const Case& one, std::vector<Finding>& findings) {
+  constexpr std::size_t enough = 8;
+  std::set<std::int64_t> values;
+  std::size_t count = 0;
+  const FieldInfo* field = nullptr;
+  for (const Attempted& attempt : one.seen.readings) {
+    if (attempt.error != Error::none || !attempt.counter) continue;
+    values.insert(*attempt.counter);
+    field = attempt.counter_field;
+    ++count;
+  }
+  if (count < enough || values.size() != 1) return;
+  findings.push_back(finding(Ailment::counter_stands,
+                             {std::string(field->name), fmt::format("{}", *values.begin()), fmt::format("{}", count)}));
+}
+
+// The alarms of this mask that have a name, in both channels.
+std::set<std::string_view> alarm_names(const Unit& unit, std::uint32_t mask) {
+  std::set<std::string_view> names;
+  for (const Flags& flags : alarms_of(unit, {.alarms = mask})) {
+    for (const std::string_view name : flag_names(*flags.field, flags.bits)) names.insert(name);
+  }
+  return names;
+}
+
+Reported reported_by(const Unit& unit, const Observations& seen) {
+  Reported reported;
+  const std::size_t all = alarm_names(unit, ~0u).size();
+  std::uint32_t ever = 0;
+  for (const Attempted& attempt : seen.readings) {
+    if (!attempt.reading) continue;
+    const std::uint32_t mask = attempt.reading->alarms_reported;
+    ever |= mask;
+    if (all != 0 && alarm_names(unit, mask).size() == all) ++reported.alarms;
+    if (attempt.reading->singleturn_validity() == Validity::valid) ++reported.valid;
+  }
+  for (const std::string_view name : alarm_names(unit, ~ever)) {
+    reported.missing += fmt::format("{}{}", reported.missing.empty() ? "" : ", ", name);
+  }
+  return reported;
+}
+
+}  // namespace
 
 Examination judge(const Unit& unit, const Options& options, const Observations& seen) {
   Examination result{.tried = seen.readings.size(), .complete = seen.complete};
@@ -198,6 +317,8 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   } else {
     if (!explained) judge_mixed_frames(one, result.findings);
     judge_state(one, result.findings);
+    judge_counter(one, result.findings);
+    result.reported = reported_by(unit, seen);
     judge_position(one, seen.readings, false, result.findings);
     judge_position(one, seen.turned, true, result.findings);
   }

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "absenc/capture/search/hypotheses.hpp"
+#include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/error.hpp"
@@ -37,22 +38,23 @@ std::string errors_of(const std::vector<Attempted>& readings) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-bool is_good(const Case& one, const Frame& request, Bytes reply) {
-  NoFields nowhere;
-  return one.unit.decode(one.options, request, {.bytes = reply}, nowhere) == Error::none;
-}
+bool is_good(const Case& one, const Frame& request, Bytes reply) { return decodes(one, request, {.bytes = reply}); }
 
 // ---- None is good
 
-std::vector<const Attempted*> damaged(const Case& one) {
-  std::vector<const Attempted*> all;
+All damaged(const Case& one) {
+  All all;
   for (const Attempted& attempt : one.seen.readings) {
     if (is_damaged(attempt)) all.push_back(&attempt);
   }
   return all;
 }
 
-using All = std::vector<const Attempted*>;
+Finding counted(Ailment ailment, const Case& one, const All& those) {
+  return finding(ailment,
+                 {fmt::format("{}", those.size()), fmt::format("{}", one.seen.readings.size()),
+                  to_hex(Bytes(those.front()->raw).first(std::min<std::size_t>(those.front()->raw.size(), 16)))});
+}
 
 // Whether nearly all are: one or two may be noise.
 template <class Is>
@@ -111,16 +113,70 @@ std::optional<Finding> two_frames(const Case& one, const All& all) {
   return finding(Ailment::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
+// Two that answer at once do not make frames that a single bit would mend.
 std::optional<Finding> same_address(const Case& one, const All&) {
   if (one.seen.clash.empty()) return {};
   return finding(Ailment::same_address, {one.seen.clash});
 }
 
+std::optional<Finding> extra_bytes(const Case& one, const All& all) {
+  const All those = chosen(all, [&](const Attempted& attempt) { return has_good_part(one, attempt); });
+  if (those.empty() || those.size() * 2 < all.size()) return {};
+  return counted(Ailment::extra_bytes, one, those);
+}
+
+std::optional<Finding> bytes_missing(const Case& one, const All& all) {
+  const All those = chosen(all, [&](const Attempted& attempt) { return is_cut(one, attempt); });
+  if (those.empty() || those.size() * 2 < all.size()) return {};
+  return counted(Ailment::bytes_missing, one, those);
+}
+
+std::optional<Finding> single_bits(const Case& one, const All& all) {
+  const std::size_t mended = mended_by_one_bit(one, all);
+  if (mended == 0) return {};
+  return finding(Ailment::damaged_bits,
+                 {fmt::format("{}", all.size()), fmt::format("{}", one.seen.readings.size()),
+                  errors_of(one.seen.readings), fmt::format("{} would be good with one bit changed", mended)});
+}
+
+// A reply that is good by itself, though not to this request.
+bool answers_another(const Case& one, const Attempted& attempt) {
+  return attempt.error != Error::none && one.unit.link != LinkKind::can && !attempt.exchange.request.frame().empty() &&
+         !attempt.exchange.reply.frame().empty() && decodes(one, {}, attempt.exchange.reply.frame());
+}
+
+bool is_contradiction(const Attempted& attempt) {
+  return attempt.error == Error::cross_check_failed || attempt.error == Error::sequence_mismatch ||
+         attempt.error == Error::unexpected_reply;
+}
+
+// These are found behind a good checksum: neither the line nor another protocol makes such replies.
+Finding contradiction(const Case& one, const All& all) {
+  std::size_t count = 0;
+  const Attempted* last = nullptr;
+  for (const Attempted* attempt : all) {
+    if (!is_contradiction(*attempt)) continue;
+    ++count;
+    last = attempt;
+  }
+  const ErrorText& text = text_of(last->error);
+  return finding(Ailment::contradictory,
+                 {fmt::format("{}", count), fmt::format("{}", one.seen.readings.size()), std::string(text.name),
+                  last->detail.empty() ? "" : fmt::format(": {}", last->detail),
+                  last->advice.empty() ? std::string(text.advice) : last->advice});
+}
+
+std::optional<Finding> contradictory(const Case& one, const All& all) {
+  if (!most(all, is_contradiction)) return {};
+  return contradiction(one, all);
+}
+
+bool is_refusal(const Attempted& attempt) {
+  return attempt.error == Error::busy || attempt.error == Error::request_rejected;
+}
+
 std::optional<Finding> refusal(const Case&, const All& all) {
-  const auto refuses = [](const Attempted& attempt) {
-    return attempt.error == Error::busy || attempt.error == Error::request_rejected;
-  };
-  if (!most(all, refuses)) return {};
+  if (!most(all, is_refusal)) return {};
   const Attempted& last = *all.back();
   const ErrorText& text = text_of(last.error);
   return finding(Ailment::refused, {last.detail.empty() ? std::string(text.description) : last.detail,
@@ -133,6 +189,8 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   if (all.size() < enough) return {};
   std::vector<capture::HeardExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
+  constexpr std::size_t most_tried = 32;  // each is decoded with many sets of options
+  exchanges.resize(std::min(exchanges.size(), most_tried));
   const std::vector<capture::Hypothesis> found = capture::find_hypotheses(one.unit, {}, exchanges);
   if (found.empty()) return {};
   const capture::Hypothesis& best = found.front();
@@ -140,8 +198,9 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   if (!mostly || best.evidence.frames > capture::frames_say_enough) return {};
   const std::vector<std::string> settings = settings_for(one.unit, best.options);
   if (settings.empty()) return {};
-  return finding(Ailment::wrong_settings, {fmt::format("{}", all.size()), fmt::format("{}", best.evidence.explained),
-                                           fmt::format("{}", fmt::join(settings, ", "))});
+  return finding(Ailment::wrong_settings,
+                 {fmt::format("{}", exchanges.size()), fmt::format("{}", best.evidence.explained),
+                  fmt::format("{}", fmt::join(settings, ", "))});
 }
 
 std::optional<Finding> other_checksum(const Case&, const All& all) {
@@ -266,8 +325,9 @@ Finding some_damage(const Case& one, const All& all) {
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
   const All all = damaged(one);
   if (all.empty()) return;
-  constexpr std::array looks{stuck_data, own_echo,       modem,          two_frames, same_address,
-                             refusal,    other_settings, other_checksum, stretched};
+  constexpr std::array looks{stuck_data,   own_echo,       modem,    two_frames,     extra_bytes,
+                             single_bits,  bytes_missing,  refusal,  other_settings, contradictory,
+                             same_address, other_checksum, stretched};
   for (const auto& look : looks) {
     if (std::optional<Finding> found = look(one, all)) {
       findings.push_back(std::move(*found));
@@ -291,7 +351,29 @@ Finding finding_of(const Unit& unit, const Options& options, const Attempted& la
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
-  const All all = damaged(one);
+  All all = damaged(one);
+  const auto take = [&all](const auto& is) {
+    All taken;
+    std::erase_if(all, [&](const Attempted* attempt) {
+      if (is(*attempt)) taken.push_back(attempt);
+      return is(*attempt);
+    });
+    return taken;
+  };
+  const auto is_misheard = [&](const Attempted& attempt) {
+    return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
+  };
+  if (const All refused = take(is_misheard); !refused.empty()) {
+    findings.push_back(finding(Ailment::requests_damaged,
+                               {fmt::format("{}", refused.size()), fmt::format("{}", one.seen.readings.size()),
+                                refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
+                                                               : refused.back()->detail}));
+  }
+  // With damage beside them they may be damage that the checksum does not see.
+  if (!all.empty() && std::ranges::all_of(all, [](const Attempted* attempt) { return is_contradiction(*attempt); })) {
+    findings.push_back(contradiction(one, all));
+    all.clear();
+  }
   if (std::optional<Finding> two = two_frames(one, all); two && all.size() * 4 > one.seen.readings.size()) {
     findings.push_back(std::move(*two));
   } else if (one.seen.overfull * 4 > one.seen.readings.size()) {
@@ -300,13 +382,15 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     findings.push_back(
         finding(Ailment::two_answer, {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                       to_hex(example.first(std::min(example.size(), most_shown)))}));
+  } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
+    findings.push_back(std::move(*extra));
   } else if (!all.empty()) {
     findings.push_back(some_damage(one, all));
   }
   const auto silent = static_cast<std::size_t>(
       std::count_if(one.seen.readings.begin(), one.seen.readings.end(),
                     [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
-  if (silent > one.seen.late + 1) {
+  if (silent > 2 * one.seen.late + 1) {  // a late reply can cost the next reading, too
     findings.push_back(
         finding(Ailment::sometimes_silent, {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
   }

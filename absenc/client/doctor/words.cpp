@@ -92,6 +92,14 @@ constexpr auto table = std::to_array<Words>({
 
     {Ailment::two_answer, "two_answer", fault, "{0} of {1} replies held more than one frame, such as {2}",
      "two encoders answer one after the other", "give each an address of its own, or disconnect one"},
+    {Ailment::extra_bytes, "extra_bytes", warning,
+     "{0} of {1} replies are good frames with other bytes before or behind them, such as {2}",
+     "the adapter switches its direction too late, noise stands on the idle line, or a reply comes twice",
+     "bias the idle line, use an adapter that switches its direction by itself, and disconnect what else sends"},
+    {Ailment::bytes_missing, "bytes_missing", warning, "{0} of {1} replies end before the frame is whole, such as {2}",
+     "bytes get lost on the way: an adapter that switches its direction, a driver that takes some for control "
+     "characters",
+     "try another adapter or driver, without flow control and with its direction switched by itself"},
     {Ailment::same_address, "same_address", fault,
      "every reply is damaged, and a scan finds that what answers at {0} is so each time",
      "two encoders have one address and speak at the same time",
@@ -100,9 +108,12 @@ constexpr auto table = std::to_array<Words>({
      "the encoder is another model, or set up otherwise", "set {2}"},
     {Ailment::other_checksum, "other_checksum", fault, "the checksum of {0} replies is wrong, but {1} explains all",
      "it speaks a variant of the protocol", "look for the document of this variant; `absenc crc find` tells more"},
+    {Ailment::contradictory, "contradictory", fault,
+     "{0} of {1} replies are whole, but contradict themselves or their request ({2}){3}",
+     "the encoder is faulty: its channels disagree, or it repeats an old reply", "{4}"},
     {Ailment::always_damaged, "always_damaged", fault, "none of {0} replies is good: {1}, such as {2}",
-     "another protocol, a model or rate that is not the encoder's, or two that answer at once",
-     "check protocol, model and rate; `absenc identify` asks in every protocol"},
+     "a line that damages every reply, another protocol, model or rate, or two encoders that answer at once",
+     "check protocol, model and rate; `absenc identify` asks in every protocol; check termination and wiring"},
     {Ailment::damaged_bits, "damaged_bits", warning, "{0} of {1} replies are damaged ({2}): single bits, {3}",
      "reflections or noise on the edges of the signal",
      "120 ohms at both ends of the line and nowhere else, twisted and shielded pairs, a common ground"},
@@ -115,11 +126,22 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::sometimes_silent, "sometimes_silent", warning, "{0} of {1} requests were not answered",
      "the request does not always arrive, or a contact is loose",
      "check plugs, supply and termination; a busy computer needs latency=MS behind the encoder"},
+    {Ailment::requests_damaged, "requests_damaged", warning, "{0} of {1} requests were refused: {2}",
+     "the request is damaged on its way to the encoder",
+     "check termination, shielding and plugs, and that nobody else sends on the line"},
     {Ailment::refused, "refused", fault, "the encoder refuses to be read: {0}", "its state does not allow it", "{1}"},
+
+    {Ailment::counter_stands, "counter_stands", fault, "the counter {0} stood at {1} in all of {2} replies",
+     "the encoder repeats a reply that it made once",
+     "switch it off and on; if the counter still stands, replace it, and do not use its position until then"},
 
     {Ailment::reply_late, "reply_late", fault,
      "{0} of {1} replies came later than their limit, up to {2} after the request",
      "something on the way holds replies up: a network, a latency timer, a busy computer",
+     "allow the way so long with latency={3} behind the encoder, or find what holds them up"},
+    {Ailment::sometimes_late, "sometimes_late", warning,
+     "{0} of {1} replies came later than their limit, up to {2} after the request",
+     "something holds up single replies: a busy computer, a network, or the encoder itself",
      "allow the way so long with latency={3} behind the encoder, or find what holds them up"},
     {Ailment::reply_slow, "reply_slow", note,
      "even the fastest replies take {0} longer than the {1} that the protocol allows",
@@ -130,6 +152,11 @@ constexpr auto table = std::to_array<Words>({
      "it was switched on just now, or its supply is too weak to come up", "wait, then look again; measure the supply"},
     // The words of the encoder's document
     {Ailment::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
+    {Ailment::status, "status", warning, "the status of the encoder has {0}", "{1}", "{2}"},
+    {Ailment::position_invalid, "position_invalid", fault,
+     "in {0} of {1} readings the encoder says that its {2} does not hold{3}",
+     "a fault that it reports by no alarm of its own",
+     "do not use the position; switch the encoder off and on, and look again"},
 
     {Ailment::position_noise, "position_noise", warning,
      "at standstill the position goes to and fro by {0} counts ({1})",
@@ -194,7 +221,14 @@ bool Examination::healthy() const { return complete && first() == nullptr; }
 std::string Examination::verdict() const {
   if (const Finding* one = first()) return fmt::format("first: {}: {}", one->id, one->action);
   if (!complete) return "interrupted: nothing was found until then";
-  return fmt::format("good: {} of {} readings, nothing to mend", good, tried);
+  std::string evidence = fmt::format("good: {} of {} readings", good, tried);
+  if (good < tried) evidence += fmt::format(" ({} failed)", tried - good);
+  evidence += reported.valid == good ? ", each with a valid position"
+                                     : fmt::format(", {} with a position that is said to be valid", reported.valid);
+  if (good != 0 && reported.alarms == good) evidence += " and no alarm";
+  if (reported.valid < good) evidence += "; whether the others hold is not reported";
+  if (!reported.missing.empty()) evidence += fmt::format("; not reported: {}", reported.missing);
+  return evidence;
 }
 
 }  // namespace absenc::client

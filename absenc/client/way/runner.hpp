@@ -37,10 +37,26 @@ struct Attempted {
   Time after{};                       // from the end of the request to the end of the reply
   Time allowed{};                     // that the protocol and the characters of the reply take at most
   std::optional<Reading> reading{};
+  std::optional<std::int64_t> counter{};  // the first field that counts the replies
+  const FieldInfo* counter_field = nullptr;
   bool possible = true;  // false: the unit cannot do it with these options
 
   /// Whether the reply began after its limit.
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
+};
+
+/// Takes the counter of the replies out of what a command reports.
+class CounterSink final : public FieldSink {
+ public:
+  explicit CounterSink(Attempted& attempt) : attempt_(attempt) {}
+  void put(const FieldValue& value) override {
+    if (value.info->role != Role::sequence || attempt_.counter) return;
+    attempt_.counter = value.number;
+    attempt_.counter_field = value.info;
+  }
+
+ private:
+  Attempted& attempt_;
 };
 
 /// How long a command is run again and again.
@@ -134,7 +150,11 @@ class Runner {
     one.detail = ended->detail();
     one.advice = ended->advice();
     one.discarded = session_->counters().discarded - discarded;
-    if (one.error == Error::none && ended->reading() != nullptr) one.reading = *ended->reading();
+    if (one.error == Error::none) {
+      if (ended->reading() != nullptr) one.reading = *ended->reading();
+      CounterSink counter(one);
+      ended->report(counter);
+    }
     keep_exchange(one);
     if (ended->streams()) keep_frame(one, *ended);
     return one;

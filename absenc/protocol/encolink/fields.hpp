@@ -18,8 +18,11 @@
 namespace absenc::encolink {
 
 inline constexpr std::array<FlagInfo, 2> general_flags{{
-    {"error", "the position is not valid", "read the alarms"},
-    {"warning", "the position is valid, but something is near its limit", "read the alarms"},
+    {.name = "error", .meaning = "the position is not valid", .action = "read the alarms", .is_summary = true},
+    {.name = "warning",
+     .meaning = "the position is valid, but something is near its limit",
+     .action = "read the alarms",
+     .is_summary = true},
 }};
 
 /// What out_of_range means in a position.

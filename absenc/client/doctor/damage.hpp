@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is left of a good frame in replies that were damaged.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "absenc/client/doctor/judges.hpp"
+
+namespace absenc::client {
+
+using All = std::vector<const Attempted*>;
+
+/// Those of which `is` is true, in their order.
+template <class Is>
+[[nodiscard]] All chosen(const All& all, const Is& is) {
+  All those;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(those), [&](const Attempted* one) { return is(*one); });
+  return those;
+}
+
+/// Whether the unit takes this reply for a good one with the options of the user. An empty request: to any request.
+[[nodiscard]] bool decodes(const Case& one, const Frame& request, const Frame& reply);
+
+/// Whether all that came, its begin or its end is a good reply to the request. Links of characters only.
+[[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
+
+/// Whether the frame that begins the reply needs more bytes than came. Links of characters only.
+[[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
+
+/// How many of the replies become good when one of their bits is flipped; 0 when these are no more than of random
+/// replies of the same length, for a short checksum lets many pass by chance.
+[[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
+
+}  // namespace absenc::client

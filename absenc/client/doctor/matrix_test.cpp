@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+// Doctor's matrix, in virtual time: every unit in every mode, with each alarm, each condition at both ends of its
+// range, and each fault at 1, 10 and 100 %. Nothing that was reported or damaged is called good, and no finding names
+// another cause. docs/doctor.md holds the table of first lines; ABSENC_UPDATE_DOCS=1 writes it anew.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gmock/gmock-more-matchers.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/doctor/lines_test.hpp"
+#include "absenc/client/reading.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/host/session.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::client {
+namespace {
+
+using Ids = std::set<std::string_view>;
+
+constexpr std::size_t readings = 200;
+
+/// What a unit may be set to that changes how it is read: its usual options, each model, each value of each option
+/// that has names or is a yes or no.
+std::vector<std::string> modes_of(const Unit& unit) {
+  std::vector<std::string> modes{""};
+  for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));
+  for (const Option& option : unit.options) {
+    if (option.role == Role::rate) continue;  // simulated lines have none that could be wrong
+    for (const std::string_view choice : option.choices) modes.push_back(fmt::format("{}={}", option.name, choice));
+  }
+  return modes;
+}
+
+/// A virtual encoder whose faults and state can be asked when the examination is over.
+struct Watched {
+  std::shared_ptr<VirtualDevice> device;
+  Examination examination{};
+
+  [[nodiscard]] std::uint64_t injected() const {
+    std::uint64_t sum = 0;
+    if (const sim::FaultCounts* counts = device->faults()) {
+      for (const std::uint64_t count : *counts) sum += count;
+    }
+    return sum;
+  }
+};
+
+/// The device behind a line in virtual time.
+Link link_on(const EncoderAddress& address, const std::shared_ptr<VirtualDevice>& device) {
+  struct Both {
+    std::shared_ptr<VirtualDevice> device;
+    std::unique_ptr<sim::SimPort<std::uint8_t>> bytes;
+    std::unique_ptr<sim::SimPort<CanFrame>> frames;
+  };
+  auto both = std::make_shared<Both>();
+  both->device = device;
+  Link link;
+  link.place = "here";
+  const LineSettings line = address.line.with_some_rate();
+  if (device->bytes() != nullptr) {
+    both->bytes = std::make_unique<sim::SimPort<std::uint8_t>>(address.unit->link, line, *device->bytes());
+    link.bytes = both->bytes.get();
+  } else {
+    both->frames = std::make_unique<sim::SimPort<CanFrame>>(address.unit->link, line, *device->frames());
+    link.frames = both->frames.get();
+  }
+  link.owner = both;
+  return link;
+}
+
+std::shared_ptr<VirtualDevice> device_of(const EncoderAddress& address) {
+  auto device = std::make_shared<VirtualDevice>(*address.unit, address.options, address.device);
+  device->power_on(Time{});
+  return device;
+}
+
+EncoderAddress address_of(const Unit& unit, const std::string& mode, const std::string& what) {
+  std::string settings = mode;
+  if (!what.empty()) settings += (settings.empty() ? "" : "&") + what;
+  return parse_address(fmt::format("sim:{}{}{}", unit.id, settings.empty() ? "" : "?", settings));
+}
+
+Watched examined(const EncoderAddress& address) {
+  Watched watched{.device = device_of(address)};
+  const Surroundings surroundings{[&](const EncoderAddress& to) { return link_on(to, watched.device); },
+                                  [](const std::string&) { return os::PortFacts{}; }};
+  watched.examination = examine(address, {.readings = readings, .limit = 60s}, surroundings);
+  return watched;
+}
+
+Ids ids_of(const Examination& examination) {
+  Ids ids;
+  for (const Finding& one : examination.findings) ids.insert(one.id);
+  return ids;
+}
+
+/// One reading without doctor: what the encoder reports in this state, and how it stands on the wire.
+struct Read {
+  Error error = Error::unsupported;
+  std::optional<Reading> reading{};
+  std::string wire{};
+};
+
+template <class Item>
+Read reading_on(const EncoderAddress& address, Port<Item>& port) {
+  std::vector<std::byte> storage(address.unit->host_storage);
+  host::Session<Item> session(*address.unit, address.options, port, storage, address.echo, 1);
+  const Conversation<Item>* one = session.run(*find_command(*address.unit, Verb::read));
+  Read read;
+  if (one == nullptr) return read;
+  read.error = one->error();
+  if (one->reading() != nullptr && read.error == Error::none) read.reading = *one->reading();
+  for (const auto& items : {one->exchange().sent, one->exchange().received}) {
+    for (const Item& item : items) {
+      if constexpr (std::is_same_v<Item, CanFrame>) {
+        read.wire += fmt::format("{:x} {:02x} ", item.id, fmt::join(Bytes(item.data).first(item.size), ""));
+      } else {
+        read.wire += fmt::format("{:02x}", item);
+      }
+    }
+    read.wire += " ";
+  }
+  return read;
+}
+Read reading_of(const EncoderAddress& address) {
+  const Link link = link_on(address, device_of(address));
+  return link.bytes != nullptr ? reading_on(address, *link.bytes) : reading_on(address, *link.frames);
+}
+
+/// What of it tells an ailment: a status without an action is none.
+std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
+  std::uint64_t bits = reading.alarms;
+  unsigned at = 0;
+  for (const Flags& flags : status_of(unit, reading)) {
+    for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
+      if (!flag->action.empty())
+        bits |= std::uint64_t{1} << (32 + at + static_cast<std::size_t>(flag - flags.field->flags.data()));
+    }
+    at += 8;
+  }
+  return bits;
+}
+
+/// What doctor may say of a state that the encoder reports by itself.
+const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradictory", "counter_stands", "refused"};
+
+/// And of each fault, by its kind. Damage shows as what the frames make of it.
+const Ids& causes_of(sim::FaultKind kind) {
+  using enum sim::FaultKind;
+  static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
+                          "position_jumps", "position_noise", "stuck_bits",        "can_errors"};
+  static const std::map<sim::FaultKind, Ids> others{
+      {delay, {"reply_late", "sometimes_late"}},
+      {echo, {"wrong_echo", "two_answer", "extra_bytes"}},
+      {garbage,
+       {"extra_bytes", "bytes_missing", "sometimes_damaged", "damaged_bits", "damaged_bursts", "always_damaged",
+        "position_jumps", "position_noise", "stuck_bits"}},
+      {silence, {"no_answer", "sometimes_silent", "miso_stuck"}},
+      {repeat, {"two_answer", "extra_bytes"}},
+      {request_corrupt, {"requests_damaged", "sometimes_silent", "no_answer", "refused"}},
+  };
+  const auto found = others.find(kind);
+  return found == others.end() ? damage : found->second;
+}
+
+std::string differences(const Ids& ids, const Ids& allowed) {
+  std::string text;
+  for (const std::string_view id : ids) {
+    if (!allowed.contains(id)) text += fmt::format(" {}", id);
+  }
+  return text;
+}
+
+class Matrix : public ::testing::TestWithParam<const Unit*> {
+ protected:
+  const Unit& unit() const { return *GetParam(); }
+};
+
+/// Those with which a virtual encoder is read at all, each way of being read once.
+std::vector<std::string> readable_modes(const Unit& unit) {
+  std::vector<std::string> modes;
+  std::set<std::string> known;
+  for (const std::string& mode : modes_of(unit)) {
+    try {
+      const EncoderAddress address = address_of(unit, mode, "");
+      const Read one = reading_of(address);
+      if (one.error == Error::none && known.insert(one.wire).second) modes.push_back(mode);
+    } catch (const std::exception&) {  // options that exclude each other
+    }
+  }
+  return modes;
+}
+
+TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
+  for (const std::string& mode : readable_modes(unit())) {
+    const Watched one = examined(address_of(unit(), mode, ""));
+    SCOPED_TRACE(fmt::format("{}?{}", unit().id, mode));
+    EXPECT_TRUE(one.examination.healthy()) << one.examination.verdict();
+    EXPECT_THAT(ids_of(one.examination), ::testing::IsEmpty());
+    const std::string verdict = one.examination.verdict();
+    EXPECT_NE(verdict.find(fmt::format("{} of {} readings", readings, readings)), std::string::npos) << verdict;
+    const std::optional<Reading> reading = reading_of(address_of(unit(), mode, "")).reading;
+    const bool is_valid = reading->singleturn_validity() == Validity::valid;
+    EXPECT_EQ(verdict.find("each with a valid position") != std::string::npos, is_valid) << verdict;
+    if (reading->alarms_reported == 0) {
+      EXPECT_EQ(verdict.find("no alarm"), std::string::npos) << verdict;
+    }
+  }
+}
+
+TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
+  std::size_t reported = 0;
+  std::size_t unreported = 0;
+  for (const std::string& mode : readable_modes(unit())) {
+    std::vector<std::string> states;
+    if (unit().alarms != nullptr) {
+      for (const FlagInfo& flag : unit().alarms->flags) {
+        if (!flag.name.empty()) states.push_back(fmt::format("alarm={}", flag.name));
+      }
+    }
+    for (const Condition& condition : unit().conditions) {
+      for (const std::int64_t value : {condition.minimum, condition.maximum}) {
+        if (value != condition.normal) states.push_back(fmt::format("condition={}={}", condition.name, value));
+      }
+    }
+    const std::optional<Reading> usual = reading_of(address_of(unit(), mode, "")).reading;
+    for (const std::string& state : states) {
+      SCOPED_TRACE(fmt::format("{}?{} {}", unit().id, mode, state));
+      std::optional<EncoderAddress> address;
+      try {
+        address = address_of(unit(), mode, state);
+        static_cast<void>(device_of(*address));
+      } catch (const std::exception&) {  // the options exclude it
+        continue;
+      }
+      const auto [error, reading, wire] = reading_of(*address);
+      const bool is_reported = error != Error::none || ailments_of(unit(), *reading) != ailments_of(unit(), *usual) ||
+                               reading->ready != usual->ready ||
+                               reading->singleturn_validity() != usual->singleturn_validity() ||
+                               reading->multiturn_validity() != usual->multiturn_validity();
+      const Examination examination = examined(*address).examination;
+      const Ids ids = ids_of(examination);
+      if (!is_reported) {
+        ++unreported;
+        continue;
+      }
+      ++reported;
+      EXPECT_FALSE(examination.healthy()) << examination.verdict();
+      EXPECT_EQ(differences(ids, of_state), "") << examination.verdict();
+      std::string sentences;
+      for (const Finding& one : examination.findings) sentences += one.sentence() + "\n";
+      if (reading && reading->ready) {
+        for (const Flags& flags : alarms_of(unit(), *reading)) {
+          for (const std::string_view name : flag_names(*flags.field, flags.bits)) {
+            EXPECT_NE(sentences.find(name), std::string::npos) << name << " is not named in\n" << sentences;
+          }
+        }
+      }
+    }
+  }
+  std::printf("%s: %zu states reported, %zu not\n", std::string(unit().id).c_str(), reported, unreported);
+}
+
+/// How its frames are damaged depends on whether it is asked or sends by itself, not on what they carry.
+std::vector<std::string> damaged_modes(const Unit& unit) {
+  std::vector<std::string> modes;
+  std::set<bool> known;
+  for (const std::string& mode : readable_modes(unit)) {
+    const bool streams = unit.streams != nullptr && unit.streams(address_of(unit, mode, "").options);
+    if (known.insert(streams).second) modes.push_back(mode);
+  }
+  return modes;
+}
+
+TEST_P(Matrix, DamageIsNeverGoodAndNamedAsWhatItIs) {
+  for (const std::string& mode : damaged_modes(unit())) {
+    for (std::size_t kind = 0; kind < sim::fault_names.size(); ++kind) {
+      for (const double rate : {0.01, 0.1, 1.0}) {
+        SCOPED_TRACE(fmt::format("{}?{} {}={}", unit().id, mode, sim::fault_names[kind], rate));
+        const EncoderAddress address =
+            address_of(unit(), mode, fmt::format("fault={}={}", sim::fault_names[kind], rate));
+        const Watched one = examined(address);
+        const Examination& examination = one.examination;
+        const bool all_good = examination.good == examination.tried;
+        // A fault that changes nothing for the host is none: a delay within its limit.
+        if (one.injected() == 0 || (all_good && examination.findings.empty())) continue;
+        EXPECT_TRUE(!examination.healthy() || examination.good + 1 == examination.tried) << examination.verdict();
+        EXPECT_EQ(differences(ids_of(examination), causes_of(static_cast<sim::FaultKind>(kind))), "")
+            << examination.verdict();
+      }
+    }
+  }
+}
+
+std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
+  std::string name(one.param->id);
+  for (char& letter : name) letter = letter == '-' ? '_' : letter;
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, Matrix, ::testing::ValuesIn(all_units().begin(), all_units().end()), name_of_test);
+
+}  // namespace
+}  // namespace absenc::client
