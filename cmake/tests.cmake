@@ -33,7 +33,8 @@ function(absenc_test name)
   else()
     target_precompile_headers(${name}_test REUSE_FROM test_headers)
   endif()
-  gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
+  gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+                       PROPERTIES ENVIRONMENT "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")  # of generated documents
 endfunction()
 
 # GLOB: the tests of the folder alone, GLOB_RECURSE: and of those in it. ABSENC_SPLIT_TESTS: of units, each source by itself

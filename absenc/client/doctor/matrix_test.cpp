@@ -217,23 +217,28 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
   }
 }
 
+/// Each alarm, and each condition at both ends of its range, as settings of a virtual encoder.
+std::vector<std::string> states_of(const Unit& unit) {
+  std::vector<std::string> states;
+  if (unit.alarms != nullptr) {
+    for (const FlagInfo& flag : unit.alarms->flags) {
+      if (!flag.name.empty()) states.push_back(fmt::format("alarm={}", flag.name));
+    }
+  }
+  for (const Condition& condition : unit.conditions) {
+    for (const std::int64_t value : {condition.minimum, condition.maximum}) {
+      if (value != condition.normal) states.push_back(fmt::format("condition={}={}", condition.name, value));
+    }
+  }
+  return states;
+}
+
 TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
   std::size_t reported = 0;
   std::size_t unreported = 0;
   for (const std::string& mode : readable_modes(unit())) {
-    std::vector<std::string> states;
-    if (unit().alarms != nullptr) {
-      for (const FlagInfo& flag : unit().alarms->flags) {
-        if (!flag.name.empty()) states.push_back(fmt::format("alarm={}", flag.name));
-      }
-    }
-    for (const Condition& condition : unit().conditions) {
-      for (const std::int64_t value : {condition.minimum, condition.maximum}) {
-        if (value != condition.normal) states.push_back(fmt::format("condition={}={}", condition.name, value));
-      }
-    }
     const std::optional<Reading> usual = reading_of(address_of(unit(), mode, "")).reading;
-    for (const std::string& state : states) {
+    for (const std::string& state : states_of(unit())) {
       SCOPED_TRACE(fmt::format("{}?{} {}", unit().id, mode, state));
       std::optional<EncoderAddress> address;
       try {
@@ -299,6 +304,77 @@ TEST_P(Matrix, DamageIsNeverGoodAndNamedAsWhatItIs) {
       }
     }
   }
+}
+
+// ---- The tables of docs/doctor.md
+
+std::string first_of(const Examination& examination) {
+  const Finding* first = examination.first();
+  return first == nullptr ? "good" : std::string(first->id);
+}
+
+/// A row a unit, a column a fault: the first finding at 1, 10 and 100 %, once where they are the same.
+std::string fault_table() {
+  std::string table = "| protocol |";
+  for (const std::string_view name : sim::fault_names) table += fmt::format(" {} |", name);
+  table += "\n|---|";
+  for (std::size_t i = 0; i < sim::fault_names.size(); ++i) table += "---|";
+  table += "\n";
+  for (const Unit* unit : all_units()) {
+    table += fmt::format("| {} |", unit->id);
+    for (const std::string_view name : sim::fault_names) {
+      std::vector<std::string> ids;
+      for (const double rate : {0.01, 0.1, 1.0}) {
+        const std::string id =
+            first_of(examined(address_of(*unit, "", fmt::format("fault={}={}", name, rate))).examination);
+        if (ids.empty() || ids.back() != id) ids.push_back(id);
+      }
+      table += fmt::format(" {} |", fmt::join(ids, ", "));
+    }
+    table += "\n";
+  }
+  return table;
+}
+
+/// Each alarm and each condition at its ends, with the finding and what it says was seen.
+std::string state_table() {
+  std::string table = "| protocol | state of the encoder | first finding | evidence |\n|---|---|---|---|\n";
+  for (const Unit* unit : all_units()) {
+    for (const std::string& state : states_of(*unit)) {
+      std::optional<Examination> examination;
+      try {
+        examination = examined(address_of(*unit, "", state)).examination;
+      } catch (const std::exception&) {  // the options exclude it
+        continue;
+      }
+      const Finding* first = examination->first();
+      table += fmt::format("| {} | {} | {} | {} |\n", unit->id, state, first_of(*examination),
+                           first == nullptr ? examination->verdict().substr(6) : first->evidence);
+    }
+  }
+  return table;
+}
+
+/// The lines between `<!-- name -->` and `<!-- end -->`.
+std::string& replace_between(std::string& text, const std::string& name, const std::string& with) {
+  const std::string begin = fmt::format("<!-- {} -->\n", name);
+  const std::size_t from = text.find(begin);
+  const std::size_t to = text.find("<!-- end -->", from);
+  if (from == std::string::npos || to == std::string::npos) throw std::runtime_error("docs/doctor.md has no " + begin);
+  return text.replace(from + begin.size(), to - from - begin.size(), with);
+}
+
+TEST(DoctorTables, StandInTheDocumentAsTheyAreToday) {
+  const char* const sources = std::getenv("ABSENC_SOURCE_DIR");
+  if (sources == nullptr) GTEST_SKIP() << "ABSENC_SOURCE_DIR names no sources";
+  const std::string path = fmt::format("{}/docs/doctor.md", sources);
+  std::stringstream read;
+  read << std::ifstream(path).rdbuf();
+  std::string text = read.str();
+  replace_between(text, "faults", fault_table());
+  replace_between(text, "states", state_table());
+  if (std::getenv("ABSENC_UPDATE_DOCS") != nullptr) std::ofstream(path) << text;
+  EXPECT_TRUE(text == read.str()) << "write it anew: ABSENC_UPDATE_DOCS=1 ctest -R DoctorTables";
 }
 
 std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
