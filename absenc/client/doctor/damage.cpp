@@ -37,7 +37,8 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
   if (!has_characters(one) || attempt.raw.empty()) return false;
   const Frame request = attempt.exchange.request.frame();
   const Bytes raw = attempt.raw;
-  for (std::size_t size = 2; size <= raw.size(); ++size) {
+  // With more beside it than half of a frame it is what follows on one that was damaged.
+  for (std::size_t size = std::max<std::size_t>(2, raw.size() * 2 / 3); size <= raw.size(); ++size) {
     if (decodes(one, request, {.bytes = raw.first(size)}) || decodes(one, request, {.bytes = raw.last(size)}))
       return true;
   }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 
+#include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/reading.hpp"
@@ -67,7 +68,7 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    if (!reply.empty() && all_are(reply, 0)) ++zeros;
+    if (!reply.empty() && all_are(reply, 0) && !is_cut(one, attempt)) ++zeros;
   }
   const std::size_t heard = count(seen.readings, was_heard);
   if (heard > 0 && zeros == heard) return fmt::format("{} replies came, all of them nothing but 00", zeros);

@@ -70,7 +70,9 @@ std::optional<Finding> stuck_data(const Case& one, const All& all) {
     const bool stuck = most(all, [&](const Attempted& attempt) {
       return !attempt.raw.empty() && std::all_of(attempt.raw.begin(), attempt.raw.end(), is_level);
     });
-    if (stuck) return finding(Ailment::miso_stuck, {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
+    const bool is_stuck = most(all, [](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
+    if (stuck || (is_stuck && level == 0xFF))
+      return finding(Ailment::miso_stuck, {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
   }
   return {};
 }
@@ -360,6 +362,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     });
     return taken;
   };
+  // Where the host is the clock, a line that never moved is silence.
+  const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
   const auto is_misheard = [&](const Attempted& attempt) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
   };
@@ -387,9 +391,10 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   } else if (!all.empty()) {
     findings.push_back(some_damage(one, all));
   }
-  const auto silent = static_cast<std::size_t>(
-      std::count_if(one.seen.readings.begin(), one.seen.readings.end(),
-                    [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
+  const auto silent =
+      stuck.size() + static_cast<std::size_t>(std::count_if(
+                         one.seen.readings.begin(), one.seen.readings.end(),
+                         [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
   if (silent > 2 * one.seen.late + 1) {  // a late reply can cost the next reading, too
     findings.push_back(
         finding(Ailment::sometimes_silent, {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
