@@ -36,11 +36,23 @@ bool decodes(const Case& one, const Frame& request, const Frame& reply) {
 bool has_good_part(const Case& one, const Attempted& attempt) {
   if (!has_characters(one) || attempt.raw.empty()) return false;
   const Frame request = attempt.exchange.request.frame();
-  const Bytes raw = attempt.raw;
-  // With more beside it than half of a frame it is what follows on one that was damaged.
-  for (std::size_t size = std::max<std::size_t>(2, raw.size() * 2 / 3); size <= raw.size(); ++size) {
-    if (decodes(one, request, {.bytes = raw.first(size)}) || decodes(one, request, {.bytes = raw.last(size)}))
+  const auto is_frame = [&](Bytes bytes) {
+    const FrameEnd end = one.unit.frame_end(one.options, Direction::reply, bytes);
+    return end.kind == FrameEnd::Kind::complete && end.size == bytes.size() && decodes(one, request, {.bytes = bytes});
+  };
+  Bytes raw = attempt.raw;
+  const Bytes sent = request.bytes;
+  if (!sent.empty() && raw.size() > sent.size() && std::equal(sent.begin(), sent.end(), raw.begin()) &&
+      is_frame(raw.subspan(sent.size()))) {
+    return true;
+  }
+  // Of two frames both are good; with more than half of a frame beside it, one follows on another that was damaged.
+  for (std::size_t size = 2; size < raw.size(); ++size) {
+    const bool is_long = size * 3 >= raw.size() * 2;
+    if (is_long ? is_frame(raw.first(size)) || is_frame(raw.last(size))
+                : is_frame(raw.first(size)) && is_frame(raw.subspan(size))) {
       return true;
+    }
   }
   return false;
 }

@@ -22,7 +22,8 @@ template <class Is>
 /// Whether the unit takes this reply for a good one with the options of the user. An empty request: to any request.
 [[nodiscard]] bool decodes(const Case& one, const Frame& request, const Frame& reply);
 
-/// Whether all that came, its begin or its end is a good reply to the request. Links of characters only.
+/// Whether a good reply to the request came with other bytes beside it: the request before it, a few bytes before or
+/// behind it, or the same again. Links of characters only.
 [[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
 
 /// Whether the frame that begins the reply needs more bytes than came. Links of characters only.

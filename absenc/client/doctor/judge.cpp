@@ -94,7 +94,8 @@ void judge_silence(const Case& one, std::vector<Finding>& findings) {
 void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   const std::size_t tried = seen.readings.size();
-  if (seen.late == 0) return;
+  // On a CAN bus encoders send unasked: what comes behind a request that was not answered is no late answer to it.
+  if (seen.late == 0 || one.unit.link == LinkKind::can) return;
   // A single one may be this computer, which was busy. The verdict counts it all the same.
   const bool often = one.good == 0 || seen.late * 10 >= tried;
   if (!often && seen.late < 2) return;

@@ -395,7 +395,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
       stuck.size() + static_cast<std::size_t>(std::count_if(
                          one.seen.readings.begin(), one.seen.readings.end(),
                          [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
-  if (silent > 2 * one.seen.late + 1) {  // a late reply can cost the next reading, too
+  const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
+  if (silent > 2 * late + 1) {  // a late reply can cost the next reading, too
     findings.push_back(
         finding(Ailment::sometimes_silent, {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
   }
