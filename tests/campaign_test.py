@@ -45,9 +45,26 @@ class Campaign(Case):
         self.assertIn("exchanges a second", text.stderr)
         self.assertIn("nothing is computed", absenc("campaign", "esl", "--exchanges", "2000").stdout)
 
+    def test_confirmed_positions_of_a_turning_shaft(self):
+        arguments = ("ssi", "--fault", "corrupt=0.1", "--exchanges", "10000", "--rpm", "60", "--max-rpm")
+        for limit, most in (("10000", 0.1), ("100", 0.03)):
+            guarded = self.result(*arguments, limit)["guarded"]
+            self.assertGreater(guarded["alone"]["count"] / guarded["alone"]["of"], 0.05)
+            wrong, confirmed = guarded["wrong"]["count"], guarded["confirmed"]["count"]
+            self.assertLess(wrong / confirmed, most, limit)
+            self.assertAlmostEqual(wrong, guarded["let_through"], delta=5 * guarded["let_through"] ** 0.5)
+        text = absenc("campaign", *arguments, "100").stdout
+        self.assertRegex(text, r"wrong and confirmed +\d+ +of \d+ confirmed")
+        self.assertIn("agree by chance with the position before", text)
+        table = absenc("campaign", "--exchanges", "200", "--rpm", "-60", "--fault", "bit=0").stdout.splitlines()
+        self.assertIn("LET THROUGH", table[0])
+        for line in table[1:]:
+            self.assertEqual(line.split()[3:7], ["100", "%", "0", "0"], line)
+
     def test_wrong_usage(self):
         for arguments, word in ((("tformat", "--fault", "bits=0.1"), "did you mean bit?"), (("tformat", "--fault", "bit=2"), "0 to 1"),
-                                (("tformatt",), "tformat"), (("--model", "23-bit"), "one protocol")):
+                                (("tformatt",), "tformat"), (("--model", "23-bit"), "one protocol"),
+                                (("ssi", "--max-rpm", "100"), "set --rpm as well")):
             result = absenc("campaign", *arguments)
             self.assertEqual(result.returncode, 2, arguments)
             self.assertIn(word, result.stderr)

@@ -111,6 +111,26 @@ class Recording(Case):
             self.assertEqual(row["position_mm"], "")
 
 
+class SpeedLimit(Case):
+    def test_is_in_millimetres_a_second(self):
+        encoder = "sim:biss?model=linear-26-1um"
+        self.assert_good(absenc("read", f"{encoder}&max_mm_s=500"))
+        for setting, other in (("&max_rpm=500", "max_mm_s=MM/S"), ("&max_mm_s=0", "max_mm_s")):
+            result = absenc("read", encoder + setting)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn(other, result.stderr)
+        result = absenc("read", "sim:biss?max_mm_s=500")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("set max_rpm=RPM", result.stderr)
+
+    def test_a_pause_says_how_to_set_it(self):
+        """A scale of 67 m: nobody knows where a carriage of 1000 m/s was meanwhile."""
+        log = os.path.join(self.directory, "pause.csv")
+        result = absenc("record", "sim:biss?model=linear-26-1um&max_mm_s=1000000", "--output", log, "--rate", "10", "--for", "0.5")
+        self.assertIn("at up to 1000000 mm/s", result.stderr)
+        self.assertIn("max_mm_s=MM/S", result.stderr)
+
+
 class Monitor(Case):
     def test_lines(self):
         text = absenc("monitor", FAST, "--for", "1").stdout

@@ -144,6 +144,28 @@ class Simulated(EncoderCase):
         self.assertEqual(len({reading["angle_deg"] for reading in readings}), 5)
         self.assertEqual(readings[0]["singleturn_bits"], 23)
 
+    def test_damaged_words_are_not_confirmed(self):
+        """SSI has no check: only another word that agrees, within what the shaft can turn meanwhile, tells."""
+        result = absenc("read", "sim:ssi?fault=corrupt=1&max_rpm=1", "--json", "--count", "6", "--rate", "50")
+        readings = [json.loads(line) for line in result.stdout.splitlines()]
+        self.assertEqual(len(readings), 6)
+        for one in readings:
+            away = min(one["singleturn"], 4096 - one["singleturn"])
+            self.assertTrue(not one["confirmed"] or away <= 4, one)  # counts: what noise may do
+        doubtful = [one for one in readings if not one["confirmed"]]
+        self.assertTrue(doubtful)
+        for one in doubtful:
+            self.assertEqual((one["singleturn_valid"], one["angle_deg"]), (False, None))
+
+    def test_every_model_has_a_speed_limit(self):
+        """Words of which three of ten are damaged: a twentieth of the confirmed ones may agree by chance."""
+        for encoder in ("sim:ssi?fault=corrupt=0.3&max_rpm=1", "sim:amt21?fault=corrupt=0.3&max_rpm=1"):
+            result = absenc("read", encoder, "--json", "--count", "400", "--rate", "0")
+            readings = [json.loads(line) for line in result.stdout.splitlines()]
+            confirmed = [one["singleturn"] for one in readings if one.get("confirmed")]
+            self.assertGreater(len(confirmed), 300, encoder)
+            self.assertLess(sum(one != 0 for one in confirmed), 40, encoder)
+
     def test_faults_and_alarms(self):
         self.assert_failed(absenc("read", "sim:tformat?fault=silence=1"), "timeout", "the virtual encoder")
         result = absenc("read", "sim:tformat?alarm=over_heat&alarm=battery_alarm", "--json")

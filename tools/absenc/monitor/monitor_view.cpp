@@ -203,7 +203,10 @@ std::string speed_line(const Snapshot& snapshot) {
     const double mm = micrometres(snapshot.last.position, reading.unit_um) / 1000;
     text = fmt::format("position {} mm", millimetres_text(mm, reading.unit_um));
   }
-  if (snapshot.last.restarted) return text + ", started again: it jumped, or the turns before are not known (max_rpm)";
+  if (snapshot.last.restarted) {
+    return text + (reading.unit_um > 0 ? ", started again: it jumped, or the way before is not known (max_mm_s)"
+                                       : ", started again: it jumped, or the turns before are not known (max_rpm)");
+  }
   if (!snapshot.last.speed_valid) return text;
   return fmt::format("speed {} {}, {} ago; {}", speed_text(snapshot), speed_unit(reading),
                      to_text(snapshot.last.speed_delay), text);
