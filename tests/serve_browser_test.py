@@ -93,6 +93,20 @@ class Page(ServeCase):
         self.shot("phone")
         self.assert_no_errors()
 
+    def test_what_is_not_reported_is_not_good(self):
+        """A word without an error bit, one that has one, and turns that an alarm takes away."""
+        served = self.without_history("sim:ssi", "sim:ssi?error_bit=active_high", "sim:tformat?alarm=battery_error")
+        self.browser.get(served.url)
+        self.wait_for("connected: 3 of 3 live", "#connection")
+        self.wait_for("battery_error", ".alarm")
+        words = [one.text for one in self.browser.find_elements(By.CSS_SELECTOR, ".card .words")]
+        self.assertEqual(words[:2], ["alarms not reported", ""])
+        self.assertIn("INVALID", self.text(".card:nth-child(3) dd"))
+        self.browser.get(served.url + "#encoder=sim:ssi")
+        self.wait_for("alarms not reported")
+        self.shot("not-reported")
+        self.assert_no_errors()
+
     def test_an_encoder_is_lost_and_comes_back(self):
         self.open()
         self.wait_for("connected: 3 of 3 live", "#connection")

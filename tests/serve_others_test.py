@@ -54,6 +54,10 @@ class HomeAssistant(ServeCase):
                 self.assertIn(one["topic"], last)
             key = re.search(r"value_json\.(\w+)", config["value_template"]).group(1)
             self.assertIn(key, last[config["state_topic"]])
+        template = next(one["value_template"] for one in configs.values() if one["name"] == "Alarm")
+        expression = template.strip("{} ").replace("is none", "is None").replace("value_json.alarms", "alarms")
+        told = [eval(expression, {"alarms": alarms}) for alarms in ([], [{"name": "over_heat"}], None)]
+        self.assertEqual(told, ["OFF", "ON", "None"])  # what is not reported is no OFF: None is "unknown" there
         units = {(one["name"], one.get("unit_of_measurement")) for one in configs.values()}
         self.assertLessEqual({("Angle", "°"), ("Position", "mm"), ("Speed", "rpm"), ("Speed", "mm/s")}, units)
         self.assertEqual(end(server.process)[0], 0)

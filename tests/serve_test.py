@@ -50,6 +50,18 @@ class Values(ServeCase):
         self.assertIn('alarm="over_heat"} 1\n', page)
         self.assertIn('alarm="over_speed"} 0\n', page)
 
+    def test_alarms_that_are_not_reported(self):
+        server = self.without_history("sim:ssi")
+        encoder = wait_until(lambda: server.encoder()["state"] == "live" and server.encoder(), "it is live")
+        self.assertEqual((encoder["alarms"], encoder["status"], encoder["singleturn_valid"]), (None, None, True))
+        self.assertIn("absenc_up", server.ask("/metrics")[1])
+        self.assertNotIn("absenc_alarm{", server.ask("/metrics")[1])
+
+    def test_a_position_that_does_not_hold(self):
+        server = self.without_history("sim:tformat?alarm=battery_error")
+        encoder = wait_until(lambda: server.encoder()["state"] == "live" and server.encoder(), "it is live")
+        self.assertEqual((encoder["singleturn_valid"], encoder["multiturn_valid"], encoder["turns"]), (True, False, None))
+
     def test_an_alarm_that_has_cleared_is_told_as_none(self):
         emulator = Emulator(self.directory, "--alarm", "over_heat")
         self.addCleanup(emulator.end)

@@ -86,10 +86,13 @@ class NotReported(Case):
     def test_encolink(self):
         address = "sim:encolink?singleturn=77"
         reading, = json_lines(absenc("read", address, "--json").stdout)
-        self.assertEqual((reading["status"], reading["alarms"]), ([], None))
-        self.assertIn("general_status clear   alarms not reported", absenc("read", address).stdout)
+        self.assertEqual((reading["status"], reading["alarms"]), ([], []))
         self.assertEqual(absenc("alarms", address).stdout, "no alarms\n")
+        self.assert_failed(absenc("alarms", address + "&condition=channels_disagree=1"), "cross_check_failed")
         alone = address + "&has_ch2=false"
+        reading, = json_lines(absenc("read", alone, "--json").stdout)
+        self.assertEqual((reading["status"], reading["alarms"]), ([], None))
+        self.assertIn("general_status clear   alarms not reported", absenc("read", alone).stdout)
         result = absenc("alarms", alone)
         self.assertEqual((result.returncode, result.stdout), (0, "alarms not reported\ngeneral_status clear\n"))
         self.assertIn("error: the position is not valid", absenc("alarms", alone + "&alarm=signal_lost").stdout)

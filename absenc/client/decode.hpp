@@ -35,6 +35,9 @@ struct DecodeChoices {
 /// "noise"), `request` and `reply` (bytes; of CAN and clocked links text, as "1FF:022B" and "0001"), `turnaround_us`,
 /// `angle_deg` (of linear encoders `position_mm`), then each field of the unit under its name, and `error` with
 /// `message`, which are empty in a good row. A row with an error has no other values than these, its times and frames.
+///
+/// What a reply does not carry, as alarms, is completed by what an earlier reply of the same encoder has reported; the
+/// encoder is taken to stay switched on. Where none has, alarms and the position that depends on them are `Unknown`.
 class Decoded {
  public:
   using value_type = Row;

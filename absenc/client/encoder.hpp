@@ -81,7 +81,7 @@ class Encoder {
   /// The position, with all alarms that the encoder can tell. A position that no second one confirmed is not valid. A
   /// port that was lost is opened again. Throws EncoderFailure, os::Failure, Cancelled.
   [[nodiscard]] Reading read();
-  /// The same for its alarms: where the reply of `read` does not report them all, what else reads them is asked too.
+  /// A reading for its alarms: where the unit has a command that reads all of them by name, by that one.
   [[nodiscard]] Reading read_alarms();
   /// For a loop over samples that goes on when the port is lost and comes back. Ends after `count`, or by `cancel`.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});

@@ -58,6 +58,7 @@ struct Command {
                                   // can, the setting has the name of this command, which looks at the effect itself
   std::string_view changes_option{};  // config_set: the option that must follow its first argument; who goes on does
                                       // so with the new value, on the same open port
+  bool reads_alarms = false;  // read_part: its reading has all the alarms by name, where that of Verb::read may not
 };
 
 /// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments with

@@ -7,7 +7,6 @@
 
 #include "absenc/client/doctor/observations.hpp"
 #include "absenc/client/error.hpp"
-#include "absenc/client/reading.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/client/way/diagnosis.hpp"
@@ -274,25 +273,18 @@ std::unique_ptr<Connection> Connection::open(const EncoderAddress& uri) {
 
 Reading read_alarms(Connection& connection) {
   const Unit& unit = connection.unit();
-  const auto reports_all = [&](const Reading& reading) {
-    const std::optional<Flags> alarms = joined_alarms(unit, reading);
-    return !alarms || alarms->is_complete();
+  const auto taken = [&](const Outcome& outcome) {
+    if (outcome.error != Error::none) throw EncoderFailure(connection.trouble(outcome));
+    if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no alarms");
+    return *outcome.reading;
   };
-  const Outcome outcome = connection.read();
-  if (outcome.error != Error::none) throw EncoderFailure(connection.trouble(outcome));
-  if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no alarms");
-  const Reading first = *outcome.reading;
-  if (unit.streams != nullptr && unit.streams(connection.uri().options)) return first;  // it cannot be asked
-  Reading reading = first;
+  const bool can_be_asked = unit.streams == nullptr || !unit.streams(connection.uri().options);
   for (const Command& command : unit.commands) {
-    if (reports_all(reading)) return reading;
-    if (command.verb != Verb::read_part || !command.arguments.empty() || command.changes_encoder) continue;
-    const Outcome part = connection.run(command, {});
-    if (part.error == Error::unsupported) continue;
-    if (part.error != Error::none) throw EncoderFailure(connection.trouble(part));
-    if (part.reading != nullptr) reading = *part.reading;
+    if (!command.reads_alarms || !can_be_asked) continue;
+    const Outcome outcome = connection.run(command, {});
+    if (outcome.error != Error::unsupported) return taken(outcome);
   }
-  return reports_all(reading) ? reading : first;
+  return taken(connection.read());
 }
 
 void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink) {

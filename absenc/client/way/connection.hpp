@@ -82,8 +82,8 @@ class Connection {
   EncoderAddress uri_;
 };
 
-/// A reading for its alarms. One that does not report all of them is followed by the commands that read another part,
-/// because one of them may. Throws EncoderFailure, Failure, and as Connection::run.
+/// A reading for its alarms: by the command that reads them, where the unit has one and these options allow it, else as
+/// `read`. Throws EncoderFailure, Failure, and as Connection::run.
 [[nodiscard]] Reading read_alarms(Connection& connection);
 
 /// The fields that a command tells, into `sink`. Throws EncoderFailure, and as Connection::run.

@@ -291,8 +291,14 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return position.singleturn == 0 && position.multiturn == 0;
 }
 
-/// `detailed`: the status of a cycle, where there was one; otherwise no alarm is reported by name, only the two bits of
-/// the frame.
+/// Returns the alarms that the two bits of a frame report clear: all errors, all warnings. A bit that is set does not say
+/// which alarm it is for. Without channel 2 an encoder has no alarms by name.
+[[nodiscard]] constexpr std::uint32_t clear_by(const Format& format, const Position& position) {
+  if (!format.has_ch2) return 0;
+  return (position.error ? 0u : status::errors) | (position.warning ? 0u : status::warnings);
+}
+
+/// `detailed`: the status of a cycle, where there was one.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position,
                                            std::optional<std::uint16_t> detailed = {}) {
   const std::uint16_t alarms = detailed.value_or(0);
@@ -307,7 +313,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   reading.status = (position.error ? general::error : 0) | (position.warning ? general::warning : 0);
   reading.alarms = alarms;
   reading.status_reported = general::error | general::warning;
-  reading.alarms_reported = detailed ? 0xFFFF : 0;
+  reading.alarms_reported = detailed ? 0xFFFFu : clear_by(format, position);
   return reading;
 }
 

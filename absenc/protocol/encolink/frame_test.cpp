@@ -62,10 +62,16 @@ TEST(EncolinkFrame, WhatOfAReadingHolds) {
 }
 
 // A frame has two bits, and no alarm by name: a cycle of channel 2 has these.
-TEST(EncolinkFrame, OnlyChannelTwoReportsAlarms) {
+TEST(EncolinkFrame, BitsOfAFrameReportAlarmsOnlyWhereTheyAreClear) {
   EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
-  EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0u);
-  EXPECT_EQ(to_reading(multi, {}, std::uint16_t{0}).alarms_reported, 0xFFFFu);
+  EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0xFFFFu);
+  EXPECT_EQ(to_reading(multi, {.error = true}).alarms_reported, status::warnings);
+  EXPECT_EQ(to_reading(multi, {.warning = true}).alarms_reported, status::errors);
+  EXPECT_EQ(to_reading(multi, {.error = true}, status::system).alarms_reported, 0xFFFFu);
+  Format alone = multi;
+  alone.has_ch2 = false;
+  EXPECT_EQ(to_reading(alone, {}).alarms_reported, 0u);
+  EXPECT_EQ(to_reading(alone, {}).status_reported, general::error | general::warning);
 }
 
 TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {

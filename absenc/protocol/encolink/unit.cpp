@@ -255,7 +255,11 @@ constexpr bool streams(const Format& format) { return format.interface == Interf
 constexpr Command read_position{"position", Verb::read, 0, "position, turns, and the alarms when there are any"};
 constexpr auto commands_of_unit = std::array{
     position(read_position).or_when(streams, listen(read_position)),
-    command<read_alarms>({"alarms", Verb::read_part, 0, "detailed status from channel 2, checked against channel 1"},
+    command<read_alarms>({.name = "alarms",
+                          .verb = Verb::read_part,
+                          .id = 0,
+                          .meaning = "detailed status from channel 2, checked against channel 1",
+                          .reads_alarms = true},
                          frame<Config::reset_channels>),
     command<read_info>({"info", Verb::info, 0, "identity, firmware, serial number, temperature, speed"},
                        frame<Config::identify>),

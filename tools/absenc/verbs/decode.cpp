@@ -211,7 +211,9 @@ const Subcommand decode_subcommand{
     "decode",
     "say what a captured frame or a whole capture means, or what is wrong with it",
     "Every check that the protocol allows is made: the first that fails names the error.\n"
-    "In a capture, requests are paired with their replies; who speaks is found by what is said.\n"
+    "In a capture, requests are paired with their replies; who speaks is found by what is said. Alarms that a\n"
+    "reply does not carry are those that an earlier reply of the same encoder has reported, which is taken to stay\n"
+    "switched on; what no reply has reported is unknown.\n"
     "Exit status 1 for a bad frame, a damaged file, or a capture without any good frame.",
     decode_parameters,
     decode_examples,
