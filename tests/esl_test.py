@@ -9,6 +9,7 @@ import tty
 import unittest
 
 from command_support import PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, json_lines
+from decode_file_test import Wave
 
 POSITION, QUICK, TEMPERATURE, READ, WRITE = 0x1, 0x5, 0x9, 0xE, 0xF
 LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
@@ -253,6 +254,21 @@ class Command(EslCase):
         self.assertRegex(result.stdout, r"(?m)^6 +yes +-")
         self.assert_sentence(result.stderr, "two encoders share the address")
 
+    def test_scan_of_an_encoder_that_refuses(self):
+        """Its answers are whole: nobody else has its address."""
+        encoder = self.encoder("--condition", "ch1_status_set=1")
+        result = absenc("scan", encoder, "--json")
+        self.assertEqual(result.returncode, 1)
+        found = json.loads(result.stdout)["encoders"]
+        self.assertEqual([(one["encoder_address"], one["clash"]) for one in found], [(0, False)])
+        self.assertIn("wrong parity bit", found[0]["trouble"])
+        text = absenc("scan", encoder)
+        self.assertIn("wrong parity bit", text.stdout)
+        self.assertNotIn("share the address", text.stderr)
+        verdict = absenc("doctor", encoder)
+        self.assertIn("refused: ", verdict.stdout)
+        self.assertNotIn("disconnect one", verdict.stdout)
+
     def test_scan_of_nobody(self):
         encoder = self.encoder(latency=20, more="&crc_bit_order=msb")
         self.assert_failed(absenc("scan", encoder), "timeout")
@@ -287,6 +303,27 @@ class Reasons(EslCase):
         first, second = json_lines(absenc("decode", "esl", capture, "--json").stdout)
         self.assertTrue(first["ok"])
         self.assertEqual((second["ok"], second["error"]), (False, "sequence_mismatch"))
+
+    def test_a_refusal(self):
+        """The check of the request is right: what the encoder says of it is the error."""
+        good = absenc("encode", "esl", "position").stdout.strip()
+        field = control_field(POSITION) ^ 0x80
+        refused = bytes([field]) + crc8([field])
+        one = bytes([field, READY | 1, 0, 0xEF, 0xCD, 0xAB, 0x34, 0x12, 0x56])
+        two = bytes([field, READY | CHANNEL_2 | 1, 0, 0xAB, 0x80 | 0x56])
+        answer = one + crc16(one, 0x0000) + two + crc16(two, 0xFFFF)
+        self.assert_failed(absenc("decode", "esl", "--request", refused.hex(), "--hex", answer.hex()),
+                           "request_rejected", "wrong parity bit")
+        wave = Wave(D0=1)
+        for asked, told in ((bytes.fromhex(good), self.ONE + self.TWO), (refused, answer)):
+            wave.send("D0", asked, 100)
+            wave.wait(2000)
+            wave.send("D0", told, 100)
+            wave.wait(10_000)
+        lines = json_lines(absenc("decode", "esl", self.file("refused.vcd", wave.vcd()), "--json").stdout)
+        self.assertEqual([(one["kind"], one["ok"]) for one in lines], [("exchange", True), ("exchange", False)])
+        self.assertEqual(lines[1]["error"], "request_rejected")
+        self.assertIn("wrong parity bit", lines[1]["message"])
 
     def test_probe_names_what_contradicts(self):
         result = absenc("probe", "esl", "--request", "0858", "--hex", (self.ONE + self.TWO).hex())
@@ -372,6 +409,87 @@ class Sentences(EslCase):
         busy = bytes([control_field(READ), 1, 0])
         encoder = self.fake(page + crc8(page), busy + crc8(busy))
         self.assert_failed(absenc("memory", "read", encoder, "0"), "busy", "not executed")
+
+
+class SafePositions(EslCase):
+    """One after the other, each compared with the one before."""
+
+    def test_read(self):
+        lines = json_lines(absenc("read", "sim:esl?singleturn=5&multiturn=3", "--command", "safe-position", "--count", "20",
+                                  "--rate", "0", "--json").stdout)
+        self.assertEqual([one["singleturn"] for one in lines], [5] * 20)
+        self.assertTrue(all(one["singleturn_valid"] for one in lines))
+        self.assertTrue(all("multiturn" not in one for one in lines), lines[0])  # no part of a safe position
+
+    def test_a_counter_that_stands_still_is_an_error_each_time(self):
+        encoder = "sim:esl?condition=ch1_sequence=5&condition=ch2_sequence=5&command=safe-position"
+        result = absenc("read", encoder, "--count", "3", "--json")
+        self.assertEqual(result.returncode, 1)
+        self.assertEqual([one["error"] for one in json_lines(result.stdout)], ["sequence_mismatch"] * 3)
+        self.assert_good(absenc("read", "sim:esl?condition=ch1_sequence=5&condition=ch2_sequence=5"))
+
+    def test_monitor_and_record(self):
+        live = self.watch("sim:esl?singleturn=77", "--command", "safe-position", until=len)
+        self.assertEqual(live["sim:esl?singleturn=77"]["singleturn"], 77)
+        path = self.file("safe.jsonl")
+        self.assert_good(absenc("record", "sim:esl?singleturn=77", "--command", "safe-position", "--output", path,
+                                "--rate", "0", "--count", "30"))
+        with open(path, encoding="utf-8") as file:
+            rows = json_lines(file.read())
+        self.assertEqual([row["singleturn"] for row in rows if "singleturn" in row], [77] * 30)
+
+    def test_two_on_one_line(self):
+        """Whoever speaks in between does not break the sequence."""
+        line = self.encoder("--also", "address=3&singleturn=70000", latency=300)
+        live = self.watch(line, f"{line}&address=3", "--command", "safe-position", until=lambda live: len(live) == 2)
+        self.assertEqual(sorted(one["singleturn"] for one in live.values()), [0, 70000])
+        result = absenc("monitor", line, f"{line}&address=3", "--command", "safe-position", "--for", "2", "--json")
+        self.assertEqual([one["errors"] for one in json_lines(result.stdout)][-2:], [{}, {}])
+
+    def test_what_cannot_be_read_again_and_again(self):
+        self.assert_wrong_usage(absenc("read", "sim:esl?command=zero"), "changes the encoder")
+        self.assert_wrong_usage(absenc("monitor", "sim:esl", "--command", "memory-read"), "takes arguments")
+        self.assert_wrong_usage(absenc("read", "sim:esl?command=safe-positon"), "safe-position")
+        self.assert_failed(absenc("read", "sim:esl?command=temperature"), "temperature yields no position")
+
+
+class OneTurn(EslCase):
+    def test_has_no_turns(self):
+        reading = self.good_json("read", "sim:esl?model=single-turn&singleturn=1000")
+        self.assertEqual((reading["singleturn"], "multiturn" in reading), (1000, False))
+        info = self.good_json("info", "sim:esl?model=single-turn")
+        self.assertEqual(info["answers"]["encoder-id"]["fields"]["encoder_id"], 0x98)
+        self.assert_failed(absenc("reset-multiturn", "sim:esl?model=single-turn", "--yes"), "unsupported", "one turn")
+
+    def test_an_encoder_id_that_contradicts_the_options(self):
+        encoder = self.encoder("--model", "single-turn")
+        self.assert_failed(absenc("run", encoder, "encoder-id"), "unexpected_reply", "no turns", "model")
+        self.assert_good(absenc("run", f"{encoder}&model=single-turn", "encoder-id"))
+
+
+class Doctor(EslCase):
+    """What a reply reports is found, and named as what it is."""
+
+    def verdict(self, settings, *words):
+        result = absenc("doctor", f"sim:esl?{settings}")
+        self.assertEqual(result.returncode, 1, result.stdout)
+        for word in words:
+            self.assertIn(word, result.stdout)
+        self.assertNotIn("good: ", result.stdout)
+
+    def test_channels_that_disagree(self):
+        self.verdict("condition=redundant_offset=3", "contradiction: ", "redundant position of channel 2")
+        self.verdict("condition=ch2_sequence=5", "contradiction: ", "sequence counters of the two channels")
+
+    def test_status_bits(self):
+        self.verdict("condition=ch2_status_set=4", "alarm: ", "safety_error in ch2_status alone")
+        self.verdict("condition=temperature=120", "alarm: ", "temperature_warning")
+        self.verdict("alarm=singleturn_error", "alarm: ", "singleturn_error")
+        result = absenc("doctor", "sim:esl?alarm=singleturn_error", "--json")
+        self.assertEqual(len(json.loads(result.stdout)["findings"]), 1)  # safety_error is the sum of it
+
+    def test_replies_that_come_twice_are_not_late(self):
+        self.verdict("fault=repeat=1", "two_answer: ")
 
 
 class TwoChannels(EslCase):
@@ -503,9 +621,10 @@ class OneLine(EslCase):
             bus = "leg"
             """)
         env = dict(os.environ, ABSENC_CONFIG=config)
-        for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"],
-                        ["run", "elbow", "led-or-lissajous"]):
+        for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"]):
             self.assert_failed(absenc(*command, env=env), "unsupported", "several encoders on the line", "nothing was sent")
+        told = json.loads(absenc("run", "elbow", "led-or-lissajous", "--json", env=env).stdout)["fields"]
+        self.assertEqual((told["led_error"], told["lissajous_error"]), (False, False))  # by SF, without memory
         self.assert_good(absenc("memory", "read", "knee", "0", env=env))
         self.assert_failed(absenc("memory", "read", "elbow?bus=false", "0", env=env), "timeout")
         summary = emulator.end()[2]

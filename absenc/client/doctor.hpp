@@ -49,6 +49,8 @@ enum class Ailment : std::uint8_t {
   bytes_missing,
   same_address,
   wrong_settings,
+  contradiction,
+  other_content,
   other_checksum,
   contradictory,
   always_damaged,

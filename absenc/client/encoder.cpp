@@ -164,7 +164,11 @@ Sample Encoder::next() {
     if (outcome.error != Error::none) {
       return {.kind = Sample::Kind::failed, .at = os::now(), .trouble = connection_->trouble(outcome)};
     }
-    if (outcome.reading == nullptr) throw Failure("the encoder's reply carries no position");
+    if (outcome.reading == nullptr) {
+      const Command* command = connection_->uri().reads;
+      throw Failure(command == nullptr ? std::string("the encoder's reply carries no position")
+                                       : fmt::format("{} yields no position", command->name));
+    }
     return take(*outcome.reading);
   } catch (const os::Failure& failure) {
     connection_->disconnect();

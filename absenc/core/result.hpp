@@ -61,6 +61,12 @@ inline constexpr std::array<ErrorText, 16> error_texts{{
     {"request_rejected", "the encoder refused the request", "check that the request is allowed, then send it again"},
 }};
 
+/// Whether the bytes themselves are wrong. With any other error a whole frame with a right checksum came: what it says
+/// is not what was expected.
+[[nodiscard]] constexpr bool is_damage(Error error) {
+  return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
+}
+
 [[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
 /// A value, at first that of T{}, or an Error other than `none`. Reading the value of a failed result is undefined, as

@@ -19,15 +19,21 @@ class GuardedHost {
     valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
   }
 
-  /// Whether it came to its end within this time. `may_repeat`: whether it only reads.
-  [[nodiscard]] bool run(Machine<Item>& conversation, Time limit, bool may_repeat = true) {
+  /// Whether it came to its end within this time, one that asks without end to its first result. `may_repeat`: whether
+  /// it only reads.
+  [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
+    asks_ = conversation.asks();
+    emitted_ = false;
     guard_.attach(conversation, *unit_, options_, may_repeat);
     if (node_ == none) {
-      node_ = line_->attach(sim::Role::host, guard_);
+      node_ = line_->attach(sim::Role::host, guard_, [this] {
+        emitted_ = asks_;
+        return !asks_;
+      });
     } else {
       line_->replace(node_, guard_);
     }
-    const bool ended = line_->run(node_, line_->now() + limit);
+    const bool ended = line_->run(node_, line_->now() + limit) || emitted_;
     guard_.conclude();
     return valid_ && ended;
   }
@@ -40,6 +46,8 @@ class GuardedHost {
   bool valid_ = false;
   ReplyGuard<Item> guard_;
   std::size_t node_ = none;
+  bool asks_ = false;
+  bool emitted_ = false;
 };
 
 /// Faults after which wrong bytes may be a good frame: all others leave frames as they were, and nothing wrong may come

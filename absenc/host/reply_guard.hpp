@@ -36,6 +36,7 @@ class ReplyGuard final : public Machine<Item> {
   /// Serves this conversation from now on; `unit` and `options` must outlive it. `may_repeat`: whether each of its
   /// requests may be sent once more.
   void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
+  [[nodiscard]] bool serves(const Machine<Item>& inner) const { return inner_ == &inner; }
   /// The conversation has ended, or is not gone on with.
   void conclude() { close(); }
 

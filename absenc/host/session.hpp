@@ -74,7 +74,9 @@ class Session {
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
-    return attempt(command, arguments, on_emit);
+    const Conversation<Item>* conversation = attempt(command, arguments, on_emit);
+    streaming_ = false;  // only readings go on
+    return conversation;
   }
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
@@ -95,7 +97,7 @@ class Session {
   /// says whether with what came meanwhile. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
-    if (streaming_ && take == Take::newest) catch_up(machine(), *port_);
+    if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);
     const FirstReading before = first_;
     std::optional<BadExchange<Item>> suspect;
     constexpr unsigned most = 11;
@@ -276,6 +278,11 @@ class Session {
   // Whether it came to its end; a conversation that streams stops at its next result.
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
+    if (!again) guarded_ = guarded(command);
+    // Others on the same line may have had the guard meanwhile.
+    if (guarded_ && !(again && guard_->serves(conversation))) {
+      guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
+    }
     if (!again) {
       guarded_ = guarded(command);
       if (guarded_) guard_->attach(conversation, *unit_, options_, !command.changes_encoder);

@@ -31,9 +31,10 @@ struct LineSettings {
   std::uint32_t rate = 0;  // bits a second: baud, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;
   std::uint8_t stop_bits = 1;
-  std::uint8_t spi_mode = 0;     // spi, clocked: 2 * CPOL + CPHA
-  std::uint8_t idle_clocks = 0;  // clocked: clocks that show the idle line before the first bit
-  Time select_lead{};            // spi: from chip select to the first clock, at least
+  std::uint8_t spi_mode = 0;       // spi, clocked: 2 * CPOL + CPHA
+  std::uint8_t idle_clocks = 0;    // clocked: clocks that show the idle line before the first bit
+  Time select_lead{};              // spi: from chip select to the first clock, at least
+  std::uint32_t highest_rate = 0;  // that the document allows, where a controller could be faster; 0: not told
 
   /// The same; with `assumed_rate` where there is none.
   [[nodiscard]] constexpr LineSettings with_some_rate() const {

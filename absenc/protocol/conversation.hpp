@@ -50,6 +50,8 @@ struct Conversation : Machine<Item> {
   /// this is driven.
   [[nodiscard]] virtual const StreamCounts* stream() const { return nullptr; }
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
+  /// Of one that streams: whether it sends a request for each result. Then nothing came while it was not driven.
+  [[nodiscard]] virtual bool asks() const { return false; }
   /// Every named value of the result. Nothing is put when there was an error.
   virtual void report(FieldSink& sink) const = 0;
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;

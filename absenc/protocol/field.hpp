@@ -18,7 +18,7 @@ struct FlagInfo {
   std::string_view meaning;  // what has happened
   std::string_view action;   // what the operator must do; "" when nothing: it is no ailment
   bool optional = false;     // some encoders have no such flag: one that reports the others and not this one has none
-  bool is_summary = false;   // of a status: raised because alarms are, where the reply carries those they tell more
+  std::uint32_t sums = 0;    // of a status flag: the bits of the unit's alarms that it is the sum of; 0: none
 };
 
 struct FieldInfo {

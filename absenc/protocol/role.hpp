@@ -20,6 +20,7 @@ enum class Role : std::uint8_t {
   encoder,      // option, field: which of the encoders on the line; in a scan a new record begins with it
   identity,     // field: says which encoder it is: its type, its serial number
   clash,        // field of a scan: not 0: whatever answers there is damaged every time
+  trouble,      // field of a scan: what is wrong with an answer that came whole
   rate,         // option: bits a second
   // Of a check at the end of a word, as `crc find` finds one: options
   check_width,       // bits

@@ -12,6 +12,9 @@ inline constexpr Parameter encoder{"encoder", "",
                                    "", true};
 inline constexpr Parameter option{
     "--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true};
+/// The setting `command` of the encoder, for verbs that read again and again.
+inline constexpr Parameter read_command{
+    "--command", "COMMAND", "what to read, instead of the position with all alarms: a command that yields positions"};
 inline constexpr Parameter yes{"--yes", "", "do not ask before the encoder is changed"};
 inline constexpr Parameter force{"--force", "", "write also what the protocol protects, as calibration"};
 inline constexpr Parameter json{"--json", "", "one JSON object"};

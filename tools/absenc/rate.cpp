@@ -25,4 +25,11 @@ double readings_a_second(const Invocation& invocation, double fallback) {
   return rate;
 }
 
+std::vector<std::string> reading_settings(const Invocation& invocation) {
+  const auto options = invocation.texts("--option");
+  std::vector<std::string> settings(options.begin(), options.end());
+  if (invocation.has("--command")) settings.push_back(fmt::format("command={}", invocation.text("--command")));
+  return settings;
+}
+
 }  // namespace absenc::tool

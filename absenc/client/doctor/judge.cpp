@@ -178,11 +178,18 @@ bool is_invalid(const Reading& reading) {
   return reading.singleturn_validity() == Validity::invalid || reading.multiturn_validity() == Validity::invalid;
 }
 
-void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& reading,
+// The raised alarms of both channels, by the bits of the first.
+std::uint32_t alarms_of_either(const Unit& unit, const Reading& reading) {
+  std::uint32_t bits = 0;
+  for (const Flags& flags : alarms_of(unit, reading)) bits |= flags.bits;
+  return bits;
+}
+
+void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& reading, std::uint32_t alarms,
                  std::vector<RaisedFlag>& counts) {
   for (const Flags& flags : all) {
     for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
-      if (!is_alarm && (flag->action.empty() || (flag->is_summary && reading.alarms != 0))) continue;
+      if (!is_alarm && (flag->action.empty() || (flag->sums & alarms) != 0)) continue;
       // Channels have fields of their own with the same words.
       auto count = std::ranges::find_if(counts, [&](const RaisedFlag& known) {
         return known.is_alarm == is_alarm && known.flag->name == flag->name;
@@ -235,8 +242,9 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   }
   std::vector<RaisedFlag> flags;
   for (const Reading* reading : ready) {
-    count_flags(alarms_of(one.unit, *reading), true, *reading, flags);
-    count_flags(status_of(one.unit, *reading), false, *reading, flags);
+    const std::uint32_t alarms = alarms_of_either(one.unit, *reading);
+    count_flags(alarms_of(one.unit, *reading), true, *reading, alarms, flags);
+    count_flags(status_of(one.unit, *reading), false, *reading, alarms, flags);
   }
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
     return (before.invalid > 0) > (after.invalid > 0);  // what makes the position invalid is mended first

@@ -53,6 +53,18 @@ void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText
   }
 }
 
+// What can be asked again and again.
+const Command& reading_command(const Unit& unit, std::string_view name) {
+  const Command& command = require_command(unit, name);
+  if (command.changes_encoder || !command.arguments.empty()) {
+    throw UsageError(
+        fmt::format("command is \"{}\", which {}: only a command that reads a position can be read again and "
+                    "again",
+                    name, command.changes_encoder ? "changes the encoder" : "takes arguments"));
+  }
+  return command;
+}
+
 void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
   const std::string value(setting.value);
   constexpr std::string_view trigger = "trigger";
@@ -79,6 +91,10 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
     uri.latency = std::chrono::milliseconds(number_of(setting, 0, 60'000));
   } else if (setting.name == "speed") {
     uri.spi.speed = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000'000));
+    if (uri.line.highest_rate != 0 && uri.spi.speed > uri.line.highest_rate) {
+      throw UsageError(fmt::format("speed is {} Hz, but {} allows {} Hz at most", *uri.spi.speed, uri.unit->document,
+                                   uri.line.highest_rate));
+    }
   } else if (setting.name == "spi_mode") {
     uri.spi.mode = static_cast<std::uint8_t>(number_of(setting, 0, 3));
   } else if (setting.name == "echo") {
@@ -88,6 +104,8 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
     uri.maximum_rpm = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
   } else if (setting.name == "max_mm_s") {
     uri.maximum_mm_s = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
+  } else if (setting.name == "command") {
+    uri.reads = &reading_command(*uri.unit, setting.value);
   } else if (setting.name == "motion") {
     uri.device.motion = value;
   } else if (setting.name == "singleturn") {

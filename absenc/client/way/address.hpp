@@ -34,7 +34,7 @@ struct LinkParameter {
   bool repeatable = false;
 };
 
-inline constexpr std::array<LinkParameter, 23> link_parameters{{
+inline constexpr std::array<LinkParameter, 24> link_parameters{{
     {rate_setting, "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan"},
     {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
@@ -56,6 +56,8 @@ inline constexpr std::array<LinkParameter, 23> link_parameters{{
      "too long a pause",
      "serial, tcp, spi, can, slcan, sim"},
     {"max_mm_s", "MM/S", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
+    {"command", "NAME", "what is read, instead of the position with all alarms: a command that yields positions",
+     "serial, tcp, spi, can, slcan, sim"},
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
     {"multiturn", "TURNS", "turns at the start", "sim"},
@@ -94,6 +96,7 @@ struct EncoderAddress {
   host::EchoMode echo = host::EchoMode::off;
   std::uint32_t maximum_rpm = 0;   // 0: as the model says, or as is usual
   std::uint32_t maximum_mm_s = 0;  // of linear encoders; 0: as is usual
+  const Command* reads = nullptr;  // what is read again and again; null: the first command with Verb::read
   DeviceSettings device;
 };
 

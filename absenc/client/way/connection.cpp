@@ -47,7 +47,7 @@ class ConnectionOn final : public Connection {
   const std::vector<std::string>& notes() const override { return link_->link().notes; }
 
   Outcome read(host::Take take) override {
-    const Command* command = find_command(unit(), Verb::read);
+    const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     return outcome(*command, link_->take_turn([&] {
       return runner_.converse([&](host::Session<Item>& session) { return session.read(*command, take); });

@@ -40,8 +40,8 @@ class Connection {
 
   // All of the following only while it is connected, but for counters and statistics.
 
-  /// The position, with all the alarms the unit can tell; of those that an encoder transmits by itself, which. Throws
-  /// UsageError when the unit has none.
+  /// The position, with all the alarms the unit can tell, or what the address says is read in its place; of those that
+  /// an encoder transmits by itself, which. Throws UsageError when the unit has none.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
   /// `on_emit` is called for each result but the last; `report` then tells of it. What reaches the encoder by what the
   /// command sets reaches it by the new value from now on.

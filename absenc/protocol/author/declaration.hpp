@@ -53,7 +53,7 @@ struct Declaration {
   /// Returns the length of any reply that begins so; 0: none does. Null: the longest.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
   /// Returns the error of a bad request, by the reply to it. Null: the error of the request.
-  Error (*answer_to_bad)(Error error, Bytes reply) = nullptr;
+  Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
   /// Checks a frame and puts its fields. Null: by the protocol and the report.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
 

@@ -135,7 +135,7 @@ constexpr Declaration<Toy, Encoder> whole{
     .is_usable = [](const Format& format) { return format.bits != 3; },
     .guess_request = guess_request,
     .reply_size = [](const Format&, Bytes) -> std::size_t { return 9; },
-    .answer_to_bad = [](Error, Bytes) { return Error::request_rejected; },
+    .answer_to_bad = [](const Format&, Bytes, Error, Bytes) { return Error::request_rejected; },
     .decode = nullptr,
     .frame_end = end_of_frame,
     .is_answered = is_answered,

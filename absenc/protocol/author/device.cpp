@@ -60,7 +60,7 @@ void Responder::feed(const ByteEvent& event) {
 void Responder::forget() {
   request_.clear();
   skipping_ = 0;
-  damaged_ = false;
+  skip_begins_ = damaged_ = false;
 }
 
 // The rest of what was begun is none either, until the line is silent.
@@ -99,24 +99,29 @@ void Responder::hear(std::uint8_t byte, Time at) {
   }
   heard_at_ = at;
   if (damaged_ || refusing_) return;
+  if (std::exchange(skip_begins_, false) && !begins_others_reply(byte)) skipping_ = 0;
   if (skipping_ != 0) {
     --skipping_;
     return;
   }
   request_.push_back(byte);
   const std::size_t size = request_size(request_);
-  if (size == 0) {
-    refusing_ = is_refused(Flaw::unknown, request_);
-    const bool may_begin_one = !refusing_ && request_.size() > 1;
-    request_.clear();
-    return may_begin_one ? hear(byte, at) : void();
-  }
+  if (size == 0) return search_on(at);
   if (request_.size() < size) return;
   if (answer_count() > 0) expect(true, turn_rule, at);
   reply_.clear();
   longer_ = {};
   ended(respond(request_, at, reply_), at);
   request_.clear();
+}
+
+// No request begins with the first byte: perhaps one begins behind it.
+void Responder::search_on(Time at) {
+  refusing_ = is_refused(Flaw::unknown, request_);
+  const ByteBuffer<32> heard = request_;
+  request_.clear();
+  if (refusing_) return;
+  for (const std::uint8_t byte : heard.view().subspan(1)) hear(byte, at);
 }
 
 void Responder::ended(Answer answer, Time at) {
@@ -132,6 +137,7 @@ void Responder::ended(Answer answer, Time at) {
       break;
     case Answer::for_others:
       skipping_ = others_reply_size(request_);
+      skip_begins_ = true;
       break;
   }
 }

@@ -46,10 +46,13 @@ class Responder : public EncoderOn<std::uint8_t> {
   /// must wait for counts from here.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
-  /// How many bytes the request has that begins so, one at least; 0: none begins so.
+  /// How many bytes the request has that begins so, one at least, or how many tell more; 0: none begins so, and the
+  /// search goes on behind the first byte.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
   /// How many bytes follow this request, which is another encoder's.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
+  /// Whether the reply to the last request of others may begin so; if not, nobody answers it, and a request follows.
+  [[nodiscard]] virtual bool begins_others_reply(std::uint8_t) const { return true; }
   enum class Answer : std::uint8_t {
     sent,
     none,
@@ -73,6 +76,7 @@ class Responder : public EncoderOn<std::uint8_t> {
 
  private:
   void hear(std::uint8_t byte, Time at);
+  void search_on(Time at);
   void begin_reply(Time at);
   void ended(Answer answer, Time at);
   void damage(Time at);
@@ -85,6 +89,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   Time heard_at_{};
   Time late_{};               // what was heard last may have come so much earlier
   std::size_t skipping_ = 0;  // characters of another encoder's reply
+  bool skip_begins_ = false;  // none of them has come yet
   bool refusing_ = false;     // what was heard is answered when the line is silent
   ByteBuffer<64> reply_;
   Time reply_at_{};

@@ -276,8 +276,8 @@ template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
 /// A procedure that runs: `procedure(dialog, found, bound..., arguments)`, the last where it takes them. What it finds
-/// is `Found`, whose member `reading`, if there is one, is the position; else that of the dialog. Frames lie in the
-/// storage behind this object.
+/// is `Found`, whose member `reading`, if there is one, is the position; else that of the dialog. With `Found::streams`
+/// each `emit` is a result, and the procedure ends only with an error. Frames lie in the storage behind this object.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {
  public:
@@ -292,6 +292,8 @@ class Run : public ProcedureDialog<P> {
     }
   }
   [[nodiscard]] const Found& found() const { return found_; }
+  [[nodiscard]] bool streams() const final { return goes_on || ProcedureDialog<P>::streams(); }
+  [[nodiscard]] bool asks() const final { return goes_on; }
   [[nodiscard]] const Reading* reading() const final {
     if constexpr (requires { found_.reading; }) {
       return this->error() == Error::none && found_.reading.singleturn_bits != 0 ? &found_.reading : nullptr;
@@ -301,6 +303,8 @@ class Run : public ProcedureDialog<P> {
   }
 
  private:
+  static constexpr bool goes_on = requires { Found::streams; };
+
   Found found_{};
   Buffer<std::int64_t, 6> arguments_;
 };

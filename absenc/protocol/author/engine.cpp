@@ -89,7 +89,7 @@ void Engine::go_on(ByteStep& step, Time now) {
     state_ = State::sending;
     disturbed_ = heard_ = noisy_ = false;
     size_ = 0;
-    step.at = begun_at_ = std::max(now, earliest_);
+    step.at = begun_at_ = std::max({now, earliest_, received_at_ + times_.pause});
     step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
     step.width = manner_.pulse;
     step.wire = manner_.wire;

@@ -19,6 +19,7 @@ struct HostTimes {
   Time gap_limit{};             // between two characters of it, at the most
   Time silence{};               // of the line before each request; what is heard meanwhile begins it anew
   Time patience = noise_limit;  // a line on which something goes on for so long is never silent
+  Time pause{};                 // from a reply to the next request, at least: so short that nobody listens meanwhile
 };
 
 /// How one request is sent, and how its reply ends.

@@ -12,7 +12,7 @@ namespace absenc::author {
 template <std::size_t addresses>
 struct Nodes {
   std::array<bool, addresses> there{};
-  std::array<bool, addresses> clash{};  // what came was damaged every time: two of one address, or a bad line
+  std::array<bool, addresses> clash{};  // every answer was damaged: two encoders of one address, or a bad line
 };
 
 /// `request_to(i)` asks the address of this index. Each that is not silent is asked twice: one answer may be noise.
@@ -32,7 +32,8 @@ Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
     const Result<typename P::Reply> second = co_await dialog.attempt(request_to(i)).once();
     if (!first && !second && second.error() == Error::timeout) continue;
     nodes.there[i] = any = true;
-    nodes.clash[i] = !first && !second;
+    // Two whole answers that are not good are those of one encoder.
+    nodes.clash[i] = !first && !second && (is_damage(first.error()) || is_damage(second.error()));
     if (++noise == most_in_a_row) {
       co_return {Error::wrong_length, "something comes back whatever address is asked: noise, or another device"};
     }

@@ -92,7 +92,7 @@ struct Descriptor {
     }
     const Result<Request> request = P::decode_request(f, asked);
     if constexpr (declared.answer_to_bad != nullptr) {
-      if (!request) return declared.answer_to_bad(request.error(), reply);
+      if (!request) return declared.answer_to_bad(f, asked, request.error(), reply);
     }
     return request;
   }

@@ -191,7 +191,8 @@ struct UnitBench {
     line.attach(sim::Role::device, tampered);
   }
 
-  /// A command of the unit to its end, told what `options` say. `on_emit` is called at every emit.
+  /// A command of the unit to its end, told what `options` say; one that asks without end to its first result.
+  /// `on_emit` is called at every emit.
   Told run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
     const Talk<std::uint8_t> talk(unit, options, name, arguments);
     return run(*talk, on_emit);
@@ -203,9 +204,9 @@ struct UnitBench {
     line.on_emit = [&] {
       ++told.emits;
       if (on_emit) on_emit(conversation);
-      return !conversation.streams();
+      return !conversation.asks();
     };
-    told.finished = line.converse(conversation);
+    told.finished = line.converse(conversation) || conversation.asks();
     line.on_emit = {};
     told.take(conversation);
     told.frames = device.answer_count() - before;

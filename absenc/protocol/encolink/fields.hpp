@@ -18,11 +18,10 @@
 namespace absenc::encolink {
 
 inline constexpr std::array<FlagInfo, 2> general_flags{{
-    {.name = "error", .meaning = "the position is not valid", .action = "read the alarms", .is_summary = true},
-    {.name = "warning",
-     .meaning = "the position is valid, but something is near its limit",
-     .action = "read the alarms",
-     .is_summary = true},
+    {"error", "the position is not valid", "do not use it; `absenc alarms` says why, where frames have channel 2",
+     false, status::errors},
+    {"warning", "the position is valid, but something is near its limit",
+     "`absenc alarms` says what it is, where frames have channel 2", false, status::warnings},
 }};
 
 /// What out_of_range means in a position.
@@ -117,7 +116,7 @@ inline constexpr auto frame_fields = [] {
       field<of<&Values::identity, &Identity::protocol_version>>("protocol_version", "", "of EncoLink: 2 or 4"),
       field<of<&Values::identity, &Identity::frame_bytes>>("frame_bytes", "", "5 without turns, 7 with"),
       field<of<&Values::identity, &Identity::resolution>>("resolution", "bits", "of a turn"),
-      field<detail::part_number_of>("part_number", "", "from the identity", Role::identity),
+      field<detail::part_number_of>({"part_number", text, "", "from the identity", {}, Role::identity}),
       field<&Values::config>("config", "",
                              "first byte of a request: 00 position, AA reset of the channels, BB identify"),
       field<&Values::ra>("ra", "", "second byte of a request: one byte of a register access"),
@@ -140,8 +139,8 @@ inline constexpr auto register_fields = [] {
   using enum FieldInfo::Kind;
   constexpr std::array<FieldInfo, 5> of_content{{
       {"", number, "", "register"},
-      {"", real, "degC", "register, in tenths"},
-      {"", real, "rpm", "register, in tenths"},
+      {"", real, "degC", "register: how warm the readhead is"},
+      {"", real, "rpm", "register: how fast the ring turns"},
       {"", flags, "", "how the last self-calibration ended", calibration_flags},
       {"", text, "", "register", {}, Role::identity},  // its numbers, all of them
   }};

@@ -25,7 +25,8 @@ using namespace std::chrono_literals;
 inline constexpr LineSettings uart_settings{.rate = 1'000'000};  // interface variant L
 inline constexpr Time spi_lead = 5us;                            // t_s: NCS low to the first edge of SCK
 // 4 MHz at most; CPOL 0, CPHA 1
-inline constexpr LineSettings spi_settings{.rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead};
+inline constexpr LineSettings spi_settings{
+    .rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead, .highest_rate = 4'000'000};
 inline constexpr Time shortest_clock = 250ns;
 inline constexpr Time spi_pause = 5us;  // t_p
 

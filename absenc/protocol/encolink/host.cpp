@@ -46,6 +46,8 @@ void Channels::take(const author::HostOf<Frames>& host) {
     bytes_.push_back(position.channel2);
     if (bytes_.size() == format.cycle_bytes()) {
       const Result<Cycle> cycle = decode_cycle(format, bytes_);
+      const Bytes all = bytes_;
+      silent = std::all_of(all.begin(), all.end(), [](std::uint8_t byte) { return byte == 0; });
       ended = cycle && !same_place(cycle->position, first_) ? Error::cross_check_failed : cycle.error();
       bytes_.clear();
       in_step = ended == Error::none;
@@ -82,7 +84,7 @@ void ReadPosition::concluded(Error error) {
   if (channels_.in_step && !channels_.ended) return go_on(Ask::position);
   const bool looks_closer = position.error || position.warning || is_all_zero(position);
   if (format().has_ch2 && looks_closer && !channels_.ended) return go_on(Ask::reset);
-  if (channels_.ended && !channels_.in_step && is_all_zero(position)) channels_.reading.ready = false;
+  if (channels_.silent && is_all_zero(position)) channels_.reading.ready = false;
   finish(Error::none);
 }
 

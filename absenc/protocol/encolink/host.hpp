@@ -51,6 +51,7 @@ struct Channels {
   std::optional<Error> ended{};           // the last frame ended a cycle: none, or what is wrong with it
   std::uint8_t channel3 = 0;              // of the last good cycle
   bool in_step = false;                   // the bytes of channel 2 are those of a cycle
+  bool silent = false;                    // all bytes of the last cycle were 0: there is no channel 2 yet
 
   /// A good frame. A cycle whose position is not that of the frame with which it began is cross_check_failed; one that
   /// is not good ends the step.
@@ -62,8 +63,8 @@ struct Channels {
 };
 
 /// One frame. When its position is not valid, near a limit, or all zero as while the encoder starts, a cycle of channel
-/// 2 follows: its alarms become those of the reading, and zeros without a channel 2 are not `ready`. What of the format
-/// is unknown is asked first.
+/// 2 follows: its alarms become those of the reading. Zeros in both channels are not `ready`; a channel 2 that is wrong
+/// otherwise leaves the alarms unknown. What of the format is unknown is asked first.
 class ReadPosition : public author::HostOf<Frames> {
  public:
   explicit ReadPosition(const Format& format);

@@ -283,6 +283,38 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
   EXPECT_TRUE(late.reading->ready);
 }
 
+// A real zero of an encoder whose channel 2 is wrong: it is not starting.
+TEST_P(EncolinkHost, ZerosBesideAWrongChannel2AreReady) {
+  const auto damaged = [](unsigned, RawBytes& reply) { reply.back() ^= 0x01; };
+  const auto none = [](unsigned, RawBytes&) {};
+  for (const bool disagrees : {false, true}) {
+    Bench bench(testing::single, interface);
+    bench.shaft.put(0, 0);
+    bench.condition(condition_channels_disagree, disagrees ? 1 : 0);
+    bench.tampered.replies(disagrees ? author::testing::Tamper(none) : author::testing::Tamper(damaged));
+    const Told read = bench.run("position");
+    ASSERT_TRUE(read.reading) << read.detail;
+    EXPECT_TRUE(read.reading->ready) << disagrees;
+    bench.pass(spi_pause);
+    EXPECT_EQ(bench.run("alarms").error, disagrees ? Error::cross_check_failed : Error::bad_checksum);
+  }
+}
+
+// At 10 000 rpm 175 counts a microsecond: the time of a reading is that at which the encoder took it.
+TEST_P(EncolinkHost, LatchedIsWhenTheEncoderTookThePosition) {
+  for (const std::string_view told : {testing::multi, std::string_view("")}) {
+    Bench bench(testing::multi, interface);
+    bench.tell(told);
+    bench.shaft.spin(10'000, bench.line.now());
+    for (int i = 0; i < 3; ++i) {
+      const Told read = bench.run("position");
+      ASSERT_TRUE(read.reading) << read.detail;
+      EXPECT_EQ(read.reading->singleturn, bench.encoder.measure(read.reading->latched).singleturn);
+      bench.pass(1ms);
+    }
+  }
+}
+
 TEST_P(EncolinkHost, WithoutChannel2ThereAreOnlyPositions) {
   Bench bench("resolution=20 multiturn_bits=0 has_ch2=false", interface);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x12345u);
@@ -316,6 +348,36 @@ TEST(EncolinkListen, FindsTheFramesByTheirChecksums) {
   EXPECT_EQ(listen.stream()->discarded, 0u) << "the frame that was under way before";
   for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_GT(seen[i], seen[i - 1]);
   EXPECT_EQ(bench.first_violation(), "");
+}
+
+TEST(EncolinkListen, LatchedIsWhenTheEncoderTookThePosition) {
+  Bench bench(streaming);
+  bench.shaft.spin(10'000, bench.line.now());
+  Listen listen(testing::multi_format, 10);
+  unsigned compared = 0;
+  bench.run(listen, [&](const auto&) {
+    const Reading& reading = *listen.reading();
+    EXPECT_EQ(reading.singleturn, bench.encoder.measure(reading.latched).singleturn);
+    ++compared;
+  });
+  EXPECT_EQ(compared, 9u);
+}
+
+// "Nothing is sent then."
+TEST(EncolinkListen, AnEncoderThatTransmitsByItselfIsNotAsked) {
+  Bench bench(streaming);
+  std::size_t sent = 0;
+  bench.line.observe([&](std::size_t sender, Time, Time, std::uint8_t) { sent += sender == 1 ? 1 : 0; });
+  for (const Command& command : unit.commands) {
+    if (command.verb == Verb::read || command.name == "listen") continue;
+    std::vector<std::int64_t> arguments;
+    for (const Argument& argument : command.arguments) arguments.push_back(argument.default_value);
+    const Told refused = bench.run(command.name, arguments);
+    EXPECT_EQ(refused.error, Error::unsupported) << command.name;
+    EXPECT_TRUE(says(refused.detail, "stream_rate=0")) << command.name << ": " << refused.detail;
+  }
+  EXPECT_EQ(bench.run("position").reading->singleturn, 0x12345u);
+  EXPECT_EQ(sent, 0u);
 }
 
 TEST(EncolinkListen, ReportsDamagedFramesAndGoesOn) {

@@ -98,7 +98,9 @@ void Listen::take(Bytes frame, const Position& position) {
   frame_.clear();
   frame_.append(frame);
   reading_ = to_reading(format_, position_);
-  reading_.latched = reading_.received = received_at_;  // when it was taken is not known
+  // The document does not say when it was taken: before the frame began. What waits ended at `received_at_`.
+  reading_.latched = received_at_ - uart_settings.character() * static_cast<std::int64_t>(waiting().size());
+  reading_.received = received_at_;
 }
 
 void Listen::lose(Error error, Bytes frame) {

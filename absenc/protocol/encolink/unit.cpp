@@ -38,7 +38,9 @@ constexpr auto options = author::OptionsOf{
     option<&Format::offset_sign>(
         "offset_sign", "whether the position offset is added to the measured position or subtracted", offset_signs),
     option<&Format::stream_rate>(
-        "stream_rate", "frames a second that the encoder sends by itself (UART): nothing is sent then; 0: it is asked",
+        "stream_rate",
+        "frames a second that the encoder sends by itself (UART): only position and listen are possible then, and "
+        "nothing is sent; 0: it is asked",
         0, 10'000),
     option<&Format::offset_unit>("offset_unit", "of the position offset: counts of the resolution, or 2^-32 revolution",
                                  offset_units),
@@ -226,11 +228,17 @@ constexpr std::array<Argument, 1> listen_arguments{{{"count", "frames", 1, UINT3
 constexpr std::array<Argument, 1> offset_arguments{{{"value", "in what offset_unit says", 0, 0xFFFFFFFF}}};
 constexpr std::array<Argument, 1> lock_arguments{{{"value", "0: open, 1: locked", 0, 1}}};
 
+constexpr bool streams(const Format& format) { return format.interface == Interface::uart && format.stream_rate > 0; }
+constexpr std::string_view not_asked(const Format& format) {
+  if (!streams(format)) return {};
+  return "an encoder that transmits by itself is not asked: set stream_rate=0 for one that answers; nothing was sent";
+}
+
 template <auto procedure, auto... bound>
 constexpr CommandOf<Protocol> command(const Command& info, MakeRequest request) {
   CommandOf<Protocol> made = author::command<report, found, procedure, frame<Config::position>, bound...>(info);
   made.request = request;
-  return made;
+  return made.unless(not_asked);
 }
 
 constexpr CommandOf<Protocol> position(const Command& info) {
@@ -249,8 +257,6 @@ constexpr CommandOf<Protocol> listen(const Command& info) {
                      std::span<std::byte> storage) { return make_host<Listen>(storage, format); },
           .size = sizeof(Listen)};
 }
-
-constexpr bool streams(const Format& format) { return format.interface == Interface::uart && format.stream_rate > 0; }
 
 constexpr Command read_position{"position", Verb::read, 0, "position, turns, and the alarms when there are any"};
 constexpr auto commands_of_unit = std::array{

@@ -81,6 +81,8 @@ class VirtualEncoder final : public author::Responder {
     condition_[index] = static_cast<std::int32_t>(value);
   }
   void raise_alarms(std::uint32_t bits) override {
+    // A turn counter that was cleared before the error does not count as cleared.
+    if ((bits & ~unsigned{latches_} & alarms::multiturn_error) != 0) turns_cleared_ = false;
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
   }
@@ -129,23 +131,42 @@ class VirtualEncoder final : public author::Responder {
 
   // ---- Requests
 
-  // Whatever its parity bit: a wrong one is reported.
+  [[nodiscard]] bool is_own(Bytes begin) const { return address_of(begin[0]) == profile_.address; }
+  // A request without a CRC has none that could be wrong.
+  [[nodiscard]] bool has_wrong_checksum(Bytes request) const {
+    return request.size() > 1 && !has_checksum8(profile_, request);
+  }
+  // Whether one of its own ends here.
+  [[nodiscard]] bool holds_own_request(Bytes heard) const {
+    for (std::size_t begin = 1; begin < heard.size(); ++begin) {
+      const Bytes rest = heard.subspan(begin);
+      const std::optional<DataId> id = data_id(rest[0]);
+      if (id && is_own(rest) && rest.size() == request_length(profile_, *id) && !has_wrong_checksum(rest)) return true;
+    }
+    return false;
+  }
+  // Whatever its parity bit: a wrong one is reported. "Else, it will continue to search for the next available logic of
+  // low state": behind what begins a request of another address, and behind a wrong CRC.
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
-    return id ? request_length(profile_, *id) : 0;
+    if (!id) return 0;
+    const std::size_t size = request_length(profile_, *id);
+    if (begin.size() >= size) return has_wrong_checksum(begin.first(size)) ? 0 : size;
+    if (is_own(begin)) return size;
+    return holds_own_request(begin) ? 0 : begin.size() + 1;
   }
   [[nodiscard]] std::size_t others_reply_size(Bytes request) const override {
-    return address_of(request[0]) == profile_.address ? 0 : reply_length(*data_id(request[0]));
+    return is_own(request) ? 0 : reply_length(*data_id(request[0]));
   }
+  [[nodiscard]] bool begins_others_reply(std::uint8_t byte) const override { return byte == others_field_; }
   Answer respond(Bytes bytes, Time at, ByteBuffer<64>& reply) override {
     if (magnitude(shaft_->at(at).speed_millirpm) > overspeed_above) latches_ |= alarms::overspeed;
-    if (address_of(bytes[0]) != profile_.address) return Answer::for_others;
+    others_field_ = bytes[0];
+    if (!is_own(bytes)) return Answer::for_others;
     const Result<Request> request = decode_request(profile_, bytes);
     if (!request) {
-      const bool crc_wrong =
-          bytes.size() > 1 && checksum8(profile_.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back();
       in_a_row_ = 0;
-      return crc_wrong ? Answer::for_others : report_bad_request(bytes[0], status::parity_error, at, reply);
+      return report_bad_request(bytes[0], status::parity_error, at, reply);
     }
     count(request->id, at);
     const std::optional<Reply> made =
@@ -156,8 +177,9 @@ class VirtualEncoder final : public author::Responder {
     return Answer::sent;
   }
   bool is_refused(Flaw flaw, Bytes heard) override {
-    if (flaw != Flaw::damaged || heard.empty() || address_of(heard[0]) != profile_.address) return false;
+    if (heard.empty() || !is_own(heard)) return false;
     in_a_row_ = 0;
+    if (flaw != Flaw::damaged) return false;
     refused_field_ = heard[0];
     return is_reported(heard[0]);
   }
@@ -299,6 +321,7 @@ class VirtualEncoder final : public author::Responder {
     return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
   }
   [[nodiscard]] std::uint16_t turns(Time now) const {
+    if (!profile_.turns) return 0;
     const std::uint64_t offset = load_little_endian(Bytes(memory_).subspan(turns_at, 8));
     return static_cast<std::uint16_t>(shaft_turns(now) - offset);
   }
@@ -333,7 +356,7 @@ class VirtualEncoder final : public author::Responder {
     return {.status = static_cast<std::uint8_t>(bits),
             .alarms = static_cast<std::uint8_t>(alarms),
             .sequence = static_cast<std::uint8_t>(channel == Channel::one ? counter : counter & 0x7F),
-            .encoder_id = 0xD8};
+            .encoder_id = encoder_id(profile_)};
   }
 
   // ---- Power
@@ -380,6 +403,7 @@ class VirtualEncoder final : public author::Responder {
   unsigned in_a_row_ = 0;           // requests of `last_id_`
   unsigned resets_sent_ = 0;        // of `last_id_`
   std::uint8_t refused_field_ = 0;  // CF of a damaged request
+  std::uint8_t others_field_ = 0;   // CF of the last request: the reply to it begins alike
   Time last_reset_{};
 };
 

@@ -67,6 +67,33 @@ TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
+// "Else, it will continue to search for the next available logic of low state."
+TEST(EslDevice, FindsARequestBehindBytesThatBeginNoneOfItsOwn) {
+  for (const Wire& before : {wire(hex<"AB7B">), wire(hex<"AB">), wire(hex<"FF">), wire(hex<"FF10">), wire(hex<"18">),
+                             wire(hex<"0874">), wire(hex<"08">), wire(hex<"ABFF">), wire(hex<"70">)}) {
+    Bench bench;
+    Wire both = before;
+    both.insert(both.end(), {0x08, 0x75});
+    const sim::testing::RawHost host = bench.UnitBench::raw(both, 100us, 12us);
+    EXPECT_EQ(host.reply.size(), 18u) << int{before[0]} << " " << before.size();
+    EXPECT_EQ(host.first_byte_at - host.sent_at, answer_time + 1us) << int{before[0]} << " " << before.size();
+  }
+}
+
+// It looks like a request, but stands in the reply of another encoder.
+TEST(EslDevice, FindsNoRequestInAReplyToAnotherEncoder) {
+  Bench bench;
+  const Wire reply = wire({.id = DataId::position_short,
+                           .encoder_address = 3,
+                           .one = {.status = status::ready},
+                           .singleturn = 0x7508,
+                           .multiturn = 0x7508});
+  Wire both = wire_of({DataId::position_short, 3});
+  both.insert(both.end(), reply.begin(), reply.end());
+  EXPECT_TRUE(bench.raw(both).empty());
+  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);
+}
+
 TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {
   for (std::uint8_t address = 0; address < 8; ++address) {
     for (const ParityScope scope : {ParityScope::command, ParityScope::all}) {
@@ -317,6 +344,21 @@ TEST(EslDevice, WhatClearsWhichAlarm) {
     bench.encoder.lower_alarms(row.alarm);
     EXPECT_EQ(bench.read().one.alarms, 0);
   }
+}
+
+// Table 8: "perform MT counter reset and all error clear", of this error, not of one long ago.
+TEST(EslDevice, CClearsAMultiturnErrorOnlyIfTheTurnsWereClearedSince) {
+  Bench bench;
+  reset(bench, DataId::reset_multiturn);
+  bench.pass(10ms);
+  bench.encoder.raise_alarms(alarms::multiturn_error);
+  reset(bench, DataId::clear_alarms);
+  EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
+  reset(bench, DataId::reset_multiturn);
+  bench.pass(10ms);
+  bench.encoder.raise_alarms(alarms::multiturn_error);  // it is there already
+  reset(bench, DataId::clear_alarms);
+  EXPECT_EQ(bench.read().one.alarms, 0);
 }
 
 TEST(EslDevice, WhatAPowerCycleLeaves) {

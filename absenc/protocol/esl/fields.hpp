@@ -18,14 +18,10 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
      "send the same request again; if it stays, set parity_scope"},
     {"stop_error", "the encoder received the request with a wrong stop bit and did not execute it",
      "send the same request again; if it stays, check baud rate and termination"},
-    {.name = "safety_error",
-     .meaning = "single-turn, memory, supply voltage or LED: the position is not safe",
-     .action = "read the alarms (ID A)",
-     .is_summary = true},
-    {.name = "non_safety_error",
-     .meaning = "multi-turn, turn counting, Lissajous or overspeed",
-     .action = "read the alarms (ID A)",
-     .is_summary = true},
+    {"safety_error", "single-turn, memory, supply voltage or LED: the position is not safe",
+     "stop the drive; `absenc alarms` says which it is", false, alarms::unsafe},
+    {"non_safety_error", "multi-turn, turn counting, Lissajous or overspeed", "`absenc alarms` says which it is", false,
+     alarms::turns_wrong | alarms::led_or_lissajous_error | alarms::overspeed},
     {"temperature_warning", "the encoder is too warm", "read the temperature, improve the cooling"},
     {"channel_2", "this is channel 2", ""},
     {"ready", "the encoder is ready", ""},
@@ -76,6 +72,7 @@ struct Shown {
   std::optional<std::uint8_t> encoder_address{};
   std::optional<Reply> reply{};
   std::optional<bool> clash{};
+  std::optional<std::string_view> trouble{};
   std::optional<std::uint8_t> page{};
   std::optional<std::uint8_t> memory_address{};
   std::optional<bool> busy{};
@@ -86,6 +83,7 @@ struct Shown {
   std::optional<bool> lissajous_error{};
   std::optional<std::uint32_t> safe_singleturn{};
   std::optional<std::uint8_t> page_left{};
+  bool has_turns = true;  // false: what stands in ABM is no part of the position
 };
 
 namespace detail {
@@ -100,6 +98,9 @@ constexpr auto in(const Shown& all) {
   } else {
     return is_there ? std::optional((channel == Channel::one ? reply.one : reply.two).*member) : std::nullopt;
   }
+}
+constexpr std::optional<std::uint16_t> turns_in(const Shown& all) {
+  return all.has_turns ? in<Channel::one, part::multiturn, &Reply::multiturn>(all) : std::nullopt;
 }
 // Bits of ENID, which is the same in both channels.
 template <unsigned shift, unsigned mask>
@@ -120,11 +121,12 @@ inline constexpr auto fields = [] {
       field<&Shown::clash>("clash", "",
                            "yes: its answer is damaged every time; two encoders share the address, or the line is bad",
                            Role::clash),
+      field<&Shown::trouble>("trouble", "", "why an answer that came whole is not good", Role::trouble),
       field<in<one, part::status, &ChannelReply::status>>("ch1_status", "SF of channel 1", status_flags),
       field<in<one, part::alarms, &ChannelReply::alarms>>("ch1_alarms", "ALM of channel 1", alarm_flags),
       field<in<one, part::singleturn, &Reply::singleturn>>("singleturn", "counts", "ABS: position within the turn",
                                                            Role::position),
-      field<in<one, part::multiturn, &Reply::multiturn>>("multiturn", "revolutions", "ABM", Role::turns),
+      field<detail::turns_in>("multiturn", "revolutions", "ABM", Role::turns),
       field<in<one, part::encoder_id, &ChannelReply::encoder_id>>(
           "encoder_id", "", "ENID: D8 multi-turn, 98 single-turn", Role::identity),
       field<detail::of_encoder_id<7, 1>>("safety", "", "1: a safety encoder (ENID bit 7)"),
@@ -187,7 +189,7 @@ constexpr BitRanges place_in(const Profile& profile, unsigned parts, std::size_t
   if constexpr (channel == Channel::one) {
     const FieldInfo* const position = fields.of<in<channel, part::singleturn, &Reply::singleturn>>();
     if (has(part::singleturn, 3) && is(position)) return bits_of(here, 0, singleturn_bits);
-    const FieldInfo* const turns = fields.of<in<channel, part::multiturn, &Reply::multiturn>>();
+    const FieldInfo* const turns = fields.of<turns_in>();
     if (has(part::multiturn, 2) && is(turns)) return bits_of(here, 0, multiturn_bits);
     if (has(part::encoder_id, 1)) {
       if (is(fields.of<in<channel, part::encoder_id, &ChannelReply::encoder_id>>())) return bits_of(here, 0, 8);

@@ -200,6 +200,10 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr bool is_safety_position(DataId id) {
   return id == DataId::position || id == DataId::singleturn;
 }
+/// Of the positions that carry all that the encoder measures.
+[[nodiscard]] constexpr DataId position_id(const Profile& profile) {
+  return profile.turns ? DataId::position : DataId::singleturn;
+}
 /// Ids whose replies carry the sequence counter (and count it, with sequence_step=safety).
 [[nodiscard]] constexpr bool has_sequence(DataId id) { return layout_of(id).crc_bytes == 2; }
 
@@ -217,6 +221,12 @@ inline constexpr std::array<Layout, 16> layouts = [] {
   const auto id = static_cast<unsigned>(data);
   const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
   return static_cast<std::uint8_t>((address & 7) | id << 3 | (odd_parity(covered) ? 0 : 0x80));
+}
+/// ENID: b7 a safety encoder, b6..5 bytes of turns, b4..0 bits of the turn.
+[[nodiscard]] constexpr std::uint8_t encoder_id(const Profile& profile) {
+  constexpr unsigned safety = 0x80;
+  const unsigned turn_bytes = profile.turns ? multiturn_bits / 8 : 0;
+  return static_cast<std::uint8_t>(safety | turn_bytes << 5 | singleturn_bits);
 }
 [[nodiscard]] constexpr std::uint8_t address_of(std::uint8_t field) { return field & 7; }
 

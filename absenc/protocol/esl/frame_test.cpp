@@ -204,7 +204,7 @@ TEST(EslFrame, ValidityOfEachPart) {
   EXPECT_TRUE(to_reading(short_reply).multiturn_valid);
   short_reply.one.status = status::ready | status::non_safety_error;
   EXPECT_TRUE(to_reading(short_reply).singleturn_valid());
-  EXPECT_FALSE(to_reading(short_reply).multiturn_valid);
+  EXPECT_EQ(to_reading(short_reply).multiturn_validity(), Validity::unknown);  // or Lissajous, or overspeed
   EXPECT_EQ(to_reading({.id = DataId::temperature}).singleturn_bits, 0u);
 }
 
@@ -224,6 +224,54 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
     EXPECT_EQ(reading.status_reported, row.status) << static_cast<int>(row.id);
     EXPECT_EQ(reading.alarms_reported, row.alarms) << static_cast<int>(row.id);
   }
+}
+
+// A Lissajous error is a non-safety error (Table 5): the position holds, whichever ID asks for it.
+TEST(EslFrame, LedAndLissajousErrorsCountAlikeInEveryId) {
+  for (const auto& [error, validity] :
+       {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {
+    for (const DataId id : {DataId::position, DataId::singleturn, DataId::position_short, DataId::singleturn_short,
+                            DataId::calibration, DataId::zero, DataId::clear_alarms}) {
+      Reply reply{.id = id};
+      reply.one.status = static_cast<std::uint8_t>(status::ready | error);
+      reply.two.status = static_cast<std::uint8_t>(status::channel_2 | status::ready | error);
+      if (layout_of(id).has(part::alarms)) reply.one.alarms = reply.two.alarms = alarms::led_or_lissajous_error;
+      EXPECT_EQ(to_reading(reply).singleturn_validity(), validity) << static_cast<int>(id);
+      EXPECT_NE(to_reading(reply).multiturn_validity(), Validity::invalid) << static_cast<int>(id);
+    }
+  }
+  // Of another channel, or of both alarms at once.
+  Reply reply = sample(DataId::position);
+  reply.one = {.status = status::ready | status::non_safety_error};
+  reply.two = {.status = status::channel_2 | status::ready, .alarms = alarms::led_or_lissajous_error};
+  EXPECT_EQ(to_reading(reply).singleturn_validity(), Validity::invalid);
+  reply.one = {.status = status::ready | status::non_safety_error | status::safety_error,
+               .alarms = alarms::led_or_lissajous_error};
+  reply.two = {.status = status::channel_2 | status::ready};
+  EXPECT_EQ(to_reading(reply).singleturn_validity(), Validity::invalid);
+}
+
+// The check of the request is right, and the encoder says what it does not like.
+TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
+  const Options values = author::testing::options_of(unit, "");
+  const auto field = static_cast<std::uint8_t>(control_field({}, 0, DataId::position) ^ 0x80);
+  const std::array<std::uint8_t, 2> request{field, checksum8(CrcBitOrder::lsb, std::array{field})};
+  Reply reply = sample(DataId::position);
+  reply.one.status = status::ready | status::parity_error;
+  reply.two.status = status::ready | status::channel_2 | status::parity_error;
+  NoFields nowhere;
+  for (const Bytes asked : {Bytes(request), Bytes{}}) {
+    const ReplyBytes refused = encode_reply({}, reply, field);
+    EXPECT_EQ(unit.decode(values, {.bytes = asked}, {.bytes = refused}, nowhere), Error::request_rejected);
+    const Explanation why = unit.explain(values, Error::request_rejected, {.bytes = asked}, {.bytes = refused});
+    EXPECT_NE(why.detail.find("wrong parity bit"), std::string_view::npos) << why.detail;
+  }
+  // What is not refused is not explained by the parity bit.
+  reply.one.status = status::ready;
+  reply.two.status = status::ready | status::channel_2;
+  const ReplyBytes taken = encode_reply({}, reply, field);
+  EXPECT_EQ(unit.decode(values, {.bytes = request}, {.bytes = taken}, nowhere), Error::bad_checksum);
+  EXPECT_EQ(unit.decode(values, {}, {.bytes = taken}, nowhere), Error::unexpected_reply);
 }
 
 TEST(EslUnit, SaysNothingOfWhatIsNoFrame) {

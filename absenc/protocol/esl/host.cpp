@@ -22,25 +22,48 @@ void show_last(const Dialog& dialog, Found& found) {
   found.reading = dialog.last_reading();
 }
 
+// "24 bits and turns", "20 bits and no turns, not a safety encoder"
+void describe(Sentence& words, std::uint8_t id) {
+  const std::array<char, 2> bits{static_cast<char>('0' + (id & 0x1F) / 10), static_cast<char>('0' + (id & 0x1F) % 10)};
+  words.add({bits.data(), bits.size()}).add(" bits and ").add((id >> 5 & 3) != 0 ? "turns" : "no turns");
+  if ((id & 0x80) == 0) words.add(", not a safety encoder");
+}
+
 }  // namespace
 
 Procedure read_encoder_id(Dialog& dialog, Found& found) {
   co_await dialog.ask(request_of(dialog, DataId::singleturn_short));
-  found.show(co_await dialog.ask(request_of(dialog, DataId::encoder_id)));
-  co_return done;
+  const Reply reply = co_await dialog.ask(request_of(dialog, DataId::encoder_id));
+  found.show(reply);
+  const std::uint8_t expected = encoder_id(dialog.format());
+  if (reply.one.encoder_id == expected) co_return done;
+  found.words.add("the encoder id says ");
+  describe(found.words, reply.one.encoder_id);
+  found.words.add(", the options say ");
+  describe(found.words, expected);
+  co_return {Error::unexpected_reply, found.words.view(),
+             "choose the model of this encoder; where there is none, do not trust its angle: nothing tells how fewer "
+             "bits stand in ABS"};
 }
 
-Procedure read_safely(Dialog& dialog, Found& found) {
+Procedure read_safely(Dialog& dialog, FoundSafe& found) {
   SafetyMonitor monitor(dialog.format());
-  SafetyVerdict verdict{.failed = Check::sequence_unknown};
-  for (unsigned i = 0; i < safe_attempts && verdict.failed == Check::sequence_unknown; ++i) {
-    const Request request = request_of(dialog, monitor.next_id());
-    co_await dialog.ask(request);
-    show_last(dialog, found);
-    verdict = monitor.judge(request, dialog.reply(), dialog.sent_at());
+  found.has_turns = false;  // a safe position has none
+  for (;;) {
+    SafetyVerdict verdict{.failed = Check::sequence_unknown};
+    for (unsigned i = 0; i < safe_attempts && verdict.failed == Check::sequence_unknown; ++i) {
+      const Request request = request_of(dialog, monitor.next_id(position_id(dialog.format())));
+      co_await dialog.ask(request);
+      show_last(dialog, found);
+      verdict = monitor.judge(request, dialog.reply(), dialog.sent_at());
+    }
+    if (!verdict.position) co_return {error_of(verdict.failed), text_of(verdict.failed).sentence};
+    found.safe_singleturn = verdict.position->singleturn();
+    found.reading.multiturn = 0;
+    found.reading.multiturn_bits = 0;
+    found.reading.multiturn_valid = false;
+    dialog.emit();
   }
-  if (verdict.position) found.safe_singleturn = verdict.position->singleturn();
-  co_return {error_of(verdict.failed), text_of(verdict.failed).sentence};
 }
 
 // ---- Resets (Table 4)
@@ -83,7 +106,7 @@ std::string_view missed(Sentence& words, DataId id, const Reply& before, const R
 }  // namespace
 
 Procedure reset(Dialog& dialog, Found& found, DataId id) {
-  const Request look = request_of(dialog, DataId::position);
+  const Request look = request_of(dialog, position_id(dialog.format()));
   const Reply first = co_await dialog.ask(look).repeated(attempts);
   const Reply before = co_await dialog.ask(look).repeated(attempts).after(author::between_looks);
   if (!to_reading(before).ready) {
@@ -216,7 +239,34 @@ Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
   co_return {Error::cross_check_failed, "another page is selected", {}, eeprom_read_pause};
 }
 
+namespace {
+
+// A bit of SF that an alarm beside it raises as well does not tell, unless the other bit is clear.
+bool tell_by_status(Found& found, const Reply& reply) {
+  constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
+  constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;
+  const unsigned raised = reply.one.alarms | reply.two.alarms;
+  const unsigned bits = reply.one.status | reply.two.status;
+  const bool is_raised = (raised & alarms::led_or_lissajous_error) != 0;
+  const bool led = is_raised && (bits & status::safety_error) != 0;
+  const bool lissajous = is_raised && (bits & status::non_safety_error) != 0;
+  if (!led || !lissajous || (raised & other_safety) == 0) found.led_error = led;
+  if (!led || !lissajous || (raised & other_non_safety) == 0) found.lissajous_error = lissajous;
+  return found.led_error || found.lissajous_error;
+}
+
+}  // namespace
+
 Procedure read_error_info(Dialog& dialog, Found& found) {
+  if (dialog.format().bus == sharing_yes) {
+    const Reply reply = co_await dialog.ask(request_of(dialog, DataId::alarms));
+    found.show(reply);
+    if (tell_by_status(found, reply)) co_return done;
+    co_return {Error::unsupported,
+               "other alarms raise the same bits of SF, and memory cannot be reached with several encoders on the line "
+               "(Figure 18)",
+               "connect this encoder alone and say bus=false: then a register tells"};
+  }
   constexpr std::string_view page_may_be_left = "page 8 may be left selected, where it was another before";
   const Request which{DataId::read_memory, dialog.format().address, page_select_address};
   const Result<Reply> before = co_await settled(dialog, which);
@@ -243,11 +293,17 @@ Procedure scan(Dialog& dialog, Nodes& found) {
   bool any = false;
   for (std::uint8_t address = 0; address < most_encoders; ++address) {
     const Request request{DataId::singleturn_short, address};
-    const Result<Reply> reply = co_await dialog.attempt(request).repeated(attempts).after(request_pause);
+    const Result<Reply> reply = co_await dialog.attempt(request).repeated(attempts);
     if (!reply && dialog.is_noisy()) co_return {reply.error()};
-    if (reply) found.answers[address] = *reply;
-    found.disturbed[address] = !reply && reply.error() != Error::timeout;
-    any = any || reply || found.disturbed[address];
+    any = any || reply.error() != Error::timeout;
+    if (reply) {
+      found.answers[address] = *reply;
+    } else if (is_damage(reply.error())) {
+      found.disturbed[address] = true;
+    } else if (reply.error() != Error::timeout) {
+      Reply ignored;
+      found.troubles[address] = check_reply(dialog.format(), request, dialog.reply(), ignored);
+    }
   }
   if (!any) co_return {Error::timeout};
   co_return done;

@@ -20,12 +20,18 @@ struct Found : Shown {
   Sentence words{};                      // of the error
 };
 
-/// ID 8, preceded by an ID 5, so that eight of these in a row are not eight IDs 8 in a row.
+/// ID 8, preceded by an ID 5, so that eight of these in a row are not eight IDs 8 in a row. Error: unexpected_reply (it
+/// says another encoder than the options).
 author::Procedure read_encoder_id(Dialog& dialog, Found& found);
 
-/// IDs 1 and 2 until the monitor trusts the line: two exchanges when all is well. Errors: those of the check that
+/// What a safety reading found: each emit is one.
+struct FoundSafe : Found {
+  static constexpr bool streams = true;
+};
+/// Safe positions without end: IDs 1 and 2 until the monitor trusts the line, two exchanges when all is well, then one
+/// exchange each, so that the sequence counter is compared from reading to reading. Errors: those of the check that
 /// failed.
-author::Procedure read_safely(Dialog& dialog, Found& found);
+author::Procedure read_safely(Dialog& dialog, FoundSafe& found);
 
 /// IDs B (single-turn zero here), C (clear alarms) and D (turns): makes sure that the shaft stands still, sends eight
 /// requests, reads back what became of it. Errors: invalid_argument (the shaft turns, the encoder is not ready),
@@ -44,7 +50,8 @@ author::Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments
 /// For whoever reads or writes by himself. Arguments: page.
 author::Procedure select_page(Dialog& dialog, Found& found, Arguments arguments);
 
-/// Page 8 address 1A: which of the two is behind led_or_lissajous_error. The page before is selected again.
+/// Which of the two is behind led_or_lissajous_error: page 8 address 1A, after which the page before is selected again;
+/// where others share the line, SF (Table 5). Error: unsupported (other alarms raise the same bits of SF).
 author::Procedure read_error_info(Dialog& dialog, Found& found);
 
 // ---- Several encoders on one line
@@ -54,9 +61,11 @@ inline constexpr unsigned most_encoders = 8;  // 3 address bits
 struct Nodes {
   std::array<std::optional<Reply>, most_encoders> answers{};  // the last good reply of each
   std::array<bool, most_encoders> disturbed{};
+  std::array<Check, most_encoders> troubles{};  // of an answer that came whole and is not good
 };
 /// Asks every address for ID 5, never for ID 8: eight of these in a row are "dynamic addressing". An answer that is
-/// damaged every time tells of two encoders with one address, or of a bad line. Error: timeout when nobody answers.
+/// damaged every time tells of two encoders with one address, or of a bad line. One that comes whole is that of one
+/// encoder, also where it refuses or is not as drawn. Error: timeout when nobody answers.
 author::Procedure scan(Dialog& dialog, Nodes& found);
 
 }  // namespace absenc::esl

@@ -23,13 +23,13 @@ TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   bench.shaft.put(4660, 0xABCDEF);
   const Told read = bench.run("position");
   ASSERT_EQ(read.error, Error::none);
-  EXPECT_EQ(bench.line.now(), 2us + answer_time + 18us);
+  EXPECT_EQ(bench.line.now(), request_pause + 2us + answer_time + 18us);
   ASSERT_TRUE(read.reading.has_value());
   EXPECT_EQ(read.reading->singleturn, 0xABCDEFu);
   EXPECT_EQ(read.reading->multiturn, 4660u);
   EXPECT_TRUE(read.reading->singleturn_valid() && read.reading->multiturn_valid && read.reading->ready);
-  EXPECT_EQ(read.reading->latched, 1us + 4300ns);  // the end bit of CF is over after one character
-  EXPECT_EQ(read.reading->received, 22us);
+  EXPECT_EQ(read.reading->latched, request_pause + 1us + 4300ns);  // the end bit of CF is over after one character
+  EXPECT_EQ(read.reading->received, request_pause + 22us);
   EXPECT_EQ(read.numbers.at("redundant_singleturn"), 0xABCDEF >> 15);
 }
 
@@ -39,6 +39,124 @@ TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   EXPECT_EQ(bench.violations(), 0u);
   for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::encoder_id});
   ASSERT_EQ(bench.violations(), 1u);  // the rule is watched
+}
+
+// "If there is no Start Bit after the End Bit of the last frame": one bit between two frame sets is the least.
+TEST(EslHost, EachRequestBeginsTwoBitsAfterTheReplyBeforeInEveryConversation) {
+  const std::vector<std::pair<const char*, std::vector<std::int64_t>>> commands{{"position", {}},
+                                                                                {"position", {}},
+                                                                                {"safe-position", {}},
+                                                                                {"encoder-id", {}},
+                                                                                {"alarms", {}},
+                                                                                {"led-or-lissajous", {}},
+                                                                                {"scan", {}},
+                                                                                {"zero", {}},
+                                                                                {"clear-alarms", {}},
+                                                                                {"memory-read", {3, 0}},
+                                                                                {"memory-write", {3, 7, 0}},
+                                                                                {"select-page", {8}},
+                                                                                {"reset-multiturn", {}}};
+  Bench bench;
+  std::size_t last_sender = 1;
+  Time last_end = -1ms;
+  Time shortest = never;
+  bench.line.observe([&](std::size_t sender, Time start, Time end, std::uint8_t) {
+    if (sender == 1 && last_sender != 1) shortest = std::min(shortest, start - last_end);
+    last_sender = sender;
+    last_end = end;
+  });
+  for (const auto& [command, arguments] : commands) {
+    shortest = never;
+    EXPECT_EQ(bench.run(command, arguments).error, Error::none) << command;
+    EXPECT_GE(shortest, line_settings.bits(2)) << command;
+  }
+  EXPECT_EQ(bench.violations(), 0u);
+}
+
+// ---- Which encoder it is
+
+TEST(EslHost, AnEncoderIdThatIsNotThatOfTheOptionsIsReported) {
+  for (const auto& [id, turns, words] :
+       {std::tuple{0x98, true, "says 24 bits and no turns, the options say 24 bits and turns"},
+        std::tuple{0xD4, true, "says 20 bits and turns, the options say 24 bits and turns"},
+        std::tuple{0x58, true, "says 24 bits and turns, not a safety encoder"},
+        std::tuple{0xD8, false, "says 24 bits and turns, the options say 24 bits and no turns"}}) {
+    Bench bench({.turns = turns}, [id = static_cast<std::uint8_t>(id)](unsigned, Wire& reply) {
+      Result<Reply> sent = decode_reply({}, {DataId::encoder_id}, reply);
+      if (!sent) return;
+      sent->one.encoder_id = sent->two.encoder_id = id;
+      reply = wire(*sent);
+    });
+    const Told told = bench.run("encoder-id");
+    EXPECT_EQ(text_of(told.error).name, "unexpected_reply");
+    EXPECT_TRUE(told.says(words)) << told.detail;
+    EXPECT_NE(told.advice.find("model"), std::string::npos) << told.advice;
+  }
+}
+
+TEST(EslHost, AnEncoderOfOneTurnHasNone) {
+  Bench bench({.turns = false});
+  bench.shaft.put(7, 0xABCDEF);
+  for (const char* command : {"position", "position-short", "safe-position"}) {
+    const Told read = bench.run(command);
+    ASSERT_EQ(read.error, Error::none) << command;
+    EXPECT_EQ(read.reading->singleturn, 0xABCDEFu) << command;
+    EXPECT_EQ(read.reading->multiturn_validity(), Validity::absent) << command;
+    EXPECT_EQ(read.numbers.count("multiturn"), 0u) << command;
+  }
+  EXPECT_EQ(bench.run("encoder-id").numbers.at("encoder_id"), 0x98);
+  EXPECT_EQ(bench.run("zero").error, Error::none);
+  EXPECT_EQ(bench.read().singleturn, 0u);
+  const std::uint64_t answered = bench.encoder.answer_count();
+  const Told reset = bench.run("reset-multiturn");
+  EXPECT_EQ(reset.error, Error::unsupported);
+  EXPECT_TRUE(reset.says("one turn")) << reset.detail;
+  EXPECT_EQ(bench.encoder.answer_count(), answered);
+}
+
+TEST(EslHost, TurnsFromAnEncoderOfOneTurnAreAnError) {
+  Bench bench;
+  bench.shaft.put(7, 0);
+  bench.options = testing::options_of({.turns = false});
+  const Told read = bench.run("position-short");
+  EXPECT_EQ(read.error, Error::out_of_range);
+  EXPECT_TRUE(read.says("turns=false")) << read.detail;
+}
+
+// ---- Safe positions
+
+// One exchange each, as soon as two have shown that the counter moves.
+TEST(EslHost, SafePositionsFollowEachOther) {
+  Bench bench;
+  const testing::Talk made(unit, testing::options_of({}), "safe-position");
+  unsigned safe = 0;
+  bench.line.on_emit = [&] {
+    EXPECT_EQ((*made).error(), Error::none);
+    EXPECT_EQ((*made).reading()->singleturn, safe);
+    EXPECT_EQ(bench.encoder.answer_count(), safe + 2);
+    bench.shaft.put(0, ++safe);
+    return safe < 300;
+  };
+  bench.line.converse(*made);
+  EXPECT_EQ(safe, 300u);
+}
+
+TEST(EslHost, ACounterThatStopsBetweenSafePositionsIsFound) {
+  Bench bench;
+  const testing::Talk made(unit, testing::options_of({}), "safe-position");
+  unsigned safe = 0;
+  bench.line.on_emit = [&] {
+    if (++safe == 10) {
+      bench.condition(condition::ch1_sequence, 11);  // that of the last reply
+      bench.condition(condition::ch2_sequence, 11);
+    }
+    return safe < 20;
+  };
+  EXPECT_TRUE(bench.line.converse(*made));
+  EXPECT_EQ(safe, 10u);
+  EXPECT_EQ((*made).error(), Error::sequence_mismatch);
+  EXPECT_NE((*made).detail().find("stands still"), std::string_view::npos) << (*made).detail();
+  EXPECT_EQ((*made).reading(), nullptr);
 }
 
 // Every profile on both sides; another address too.
@@ -68,7 +186,7 @@ TEST(EslHost, SilenceIsATimeout) {
   bench.encoder.power_off(Time{});
   const Told read = bench.run("position");
   EXPECT_EQ(read.error, Error::timeout);
-  EXPECT_EQ(bench.line.now(), 2us + answer_limit);
+  EXPECT_EQ(bench.line.now(), request_pause + 2us + answer_limit);
   EXPECT_EQ(read.detail, "it is also silent when request_crc, crc_bit_order or address is another");
   EXPECT_EQ(read.sent.size(), 2u);
   EXPECT_TRUE(bench.run("memory-read", {0}).says("(Figure 18)"));
@@ -385,6 +503,41 @@ TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
       EXPECT_EQ(encoder->answer_count(),
                 clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // ID 5 and never ID 8
     }
+  }
+}
+
+// "disconnect one" is bad advice where there is only one: its answer is whole.
+TEST(EslBus, ARefusalIsNoClash) {
+  struct Scan final : FieldSink {
+    void put(const FieldValue& value) override {
+      if (value.info->role == Role::clash) clash = value.number != 0;
+      if (value.info->role == Role::trouble) trouble.assign(value.bytes.begin(), value.bytes.end());
+    }
+    bool clash = true;
+    std::string trouble;
+  };
+  struct Row {
+    Profile encoder;
+    std::size_t condition;
+    std::int64_t value;
+    const char* words;
+  };
+  for (const Row& row : {Row{{}, condition::ch1_status_set, status::parity_error, "wrong parity bit"},
+                         Row{{}, condition::ch1_status_set, status::stop_error, "wrong stop bit"},
+                         Row{{}, condition::ch1_status_set, status::channel_2, "says that it is channel 2"},
+                         Row{{.status_order = FieldOrder::tformat}, condition::temperature, 35, "channel 2"}}) {
+    Bench bench(row.encoder);
+    bench.options = testing::options_of({});
+    bench.condition(row.condition, row.value);
+    if (row.encoder.status_order == FieldOrder::tformat) bench.encoder.raise_alarms(alarms::overspeed);
+    const testing::Talk made(unit, bench.options, "scan");
+    Conversation<std::uint8_t>& host = *made;
+    EXPECT_TRUE(bench.line.converse(host));
+    EXPECT_EQ(host.error(), Error::none);
+    Scan found;
+    host.report(found);
+    EXPECT_FALSE(found.clash) << row.words;
+    EXPECT_NE(found.trouble.find(row.words), std::string::npos) << found.trouble;
   }
 }
 

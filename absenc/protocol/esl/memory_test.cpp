@@ -98,8 +98,7 @@ TEST(EslMemory, MemoryOnABusIsRefused) {
   Bench bench({.bus = sharing_yes});
   for (const auto& [command, arguments] :
        {std::pair{read, std::vector<std::int64_t>{0}}, std::pair{write, std::vector<std::int64_t>{0, 1, 0}},
-        std::pair{"select-page", std::vector<std::int64_t>{0}},
-        std::pair{"led-or-lissajous", std::vector<std::int64_t>{}}}) {
+        std::pair{"select-page", std::vector<std::int64_t>{0}}}) {
     const Told refused = bench.run(command, arguments);
     EXPECT_EQ(refused.error, Error::unsupported);
     EXPECT_TRUE(refused.says("several encoders on the line")) << refused.detail;
@@ -180,6 +179,41 @@ TEST(EslMemory, LedAndLissajousAreToldApart) {
     EXPECT_EQ(info.numbers.at("led_error"), lissajous ? 0 : 1);
     EXPECT_EQ(info.numbers.at("lissajous_error"), lissajous ? 1 : 0);
   }
+}
+
+// By SF, as far as no other alarm raises the same bit.
+TEST(EslMemory, LedAndLissajousAreToldApartOnABusWithoutMemory) {
+  constexpr int open = -1;
+  struct Row {
+    unsigned alarms;
+    bool lissajous;
+    int led_error;
+    int lissajous_error;
+  };
+  using alarms::led_or_lissajous_error;
+  for (const Row& row :
+       {Row{led_or_lissajous_error, false, 1, 0}, Row{led_or_lissajous_error, true, 0, 1}, Row{0, false, 0, 0},
+        Row{alarms::memory_error, false, 0, 0}, Row{led_or_lissajous_error | alarms::memory_error, false, 1, 0},
+        Row{led_or_lissajous_error | alarms::memory_error, true, open, 1},
+        Row{led_or_lissajous_error | alarms::overspeed, false, 1, open},
+        Row{led_or_lissajous_error | alarms::xc_error, true, 0, 1}}) {
+    Bench bench({.bus = sharing_yes});
+    bench.condition(condition::lissajous, row.lissajous ? 1 : 0);
+    bench.encoder.raise_alarms(row.alarms);
+    const Told info = bench.run("led-or-lissajous");
+    ASSERT_EQ(info.error, Error::none) << row.alarms;
+    const auto told = [&info](const char* name) {
+      return info.numbers.count(name) != 0 ? static_cast<int>(info.numbers.at(name)) : open;
+    };
+    EXPECT_EQ(told("led_error"), row.led_error) << row.alarms;
+    EXPECT_EQ(told("lissajous_error"), row.lissajous_error) << row.alarms;
+    EXPECT_EQ(bench.violations(), 0u);
+  }
+  Bench bench({.bus = sharing_yes});
+  bench.encoder.raise_alarms(led_or_lissajous_error | alarms::memory_error | alarms::overspeed);
+  const Told info = bench.run("led-or-lissajous");
+  EXPECT_EQ(info.error, Error::unsupported);
+  EXPECT_TRUE(info.says("other alarms")) << info.detail;
 }
 
 }  // namespace

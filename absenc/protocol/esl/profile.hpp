@@ -50,6 +50,7 @@ struct Profile {
   Id6Redundant id6_rs = Id6Redundant::bits_16;
 
   std::uint8_t address = 0;              // EAD, 0 to 7
+  bool turns = true;                     // false: an encoder of one turn
   Sharing bus = sharing_automatic;       // yes: others share the line, memory cannot be reached (Figure 18)
   bool require_forced_test = false;      // of a safe position
   std::uint8_t redundant_tolerance = 1;  // RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
@@ -106,6 +107,8 @@ inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::id6_rs>("id6_rs", "bits of the redundant position in a reply to ID 6",
                                           choices::id6_rs),
     author::with_role<Role::encoder>(author::option<&Profile::address>("address", "EAD of the encoder", 0, 7)),
+    author::option<&Profile::turns>(
+        "turns", "whether the encoder counts turns (encoder id D8); false: it has one turn (98), and ABM is 0"),
     author::option<&Profile::bus>(
         "bus",
         "several encoders share the line: memory cannot be read or written then; auto: where it is known, as on "

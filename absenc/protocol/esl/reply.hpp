@@ -34,6 +34,7 @@ enum class Check : std::uint8_t {
   ch1_channel_bit,
   ch2_channel_bit,
   unused_bits,
+  turns_of_one,
   busy_with_data,
   other_value,
   sequences_differ,
@@ -59,7 +60,7 @@ struct CheckText {
 };
 
 /// Indexed by the enumerator.
-inline constexpr std::array<CheckText, 31> check_texts{{
+inline constexpr std::array<CheckText, 32> check_texts{{
     {Error::none, ""},
     {Error::wrong_length, "the number of bytes is not that of this reply"},
     {Error::wrong_length, "channel 2 is missing: the reply ends after channel 1"},
@@ -76,6 +77,7 @@ inline constexpr std::array<CheckText, 31> check_texts{{
     {Error::unexpected_reply, "channel 1 says that it is channel 2"},
     {Error::unexpected_reply, "channel 2 says that it is channel 1"},
     {Error::out_of_range, "a bit that is always 0 is set"},
+    {Error::out_of_range, "turns came from an encoder of one turn (turns=false)"},
     {Error::unexpected_reply, "the encoder is busy but sends data (Table 10: 00)"},
     {Error::unexpected_reply, "the encoder accepted another value than was sent"},
     {Error::sequence_mismatch, "the sequence counters of the two channels differ"},
@@ -117,6 +119,11 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
 }
 }  // namespace detail
 
+/// Whether the last byte is the 8-bit CRC of those before it.
+[[nodiscard]] constexpr bool has_checksum8(const Profile& profile, Bytes bytes) {
+  return checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) == bytes.back();
+}
+
 /// Errors: wrong_length; unsupported (an id that Table 3 does not list); bad_checksum (parity or CRC); out_of_range
 /// (the busy bit is 0 in requests).
 [[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
@@ -124,9 +131,7 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
   const std::optional<DataId> id = data_id(bytes[0]);
   if (!id) return Error::unsupported;
   if (bytes.size() != request_length(profile, *id)) return Error::wrong_length;
-  if (bytes.size() > 1 && checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) != bytes.back()) {
-    return Error::bad_checksum;
-  }
+  if (bytes.size() > 1 && !has_checksum8(profile, bytes)) return Error::bad_checksum;
   if (bytes[0] != control_field(profile, address_of(bytes[0]), *id)) return Error::bad_checksum;
   bool busy = false;
   const Request request = detail::split_request(profile, *id, bytes, busy);
@@ -227,6 +232,7 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
   if ((both & status::parity_error) != 0) return Check::parity_reported;
   if ((both & status::stop_error) != 0) return Check::stop_reported;
   if ((reply.one.status & status::channel_2) != 0) return Check::ch1_channel_bit;
+  if (!profile.turns && reply.multiturn != 0) return Check::turns_of_one;
   if (!layout.has_two()) return Check::passed;
   if ((reply.two.status & status::channel_2) == 0) return Check::ch2_channel_bit;
   if (reply.unused_bits) return Check::unused_bits;
@@ -241,29 +247,51 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 
 }  // namespace detail
 
-/// Checks in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. `reply` is filled as soon
-/// as the checksums hold, and to be used only when the result is `passed`. A busy memory reply passes.
-[[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
+namespace detail {
+// `asked`: the control field that was sent, also one with a wrong parity bit.
+constexpr Check check_reply_to(const Profile& profile, const Request& request, std::uint8_t asked, Bytes bytes,
+                               Reply& reply) {
   const Layout& layout = layout_of(request.id);
   if (bytes.size() != reply_length(request.id)) {
     const bool first_only = layout.has_two() && bytes.size() == layout.length_one;
-    return first_only && detail::checksum_holds(profile, layout.crc_bytes, Channel::one, bytes)
-               ? Check::channel_2_missing
-               : Check::length;
+    return first_only && checksum_holds(profile, layout.crc_bytes, Channel::one, bytes) ? Check::channel_2_missing
+                                                                                        : Check::length;
   }
   const Bytes one = bytes.first(layout.length_one);
   const Bytes two = bytes.subspan(layout.length_one);
-  const Check sums = detail::check_checksums(profile, layout, one, two);
+  const Check sums = check_checksums(profile, layout, one, two);
   if (sums != Check::passed) return sums;
   reply.id = request.id;
   reply.encoder_address = address_of(one[0]);
-  detail::decode_parts(profile, layout.one, one, reply, reply.one);
-  if (layout.has_two()) detail::decode_parts(profile, layout.two, two, reply, reply.two);
-  const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
-  const Check echo = detail::check_echo(asked, one[0], layout.has_two() ? two[0] : asked);
+  decode_parts(profile, layout.one, one, reply, reply.one);
+  if (layout.has_two()) decode_parts(profile, layout.two, two, reply, reply.two);
+  const Check echo = check_echo(asked, one[0], layout.has_two() ? two[0] : asked);
   if (echo != Check::passed) return echo;
-  return is_memory_access(request.id) ? detail::check_memory(request, reply)
-                                      : detail::check_content(profile, layout, reply);
+  return is_memory_access(request.id) ? check_memory(request, reply) : check_content(profile, layout, reply);
+}
+}  // namespace detail
+
+/// Checks in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. `reply` is filled as soon
+/// as the checksums hold, and to be used only when the result is `passed`. A busy memory reply passes.
+[[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
+  const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
+  return detail::check_reply_to(profile, request, asked, bytes, reply);
+}
+
+/// A good request is a whole one with the right parity bit. Of one in which that bit alone is wrong, and of its reply:
+/// what the encoder reports, `passed` where it is something else. Without the request the reply echoes it.
+[[nodiscard]] constexpr Check check_refusal(const Profile& profile, Bytes request, Bytes bytes) {
+  if (bytes.empty()) return Check::passed;
+  const Bytes sent = request.empty() ? bytes : request;
+  const std::optional<DataId> id = data_id(sent[0]);
+  if (!id || sent[0] == control_field(profile, address_of(sent[0]), *id)) return Check::passed;
+  const bool whole = request.empty() || request.size() == request_length(profile, *id);
+  if (!whole || (request.size() > 1 && !has_checksum8(profile, request))) return Check::passed;
+  bool busy = false;
+  Reply reply;
+  const Check check =
+      detail::check_reply_to(profile, detail::split_request(profile, *id, sent, busy), sent[0], bytes, reply);
+  return error_of(check) == Error::request_rejected ? check : Check::passed;
 }
 
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Profile& profile, const Request& request, Bytes bytes) {
@@ -273,8 +301,19 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
   return result;
 }
 
+namespace detail {
+// The alarms of a channel with which the position within the turn is not used. SF tells LED from Lissajous: a Lissajous
+// error is a non-safety error (Table 5), and the position holds.
+constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
+  constexpr std::uint8_t errors = status::safety_error | status::non_safety_error;
+  const bool lissajous = (channel.status & errors) == status::non_safety_error;
+  return channel.alarms & alarms::unsafe & ~(lissajous ? unsigned{alarms::led_or_lissajous_error} : 0u);
+}
+}  // namespace detail
+
 /// The position in a good reply and what of it holds, the flags of channel 2 above those of channel 1. IDs 4, 5 and 6
-/// carry no alarms: SF alone tells then. This is not a safe position (safety.hpp).
+/// carry no alarms: SF alone tells then. Whether a non-safety error is one of the turns it does not say. This is not a
+/// safe position (safety.hpp).
 [[nodiscard]] constexpr Reading to_reading(DataId id, const Reply& reply) {
   const Layout& layout = layout_of(id);
   const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
@@ -288,17 +327,18 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
       ((layout.one & part::alarms) != 0 ? 0xFFu : 0u) | ((layout.two & part::alarms) != 0 ? 0xFF00u : 0u);
   reading.ready = (reply.one.status & second & status::ready) != 0;
   if (layout.has(part::singleturn)) {
-    const bool valid = reading.ready && (either & status::safety_error) == 0 && (raised & alarms::unsafe) == 0;
+    const bool valid = reading.ready && (either & status::safety_error) == 0 &&
+                       (detail::unsafe_alarms(reply.one) | detail::unsafe_alarms(reply.two)) == 0;
     reading.singleturn = reply.singleturn;
     reading.singleturn_bits = singleturn_bits;
     reading.singleturn_valid_bits = valid ? singleturn_bits : 0;
   }
   if (layout.has(part::multiturn)) {
-    const bool wrong =
-        layout.has(part::alarms) ? (raised & alarms::turns_wrong) != 0 : (either & status::non_safety_error) != 0;
+    const bool told = layout.has(part::alarms) || (either & status::non_safety_error) == 0;
     reading.multiturn = reply.multiturn;
     reading.multiturn_bits = multiturn_bits;
-    reading.multiturn_valid = reading.ready && !wrong;
+    reading.multiturn_known = told || !reading.ready;
+    reading.multiturn_valid = reading.ready && told && (raised & alarms::turns_wrong) == 0;
   }
   return reading;
 }
@@ -317,7 +357,7 @@ struct Protocol {
   static constexpr std::size_t longest_reply = reply_capacity;
 
   static constexpr author::HostTimes host_times(const Profile&) {
-    return {.answer_limit = answer_limit, .gap_limit = gap_limit};
+    return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
   /// A page change that was not answered well may be going on all the same, and so may the reading of an EEPROM byte:
   /// neither a repetition nor whoever comes next may meet it.
@@ -334,8 +374,11 @@ struct Protocol {
   static constexpr auto encode = encode_request;
   static constexpr auto decode_request = esl::decode_request;
   static constexpr auto decode = decode_reply;
-  static constexpr Reading reading(const Profile&, const Request& request, const Reply& reply) {
-    return to_reading(request.id, reply);  // by the request, which may be known when the program is written
+  static constexpr Reading reading(const Profile& profile, const Request& request, const Reply& reply) {
+    Reading reading = to_reading(request.id, reply);  // by the request, which may be known when the program is written
+    if (!profile.turns) reading.multiturn_bits = 0;
+    if (!profile.turns) reading.multiturn_valid = false;
+    return reading;
   }
   static constexpr std::size_t expected(const Profile& profile, const Request& request, Bytes) {
     return reply_size(profile, request);

@@ -31,8 +31,8 @@ inline constexpr Time page_time = 18ms;                              // after a 
 /// Not in the document: how long the host waits for an answer, and for the next character of one.
 inline constexpr Time answer_limit = 20us;
 inline constexpr Time gap_limit = 3 * line_settings.character();
-/// Not in the document: what a host leaves between a reply and the next request of a scan. A missing start bit ends a
-/// frame set, so one bit would do.
+/// Not in the document: what a host leaves between a reply and its next request. A missing start bit ends a frame set,
+/// so one bit would do.
 inline constexpr Time request_pause = line_settings.bits(2);
 
 /// When the encoder takes a position: that is finished 4.3 us after the end of CF, which one CRC byte may follow.

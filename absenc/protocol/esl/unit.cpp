@@ -41,8 +41,10 @@ constexpr Request write_at(const Profile& profile, Arguments arguments) {
   return {DataId::write_memory, profile.address, byte_of(arguments[0]), byte_of(arguments[1])};
 }
 constexpr Request read_info(const Profile& profile, Arguments) {
+  if (profile.bus == sharing_yes) return {DataId::alarms, profile.address};
   return {DataId::read_memory, profile.address, error_info_address};
 }
+constexpr Request ask_position(const Profile& profile, Arguments) { return {position_id(profile), profile.address}; }
 constexpr Request select(const Profile& profile, Arguments arguments) {
   return {DataId::write_memory, profile.address, page_select_address, byte_of(arguments[0])};
 }
@@ -50,6 +52,10 @@ constexpr std::string_view no_memory(const Profile& profile) {
   if (profile.bus != sharing_yes) return {};
   return "memory cannot be reached by broadcast or with several encoders on the line (Figure 18): connect this one "
          "alone and say bus=false; nothing was sent";
+}
+
+constexpr std::string_view no_turns(const Profile& profile) {
+  return profile.turns ? "" : "an encoder of one turn counts none (turns=false); nothing was sent";
 }
 
 // ---- What is said of errors
@@ -67,6 +73,7 @@ constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes 
 // The check behind `error`; `passed` where the error is none of the frame's.
 Check check_behind(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
+  if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;
   const Result<Request> asked = asked_by(profile, request, reply);
   if (!asked) return Check::passed;
   Reply ignored;
@@ -77,15 +84,26 @@ Check check_behind(const Profile& profile, Error error, Bytes request, Bytes rep
 // ---- What is shown, of frames and of what procedures find
 
 constexpr Shown values_of_request(const Profile& profile, const Request& request) { return {profile, request}; }
-constexpr Shown values_of_reply(const Profile&, const Request&, const Reply& reply) { return Shown(reply); }
-void put_found(FieldSink& sink, const Profile&, const Found& found) { fields.put(sink, found); }
+constexpr Shown values_of_reply(const Profile& profile, const Request&, const Reply& reply) {
+  Shown shown(reply);
+  shown.has_turns = profile.turns;
+  return shown;
+}
+void put_found(FieldSink& sink, const Profile& profile, const Found& found) {
+  Shown shown = found;
+  shown.has_turns = found.has_turns && profile.turns;
+  fields.put(sink, shown);
+}
+void put_safe(FieldSink& sink, const Profile& profile, const FoundSafe& found) { put_found(sink, profile, found); }
 void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
   for (std::uint8_t node = 0; node < most_encoders; ++node) {
     const std::optional<Reply>& reply = nodes.answers[node];
-    if (!reply && !nodes.disturbed[node]) continue;
+    const Check trouble = nodes.troubles[node];
+    if (!reply && !nodes.disturbed[node] && trouble == Check::passed) continue;
     Shown node_shown;
     node_shown.encoder_address = node;
-    node_shown.clash = !reply;
+    node_shown.clash = nodes.disturbed[node];
+    if (trouble != Check::passed) node_shown.trouble = text_of(trouble).sentence;
     node_shown.reply = reply;
     fields.put(sink, node_shown);
     if (reply) sink.put_reading(to_reading(*reply));
@@ -128,6 +146,7 @@ constexpr Report<Protocol, HostOf<Protocol>> report{
     .tell = tell,
 };
 constexpr Finding<Profile, Found> found{.put = put_found};
+constexpr Finding<Profile, FoundSafe> found_safe{.put = put_safe};
 constexpr Finding<Profile, Nodes> nodes{.put = put_nodes};
 
 template <DataId data>
@@ -144,26 +163,29 @@ constexpr CommandOf<Protocol> reset_by(std::string_view name, Verb verb, std::st
 }
 
 constexpr auto commands = std::array{
-    read<DataId::position>("position", Verb::read, "position, turns and alarms of both channels"),
+    reading<report, ask_position>({"position", Verb::read, 0, "position, turns and alarms of both channels"}),
     read<DataId::singleturn>("singleturn", Verb::read_part, "position within the turn, both channels"),
     read<DataId::position_short>("position-short", Verb::read_part, "position and turns, one channel, no alarms"),
     read<DataId::singleturn_short>("singleturn-short", Verb::read_part,
                                    "position within the turn, one channel, no alarms"),
     read<DataId::calibration>("calibration", Verb::read_part, "position within the turn as each channel sees it"),
-    run<read_safely, ask<DataId::position>>(
-        {"safe-position", Verb::run, 0,
-         "a position that passed every check of a safety reader (not a certified safety function)"}),
+    command<report, found_safe, read_safely, ask_position>(
+        {.name = "safe-position",
+         .verb = Verb::run,
+         .id = 0,
+         .meaning = "a position that passed every check of a safety reader (not a certified safety function)",
+         .repeatable = false}),
     run<read_encoder_id, ask<DataId::encoder_id>>({"encoder-id", Verb::info, 0, "encoder id", {}, false, false}),
     read<DataId::alarms>("alarms", Verb::info, "alarms of both channels"),
     read<DataId::temperature>("temperature", Verb::temperature, "temperature inside the encoder"),
     run<read_error_info, read_info>(
-        {"led-or-lissajous", Verb::run, 0, "which of the two is behind led_or_lissajous_error"})
-        .unless(no_memory),
+        {"led-or-lissajous", Verb::run, 0, "which of the two is behind led_or_lissajous_error"}),
     command<report, nodes, scan, ask<DataId::singleturn_short>>(
         {"scan", Verb::scan, 0, "who answers on the line", {}, false, false}),
     reset_by<DataId::zero>("zero", Verb::zero, "make this the zero of the turn"),
     reset_by<DataId::clear_alarms>("clear-alarms", Verb::clear_alarms, "clear the alarms that can be cleared"),
-    reset_by<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn, "set the turns to zero"),
+    reset_by<DataId::reset_multiturn>("reset-multiturn", Verb::reset_multiturn, "set the turns to zero")
+        .unless(no_turns),
     run<read_memory, read_at>({"memory-read", Verb::memory_read, 0, "read EEPROM, MTP or registers", read_arguments})
         .unless(no_memory),
     run<write_memory, write_at>(
@@ -180,17 +202,28 @@ constexpr const FieldInfo* status_of = fields.of<detail::in<channel, part::statu
 template <Channel channel>
 constexpr const FieldInfo* alarms_of = fields.of<detail::in<channel, part::alarms, &ChannelReply::alarms>>();
 constexpr auto models =
-    std::array{ModelText{"QS35-M40M-E12F", "24 bits, 65536 turns, two channels (SIL3)", 10'000, ""}};
+    std::array{ModelText{"QS35-M40M-E12F", "24 bits, 65536 turns, two channels (SIL3)", 10'000, "turns=true"},
+               ModelText{"single-turn", "24 bits, one turn, two channels (SIL3)", 10'000, "turns=false"}};
 
 constexpr LineSettings line_of(const Profile&) { return line_settings; }
-constexpr Resolution resolution_of(const Profile&) { return {singleturn_bits, multiturn_bits}; }
+constexpr Resolution resolution_of(const Profile& profile) {
+  return {singleturn_bits, profile.turns ? multiturn_bits : 0};
+}
 BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
   return place_of(options.format(values), reply.bytes, field);
 }
 constexpr std::size_t size_of_reply(const Profile& profile, Bytes begin) {
   return Protocol::request_size(profile, begin) == 0 ? 0 : reply_length(*data_id(begin[0]));
 }
-constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) { return asked_by(profile, {}, reply); }
+// The encoder answers a request with a wrong parity bit, too.
+constexpr Error answer_to_bad(const Profile& profile, Bytes request, Error error, Bytes reply) {
+  const Check refusal = check_refusal(profile, request, reply);
+  return refusal == Check::passed ? error : error_of(refusal);
+}
+constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) {
+  const Error refused = answer_to_bad(profile, {}, Error::none, reply);
+  return refused == Error::none ? asked_by(profile, {}, reply) : Result<Request>(refused);
+}
 
 constexpr Declaration<Protocol, VirtualEncoder, HostOf<Protocol>> declaration{
     .id = "esl",
@@ -209,6 +242,7 @@ constexpr Declaration<Protocol, VirtualEncoder, HostOf<Protocol>> declaration{
     .resolution = resolution_of,
     .guess_request = guess_request,
     .reply_size = size_of_reply,
+    .answer_to_bad = answer_to_bad,
     .bits = bits_in,
     .probe = probe,
     .status = status_of<Channel::one>,

@@ -35,7 +35,7 @@ inline constexpr std::array vectors{
     author::VectorText{"esl-033", "IDA alarm bit 5 st", "derived", "", "d064", "d04020c4d060206f", "data_id=10 encoder_address=0 ch1_status=0x40 ch1_alarms=0x20 ch2_status=0x60 ch2_alarms=0x20"},
     author::VectorText{"esl-034", "IDA alarm bit 6 uv", "derived", "", "d064", "d0404083d0604028", "data_id=10 encoder_address=0 ch1_status=0x40 ch1_alarms=0x40 ch2_status=0x60 ch2_alarms=0x40"},
     author::VectorText{"esl-035", "IDA alarm bit 7 ov", "derived", "", "d064", "d040800dd06080a6", "data_id=10 encoder_address=0 ch1_status=0x40 ch1_alarms=0x80 ch2_status=0x60 ch2_alarms=0x80"},
-    author::VectorText{"esl-036", "ID8 ST ENID 0x98", "derived", "", "407a", "4040980150b340609801311b", "data_id=8 encoder_address=0 ch1_status=0x40 ch1_sequence=1 encoder_id=152 safety=1 multiturn_bytes=0 singleturn_bits=24 ch2_status=0x60 ch2_sequence=1"},
+    author::VectorText{"esl-036", "ID8 ST ENID 0x98", "derived", "turns=false", "407a", "4040980150b340609801311b", "data_id=8 encoder_address=0 ch1_status=0x40 ch1_sequence=1 encoder_id=152 safety=1 multiturn_bytes=0 singleturn_bits=24 ch2_status=0x60 ch2_sequence=1"},
     author::VectorText{"esl-037", "ID8 MT ENID 0xD8", "derived", "", "407a", "4040d8019f014060d801fea9", "data_id=8 encoder_address=0 ch1_status=0x40 ch1_sequence=1 encoder_id=216 safety=1 multiturn_bytes=2 singleturn_bits=24 ch2_status=0x60 ch2_sequence=1"},
     author::VectorText{"esl-038", "ID9 -10 C", "derived", "", "c8fb", "c840f600", "data_id=9 encoder_address=0 ch1_status=0x40 temperature_c=-10"},
     author::VectorText{"esl-039", "IDE register read", "derived", "", "7034ac", "70340a60", "data_id=14 encoder_address=0 memory_address=26 busy=0 value=10"},

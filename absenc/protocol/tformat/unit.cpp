@@ -382,7 +382,7 @@ constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   return request;
 }
 /// What the encoder cannot accept is answered like ID 3 (8.4, 9.4).
-constexpr Error answer_to_bad(Error error, Bytes reply) {
+constexpr Error answer_to_bad(const Format&, Bytes, Error error, Bytes reply) {
   const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
                        reply[0] == control_field(DataId::everything);
   return refused ? Error::request_rejected : error;

@@ -166,7 +166,7 @@ bool summarize(const Watches& watches, Time start, Time processor) {
 Watches make_watches(const Invocation& invocation, double rate) {
   const std::span<const std::string> names = invocation.texts("encoder");
   std::vector<EncoderAddress> uris;
-  for (const std::string& name : names) uris.push_back(parse_address(name, invocation.texts("--option")));
+  for (const std::string& name : names) uris.push_back(parse_address(name, reading_settings(invocation)));
   require_different(uris, names);
   Watches watches;
   for (std::size_t i = 0; i < uris.size(); ++i) {
@@ -198,12 +198,13 @@ int run_monitor(const Invocation& invocation) {
   return summarize(watches, start, used) ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 6> monitor_parameters{{
+constexpr std::array<Parameter, 7> monitor_parameters{{
     {"encoder", "", "as for `absenc read`; several may be given", "", true, true},
     {"--rate", "HZ", "readings a second of each; 0: as many as the line allows", "50"},
     {"--interval", "SECONDS", "without a screen: how often to print a line for each", "1"},
     {"--for", "SECONDS", "end by itself", "until q or Ctrl-C"},
     {"--json", "", "no screen: one JSON object a line"},
+    parameter::read_command,
     parameter::option,
 }};
 

@@ -121,7 +121,7 @@ void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, 
 
 int run_read(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), reading_settings(invocation));
   const auto count = static_cast<std::uint64_t>(invocation.number("--count", 1, 0, INT64_MAX));
   Pace pace(readings_a_second(invocation, 10));
   if (invocation.has("--json") && invocation.has("--csv")) throw UsageError("--json and --csv exclude each other");
@@ -147,12 +147,13 @@ int run_read(const Invocation& invocation) {
   return tally.last_good ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 6> read_parameters{{
+constexpr std::array<Parameter, 7> read_parameters{{
     parameter::encoder,
     {"--count", "N", "how many readings; 0: until Ctrl-C", "1"},
     {"--rate", "HZ", "readings a second; 0: as many as the line allows", "10"},
     {"--json", "", "one JSON object a line, failures too"},
     {"--csv", "", "comma-separated values with a header"},
+    parameter::read_command,
     parameter::option,
 }};
 

@@ -92,7 +92,7 @@ void summarize_recording(const Recording& recording, const Encoder& live, bool w
 
 int run_record(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), reading_settings(invocation));
   const RecordingSettings settings = settings_of(invocation);
   Encoder live(uri, Pace(settings.rate_hz).period());
   live.connect();
@@ -123,7 +123,7 @@ int run_record(const Invocation& invocation) {
   return good ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 9> record_parameters{{
+constexpr std::array<Parameter, 10> record_parameters{{
     parameter::encoder,
     {"--output", "FILE",
      "where to; the name ends in .csv, in .jsonl for JSON lines or in .h5 for HDF5; it must not exist yet", "", true},
@@ -133,6 +133,7 @@ constexpr std::array<Parameter, 9> record_parameters{{
     {"--for", "SECONDS", "end after this time", "until Ctrl-C"},
     {"--part-size", "MEGABYTES", "begin another file when one is this large: NAME-0001.csv, NAME-0002.csv ..."},
     {"--part-time", "SECONDS", "begin another file after this time"},
+    parameter::read_command,
     parameter::option,
 }};
 

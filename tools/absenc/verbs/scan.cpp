@@ -23,6 +23,7 @@ namespace {
 struct Records final : FieldSink {
   struct Record {
     bool clash = false;
+    bool trouble = false;
     std::map<const FieldInfo*, std::string> texts{};
     JsonFields json{};
   };
@@ -33,6 +34,7 @@ struct Records final : FieldSink {
     if (info.role == Role::encoder || all.empty()) all.emplace_back();
     Record& record = all.back();
     if (info.role == Role::clash) record.clash = value.number != 0;
+    if (info.role == Role::trouble) record.trouble = true;
     record.texts[&info] = to_text(value);
     record.json.put(value);
   }
@@ -69,9 +71,11 @@ int run_scan_command(const Invocation& invocation, const EncoderAddress& uri, co
   Records records;
   run_into(*encoder, command, arguments, records);
   std::size_t good = 0;
+  bool clashes = false;
   Json list = Json::array();
   for (const Records::Record& record : records.all) {
-    if (!record.clash) ++good;
+    if (!record.clash && !record.trouble) ++good;
+    clashes = clashes || record.clash;
     list.append(record.json.fields);
   }
   if (invocation.has("--json")) {
@@ -79,7 +83,7 @@ int run_scan_command(const Invocation& invocation, const EncoderAddress& uri, co
     return good != 0 ? exit_good : exit_failed;
   }
   print_line(records.text());
-  if (good != records.all.size()) {
+  if (clashes) {
     print_message("clash: the answer is damaged every time; two encoders share the address, or the line is bad");
   }
   return good != 0 ? exit_good : exit_failed;

@@ -107,7 +107,7 @@ struct Conversations {
     while (port.now() < until) static_cast<void>(port.wait({.at = until}));
   }
 
-  // One that never ends by itself, as a stream, ends with the last round.
+  // One that never ends by itself, as a stream, ends with the last round; one that asks without end after a result.
   template <class Item>
   void hold(sim::SimPort<Item>& port, const Spoken& one) {
     std::vector<std::byte> storage(uri.unit->host_storage);
@@ -130,9 +130,9 @@ struct Conversations {
     };
     const bool ended = host::drive(*conversation, port, [&] {
       if (reads) count();
-      return results < rounds;
+      return results < rounds && !conversation->asks();
     });
-    if (ended && (&one == &commands.back() || conversation->error() != Error::none)) count();
+    if ((ended || conversation->asks()) && (&one == &commands.back() || conversation->error() != Error::none)) count();
   }
 };
 
