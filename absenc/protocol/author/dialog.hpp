@@ -292,7 +292,9 @@ class Run : public ProcedureDialog<P> {
     }
   }
   [[nodiscard]] const Found& found() const { return found_; }
-  [[nodiscard]] bool streams() const final { return goes_on || ProcedureDialog<P>::streams(); }
+  [[nodiscard]] const StreamCounts* stream() const final {
+    return goes_on ? &counts_ : ProcedureDialog<P>::stream();
+  }
   [[nodiscard]] bool asks() const final { return goes_on; }
   [[nodiscard]] const Reading* reading() const final {
     if constexpr (requires { found_.reading; }) {
@@ -304,6 +306,8 @@ class Run : public ProcedureDialog<P> {
 
  private:
   static constexpr bool goes_on = requires { Found::streams; };
+
+  static constexpr StreamCounts counts_{};  // what it asks for is no stream of which frames could be discarded
 
   Found found_{};
   Buffer<std::int64_t, 6> arguments_;
