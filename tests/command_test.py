@@ -97,7 +97,7 @@ class Decode(Case):
     def test_words(self):
         result = absenc("decode", "tformat", "--request", "1a", "--hex", "1a2000000011000000103b")
         self.assert_good(result)
-        for word in ["singleturn", "counts", "over_heat", "let it cool, then clear-alarms"]:
+        for word in ["singleturn", "counts", "over_heat", "let it cool, then `absenc clear-alarms`"]:
             self.assertIn(word, result.stdout)
 
     def test_bad_frame_in_words(self):

@@ -214,7 +214,7 @@ class List(ConfigCase):
         self.assertEqual(elbow, {"name": "elbow", "encoder": "tformat:/dev/ttyUSB0", "protocol": "tformat",
                                  "model": "23-bit",
                                  "options": {"singleturn_bits": 23, "multiturn_bits": 16, "encoder_id": 23,
-                                             "strict": True}})
+                                             "strict": True, "battery": True}})
         self.assertEqual((arm["name"], arm["model"]), ("arm", None))
 
     def test_no_protocol_beside_names(self):

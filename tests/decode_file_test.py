@@ -189,7 +189,7 @@ class Text(Case):
         self.assertEqual(result.returncode, 1)
         good, bad = csv.DictReader(io.StringIO(result.stdout))
         self.assertEqual((good["singleturn"], good["singleturn_valid"], good["error"]), ("74565", "true", ""))
-        self.assertIn("encoder_id=17", good["fields"])
+        self.assertIn("encoder_id=0x11", good["fields"])
         self.assertEqual((bad["angle_deg"], bad["fields"], bad["error"]), ("", "", "bad_checksum"))
         self.assertIn("checksum", bad["message"])
 

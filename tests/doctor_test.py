@@ -201,6 +201,15 @@ class Named(EncoderCase):
         found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", "alarm")
         self.assertIn("replace the battery", found["findings"][0]["action"])
 
+    def test_an_encoder_without_battery_is_not_ill(self):
+        """battery_error and battery_alarm are how it always is (paragraph 2 (1)); anything else is told."""
+        result, found = doctor("sim:tformat?battery=false")
+        self.assert_good(result)
+        self.assertEqual((found["ok"], found["findings"]), (True, []))
+        _, found = doctor("sim:tformat?battery=false&alarm=over_heat")
+        self.assertEqual([finding["evidence"] for finding in found["findings"]], ["the encoder reports over_heat"])
+        self.assertIn("battery=false", doctor("sim:tformat?condition=battery=0")[1]["findings"][0]["action"])
+
     def test_replies_that_come_late(self):
         result, found = doctor("sim:tformat?fault=delay=1")
         self.assertEqual(result.returncode, 1)

@@ -149,7 +149,7 @@ class Failures(InterfaceCase):
 
     def test_silence(self):
         with FakeInterface() as interface:
-            self.assert_failed(absenc("read", f"e201:{interface.path}"), "timeout", "`v` but not `4`", "`info`")
+            self.assert_failed(absenc("read", f"e201:{interface.path}"), "timeout", "`v` but not `4`", "`absenc info`")
         with FakeInterface(version=b"") as interface:
             self.assert_failed(absenc("read", f"e201:{interface.path}"), "timeout", "is silent", "it is an E201-9S")
 
@@ -157,7 +157,7 @@ class Failures(InterfaceCase):
         with self.emulator("--option", "firmware=1.15") as emulator:
             for arguments in (["read"], ["run", "clock-sweep"]):
                 result = absenc(arguments[0], f"e201:{emulator.path}", *arguments[1:])
-                self.assert_failed(result, "unsupported", "1.16", "`info`")
+                self.assert_failed(result, "unsupported", "1.16", "`absenc info`")
         with FakeInterface(b"?" + CR, b"V0.9" + CR) as interface:
             self.assert_failed(absenc("read", f"e201:{interface.path}"), "unsupported", "1.16")
 

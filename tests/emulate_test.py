@@ -731,6 +731,17 @@ class Life(EmulateCase):
         err = emulator.end()[2]
         self.assertRegex(err, r"rules that the host broke: 1\n    at \d+\.\d{6} s: memory access before the page is ready")
 
+    def test_a_host_that_does_not_wait_is_always_told(self):
+        """Three requests at once. A machine that is busy excuses two replies in a row at most."""
+        emulator = self.emulator()
+        with Client.open(emulator.path) as client:
+            for _ in range(5):
+                client.send([0x1A, 0x1A, 0x1A])
+                self.assertEqual(len(client.receive(11)), 11)
+        counted = re.search(r"rules that the host broke: (\d+)\n", emulator.end()[2])
+        self.assertIsNotNone(counted)
+        self.assertGreaterEqual(int(counted[1]), 3)
+
     def test_it_ends_by_itself(self):
         before = time.monotonic()
         result = absenc("emulate", "tformat", "--for", "0.2")

@@ -165,7 +165,7 @@ class InTheSimulator(Case):
     def test_refusals(self):
         self.assert_failed(absenc("run", "sim:encolink", "memory-write", "0x4C", "1"), "request_rejected", "access denied")
         self.assert_failed(absenc("run", "sim:encolink", "memory-read", "0x9999", "2"), "no register at this address")
-        self.assert_failed(absenc("run", "sim:encolink", "self-calibrate"), "turn the shaft")
+        self.assert_failed(absenc("run", "sim:encolink", "self-calibrate"), "did not turn far enough", "turn it evenly")
         self.assert_failed(absenc("run", "sim:encolink?has_ch2=false", "temperature"), "unsupported", "has_ch2")
 
 

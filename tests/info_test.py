@@ -31,7 +31,7 @@ class Info(EncoderCase):
         for row in [rf"^encoder +tformat:{self.directory}/encoder$", r"^protocol +Tamagawa T-format",
                     r"^model +TS5700N8500: ", r"^line +RS-485 half duplex, 2\.5 Mbit/s$",
                     r"^resolution +17 bits in a turn, 16 bits of turns$",
-                    r"^options +singleturn_bits=17$", r"^ +strict=true$", r"^  encoder_id +17 ",
+                    r"^options +singleturn_bits=17$", r"^ +strict=true$", r"^  encoder_id +0x11 ",
                     r"^  temperature_c +35 degC ", r"^  overheat_threshold_c +90 degC ",
                     r"^ *204\.799 deg +74565 counts +4660 turns +no alarms$"]:
             self.assertRegex(result.stdout, "(?m)" + row)
@@ -48,7 +48,8 @@ class Info(EncoderCase):
         self.assertEqual(info, {
             "encoder": address.split("?")[0], "protocol": "tformat", "model": "23-bit", "link": "half_duplex",
             "rate": 1000000, "resolution": {"singleturn_bits": 23, "multiturn_bits": 16},
-            "options": {"singleturn_bits": 23, "multiturn_bits": 16, "encoder_id": 23, "strict": True}, "ok": True})
+            "options": {"singleturn_bits": 23, "multiturn_bits": 16, "encoder_id": 23, "strict": True,
+                        "battery": True}, "ok": True})
         self.assertEqual(list(answers), questions())
         self.assertEqual(answers["temperature"], {"ok": True, "fields": {"temperature_c": 35}})
         self.assertEqual(answers["encoder-id"]["fields"]["encoder_id"], 23)
@@ -110,11 +111,32 @@ class Alarms(EncoderCase):
         self.assertEqual(
             result.stdout,
             "alarms:\n"
-            "  over_heat: the encoder is or was hotter than its threshold. What to do: let it cool, then clear-alarms\n"
-            "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on\n"
+            "  over_heat: the encoder is or was hotter than its threshold. "
+            "What to do: let it cool, then `absenc clear-alarms`\n"
+            "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on; "
+            "without a battery set battery=false\n"
             "status:\n"
-            "  alarm: over-heat, multi-turn error, battery error or battery alarm. "
-            "What to do: read the alarms (data ID 3)\n")
+            "  alarm: over-heat, multi-turn error, battery error or battery alarm\n")  # "read the alarms" is done
+
+    def test_a_status_sends_to_the_alarms_only_where_they_are_not_shown(self):
+        address = self.encoder("--alarm", "over_heat")
+        status = json.loads(absenc("alarms", address, "--json").stdout)["status"]
+        self.assertEqual([(flag["name"], flag["action"]) for flag in status], [("alarm", "")])
+        alone = absenc("run", address, "encoder-id")  # its reply has no alarms
+        self.assertIn("battery error or battery alarm: `absenc alarms` names the cause", alone.stdout)
+        both = absenc("decode", "tformat", "--request", "1a", "--hex", "1a2000000011000000103b")
+        self.assertIn("let it cool, then `absenc clear-alarms`", both.stdout)
+        self.assertNotIn("`absenc alarms`", both.stdout)
+
+    def test_an_encoder_id_is_shown_as_documents_name_it(self):
+        address = self.encoder()
+        for shown in (absenc("run", address, "encoder-id"), absenc("info", address)):
+            self.assertRegex(shown.stdout, r"encoder_id +0x11 ")
+        self.assertIn("encoder_id=0x11\n", absenc("info", address).stdout)
+        fields = json.loads(absenc("run", address, "encoder-id", "--json").stdout)["fields"]
+        self.assertEqual(fields["encoder_id"], 0x11)
+        self.assertRegex(absenc("list", "tformat").stdout, r"encoder_id +-1 to 0xFF +default -1 ")
+        self.assertRegex(absenc("run", "sim:esl", "encoder-id").stdout, r"encoder_id +0xD8 ")
 
     def test_every_alarm(self):
         unit = json_lines(absenc("list", "tformat", "--json").stdout)[0]

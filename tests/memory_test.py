@@ -462,6 +462,17 @@ class Config(MemoryCase):
                           "old": {"overheat_enabled": True, "overheat_threshold_c": 80}, "new": {"overheat_enabled": False}})
         self.assertEqual(absenc("memory", "read", address, "4", "--page", "7").stdout, "0x04  00  .\n")
 
+    def test_a_threshold_of_zero_degrees_is_no_setting(self):
+        """As `config set` has it: 1 to 127 degC, or off."""
+        address = self.encoder()
+        refused = absenc("memory", "write", address, "4", "0x80", "--page", "7", "--yes")
+        self.assertEqual(refused.returncode, 1)
+        for words in ("invalid_argument", "0 degC", "0x81 to 0xFF", "0x00 for off", "nothing was written"):
+            self.assertIn(words, refused.stderr)
+        self.assertEqual(absenc("memory", "read", address, "4", "--page", "7").stdout, "0x04  DA  .\n")
+        for byte in ("0x81", "0x00"):
+            self.assert_good(absenc("memory", "write", address, "4", byte, "--page", "7", "--yes"))
+
     def test_wrong_usage(self):
         emulator = self.emulator()
         encoder = f"tformat:{emulator.path}"

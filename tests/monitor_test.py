@@ -86,8 +86,8 @@ class Screen(MonitorCase):
             r"  \d+\.\d a second; latency 50 % [\d.]+ .s, 99 % [\d.]+ .s, longest [\d.]+ .s",
             r"  \d+ good; the port went away: 0",
             "  over_heat: the encoder is or was hotter than its threshold. What to do: let it",
-            "  cool, then clear-alarms",
-            "  data_id 3       status alarm    encoder_id 17",
+            "  cool, then `absenc clear-alarms`",
+            "  data_id 3       status alarm    encoder_id 0x11",
             "",
             r"      \d\.\d{3}  .*")
         self.assertEqual(screen.splitlines()[23].rstrip(), KEYS)

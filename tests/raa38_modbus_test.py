@@ -200,7 +200,7 @@ class Settings(ModbusCase):
         self.assertEqual(self.good_json("read", uri)["singleturn"], 0)
         self.assertEqual(self.violations(emulator), [])
         turning = self.emulator("--motion", "rpm=60", name="turning")
-        self.assert_failed(absenc("zero", self.uri(turning), "--yes"), "turning", "nothing was sent")
+        self.assert_failed(absenc("zero", self.uri(turning), "--yes"), "turning", "nothing was changed")
 
     def test_a_server_of_ports_keeps_its_rate(self):
         emulator = self.emulator("--tcp", "0")

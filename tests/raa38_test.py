@@ -163,7 +163,7 @@ class Bus(RaaCase):
         for reply, options, error, *words in (
                 (FRAME[:4], "", "wrong_length", "received FF 81 01 7F", "check bits"),
                 (FRAME[:4] + b"\x01", "", "bad_checksum", "two encoders", "termination"),
-                (frame(383, second=0xB2), "", "unexpected_reply", "another unit", "`scan`"),
+                (frame(383, second=0xB2), "", "unexpected_reply", "another unit", "`absenc scan`"),
                 (FRAME, "&second_byte=echo", "unexpected_reply", "another unit", "second_byte"),
                 (frame(383, second=0xB1), "&second_byte=81", "unexpected_reply", "second_byte"),
                 (bytes.fromhex("fe81017fff"), "", "unexpected_reply", "no frame came"),

@@ -494,6 +494,11 @@ class Run(EncoderCase):
             self.assert_wrong_usage(absenc(verb, f"tformat:{emulator.path}"), "--yes", "changes the encoder")
         self.assertIn("0 requests answered", emulator.end()[2])
 
+    def test_no_zero_is_made_of_a_position_that_does_not_hold(self):
+        for address in (self.encoder("--alarm", "counting_error", "--singleturn", "1000"),
+                        "sim:esl?alarm=singleturn_error"):
+            self.assert_failed(absenc("zero", address, "--yes"), "invalid_argument", "does not hold", "`absenc alarms`")
+
     def test_clearing_alarms_does_not_hide_lost_turns(self):
         address = self.encoder("--alarm", "battery_error")
         self.assert_failed(absenc("clear-alarms", address, "--yes"), "turns are lost", "reset-multiturn")

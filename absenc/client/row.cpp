@@ -62,7 +62,8 @@ Value value_of(Validity validity) {
 std::string to_text(const Value& value) { return std::visit(Text{}, value); }
 
 std::string to_text(const Column& column, const Value& value) {
-  const std::string text = to_text(value);
+  const auto* const number = std::get_if<std::int64_t>(&value);
+  const std::string text = number != nullptr && column.look.in_hex ? hexadecimal(*number) : to_text(value);
   return column.unit.empty() || text.empty() ? text : fmt::format("{} {}", text, column.unit);
 }
 
@@ -72,7 +73,7 @@ const Value& Answer::operator[](std::string_view name) const { return values[ind
 Column column_of(const FieldInfo& field) {
   static constexpr std::array types{Type::int64, Type::uint64, Type::boolean, Type::flags,
                                     Type::real,  Type::text,   Type::bytes};
-  return {field.name, field.unit, types[static_cast<std::size_t>(field.kind)], field.meaning};
+  return {field.name, field.unit, types[static_cast<std::size_t>(field.kind)], field.meaning, {.in_hex = field.in_hex}};
 }
 
 Value value_of(const FieldValue& value) {

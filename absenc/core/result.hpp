@@ -55,10 +55,13 @@ inline constexpr std::array<ErrorText, 16> error_texts{{
     {"unexpected_reply", "the reply does not belong to the request", "check protocol, model and address"},
     {"bad_checksum", "the checksum of the reply is wrong", "check shielding, termination and baud rate"},
     {"out_of_range", "bits that must be zero are set", "check the resolution or the model"},
-    {"sequence_mismatch", "the sequence counter did not move as it should", "the reply may be a repeated one"},
-    {"cross_check_failed", "parts of the reply contradict each other", "treat the reading as invalid and read again"},
+    {"sequence_mismatch", "the sequence counter did not move as it should",
+     "do not use the reply; if it stays, find what on the way repeats or delays replies"},
+    {"cross_check_failed", "parts of the reply contradict each other",
+     "do not use the reply; if it stays, check shielding and termination"},
     {"busy", "the encoder stayed busy", "wait and try again"},
-    {"request_rejected", "the encoder refused the request", "check that the request is allowed, then send it again"},
+    {"request_rejected", "the encoder refused the request",
+     "check that this encoder allows the request, and does in its present state"},
 }};
 
 /// Whether the bytes themselves are wrong. With any other error a whole frame with a right checksum came: what it says

@@ -16,10 +16,14 @@ namespace absenc {
 struct FlagInfo {
   std::string_view name;     // "" when the bit has no meaning
   std::string_view meaning;  // what has happened
-  std::string_view action;   // what the operator must do; "" when nothing: it is no ailment
+  /// What the operator must do, commands as "`absenc clear-alarms`"; "" when nothing: it is no ailment.
+  std::string_view action;
   bool optional = false;     // some encoders have no such flag: one that reports the others and not this one has none
   std::uint32_t sums = 0;    // of a status flag: the bits of the unit's alarms that it is the sum of; 0: none
 };
+
+/// The action of a status flag that only sums up alarms. Who shows the alarms beside it leaves it out.
+inline constexpr std::string_view read_the_alarms = "`absenc alarms` names the cause";
 
 struct FieldInfo {
   enum class Kind : std::uint8_t {
@@ -37,6 +41,7 @@ struct FieldInfo {
   std::string_view meaning;
   std::span<const FlagInfo> flags{};
   Role role = Role::other;
+  bool in_hex = false;  // a number that documents write in hexadecimal: so do texts, while JSON and CSV have numbers
 };
 
 struct FieldValue {

@@ -36,6 +36,7 @@ struct Option {
   bool describes_word = false;  // a word format says it instead: the two cannot be given together
   std::uint32_t step = 1;       // the values are `minimum` and what is multiples of this above it
   Role role = Role::other;
+  bool in_hex = false;  // texts show it in hexadecimal, as FieldInfo::in_hex
 };
 
 struct OptionValue {

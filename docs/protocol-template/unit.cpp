@@ -23,12 +23,13 @@ constexpr Request request(const Format& format, Arguments = {}) {
 
 Procedure set_zero(Dialog& dialog, Found& found) {
   const Request position = request<Ask::position>(dialog.format());
-  const bool still = co_await stands_still(dialog, found, position);
-  if (!still) co_return {Error::invalid_argument, "the shaft is turning: nothing was sent"};
+  co_await may_set_zero(dialog, found, position);
   co_await dialog.ask(request<Ask::zero>(dialog.format())).or_say("whether the encoder obeyed is not known");
   co_await dialog.rest(20ms);  // it writes its memory
   const std::uint64_t now = co_await look(dialog, found, position);
-  if (!is_near(now, 0, 16)) co_return {Error::cross_check_failed, "the position is still not zero"};
+  if (!is_near(now, 0, 16))
+    co_return {Error::cross_check_failed, "the position is still not zero",
+               "hold the shaft still, then `absenc zero` again"};
   co_return done;
 }
 

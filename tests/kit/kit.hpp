@@ -49,6 +49,16 @@ namespace absenc::kit {
 /// too.
 [[nodiscard]] Findings check_states(const Unit& unit);
 
+/// Whatever makes the position invalid, each alarm and each condition at the ends of its range, the zero is refused
+/// with a reason, and nothing of the encoder has changed.
+[[nodiscard]] Findings check_zero(const Unit& unit);
+
+/// What people are told to do, of alarms and of errors. A command that an advice names stands in backquotes, as
+/// "`absenc run ... reset`", and this unit has it. Carried out with the alarm raised, what an alarm's advice names ends
+/// the alarm, says why it does not, or tells what the reading does not. No advice is to look again at what it is about,
+/// and no message says a thing twice.
+[[nodiscard]] Findings check_advice(const Unit& unit);
+
 /// On an undamaged line each command ends well, in each configuration of the unit, and positions are where the shaft
 /// stands.
 [[nodiscard]] Findings check_commands(const Unit& unit);

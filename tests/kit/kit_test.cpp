@@ -66,6 +66,12 @@ TEST_P(Kit, RequestsHaveTheirArguments) { expect_none(check_requests(unit, 1)); 
 TEST_P(Kit, StorageIsEnough) { expect_none(check_storage(unit)); }
 TEST_P(Kit, ChangesAreMade) { expect_none(check_settings(unit)); }
 TEST_P(Kit, ConditionsAreSeen) { expect_none(check_conditions(unit)); }
+TEST_P(Kit, AdviceCanBeFollowed) {
+  const Findings findings = check_advice(unit);
+  EXPECT_GT(findings.looks(), 50u);
+  expect_none(findings);
+}
+TEST_P(Kit, NoZeroIsSetOfAPositionThatDoesNotHold) { expect_none(check_zero(unit)); }
 TEST_P(Kit, MemoryKeepsItsBytes) { expect_none(check_memory(unit)); }
 
 /// The series of faults, of which sanitizers see the first (CMakePresets.json), and the unit.

@@ -30,6 +30,7 @@ enum class Mistake : std::uint8_t {
   never_ends,      // the host waits for ever when nothing comes
   takes_all,       // any arguments make a request
   gives_up_late,   // captures wait for a reply longer than any host
+  zeroes_blindly,  // its position never holds, and its zero does not look
 };
 
 inline constexpr std::uint8_t ask = 0x5A;
@@ -82,7 +83,9 @@ struct Toy {
     return position;
   }
   static Reading reading_of(unsigned position) {
-    return {.singleturn = position, .singleturn_bits = bits, .singleturn_valid_bits = bits};
+    return {.singleturn = position,
+            .singleturn_bits = bits,
+            .singleturn_valid_bits = mistake == Mistake::zeroes_blindly ? 0 : bits};
   }
 
   class Host final : public Conversation<std::uint8_t> {
@@ -229,7 +232,8 @@ struct Toy {
   static Resolution resolution(const Options&) { return {bits, 0}; }
 
   static constexpr std::array<Model, 1> models{{{"toy", "", 0, {}}}};
-  static constexpr std::array<Command, 1> commands{{{"position", Verb::read, 0, "position"}}};
+  static constexpr std::array<Command, 2> commands{
+      {{"position", Verb::read, 0, "position"}, {"zero", Verb::zero, 0, "zero", {}, true, false}}};
   static constexpr std::array<Condition, 1> conditions{{{"eccentricity", "counts", "beside its shaft", 0, 100, 0}}};
   static constexpr std::array<Expected, 1> expected{{{"singleturn", weak ? 8619 : 0x1234}}};
   static constexpr std::array<std::uint8_t, 1> asks{mistake == Mistake::no_vector ? std::uint8_t{0x5B} : ask};
@@ -248,7 +252,7 @@ inline constexpr Unit unit = [] {
   made.timing = {.turnaround_limit = mistake == Mistake::gives_up_late ? 10 * answer_limit : answer_limit};
   made.models = Made::models;
   made.fields = fields;
-  made.commands = Made::commands;
+  made.commands = std::span(Made::commands).first(mistake == Mistake::zeroes_blindly ? 2 : 1);
   made.conditions = Made::conditions;
   made.vectors = Made::vectors;
   made.host_storage = sizeof(typename Made::Host) - (mistake == Mistake::wants_more ? 8 : 0);

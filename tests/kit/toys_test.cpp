@@ -23,8 +23,8 @@ void expect_no_finding() {
   const Unit& unit = toy::unit<mistake>;
   for (const Findings& findings :
        {check_decoding(unit), check_places(unit), check_hosts(unit), check_requests(unit, 1), check_storage(unit),
-        check_declarations(unit), check_settings(unit), check_memory(unit), check_conditions(unit),
-        check_commands(unit), check_exchanges(unit, few)}) {
+        check_declarations(unit), check_settings(unit), check_memory(unit), check_conditions(unit), check_zero(unit),
+        check_advice(unit), check_commands(unit), check_exchanges(unit, few)}) {
     EXPECT_THAT(findings.texts(), IsEmpty());
   }
 }
@@ -104,6 +104,29 @@ TEST(KitToys, CapturesThatWaitForLongerThanHosts) {
 TEST(KitToys, AConditionThatNothingShows) {
   EXPECT_THAT(check_conditions(toy::unit<Mistake::no_condition>).texts(),
               ElementsAre("condition eccentricity is not seen by any host, whatever it is"));
+}
+
+TEST(KitToys, AZeroThatDoesNotLook) {
+  EXPECT_THAT(check_zero(toy::unit<Mistake::zeroes_blindly>).texts(),
+              Contains(HasSubstr("as it is: zero is set of a position that does not hold")));
+}
+
+TEST(KitToys, AdviceThatNobodyCanFollow) {
+  const auto findings_of = [](std::string_view action) {
+    const std::array<FlagInfo, 1> flags{{{"too_hot", "it is too hot", action}}};
+    const std::array<FieldInfo, 2> fields{
+        {toy::fields[0], {"alarms", FieldInfo::Kind::flags, "", "what is wrong", flags}}};
+    Unit unit = toy::unit<Mistake::none>;
+    unit.fields = fields;
+    unit.alarms = &fields[1];
+    return check_advice(unit).texts();
+  };
+  EXPECT_THAT(findings_of("let it cool, and see that with `absenc read`"), IsEmpty());
+  EXPECT_THAT(findings_of("read the alarms"), ElementsAre(HasSubstr("that is circular")));
+  EXPECT_THAT(findings_of(read_the_alarms), Contains("alarm too_hot sends to the alarms, among which it is"));
+  EXPECT_THAT(findings_of("let it cool, then `absenc clear-alarms`"),
+              Contains(HasSubstr("`absenc clear-alarms` is no command of this unit")));
+  EXPECT_THAT(findings_of("then `read`"), ElementsAre(HasSubstr("not written \"absenc ...\"")));
 }
 
 TEST(KitToys, AConversationThatDoesNotEnd) {

@@ -31,6 +31,7 @@ struct Ended {
   Error error = Error::none;
   bool unfounded = false;  // it had a reading before anything came, or with an error
   std::string detail{};
+  std::string advice{};
   Seen seen{};              // every result, in order
   std::uint64_t damaged{};  // faults that changed bytes while it went on
   std::uint64_t faults{};   // of all kinds
@@ -112,6 +113,7 @@ class World {
     on_emit_ = {};
     result.error = conversation->error();
     result.detail = conversation->detail();
+    result.advice = conversation->advice();
     if (result.error == Error::none) conversation->report(result.seen);
     if (conversation->reading() != nullptr) {
       result.seen.reading = *conversation->reading();

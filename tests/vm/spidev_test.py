@@ -307,7 +307,7 @@ class Beginnings(SpidevCase):
         os.rename("/dev/cuse", "/dev/cuse.away")
         self.addCleanup(os.rename, "/dev/cuse.away", "/dev/cuse")
         result = self.failed("emulate", "ssi", "--spidev", "spidev9.0")
-        self.assertIn("there is no /dev/cuse: load the kernel's module (sudo modprobe cuse)", result.stderr)
+        self.assertIn("there is no /dev/cuse: load the kernel's module (`sudo modprobe cuse`)", result.stderr)
 
     def test_it_ends_by_itself(self):
         result = self.good("emulate", "ssi", "--spidev", "spidev9.0", "--for", "0.2")

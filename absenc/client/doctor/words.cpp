@@ -43,7 +43,7 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::port_failed, "port_failed", fault, "{0}", "the system refused", "follow what it says"},
     {Ailment::latency_timer, "latency_timer", warning, "the latency timer of {0} is {1} ms",
      "the USB adapter holds back what it has received for so long, which limits the readings a second",
-     "echo 1 | sudo tee /sys/class/tty/{0}/device/latency_timer"},
+     "shorten it: `echo 1 | sudo tee /sys/class/tty/{0}/device/latency_timer`"},
     {Ailment::direction_unswitched, "direction_unswitched", fault,
      "nothing came back, and {0} is a UART of the computer (driver {1}) whose kernel switches no direction",
      "nobody switches the RS-485 transceiver to sending, or never back to receiving",

@@ -221,6 +221,7 @@ double real_value(const Option& option, std::int64_t value) {
 }
 
 std::string to_text(const Option& option, std::int64_t value) {
+  if (option.in_hex) return hexadecimal(value);
   if (option.choices.empty())
     return option.decimals == 0 ? fmt::format("{}", value) : fmt::format("{:#}", real_value(option, value));
   return std::string(option.choices[static_cast<std::size_t>(value)]);
@@ -254,6 +255,10 @@ std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits) 
   return flags;
 }
 
+std::string_view action_of(const FlagInfo& flag, bool beside_alarms) {
+  return beside_alarms && flag.action == read_the_alarms ? std::string_view{} : flag.action;
+}
+
 std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits) {
   std::vector<std::string_view> names;
   for (const FlagInfo* flag : raised(field, bits)) names.push_back(flag->name);
@@ -279,7 +284,11 @@ std::string to_text(const FieldValue& value) {
     case FieldInfo::Kind::number:
       break;
   }
-  return fmt::format("{}", value.number);
+  return value.info->in_hex ? hexadecimal(value.number) : fmt::format("{}", value.number);
+}
+
+std::string hexadecimal(std::int64_t value) {
+  return value < 0 ? fmt::format("{}", value) : fmt::format("0x{:02X}", value);
 }
 
 Validity validity_of(const FieldInfo& field, const Reading& reading) {

@@ -75,8 +75,12 @@ struct RoleArgument {
 
 /// Those that are set in `bits` and have a name.
 [[nodiscard]] std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits);
+/// What to do about a flag; "" also where that is to look at the alarms, which are shown beside it.
+[[nodiscard]] std::string_view action_of(const FlagInfo& flag, bool beside_alarms);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);
+/// "0x17"; below zero decimal, as options say "any".
+[[nodiscard]] std::string hexadecimal(std::int64_t value);
 /// Text of an encoder as it can be shown: what is no ASCII is a point.
 [[nodiscard]] std::string printable(Bytes bytes);
 

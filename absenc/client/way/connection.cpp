@@ -122,7 +122,7 @@ class ConnectionOn final : public Connection {
     if (line_.request.empty() && line_.clocks == 0) return unasked_trouble(outcome);
     trouble.finding = finding_text(outcome);
     const Diagnosis diagnosis = diagnose_last();
-    trouble.message = describe(outcome.error, outcome.detail, diagnosis.finding);
+    trouble.message = describe(outcome.error, outcome.detail, diagnosis);
     trouble.sent = wire_text(line_.request);
     trouble.received = line_.clocks == 0 ? wire_text(line_.received) : clocked_text();
     trouble.exchange = exchange(trouble);

@@ -51,7 +51,8 @@ Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& 
     if (&model == options.model || resolve_options(unit, model.name, {}, other).kind != OptionError::Kind::none)
       continue;
     if (!is_good(unit, other, request, reply)) continue;
-    return {fmt::format("it is a good reply of the model {}", model.name), fmt::format("set model={}", model.name)};
+    const std::string setting = fmt::format("model={}", model.name);
+    return {fmt::format("it is a good reply of the model {}", model.name), fmt::format("set {}", setting), setting};
   }
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
     const Option& option = unit.options[i];
@@ -59,7 +60,8 @@ Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& 
       Options other = options;
       other.values[i] = static_cast<std::int64_t>(value);
       if (other.values[i] == options[i] || !is_good(unit, other, request, reply)) continue;
-      return {fmt::format("it is a good reply with {}={}", option.name, option.choices[value]), {}};
+      const std::string setting = fmt::format("{}={}", option.name, option.choices[value]);
+      return {fmt::format("it is a good reply with {}", setting), {}, setting};
     }
   }
   return {};
@@ -77,10 +79,11 @@ Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& reques
   return other_settings(unit, options, request, reply);
 }
 
-std::string describe(Error error, std::string_view detail, std::string_view finding) {
+std::string describe(Error error, std::string_view detail, const Diagnosis& diagnosis) {
   std::string text(text_of(error).description);
   if (!detail.empty()) text += fmt::format(": {}", detail);
-  if (!finding.empty()) text += fmt::format("; {}", finding);
+  const bool said = !diagnosis.setting.empty() && detail.find(diagnosis.setting) != std::string_view::npos;
+  if (!diagnosis.finding.empty() && !said) text += fmt::format("; {}", diagnosis.finding);
   return text;
 }
 
@@ -89,7 +92,7 @@ std::string sentence_for(const Unit& unit, const Options& options, Error error, 
   const Diagnosis diagnosis = diagnose(unit, options, request, reply);
   const Explanation explanation =
       unit.explain != nullptr ? unit.explain(options, error, request, reply) : Explanation{};
-  const std::string message = describe(error, explanation.detail, diagnosis.finding);
+  const std::string message = describe(error, explanation.detail, diagnosis);
   const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
   return advice.empty() ? message : fmt::format("{}: {}", message, advice);
 }

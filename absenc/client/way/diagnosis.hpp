@@ -9,18 +9,20 @@
 
 namespace absenc::client {
 
-/// Both are empty when nothing fits.
+/// All are empty when nothing fits.
 struct Diagnosis {
-  std::string finding;  // what the reply turns out to be
-  std::string advice;   // what would make it right
+  std::string finding;    // what the reply turns out to be
+  std::string advice;     // what would make it right
+  std::string setting{};  // "NAME=VALUE", where another setting would
 };
 
 /// What a reply that failed turns out to be: an echo, a good reply with something around it, one of another model or
 /// with another option.
 [[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// "<what the error means>: <detail>; <finding>", each part only if there is one.
-[[nodiscard]] std::string describe(Error error, std::string_view detail, std::string_view finding);
+/// "<what the error means>: <detail>; <finding>", each part only if there is one, and the finding only where the detail
+/// does not name its setting already.
+[[nodiscard]] std::string describe(Error error, std::string_view detail, const Diagnosis& diagnosis);
 
 /// Of a reply that failed with this error, in one sentence: the same with what the document says of it, and what to
 /// try.

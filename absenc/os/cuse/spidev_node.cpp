@@ -30,7 +30,7 @@ Failure control_failure(int error) {
     case ENOENT:
     case ENODEV:
     case ENXIO:
-      return {Kind::not_found, "there is no " + path + ": load the kernel's module (sudo modprobe cuse)"};
+      return {Kind::not_found, "there is no " + path + ": load the kernel's module (`sudo modprobe cuse`)"};
     case EACCES:
     case EPERM:
       return {Kind::no_permission, "no permission to open " + path +

@@ -48,9 +48,10 @@ Procedure read_both(Dialog& dialog, Found& found) {
 }
 
 Procedure restart(Dialog& dialog, Found& found, Ask act) {
-  const bool still = co_await stands_still(dialog, found, request<Ask::position>(dialog.format()));
-  if (act == Ask::zero && !still) {
-    co_return {Error::invalid_argument, "the shaft is turning: zero needs it standing still; nothing was sent"};
+  if (act == Ask::zero) {
+    co_await may_set_zero(dialog, found, request<Ask::position>(dialog.format()));
+  } else {
+    co_await look(dialog, found, request<Ask::position>(dialog.format()));
   }
   co_await dialog.ask({act, dialog.format().address});
   co_await dialog.rest(restart_time + between_looks);
@@ -58,7 +59,8 @@ Procedure restart(Dialog& dialog, Found& found, Ask act) {
   if (!answer) co_return {answer.error(), "it was sent, but whether the encoder obeyed could not be read"};
   const std::uint64_t now = co_await look(dialog, found, request<Ask::position>(dialog.format()));
   if (act == Ask::zero && !is_near(now, 0, dialog.format().singleturn_bits)) {
-    co_return {Error::cross_check_failed, "the position is still not zero"};
+    co_return {Error::cross_check_failed, "the position is still not zero",
+               "hold the shaft still, then `absenc zero` again"};
   }
   co_return done;
 }

@@ -77,6 +77,7 @@ class Responder : public EncoderOn<std::uint8_t> {
  private:
   void hear(std::uint8_t byte, Time at);
   void search_on(Time at);
+  void hear_while_transmitting(std::uint8_t byte, Time at);
   void begin_reply(Time at);
   void ended(Answer answer, Time at);
   void damage(Time at);
@@ -94,7 +95,9 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  ByteBuffer<64> kept_;  // what came while it sends
+  ByteBuffer<64> kept_;                  // what came while it sends
+  unsigned interrupted_ = 0;             // requests that came while it sends
+  unsigned interruptions_in_a_row_ = 0;  // replies during which some came
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;

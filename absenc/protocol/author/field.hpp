@@ -62,6 +62,13 @@ template <auto member>
   return {{name, FieldInfo::Kind::flags, {}, meaning, flags}};
 }
 
+/// The same field, which texts show in hexadecimal.
+template <auto member>
+[[nodiscard]] constexpr FieldOf<member> in_hex(FieldOf<member> one) {
+  one.info.in_hex = true;
+  return one;
+}
+
 /// The fields of `Values`, a struct whose members they show.
 template <class Values, auto... members>
 struct FieldsOf {

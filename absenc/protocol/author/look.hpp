@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parts that procedures share: a look at the position, and whether the shaft stands still.
+// Parts that procedures share: a look at the position, and whether a zero may be set.
 #pragma once
 
 #include <cstdint>
@@ -41,13 +41,16 @@ Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Requ
   co_return found.reading.singleturn;
 }
 
-/// Looks twice.
+/// Looks twice. Ends the procedure where a zero must not be set, before anything is sent.
 template <class P>
-Part<bool> stands_still(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
-  const std::uint64_t first = co_await look(dialog, found, request);
+Part<bool> may_set_zero(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
+  co_await look(dialog, found, request);
+  const Reading first = found.reading;
   co_await dialog.rest(between_looks);
-  const std::uint64_t second = co_await look(dialog, found, request);
-  co_return is_near(second, first, found.reading.singleturn_bits);
+  co_await look(dialog, found, request);
+  const Explanation why_not = objection_to_zero(first, found.reading);
+  if (!why_not.detail.empty()) co_await dialog.stop({Error::invalid_argument, why_not.detail, why_not.advice});
+  co_return true;
 }
 
 }  // namespace absenc::author

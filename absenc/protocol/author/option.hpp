@@ -105,6 +105,13 @@ template <Role role, auto member>
   return one;
 }
 
+/// The same option, which texts show in hexadecimal; it may be written so or in decimal.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> in_hex(OptionOf<member> one) {
+  one.info.in_hex = true;
+  return one;
+}
+
 /// Members of one struct, and of what it derives from.
 template <auto... members>
 struct OptionsOf {

@@ -16,8 +16,9 @@ namespace {
 
 constexpr unsigned supplied_above = 1000;  // mV
 
-constexpr std::string_view check_firmware = "`info` shows which firmware it has";
-constexpr std::string_view check_clocks = "read it and set it with clock and set-clock";
+constexpr std::string_view check_firmware = "`absenc info` shows which firmware it has";
+constexpr std::string_view check_clocks =
+    "look at it with `absenc config get ... clock`, set it with `absenc config set ... clock`";
 constexpr Outcome too_old{Error::unsupported, "reading by `4` needs firmware 1.16 of the interface", check_firmware};
 
 bool is_too_old(const Reply& reply) {
@@ -76,7 +77,8 @@ Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
 Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments) {
   const unsigned clock = clock_of(arguments[0]);
   const Error error = co_await switch_clock(dialog, clock);
-  if (error == Error::cross_check_failed) co_return {error, "the interface has another setting than it was given"};
+  if (error == Error::cross_check_failed)
+    co_return {error, "the interface has another setting than it was given", check_clocks};
   found.clock = clock;
   co_return {error};
 }
@@ -88,7 +90,7 @@ Procedure switch_supply(Dialog& dialog, Found& found, bool on) {
   const std::optional<unsigned> voltage = find_milli(reply.text, 'V');
   if (voltage && (*voltage > supplied_above) != on) {
     co_return {Error::cross_check_failed, "the voltage that the interface shows contradicts it",
-               "look at it with `info`"};
+               "look at it with `absenc info`"};
   }
   co_return done;
 }
@@ -106,15 +108,24 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 }  // namespace
 
 Procedure set_zero(Dialog& dialog, Found& found) {
+  // `?` says nothing of errors. An interface that has no `4` yet cannot be asked for more.
+  const Result<Reply> samples = co_await dialog.attempt({letter::samples});
+  if (samples) {
+    const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);
+    const Explanation why_not = author::objection_to_zero(look, look);
+    if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
+  }
   const Reply first = co_await dialog.ask({letter::decimal});
   const Reply second = co_await dialog.ask({letter::decimal}).after(author::between_looks);
   if (!is_near(dialog, second.number, first.number)) {
-    co_return {Error::invalid_argument, "the encoder moves: it must stand still"};
+    co_return {Error::invalid_argument, "the encoder moves: it must stand still; nothing was changed",
+               "stop the shaft, then try again"};
   }
   co_await dialog.ask({letter::zero});
   const Reply now = co_await dialog.ask({letter::decimal});
   if (!is_near(dialog, now.number, 0)) {
-    co_return {Error::cross_check_failed, "the position is not zero afterwards"};
+    co_return {Error::cross_check_failed, "the position is not zero afterwards",
+               "hold the shaft still, then `absenc run ... set-zero` again"};
   }
   found.counts = now.number;
   co_return done;
@@ -151,7 +162,8 @@ Part<Outcome> try_clocks(Dialog& dialog, Found& found) {
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
     found.left = clock;
     const Error error = co_await switch_clock(dialog, clock);
-    if (error == Error::cross_check_failed) co_return {error, "the interface has another clock than it was given"};
+    if (error == Error::cross_check_failed)
+      co_return {error, "the interface has another clock than it was given", check_clocks};
     if (error != Error::none) co_return failure(dialog, error);
     for (unsigned read = 0; read < found.frames && !dialog.is_aborted(); ++read) {
       const Result<Reply> frame = co_await dialog.attempt({letter::samples});
@@ -200,15 +212,19 @@ struct Words {
   Explanation say;
 };
 
-constexpr std::string_view check_biss = "check what is connected, or select a lower MA clock (set-clock)";
-constexpr std::string_view check_clock = "select another MA clock (set-clock; clock-sweep finds one)";
+constexpr std::string_view check_biss =
+    "check what is connected, or select a lower MA clock with `absenc config set ... clock`";
+constexpr std::string_view check_clock =
+    "select another MA clock with `absenc config set ... clock`; `absenc run ... clock-sweep` finds one";
 constexpr std::string_view check_model = "check that it is an E201-9S";
 
 constexpr auto of_samples = std::to_array<Words>({
     {Error::invalid_argument, {"the interface samples 64 bits, and the word does not fit", "give it fewer bits"}},
-    {Error::line_stuck, {{}, "check that an encoder is connected and supplied: supply-on switches its supply on"}},
+    {Error::line_stuck,
+     {{}, "check that an encoder is connected and supplied: `absenc run ... supply-on` switches its supply on"}},
     {Error::truncated,
-     {"the ACK is too long for the 64 samples", "select a lower MA clock (set-clock; clock-sweep finds one)"}},
+     {"the ACK is too long for the 64 samples",
+      "select a lower MA clock with `absenc config set ... clock`; `absenc run ... clock-sweep` finds one"}},
     {Error::bad_checksum, {"the interface does not compensate the delay of the line", check_clock}},
     {Error::cross_check_failed, {"the bits behind the word are not what after_word says", "check the number of bits"}},
     {Error::wrong_length, {"the interface answers with 16 hexadecimal digits and CR", check_stream}},

@@ -64,7 +64,8 @@ author::Procedure set_zero(Dialog& dialog, Found& found);
 /// after `abort`.
 author::Procedure sweep_clocks(Dialog& dialog, Found& found, Arguments arguments);
 
-inline constexpr std::string_view check_stream = "check that it is an E201-9S and does not stream (stream-off)";
+inline constexpr std::string_view check_stream =
+    "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";
 
 /// What is wrong with `reply` to `request`, which Protocol::decode refuses with `error`, or with none (timeout); and
 /// what the document says to do about it.

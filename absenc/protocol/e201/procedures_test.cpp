@@ -84,9 +84,9 @@ TEST(E201Read, WhatFails) {
            {replies({{"0000000000000000\r"}}, v116), "4", "line_stuck", "", "supply-on"},
            {replies({{"c0014328ff30000g\r"}}, v116), "4", "bad_framing", "hexadecimal digits", "E201-9S"},
            {replies(garbage, v116), "4v4", "wrong_length", "16 hexadecimal digits and CR", "stream-off"},
-           {replies(garbage, {{"1.15\r"}}), "4v", "unsupported", "1.16", "`info`"},
+           {replies(garbage, {{"1.15\r"}}), "4v", "unsupported", "1.16", "`absenc info`"},
            {replies(garbage, {}), "4v4", "wrong_length", "16 hexadecimal digits and CR", "stream-off"},
-           {replies({}, v116), "4v4", "timeout", "answers `v` but not `4`", "`info`"},
+           {replies({}, v116), "4v4", "timeout", "answers `v` but not `4`", "`absenc info`"},
            {replies({}, {}), "4v", "timeout", "is silent", "it is an E201-9S"},
            {replies({}, {{"V"}}), "4v", "wrong_length", "a line that ends with CR", "stream-off"}}) {
     const Ended read = bench.run_tampered(one.tamper, "position");
@@ -246,13 +246,23 @@ TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
     };
     const Ended zero = bench.run_tampered(tamper, "set-zero");
     EXPECT_EQ(zero.error, one.error) << one.looks.back();
-    const std::array asked{"", "?", "??", "??z?"};
+    const std::array asked{"", "4?", "4??", "4??z?"};  // an old interface does not answer `4`
     EXPECT_EQ(bench.answering.asked(), asked[one.looks.size()]);
     if (one.looks.size() < 2) continue;
-    const Time pause = bench.answering.log[1].second - bench.answering.log[0].second;
+    const Time pause = bench.answering.log[2].second - bench.answering.log[1].second;
     EXPECT_GE(pause, 10ms);
     EXPECT_LT(pause, 14ms);
   }
+}
+
+// `?` does not show the encoder's error bit.
+TEST(E201Zero, NeedsAPositionThatHolds) {
+  Bench bench;
+  bench.device.raise_alarms(word_error);
+  const Ended zero = bench.run("set-zero");
+  EXPECT_EQ(zero.error, "invalid_argument");
+  EXPECT_TRUE(says(zero.detail, "does not hold")) << zero.detail;
+  EXPECT_EQ(bench.answering.asked(), "4");
 }
 
 }  // namespace

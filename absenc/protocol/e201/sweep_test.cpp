@@ -138,7 +138,7 @@ TEST(E201Sweep, WhatFails) {
   };
   const std::vector<Said> short_stream(11, {"1", 10ms});
   for (const Case& one : std::vector<Case>{
-           {'v', 1, false, {{"V1.15\r"}}, "unsupported", "1.16", "`info`", true},
+           {'v', 1, false, {{"V1.15\r"}}, "unsupported", "1.16", "`absenc info`", true},
            {'m', 1, false, {{"?\r"}}, "bad_framing", "does not say which clock", "E201-9S", true},
            {'m', 4, false, {{"8\r"}}, "cross_check_failed", "another clock than", "", true},
            {'m', 4, false, {}, "timeout", "is silent", "it is an E201-9S", true},
@@ -146,8 +146,8 @@ TEST(E201Sweep, WhatFails) {
            {'4', 5, false, short_stream, "wrong_length", "without a pause", "stream-off", true},
            {'4', 1, true, {{"0000000000000000\r"}}, "line_stuck", "no MA clock", "supply-on", true},
            {'4', 1, true, {}, "timeout", "no MA clock", "check supply", true},
-           {'M', 9, false, {}, "cross_check_failed", "could not be restored", "with clock and set-clock", false},
-           {'m', 10, false, {}, "timeout", "not known whether", "with clock and set-clock", true}}) {
+           {'M', 9, false, {}, "cross_check_failed", "could not be restored", "`absenc config set ... clock`", false},
+           {'m', 10, false, {}, "timeout", "not known whether", "`absenc config set ... clock`", true}}) {
     Bench bench;
     int asked = 0;
     const Tamper tamper = [&](char letter) {

@@ -128,15 +128,16 @@ constexpr auto own_fields = fields_of<Found>(
     field<valid<5>>({"valid_1100_khz", number, "", "good frames at 1100 kHz"}),
     field<valid<6>>({"valid_2200_khz", number, "", "good frames at 2200 kHz"}),
     field<valid<7>>({"valid_4400_khz", number, "", "good frames at 4400 kHz"}),
-    field<recommended>({"recommended_clock", number, "", "to be set with set-clock"}),
+    field<recommended>({"recommended_clock", number, "", "to be set with `absenc config set ... clock`"}),
     field<khz<recommended>>({"recommended_khz", number, "kHz", "that clock"}),
     field<restored>({"restored_clock", number, "", "what it was before and is again"}),
     field<aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}));
 // Of a sweep that is broken off.
-constexpr auto left_fields = fields_of<Found>(
-    field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
-    field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
-    field<&Found::previous>({"previous_clock", number, "", "what it was before: give it back with set-clock"}));
+constexpr auto left_fields =
+    fields_of<Found>(field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
+                     field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
+                     field<&Found::previous>({"previous_clock", number, "",
+                                              "what it was before: give it back with `absenc config set ... clock`"}));
 constexpr auto all_fields =
     joined_fields(joined_fields(word_fields, biss::own_fields), joined_fields(own_fields.infos, left_fields.infos));
 

@@ -354,7 +354,7 @@ TEST_P(EncolinkRegister, APresetNeedsAShaftThatStands) {
   bench.shaft.spin(30'000, bench.line.now());
   const Told preset = bench.run("preset-multiturn", {1234});
   EXPECT_EQ(preset.error, Error::cross_check_failed);
-  EXPECT_TRUE(says(preset.detail, "hold the shaft still")) << preset.detail;
+  EXPECT_TRUE(says(preset.advice, "hold the shaft still")) << preset.advice;
 }
 
 TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {

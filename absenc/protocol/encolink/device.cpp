@@ -264,6 +264,7 @@ AccessStatus VirtualEncoder::write(std::size_t index, std::uint64_t value, Time 
   values_[index] = static_cast<std::uint32_t>(value);
   if (index == multiturn_preset) {
     values_[turns_taken] = static_cast<std::uint32_t>(static_cast<std::uint64_t>(place(at) >> 32) - value);
+    lower_alarms(status::multiturn_mismatch);
   }
   return AccessStatus::ok;
 }
@@ -327,6 +328,7 @@ void VirtualEncoder::save() {
     bytes = bytes.subspan(kept_size(index));
   }
   change_memory();
+  lower_alarms(status::configuration_error);  // it is whole again
 }
 
 }  // namespace absenc::encolink

@@ -18,16 +18,14 @@
 namespace absenc::encolink {
 
 inline constexpr std::array<FlagInfo, 2> general_flags{{
-    {"error", "the position is not valid", "do not use it; `absenc alarms` says why, where frames have channel 2",
-     false, status::errors},
-    {"warning", "the position is valid, but something is near its limit",
-     "`absenc alarms` says what it is, where frames have channel 2", false, status::warnings},
+    {"error", "the position is not valid", read_the_alarms, false, status::errors},
+    {"warning", "the position is valid, but something is near its limit", read_the_alarms, false, status::warnings},
 }};
 
 /// What out_of_range means in a position.
 inline constexpr std::string_view wrong_resolution =
-    "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `info` asks "
-    "it";
+    "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `absenc info` "
+    "asks it";
 
 /// Why the registers of an AksIM-4 are refused.
 inline constexpr std::string_view not_described =
@@ -46,21 +44,24 @@ inline constexpr std::array<FlagInfo, 16> alarm_flags{{
     {"amplitude_low", "the signal is weak: the readhead is too far from the ring", "make the gap smaller"},
     {"amplitude_high", "the signal is strong: the readhead is too near to the ring", "make the gap wider"},
     {"near_limits", "the encoder works near the limits of its range", "check gap and alignment of the readhead"},
-    {"position_invalid", "the position is not valid", "do not use it; look at the other alarms"},
-    {"configuration_error", "the stored configuration is damaged", "reset, set it up again and save"},
+    {"position_invalid", "the position is not valid", "do not use it; check gap, alignment and supply of the readhead"},
+    {"configuration_error", "the stored configuration is damaged",
+     "`absenc run ... reset`, set it up again, then `absenc run ... save`"},
     {"reading_error", "the sensor could not be read", "switch it off and on; if it comes back, replace it"},
     {"sensor_error", "the magnetic sensor is faulty", "check for magnetic fields from outside, then replace it"},
     {"amplitude_too_high_warning", "the signal is nearly too strong", "make the gap wider"},
     {"amplitude_too_high", "the signal is too strong to be read", "make the gap wider"},
     {"multiturn_mismatch", "the turn counter does not fit the position: turns are wrong",
-     "go to the origin, then reset-multiturn"},
+     "go to the origin, then `absenc reset-multiturn`"},
 }};
 
 inline constexpr std::array<FlagInfo, 4> calibration_flags{{
     {"", "", ""},
     {"", "", ""},
-    {"timed_out", "the shaft did not turn far enough in time", "turn it evenly and calibrate again"},
-    {"out_of_range", "the ring is too eccentric to be calibrated", "mount the ring again, then calibrate again"},
+    {"timed_out", "the shaft did not turn far enough in time",
+     "turn it evenly, then `absenc run ... self-calibrate` again"},
+    {"out_of_range", "the ring is too eccentric to be calibrated",
+     "mount the ring again, then `absenc run ... self-calibrate` again"},
 }};
 
 /// What frames and accesses say. What is not there is not put.

@@ -145,6 +145,7 @@ inline constexpr std::uint16_t supply = 0x0008;
 inline constexpr std::uint16_t temperature = 0x0010;
 inline constexpr std::uint16_t signal_lost = 0x0020;
 inline constexpr std::uint16_t position_invalid = 0x0200;
+inline constexpr std::uint16_t configuration_error = 0x0400;
 inline constexpr std::uint16_t multiturn_mismatch = 0x8000;
 inline constexpr std::uint16_t warnings = 0x21D0;  // amplitude high and low, near limits, temperature
 inline constexpr std::uint16_t errors = 0xDE2F;    // all others

@@ -208,7 +208,8 @@ Part<bool> write(Dialog& dialog, Found& found, std::uint32_t address, std::uint1
     }
     if (load_big_endian(found.data) == value) co_return true;
   }
-  co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
+  co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
+                        "look whether the configuration is locked, with `absenc config get ... write-lock`"});
   co_return false;
 }
 
@@ -233,12 +234,15 @@ bool is_near(const Dialog& dialog, std::uint32_t singleturn,
   return author::is_near(dialog.last().singleturn, singleturn, dialog.format().resolution, millidegrees);
 }
 
-// Of a procedure that has had a frame.
-Part<bool> stands_still(Dialog& dialog, Found& found) {
-  const std::uint32_t first = dialog.last().singleturn;
+// Of a procedure that has had a frame, and a cycle of channel 2. Ends it where a zero must not be set.
+Part<bool> may_set_zero(Dialog& dialog, Found& found) {
+  const Reading first = to_reading(dialog.format(), dialog.last(), found.status);
   const Time looked = dialog.received_at();
   while (dialog.received_at() - looked < author::between_looks) co_await next_frame(dialog, found);
-  co_return is_near(dialog, first);
+  const Explanation why_not =
+      author::objection_to_zero(first, to_reading(dialog.format(), dialog.last(), found.status));
+  if (!why_not.detail.empty()) co_await dialog.stop({Error::invalid_argument, why_not.detail, why_not.advice});
+  co_return true;
 }
 
 }  // namespace
@@ -339,18 +343,13 @@ Procedure zero(Dialog& dialog, Found& found, Arguments arguments) {
   found.emits = true;
   co_await read(dialog, found, position_offset);
   const auto old = static_cast<std::uint32_t>(load_big_endian(found.data));
-  const bool still = co_await stands_still(dialog, found);
-  if (dialog.last().error) {
-    co_return {Error::invalid_argument, "the position is not valid: read the alarms, mend their cause"};
-  }
-  if (!still) co_return {Error::invalid_argument, "the shaft turns: hold it still"};
+  co_await may_set_zero(dialog, found);
   const std::uint32_t offset = dialog.format().moved_offset(old, dialog.last().singleturn);
   co_await write(dialog, found, position_offset, offset);
   if (!is_near(dialog, 0, author::zero_millidegrees)) {
     co_await write(dialog, found, position_offset, old);
-    co_return {Error::cross_check_failed,
-               "the position did not become zero, the old offset is back: hold the shaft still, or change the option "
-               "offset_sign or offset_unit"};
+    co_return {Error::cross_check_failed, "the position did not become zero, the old offset is back",
+               "hold the shaft still, or change the option offset_sign or offset_unit"};
   }
   found.tell(position_offset, found.data);
   if (arguments[0] != 0) co_await tell(dialog, found, commands::save);
@@ -366,7 +365,8 @@ Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments) {
   if (turns > low_mask(bits)) co_return {Error::invalid_argument, "the turn counter has not so many bits"};
   co_await write(dialog, found, multiturn_preset, turns);
   if (dialog.last().multiturn != turns) {
-    co_return {Error::cross_check_failed, "the preset is written, but the turns are others: hold the shaft still"};
+    co_return {Error::cross_check_failed, "the preset is written, but the turns are others",
+               "hold the shaft still, then `absenc reset-multiturn` again"};
   }
   if (arguments[1] != 0) co_await tell(dialog, found, commands::save);
   co_return done;
@@ -395,10 +395,12 @@ Procedure self_calibrate(Dialog& dialog, Found& found) {
     if (*found.running) dialog.emit();
   }
   if ((status & calibration::timed_out) != 0) {
-    co_return {Error::cross_check_failed, "the self-calibration gave up: turn the shaft evenly, more than one turn"};
+    co_return {Error::cross_check_failed, "the self-calibration gave up: the shaft did not turn far enough in time",
+               "turn it evenly, more than one turn, then `absenc run ... self-calibrate` again"};
   }
   if ((status & calibration::out_of_range) != 0) {
-    co_return {Error::cross_check_failed, "the ring is too eccentric to be calibrated: mount it again"};
+    co_return {Error::cross_check_failed, "the ring is too eccentric to be calibrated",
+               "mount it again, then `absenc run ... self-calibrate` again"};
   }
   co_return done;
 }

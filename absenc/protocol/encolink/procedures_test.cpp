@@ -55,7 +55,7 @@ TEST_P(EncolinkProcedure, ZeroWithTheWrongSignPutsTheOldOffsetBack) {
   ASSERT_EQ(bench.run("memory-write", {0, 0x10000}).error, Error::none);
   const Told wrong = bench.run("zero");
   EXPECT_EQ(wrong.error, Error::cross_check_failed);
-  EXPECT_TRUE(says(wrong.detail, "offset_sign")) << wrong.detail;
+  EXPECT_TRUE(says(wrong.advice, "offset_sign")) << wrong.advice;
   EXPECT_EQ(bench.encoder.offset(), 0x10000u);
 }
 
@@ -91,7 +91,8 @@ TEST_P(EncolinkProcedure, SelfCalibrationShowsItsProgress) {
   Bench bench(testing::single, interface);
   const Told still = bench.run("self-calibrate");
   EXPECT_EQ(still.error, Error::cross_check_failed);
-  EXPECT_TRUE(says(still.detail, "turn the shaft")) << still.detail;
+  EXPECT_TRUE(says(still.detail, "did not turn far enough")) << still.detail;
+  EXPECT_TRUE(says(still.advice, "turn it evenly")) << still.advice;
   bench.shaft.spin(120, bench.line.now());
   for (const unsigned count : {1u, 2u, 3u, 0u}) {
     unsigned running = 0;

@@ -18,11 +18,12 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
      "send the same request again; if it stays, set parity_scope"},
     {"stop_error", "the encoder received the request with a wrong stop bit and did not execute it",
      "send the same request again; if it stays, check baud rate and termination"},
-    {"safety_error", "single-turn, memory, supply voltage or LED: the position is not safe",
-     "stop the drive; `absenc alarms` says which it is", false, alarms::unsafe},
-    {"non_safety_error", "multi-turn, turn counting, Lissajous or overspeed", "`absenc alarms` says which it is", false,
+    {"safety_error", "single-turn, memory, supply voltage or LED: the position is not safe", read_the_alarms, false,
+     alarms::unsafe},
+    {"non_safety_error", "multi-turn, turn counting, Lissajous or overspeed", read_the_alarms, false,
      alarms::turns_wrong | alarms::led_or_lissajous_error | alarms::overspeed},
-    {"temperature_warning", "the encoder is too warm", "read the temperature, improve the cooling"},
+    {"temperature_warning", "the encoder is too warm",
+     "improve the cooling; `absenc temperature` shows how warm it is"},
     {"channel_2", "this is channel 2", ""},
     {"ready", "the encoder is ready", ""},
     {"forced_test_passed", "the forced test has passed", ""},
@@ -31,18 +32,20 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
 // Tables 7 and 8
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"xc_error", "the turn counter missed five times in a row: turns may be wrong",
-     "return to the origin, then clear-alarms and check the turns"},
+     "return to the origin, then `absenc clear-alarms`, and check the turns"},
     {"multiturn_error", "the turn counter was found wrong: turns are lost",
-     "return to the origin, reset-multiturn, then clear-alarms"},
+     "return to the origin, then `absenc reset-multiturn`, then `absenc clear-alarms`"},
     {"led_or_lissajous_error", "the LED current or the signals of the disc are out of range",
-     "stop the drive; led-or-lissajous tells which; then switch the encoder off and on"},
+     "stop the drive; `absenc run ... led-or-lissajous` tells which; then switch the encoder off and on"},
     {"overspeed", "the shaft turned faster than 10 000 rpm", "slow down, then switch the encoder off and on"},
     {"memory_error", "the encoder could not load its own settings at power on",
      "stop the drive, switch the encoder off and on; replace it if the error stays"},
     {"singleturn_error", "the position within the turn was found wrong",
      "stop the drive at once, then switch the encoder off and on"},
-    {"under_voltage", "the supply is below 2.9 V", "check supply and cable; it clears with the voltage"},
-    {"over_voltage", "the supply is above 3.7 V", "check the supply; it clears with the voltage"},
+    {"under_voltage", "the supply that the encoder makes inside is below its limit of 2.9 V",
+     "check cable and plugs, and that 5 V are at the connector; it clears with the voltage"},
+    {"over_voltage", "the supply that the encoder makes inside is above its limit of 3.7 V",
+     "check that no more than 5 V are at the connector; it clears with the voltage, or the encoder is damaged"},
 }};
 
 /// What is shown of a frame, or of what a procedure found: each where it is there, of a reply what its id carries.
@@ -116,7 +119,7 @@ inline constexpr auto fields = [] {
   using enum Channel;
   return author::fields_of<Shown>(
       field<&Shown::data_id>("data_id", "", "which data was asked for (Table 3)"),
-      field<&Shown::control_field>("control_field", "", "CF: encoder address, data id, parity"),
+      author::in_hex(field<&Shown::control_field>("control_field", "", "CF: encoder address, data id, parity")),
       field<&Shown::encoder_address>("encoder_address", "", "EAD: which encoder on the line", Role::encoder),
       field<&Shown::clash>("clash", "",
                            "yes: its answer is damaged every time; two encoders share the address, or the line is bad",
@@ -127,8 +130,8 @@ inline constexpr auto fields = [] {
       field<in<one, part::singleturn, &Reply::singleturn>>("singleturn", "counts", "ABS: position within the turn",
                                                            Role::position),
       field<detail::turns_in>("multiturn", "revolutions", "ABM", Role::turns),
-      field<in<one, part::encoder_id, &ChannelReply::encoder_id>>(
-          "encoder_id", "", "ENID: D8 multi-turn, 98 single-turn", Role::identity),
+      author::in_hex(field<in<one, part::encoder_id, &ChannelReply::encoder_id>>(
+          "encoder_id", "", "ENID: D8 multi-turn, 98 single-turn", Role::identity)),
       field<detail::of_encoder_id<7, 1>>("safety", "", "1: a safety encoder (ENID bit 7)"),
       field<detail::of_encoder_id<5, 3>>("multiturn_bytes", "", "of turns (ENID bits 6 and 5)"),
       field<detail::of_encoder_id<0, 0x1F>>("singleturn_bits", "",

@@ -57,7 +57,9 @@ Procedure read_safely(Dialog& dialog, FoundSafe& found) {
       show_last(dialog, found);
       verdict = monitor.judge(request, dialog.reply(), dialog.sent_at());
     }
-    if (!verdict.position) co_return {error_of(verdict.failed), text_of(verdict.failed).sentence};
+    if (!verdict.position) {
+      co_return {error_of(verdict.failed), text_of(verdict.failed).sentence, text_of(verdict.failed).advice};
+    }
     found.safe_singleturn = verdict.position->singleturn();
     found.reading.multiturn = 0;
     found.reading.multiturn_bits = 0;
@@ -90,17 +92,23 @@ std::string_view what_remains(Sentence& words, unsigned remaining) {
   return words.view();
 }
 
-// What the encoder did not do; empty: it did all.
-std::string_view missed(Sentence& words, DataId id, const Reply& before, const Reply& now) {
+// What the encoder did not do; no detail: it did all.
+Explanation missed(Sentence& words, DataId id, const Reply& before, const Reply& now) {
   const unsigned remaining = now.one.alarms | now.two.alarms;
-  if (id == DataId::clear_alarms) return remaining != 0 ? what_remains(words, remaining) : "";
-  if (id == DataId::zero) {
-    return author::is_near(now.singleturn, 0, singleturn_bits) ? "" : "the position is still not zero";
+  if (id == DataId::clear_alarms) {
+    if (remaining == 0) return {};
+    return {what_remains(words, remaining), "do first what `absenc alarms` says of each"};
   }
-  if (now.multiturn != 0) return "the turns are still not zero";
+  if (id == DataId::zero) {
+    if (author::is_near(now.singleturn, 0, singleturn_bits)) return {};
+    return {"the position is still not zero", "hold the shaft still, then `absenc zero` again"};
+  }
+  if (now.multiturn != 0) {
+    return {"the turns are still not zero", "hold the shaft still, then `absenc reset-multiturn` again"};
+  }
   // Rev 1.4 of the document added a single-turn clear to ID D and left it out elsewhere.
-  if (author::is_near(now.singleturn, before.singleturn, singleturn_bits)) return "";
-  return "the turns are zero, but the encoder has moved its single-turn zero too: find the origin again";
+  if (author::is_near(now.singleturn, before.singleturn, singleturn_bits)) return {};
+  return {"the turns are zero, but the encoder has moved its single-turn zero too", "find the origin again"};
 }
 
 }  // namespace
@@ -110,11 +118,11 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
   const Reply first = co_await dialog.ask(look).repeated(attempts);
   const Reply before = co_await dialog.ask(look).repeated(attempts).after(author::between_looks);
   if (!to_reading(before).ready) {
-    co_return {Error::invalid_argument, "the encoder is not ready yet; nothing was sent"};
+    co_return {Error::invalid_argument, "the encoder is not ready yet; nothing was changed", "wait, then try again"};
   }
-  if (!author::is_near(before.singleturn, first.singleturn, singleturn_bits)) {
-    co_return {Error::invalid_argument, "the shaft is turning: a reset needs it standing still; nothing was sent"};
-  }
+  const Explanation why_not = id == DataId::zero ? author::objection_to_zero(to_reading(first), to_reading(before))
+                                                 : author::objection_to_moving(to_reading(first), to_reading(before));
+  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
   for (unsigned i = 0; i < reset_requests; ++i) {
     const Time pause = i == 0 ? Time{} : pause_between_resets(dialog, id);
     const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).after(pause);
@@ -129,8 +137,8 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
   show_last(dialog, found);
-  const std::string_view what = missed(found.words, id, before, now);
-  if (!what.empty()) co_return {Error::cross_check_failed, what};
+  const Explanation what = missed(found.words, id, before, now);
+  if (!what.detail.empty()) co_return {Error::cross_check_failed, what.detail, what.advice};
   co_return done;
 }
 
@@ -227,7 +235,8 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const std::uint8_t now =
       co_await read_byte(dialog, page, address, "the byte was written, but could not be read back");
   if (now == value) co_return done;
-  co_return {Error::cross_check_failed, "reading back gave another value: the write has failed", {}, eeprom_read_pause};
+  co_return {Error::cross_check_failed, "reading back gave another value: the write has failed",
+             "look at what is there with `absenc memory read` before you write it again", eeprom_read_pause};
 }
 
 Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
@@ -236,7 +245,8 @@ Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
   co_await turn_to(dialog, page, {});
   found.page = co_await read_byte(dialog, page, page_select_address, {});
   if (found.page == page) co_return done;
-  co_return {Error::cross_check_failed, "another page is selected", {}, eeprom_read_pause};
+  co_return {Error::cross_check_failed, "another page is selected",
+             "check that nobody else selects pages on this line, then try again", eeprom_read_pause};
 }
 
 namespace {

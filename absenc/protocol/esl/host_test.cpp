@@ -388,7 +388,7 @@ TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
     bench.shaft.spin(rpm, Time{});
     const Told zero = bench.run("zero");
     EXPECT_EQ(zero.error, Error::invalid_argument);
-    EXPECT_TRUE(zero.says("nothing was sent"));
+    EXPECT_TRUE(zero.says("nothing was changed"));
     EXPECT_EQ(bench.encoder.answer_count(), 2u);  // it only looked
   }
   Bench starting;
@@ -396,6 +396,18 @@ TEST(EslHost, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
   const Told zero = starting.run("zero");
   EXPECT_EQ(zero.error, Error::invalid_argument);
   EXPECT_TRUE(zero.says("not ready"));
+}
+
+// The zero would be wrong for ever: it is in the EEPROM.
+TEST(EslHost, AZeroOfAPositionThatDoesNotHoldIsNotSent) {
+  Bench bench;
+  bench.shaft.put(7, 1'000'000);
+  bench.encoder.raise_alarms(alarms::singleturn_error);
+  const Told zero = bench.run("zero");
+  EXPECT_EQ(zero.error, Error::invalid_argument);
+  EXPECT_TRUE(zero.says("does not hold")) << zero.detail;
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);
+  EXPECT_EQ(bench.encoder.memory_version(), 0u);
 }
 
 // Replies 0 and 1 are looks, 2 to 9 answer the requests, 10 and, when they fail, 11 and 12 are the verification.

@@ -57,6 +57,7 @@ enum class Check : std::uint8_t {
 struct CheckText {
   Error error;
   std::string_view sentence;
+  std::string_view advice{};  // in place of the error's own
 };
 
 /// Indexed by the enumerator.
@@ -86,9 +87,10 @@ inline constexpr std::array<CheckText, 32> check_texts{{
     {Error::unsupported, "only replies to IDs 1 and 2 can make a safe position"},
     {Error::busy, "channel 1 is not ready"},
     {Error::busy, "channel 2 is not ready"},
-    {Error::request_rejected, "the forced test has not passed in both channels"},
-    {Error::request_rejected, "a channel reports a safety error"},
-    {Error::request_rejected, "a channel raises an alarm that makes the position unsafe"},
+    {Error::request_rejected, "the forced test has not passed in both channels",
+     "let the drive run the forced test, or set require_forced_test=false where the encoder has none"},
+    {Error::request_rejected, "a channel reports a safety error", read_the_alarms},
+    {Error::request_rejected, "a channel raises an alarm that makes the position unsafe", read_the_alarms},
     {Error::sequence_mismatch, "no earlier reply to another ID is known, so the sequence counter proves nothing yet"},
     {Error::sequence_mismatch, "the sequence counter stands still: this reply was seen before"},
     {Error::sequence_mismatch, "the sequence counter did not move as it should: a reply was repeated, lost or delayed"},

@@ -15,7 +15,7 @@ namespace absenc::tformat {
 
 enum ConditionIndex : std::size_t { battery_voltage, temperature };
 inline constexpr std::array<Condition, 2> conditions{{
-    {"battery", "mV", "voltage of the external battery; 0: there is none", 0, 4750, 3600},
+    {"battery", "mV", "voltage of the external battery; 0: there is none, as always with battery=false", 0, 4750, 3600},
     {"temperature", "degC", "of the board", -20, 127, 35},
 }};
 
@@ -27,6 +27,7 @@ class VirtualEncoder final : public author::Responder {
     if (format_.encoder_id < 0) format_.encoder_id = 0x11;
     for (std::size_t i = 0; i < conditions.size(); ++i) conditions_[i] = conditions[i].normal;
     memory_[threshold_at] = overheat_at_shipping;
+    watch_battery();
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
@@ -44,6 +45,7 @@ class VirtualEncoder final : public author::Responder {
     if (is_on(now)) update(now);
     conditions_[index] = value;
     if (is_on(now)) update(now);
+    if (off_) watch_battery();
   }
   /// What an ID 3 reply would say now.
   [[nodiscard]] Reply everything(Time now) const {
@@ -67,17 +69,18 @@ class VirtualEncoder final : public author::Responder {
     } else {
       counter_lap_ = lap(now);
     }
-    const bool battery = conditions_[battery_voltage] >= battery_error_below;
-    // Without battery nothing counted the turns. Over_speed and counter_overflow are indefinite then: here, clear.
-    if (!battery) {
-      latches_ = alarms::battery_error;
+    // Without battery nothing counted the turns, also where it has come back since. Over_speed and counter_overflow are
+    // indefinite then: here, clear. Over_heat does not need the battery (6.5).
+    if (battery_lost_) {
+      latches_ = static_cast<std::uint8_t>((latches_ & alarms::over_heat) | alarms::battery_error);
       set_turns(0, now);
     }
+    battery_lost_ = false;
     page_ = 0;
     busy_until_ = Time{};
     busy_with_ = Work::none;
     Responder::power_on(now, kind);
-    if (!battery && kind == PowerOn::real) restart(now + start_up_without_battery);
+    if (!has_battery() && kind == PowerOn::real) restart(now + start_up_without_battery);
   }
   void power_off(Time now) override {
     if (off_) return;
@@ -85,6 +88,7 @@ class VirtualEncoder final : public author::Responder {
     Responder::power_off(now);
     off_ = true;
     off_since_ = now;
+    watch_battery();
     zero_pending_ = false;
     latches_ &= static_cast<std::uint8_t>(~(alarms::counting_error | alarms::multiturn_error));
     refused_status_ = 0;
@@ -93,8 +97,8 @@ class VirtualEncoder final : public author::Responder {
   }
 
  private:
-  static constexpr std::int32_t battery_error_below = 2750;  // mV, typical (5.4)
-  static constexpr std::int32_t battery_alarm_below = 3100;
+  static constexpr std::int32_t battery_error_voltage = 2750;  // mV, typical: this or less (5.4, 6.5)
+  static constexpr std::int32_t battery_alarm_voltage = 3100;
   static constexpr std::int32_t full_absolute_speed = 100'000;   // 1/1000 rpm (5.4.1)
   static constexpr std::int32_t standing_still = 1'000;          // 1/1000 rpm: what a servo at rest may tremble
   static constexpr std::int32_t power_off_speed = 6'000'000;     // 1/1000 rpm (5.4.2)
@@ -239,6 +243,8 @@ class VirtualEncoder final : public author::Responder {
   }
   // As if the turn counter had no end.
   [[nodiscard]] std::int64_t turns(Time now) const { return (counts(now) >> format_.singleturn_bits) - turn_offset_; }
+  // A single-turn encoder has no counter that could run over, or miss a turn.
+  [[nodiscard]] bool counts_turns() const { return format_.multiturn_bits != 0; }
   // How often the turn counter has gone round.
   [[nodiscard]] std::int64_t lap(Time now) const { return turns(now) >> format_.multiturn_bits; }
   void set_turns(std::int64_t turns, Time now) {
@@ -248,7 +254,7 @@ class VirtualEncoder final : public author::Responder {
   [[nodiscard]] std::uint8_t alarms_now() const {
     unsigned bits = latches_ | forced_;
     if (full_absolute_) bits |= alarms::full_absolute_status;
-    if (conditions_[battery_voltage] < battery_alarm_below) bits |= alarms::battery_alarm;
+    if (battery_now() <= battery_alarm_voltage) bits |= alarms::battery_alarm;
     return static_cast<std::uint8_t>(bits);
   }
   // Brings everything that changes with time up to now.
@@ -258,7 +264,7 @@ class VirtualEncoder final : public author::Responder {
 
     // A whole lap between two requests goes unnoticed when it is undone before the next.
     const std::int64_t lap_now = lap(now);
-    if (lap_now != counter_lap_) latches_ |= alarms::counter_overflow;
+    if (lap_now != counter_lap_ && counts_turns()) latches_ |= alarms::counter_overflow;
     counter_lap_ = lap_now;
 
     const std::uint8_t threshold = memory_[threshold_at];
@@ -275,10 +281,16 @@ class VirtualEncoder final : public author::Responder {
 
   // ---- Power
 
+  [[nodiscard]] std::int64_t battery_now() const { return format_.battery ? conditions_[battery_voltage] : 0; }
+  [[nodiscard]] bool has_battery() const { return battery_now() > battery_error_voltage; }
+  // While the power is off: however short the battery was away, it is told afterwards (6.5).
+  void watch_battery() { battery_lost_ = battery_lost_ || !has_battery(); }
+
   void started(Time at) override { full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed; }
   // What happened to the turns while only the battery counted them (5.4.2): looked at every 10 ms, but at no more than
   // 10 000 points of a long pause.
   void count_on_battery(Time from, Time now) {
+    if (!counts_turns()) return;
     const Time step = std::max(Time(10ms), (now - from) / 10'000);
     for (Time at = from; at < now; at += step) {
       const ShaftState state = shaft_->at(at);
@@ -301,6 +313,7 @@ class VirtualEncoder final : public author::Responder {
 
   std::optional<Time> off_since_{};  // none: it was never on before, or is
   bool off_ = true;
+  bool battery_lost_ = false;  // since it was switched off
 
   std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
   std::int64_t counter_lap_ = 0;  // which lap of the turn counter was seen last

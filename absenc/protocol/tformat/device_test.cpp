@@ -267,12 +267,55 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
   encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1us, .items = all});
   EXPECT_EQ(encoder.violation_count(), 2u);
   // Unless the emulator was late itself: the reply to the first, of 29 us, might have been out before the others came.
-  for (const auto& [late, rules] : {std::pair(20us, 2u), {3ms, 0u}}) {
+  // A host that asks again has given up first, which takes a millisecond at the least, each time.
+  for (const auto& [late, rules] : {std::pair(20us, 2u), {900us, 2u}, {1500us, 1u}, {3ms, 0u}}) {
     VirtualEncoder delayed({}, shaft);
     delayed.power_on(Time{}, PowerOn::skip);
     delayed.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 4ms, .items = all, .late = late});
     EXPECT_EQ(delayed.violation_count(), rules) << late.count();
   }
+}
+
+// In two writes: the second may come while the first is answered, or behind that.
+TEST(TformatDevice, RequestsWithoutAPauseAreToldHoweverTheyAreCut) {
+  testing::TestShaft shaft;
+  const Wire one{0x1A};
+  const Wire two{0x1A, 0x1A};
+  using Kind = Event<std::uint8_t>::Kind;
+  for (const bool answered : {false, true}) {
+    VirtualEncoder encoder({}, shaft);
+    encoder.power_on(Time{}, PowerOn::skip);
+    encoder.feed({.kind = Kind::received, .at = 1us, .items = one});
+    encoder.next(1us);
+    if (answered) encoder.feed({.kind = Kind::sent, .at = 2us});
+    encoder.feed({.kind = Kind::received, .at = 3us, .items = two, .late = 200us});
+    EXPECT_EQ(encoder.violation_count(), answered ? 1u : 2u);
+    EXPECT_EQ(encoder.violations()[0].rule, "request during the encoder's transmission");
+  }
+}
+
+// However busy the machine is: a host that never waits is told from one that had to give up.
+TEST(TformatDevice, AHostThatNeverWaitsIsNotExcusedForEver) {
+  testing::TestShaft shaft;
+  VirtualEncoder encoder({}, shaft);
+  encoder.power_on(Time{}, PowerOn::skip);
+  const Wire thrice{0x1A, 0x1A, 0x1A};
+  const Wire once{0x1A};
+  Time now = 1s;
+  const auto ask = [&](const Wire& request) {
+    now += 100ms;
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = request, .late = 50ms});
+    encoder.next(now);
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+    return encoder.violation_count();
+  };
+  EXPECT_EQ(ask(thrice), 0u);
+  EXPECT_EQ(ask(thrice), 0u);
+  EXPECT_EQ(ask(thrice), 2u);
+  EXPECT_EQ(ask(thrice), 4u);
+  // One that waited in between is excused again.
+  EXPECT_EQ(ask(once), 4u);
+  EXPECT_EQ(ask(thrice), 4u);
 }
 
 // What is no violation, but told to who watches (9.1, 10).
@@ -362,6 +405,77 @@ TEST(TformatDevice, BatteryFlags) {
   bench.condition(battery_voltage, 3600);
   reset(bench, DataId::reset_multiturn);
   EXPECT_EQ(bench.everything().alarms, 0);
+}
+
+// 6.5: "3.1 V or less", "2.75 V or less".
+TEST(TformatDevice, BatteryLimitsBelongToTheFlags) {
+  for (const auto& [millivolts, alarm, error] : {std::tuple(3101, false, false),
+                                                 {3100, true, false},
+                                                 {2751, true, false},
+                                                 {2750, true, true},
+                                                 {0, true, true}}) {
+    Bench bench;
+    bench.condition(battery_voltage, millivolts);
+    EXPECT_EQ(bench.everything().alarms, alarm ? alarms::battery_alarm : 0) << millivolts;
+    bench.restart();
+    EXPECT_EQ((bench.everything().alarms & alarms::battery_error) != 0, error) << millivolts;
+  }
+}
+
+TEST(TformatDevice, ABatteryThatWasAwayWhileThePowerWasOffIsTold) {
+  Bench bench;
+  bench.shaft.put(9, 0);
+  bench.encoder.power_off(bench.line.now());
+  bench.condition(battery_voltage, 0);
+  bench.pass(1s);
+  bench.condition(battery_voltage, 3600);
+  bench.pass(1s);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_error);
+  EXPECT_EQ(bench.everything().multiturn, 0u);
+  reset(bench, DataId::reset_multiturn);
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, 0);  // it has been there since
+  // Changed while the power was on: nothing was lost.
+  bench.condition(battery_voltage, 0);
+  bench.condition(battery_voltage, 3600);
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, 0);
+}
+
+// Of over_heat 6.5 says the same with a battery and without; over_speed and counter_overflow are "indefinite".
+TEST(TformatDevice, OverHeatIsLatchedWithoutABattery) {
+  Bench bench;
+  bench.condition(battery_voltage, 0);
+  bench.encoder.raise_alarms(alarms::over_heat | alarms::over_speed | alarms::counter_overflow);
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, alarms::over_heat | alarms::battery_error | alarms::battery_alarm);
+}
+
+TEST(TformatDevice, WithoutTurnsNoCounterOverflows) {
+  testing::TestShaft shaft;
+  VirtualEncoder encoder({.multiturn_bits = 0}, shaft);
+  encoder.power_on(Time{}, PowerOn::skip);
+  const Wire request{0x1A};
+  for (const int turns : {1, 5, -3}) {
+    shaft.put(turns, 77);
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1s * (10 + turns), .items = request});
+    EXPECT_EQ(encoder.everything(1s * (10 + turns)).alarms, 0) << turns;
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = 1s * (10 + turns)});
+  }
+  encoder.power_off(20s);
+  shaft.spin(9'000, 20s);
+  encoder.power_on(30s, PowerOn::skip);
+  EXPECT_EQ(encoder.everything(30s).alarms & alarms::over_speed, 0);
+}
+
+TEST(TformatDevice, OneWithoutBatteryNeverHasOne) {
+  testing::TestShaft shaft;
+  shaft.put(3, 5);
+  VirtualEncoder encoder({.battery = false}, shaft);
+  for (std::size_t i = 0; i < conditions.size(); ++i) encoder.set_condition(i, conditions[i].normal, Time{});
+  encoder.power_on(Time{}, PowerOn::skip);
+  EXPECT_EQ(encoder.everything(Time{}).alarms, alarms::without_battery);
 }
 
 TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {

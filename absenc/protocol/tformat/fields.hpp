@@ -17,29 +17,31 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"", "", ""},
     {"", "", ""},
     {"", "", ""},
-    {"counting_error", "the position within the turn is wrong", "read the alarms (data ID 3)", false,
-     alarms::counting_error},
-    {"alarm", "over-heat, multi-turn error, battery error or battery alarm", "read the alarms (data ID 3)", false,
+    {"counting_error", "the position within the turn is wrong", read_the_alarms, false, alarms::counting_error},
+    {"alarm", "over-heat, multi-turn error, battery error or battery alarm", read_the_alarms, false,
      alarms::shown_in_status},
     {"parity_error", "the encoder received the request with a parity error", "send the same request again"},
     {"delimiter_error", "the encoder received the request with a wrong stop bit", "send the same request again"},
 }};
 
-// 6.5
+// 6.5. One that is declared to have no battery reports nothing of it.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_speed", "the shaft turned faster than the counter follows while the power was off: turns may be wrong",
-     "return to the origin, then reset-multiturn or clear-alarms"},
+     "return to the origin, then `absenc reset-multiturn` or `absenc clear-alarms`"},
     {"full_absolute_status", "switched on at 100 rpm or more: only the top 5 bits of the position hold",
      "slow down below 100 rpm and wait until it clears by itself"},
     {"counting_error", "the position within the turn was found wrong",
-     "stop the servo system at once; then clear-alarms, or switch the encoder off and on"},
-    {"counter_overflow", "the turn counter went past its end and goes on from the other one", "clear-alarms"},
-    {"over_heat", "the encoder is or was hotter than its threshold", "let it cool, then clear-alarms"},
+     "stop the servo system at once; then `absenc clear-alarms`, or switch the encoder off and on"},
+    {"counter_overflow", "the turn counter went past its end and goes on from the other one", "`absenc clear-alarms`"},
+    {"over_heat", "the encoder is or was hotter than its threshold", "let it cool, then `absenc clear-alarms`"},
     {"multiturn_error", "a bit of the turn counter jumped: turns are wrong",
-     "return to the origin, then reset-multiturn"},
+     "return to the origin, then `absenc reset-multiturn`"},
     {"battery_error", "the battery was below 2.75 V while the power was off: turns are lost",
-     "check or replace the battery, return to the origin, then reset-multiturn"},
-    {"battery_alarm", "the battery is below 3.1 V", "replace the battery with the encoder switched on"},
+     "check or replace the battery, return to the origin, then `absenc reset-multiturn`; without a battery set "
+     "battery=false",
+     true},
+    {"battery_alarm", "the battery is below 3.1 V",
+     "replace the battery with the encoder switched on; without a battery set battery=false", true},
 }};
 
 /// What a frame or a procedure shows; in the order of the wire.
@@ -65,13 +67,15 @@ struct Values {
 
 inline constexpr auto fields = [] {
   using author::field;
+  using author::in_hex;
   return author::fields_of<Values>(
       field<&Values::data_id>("data_id", "", "which data was asked for (Table 1)"),
-      field<&Values::control_field>("control_field", "", "first byte of the request: sync code, data id, parity"),
+      in_hex(
+          field<&Values::control_field>("control_field", "", "first byte of the request: sync code, data id, parity")),
       field<&Values::status>("status", "SF", status_flags),
       field<&Values::singleturn>("singleturn", "counts", "ABS: position within the turn, rising counter-clockwise",
                                  Role::position),
-      field<&Values::encoder_id>("encoder_id", "", "ENID", Role::identity),
+      in_hex(field<&Values::encoder_id>("encoder_id", "", "ENID", Role::identity)),
       field<&Values::multiturn>("multiturn", "revolutions", "ABM", Role::turns),
       field<&Values::alarms>("alarms", "ALMC", alarm_flags), field<&Values::page>("page", "", "memory page"),
       field<&Values::address>("address", "", "ADF: memory address; 127 selects the page"),
@@ -95,14 +99,15 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-[[nodiscard]] constexpr Values values_of(const Reply& reply) {
+/// Without a battery the turns mean nothing, and are not shown.
+[[nodiscard]] constexpr Values values_of(const Format& format, const Reply& reply) {
   if (is_memory_access(reply.id)) {
     return {.data_id = reply.id, .address = reply.address, .busy = reply.busy, .value = reply.value};
   }
   Values all{.data_id = reply.id, .status = reply.status};
   const bool everything = reply.id == DataId::everything;
   if (everything || reply.id == DataId::encoder_id) all.encoder_id = reply.encoder_id;
-  if (everything || reply.id == DataId::multiturn) all.multiturn = reply.multiturn;
+  if (format.battery && (everything || reply.id == DataId::multiturn)) all.multiturn = reply.multiturn;
   if (everything) all.alarms = reply.alarms;
   if (reply.id != DataId::multiturn && reply.id != DataId::encoder_id) all.singleturn = reply.singleturn;
   return all;

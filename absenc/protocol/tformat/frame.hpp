@@ -44,6 +44,8 @@ inline constexpr std::uint32_t write_life = 100'000;    // of all bytes together
 inline constexpr std::uint8_t overheat_address = 4;     // on the service page (7.2)
 inline constexpr std::uint8_t temperature_address = 5;  // on the service page (7.3)
 inline constexpr std::uint8_t overheat_at_shipping = 0xDA;
+/// Watched at 0 degC: the document wants 1 degC or more (7.4), or a byte below 0x80, which is "off" (7.2.2).
+inline constexpr std::uint8_t overheat_at_zero = 0x80;
 
 /// The area open to the user; page select is not part of it.
 inline constexpr std::array<MemoryArea, user_pages + 2> memory_areas = [] {
@@ -100,6 +102,8 @@ inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | ba
 inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
 /// Held until a reset request or, some of them, until power off (6.5).
 inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
+/// What an encoder without a battery shows, and is no fault of it (2 (1), 6.5).
+inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;
 }  // namespace alarms
 
 /// What a model's frames carry, and how strictly they are checked.
@@ -108,9 +112,12 @@ struct Format {
   unsigned multiturn_bits = 16;   // 0 to 24
   int encoder_id = -1;            // ENID, 0 to 255; -1: any
   bool strict = true;             // also the checks that only a specification-true encoder passes
+  bool battery = true;            // false: none is connected; the turns mean nothing then (2 (1))
 
   [[nodiscard]] static constexpr LineSettings line() { return line_settings; }
-  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits}; }
+  /// Bits of the turns that may be used.
+  [[nodiscard]] constexpr unsigned turns_bits() const { return battery ? multiturn_bits : 0; }
+  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, turns_bits()}; }
 };
 
 inline constexpr std::uint8_t busy_bit = 0x80;     // of ADF, in replies
@@ -336,6 +343,11 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
   return reply;
 }
 
+/// Bits of ALMC that are no alarms of this encoder, because the format says so.
+[[nodiscard]] constexpr unsigned expected_alarms(const Format& format) {
+  return format.battery ? 0u : alarms::without_battery;
+}
+
 /// What replies have reported of the alarms since the encoder was switched on: bits of ALMC.
 struct KnownAlarms {
   std::uint8_t reported = 0;
@@ -382,6 +394,17 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.multiturn_known = reading.multiturn_bits == 0 || all_reported || lost;
 }
 
+// SF as a reading shows it: its `alarm` is set for ever by a battery that there is not. Without ALMC it tells nothing
+// then.
+[[nodiscard]] constexpr std::uint8_t status_of(const Format& format, bool has_alarms, const Reply& reply) {
+  if (format.battery) return reply.status;
+  const bool other = has_alarms && (reply.alarms & alarms::shown_in_status & ~expected_alarms(format)) != 0;
+  return static_cast<std::uint8_t>((reply.status & ~status::alarm) | (other ? status::alarm : 0));
+}
+constexpr unsigned reported_status(const Format& format, bool has_alarms) {
+  return format.battery || has_alarms ? 0xFFu : 0xFFu & ~unsigned{status::alarm};
+}
+
 }  // namespace detail
 
 /// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. SF of the other replies
@@ -396,13 +419,15 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
   Reading reading{.singleturn = reply.singleturn,
                   .multiturn = reply.multiturn,
                   .singleturn_bits = has_position ? format.singleturn_bits : 0,
-                  .multiturn_bits = has_turns ? format.multiturn_bits : 0,
-                  .status = reply.status,
-                  .status_reported = has_status ? 0xFFu : 0u};
+                  .multiturn_bits = has_turns ? format.turns_bits() : 0,
+                  .status = detail::status_of(format, has_all, reply),
+                  .status_reported = has_status ? detail::reported_status(format, has_all) : 0u};
   const KnownAlarms before = known_alarms ? KnownAlarms::all(*known_alarms) : KnownAlarms{};
   detail::judge(reading, has_all      ? KnownAlarms::all(reply.alarms)
                          : has_status ? known_after(before, reply.status)
                                       : before);
+  reading.alarms &= ~expected_alarms(format);
+  reading.alarms_reported &= ~expected_alarms(format);
   return reading;
 }
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
@@ -412,9 +437,10 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
 
 /// See Unit.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
-  if (now.alarms_reported == 0xFF) return now;  // an ID 3 reply
+  if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // an ID 3 reply
   const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
-  detail::judge(now, known_after(known, static_cast<std::uint8_t>(now.status)));
+  const unsigned sf = now.status | (~now.status_reported & status::alarm);  // which tells nothing without a battery
+  detail::judge(now, known_after(known, static_cast<std::uint8_t>(sf)));
   return now;
 }
 

@@ -182,6 +182,26 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
+// 2 (1): there `alarm` of SF is set for ever, by a battery that there is not.
+TEST(TformatFrame, WithoutABatteryStatusTellsNothingOfFourAlarms) {
+  constexpr Format format{.battery = false};
+  const auto whole = [&](std::uint8_t more) {
+    const auto almc = static_cast<std::uint8_t>(alarms::without_battery | more);
+    return to_reading(format, {.id = DataId::everything, .status = status_for(almc), .alarms = almc});
+  };
+  EXPECT_EQ(whole(0).alarms_reported, 0xFFu & ~alarms::without_battery);
+  EXPECT_EQ(whole(0).status, 0u);
+  EXPECT_EQ(whole(0).status_reported, 0xFFu);
+  EXPECT_EQ(whole(alarms::over_heat).status, unsigned{status::alarm});
+  const Reading part = to_reading(format, {.id = DataId::singleturn, .status = status::alarm});
+  EXPECT_EQ(part.status_reported, 0xFFu & ~status::alarm);
+  EXPECT_EQ(part.alarms_reported, unsigned{alarms::counting_error});
+  EXPECT_EQ(remembered(whole(alarms::over_heat), part).alarms, unsigned{alarms::over_heat});
+  EXPECT_EQ(remembered(whole(0), part).alarms_reported, 0xFFu & ~alarms::shown_in_status);
+  EXPECT_EQ(remembered(whole(0), part).singleturn_validity(), Validity::valid);
+  EXPECT_EQ(remembered(part, whole(0)).alarms_reported, whole(0).alarms_reported);
+}
+
 // What one reply after the other leaves known, as in a capture.
 TEST(TformatFrame, LaterRepliesCompleteWhatEarlierOnesReported) {
   const auto part = [](std::uint8_t sf) { return to_reading({}, {.id = DataId::singleturn, .status = sf}); };

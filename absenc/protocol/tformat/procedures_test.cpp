@@ -110,6 +110,19 @@ TEST(TformatProcedures, MemoryIsWrittenReadBackAndSparedWear) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
+// 7.2.4 and 7.4: bit 7 switches it on, from 1 degC on; everything else with bit 7 clear is "off".
+TEST(TformatProcedures, AnOverHeatThresholdOfZeroDegreesIsNotWritten) {
+  Bench bench;
+  const auto zero = bench.run("memory-write", {overheat_address, 0x80, service_page});
+  EXPECT_EQ(zero.error, Error::invalid_argument);
+  EXPECT_TRUE(zero.says("0x80 watches for 0 degC")) << zero.detail;
+  EXPECT_EQ(bench.encoder.answer_count(), 0u);
+  for (const std::int64_t value : {0x81, 0xFF, 0x00, 0x7F}) {
+    EXPECT_EQ(bench.run("memory-write", {overheat_address, value, service_page}).error, Error::none) << value;
+  }
+  EXPECT_EQ(bench.run("memory-write", {overheat_address, 0x80, 0}).error, Error::none);  // the user's own byte
+}
+
 TEST(TformatProcedures, ClosedMemoryIsRefusedBeforeAnythingIsSent) {
   Bench bench;
   for (const auto& [name, arguments] : {std::pair<const char*, std::vector<std::int64_t>>{"memory-read", {0, 6, 1}},
@@ -235,16 +248,44 @@ TEST(TformatProcedures, AResetThatMustNotBeSentIsNot) {
   for (const Row& row :
        {Row{"zero", 5, 0, "turning"}, Row{"zero", -5, 0, "turning"}, Row{"clear-alarms", 1, 0, "turning"},
         Row{"zero", 0, alarms::full_absolute_status, "full_absolute_status"},
-        Row{"clear-alarms", 0, alarms::battery_error, "reset-multiturn"}}) {
+        Row{"zero", 0, alarms::counting_error, "does not hold"},
+        Row{"clear-alarms", 0, alarms::battery_error, "the turns are lost"}}) {
     Bench bench;
     bench.encoder.raise_alarms(row.alarm);
     bench.shaft.spin(row.rpm, Time{});
     const auto reset = bench.run(row.name);
     EXPECT_EQ(reset.error, Error::invalid_argument) << row.detail;
     EXPECT_TRUE(reset.says(row.detail)) << reset.detail;
+    EXPECT_NE(reset.advice, "") << row.detail;
     EXPECT_EQ(bench.encoder.answer_count(), 2u);  // it only looked
     EXPECT_EQ(bench.violations(), 0u);
   }
+}
+
+// Nothing is lost of an encoder without a battery by clearing what it always shows.
+TEST(TformatProcedures, AnEncoderWithoutBatteryIsDeclared) {
+  Bench bench;
+  bench.shaft.put(7, 1000);
+  bench.condition(battery_voltage, 0);
+  bench.restart();
+  const auto taken = bench.run("position");
+  EXPECT_EQ(taken.reading->alarms, unsigned{alarms::without_battery});
+  EXPECT_EQ(taken.reading->multiturn_validity(), Validity::invalid);
+  bench.tell("battery=false");
+  const auto declared = bench.run("position");
+  EXPECT_EQ(declared.reading->alarms, 0u);
+  EXPECT_EQ(declared.reading->alarms_reported, 0xFFu & ~alarms::without_battery);
+  EXPECT_EQ(declared.reading->status, 0u);
+  EXPECT_EQ(declared.reading->multiturn_validity(), Validity::absent);
+  EXPECT_EQ(declared.reading->singleturn_validity(), Validity::valid);
+  EXPECT_FALSE(declared.numbers.contains("multiturn"));
+  EXPECT_EQ(declared.numbers.at("alarms"), alarms::without_battery);  // what the reply says
+  bench.encoder.raise_alarms(alarms::over_heat);
+  const auto hot = bench.run("position");
+  EXPECT_EQ(hot.reading->alarms, unsigned{alarms::over_heat});
+  EXPECT_EQ(hot.reading->status, unsigned{status::alarm});
+  EXPECT_EQ(bench.run("clear-alarms").error, Error::none);
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
 }
 
 // Replies 0 and 1 are looks, 2 to 11 answer the requests, 12 is the verification.
@@ -261,7 +302,9 @@ TEST(TformatProcedures, AResetThatDidNotHappenIsFound) {
         Row{"reset-multiturn", {.multiturn = 1, .encoder_id = 0x11}, "turns are still not zero"},
         Row{"reset-multiturn", {.encoder_id = 0x11, .alarms = alarms::over_speed}, "latched alarms remain"},
         Row{"clear-alarms", {.encoder_id = 0x11, .alarms = alarms::counter_overflow}, "latched alarms remain"},
-        Row{"clear-alarms", {.status = status::alarm, .encoder_id = 0x11, .alarms = alarms::over_heat}, "cool down"},
+        Row{"clear-alarms",
+            {.status = status::alarm, .encoder_id = 0x11, .alarms = alarms::over_heat},
+            "over_heat remains"},
         Row{"clear-alarms", {.status = status::alarm, .encoder_id = 0x11, .alarms = alarms::battery_alarm}, ""}}) {
     Bench bench([&row](unsigned index, Wire& reply) {
       if (index == 12) reply = wire(row.verification);

@@ -30,31 +30,40 @@ struct Found : Values {
 // ---- Resets (10)
 
 // Why this reset must not be sent; empty: it may.
-std::string_view objection(DataId id, const Reply& first, const Reply& second, unsigned bits) {
-  if (!is_near(second.singleturn, first.singleturn, bits)) {
-    return "the shaft is turning: a reset needs it standing still; nothing was sent";
-  }
+Explanation objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
+  const Reading before = to_reading(format, first);
+  const Reading now = to_reading(format, second);
   // The position is too coarse then to show a movement.
   if ((second.alarms & alarms::full_absolute_status) != 0) {
-    return "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
-           "since; nothing was sent";
+    return {
+        "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
+        "since; nothing was sent",
+        "let the shaft stand still, then try again"};
   }
-  if (id == DataId::clear_alarms && (second.alarms & alarms::battery_error) != 0) {
-    return "battery_error says that the turns are lost, and clearing it alone would hide that: replace the battery, "
-           "then reset the turns (reset-multiturn); nothing was sent";
+  const Explanation moves = id == DataId::zero ? objection_to_zero(before, now) : objection_to_moving(before, now);
+  if (!moves.detail.empty()) return moves;
+  const bool turns_lost = format.battery && (second.alarms & alarms::battery_error) != 0;
+  if (id == DataId::clear_alarms && turns_lost) {
+    return {"battery_error says that the turns are lost, and clearing it alone would hide that; nothing was sent",
+            "replace the battery, return to the origin, then `absenc reset-multiturn`"};
   }
   return {};
 }
 
-// What the encoder did not do; empty: it did all.
-std::string_view missed(DataId id, const Reply& now, unsigned bits) {
+// What the encoder did not do; no detail: it did all.
+Explanation missed(DataId id, const Reply& now, unsigned bits) {
   if (id == DataId::zero) {
-    return is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees) ? "" : "the position is still not zero";
+    if (is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees)) return {};
+    return {"the position is still not zero", "hold the shaft still, then `absenc zero` again"};
   }
-  if (id == DataId::reset_multiturn && now.multiturn != 0) return "the turns are still not zero";
-  if ((now.alarms & alarms::over_heat) != 0) return "over_heat remains: the encoder must cool down first";
+  if (id == DataId::reset_multiturn && now.multiturn != 0) {
+    return {"the turns are still not zero", "hold the shaft still, then `absenc reset-multiturn` again"};
+  }
+  if ((now.alarms & alarms::over_heat) != 0) {
+    return {"over_heat remains: the encoder is still hotter than its threshold", "let it cool down, then try again"};
+  }
   if ((now.alarms & alarms::latched) != 0) {
-    return "latched alarms remain: read them, mend their cause and try again";
+    return {"latched alarms remain", "mend the cause that `absenc alarms` names, then try again"};
   }
   return {};
 }
@@ -62,11 +71,10 @@ std::string_view missed(DataId id, const Reply& now, unsigned bits) {
 // Data IDs 7 (latched alarms), 8 (single-turn zero here) and C (turns and latched alarms): makes sure that the shaft
 // stands still, sends ten requests, reads back what became of it.
 Procedure reset(Dialog& dialog, Found& found, DataId id) {
-  const unsigned bits = dialog.format().singleturn_bits;
   const Reply first = co_await dialog.ask({DataId::everything});
   const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
-  const std::string_view why_not = objection(id, first, second, bits);
-  if (!why_not.empty()) co_return {Error::invalid_argument, why_not};
+  const Explanation why_not = objection(dialog.format(), id, first, second);
+  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
 
   // Intervals are counted from the end of the reply: that is 40 us or more however the document means it.
   for (unsigned sent = 1; sent <= reset_requests; ++sent) {
@@ -74,18 +82,18 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
     // When the tenth reply is lost, the reset may have been done all the same: reading tells.
     if (!reply && sent < reset_requests) {
       co_return {reply.error(),
-                 "one of the ten requests was not answered well, so the encoder has most likely done nothing; read the "
-                 "position before you try again"};
+                 "one of the ten requests was not answered well, so the encoder has most likely done nothing: see that "
+                 "with `absenc read` before you try again"};
     }
   }
   // Only ID 8 writes the EEPROM; the tenth reply still shows the old errors.
   const Reply now = co_await dialog.ask({DataId::everything})
                         .after(id == DataId::zero ? memory_time : reset_interval)
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
-  static_cast<Values&>(found) = values_of(now);
+  static_cast<Values&>(found) = values_of(dialog.format(), now);
   found.reading = dialog.last_reading();
-  const std::string_view what = missed(id, now, bits);
-  if (!what.empty()) co_return {Error::cross_check_failed, what};
+  const Explanation what = missed(id, now, dialog.format().singleturn_bits);
+  if (!what.detail.empty()) co_return {Error::cross_check_failed, what.detail, what.advice};
   co_return done;
 }
 
@@ -166,7 +174,8 @@ Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::u
   co_await select_page(dialog, found, *found.selected, lost);
   const std::uint8_t now = co_await insist(dialog, look, lost);
   if (now != value) {
-    co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed"});
+    co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
+                          "look at what is there with `absenc memory read` before you write it again"});
   }
   co_return true;
 }
@@ -179,6 +188,12 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
     co_return {Error::invalid_argument,
                "this address cannot be written: pages 0 to 5 have addresses 0 to 126, page 7 has 4 (over-heat "
                "threshold)"};
+  }
+  if (page == service_page && address == overheat_address && byte(arguments[1]) == overheat_at_zero) {
+    co_return {
+        Error::invalid_argument, "0x80 watches for 0 degC, and the document wants 1 degC or more",
+        "write 0x81 to 0xFF, the degrees + 128, or 0x00 for off; `absenc config set ... overheat-threshold` takes "
+        "the degrees themselves"};
   }
   co_await select_page(dialog, found, page, "nothing was written");
   co_await write_byte(dialog, found, address, byte(arguments[1]));
@@ -267,7 +282,9 @@ constexpr Explanation explain_refusal(Bytes reply) {
 // ---- What is shown
 
 constexpr Values values_of_request(const Format&, const Request& request) { return values_of(request); }
-constexpr Values values_of_reply(const Format&, const Request&, const Reply& reply) { return values_of(reply); }
+constexpr Values values_of_reply(const Format& format, const Request&, const Reply& reply) {
+  return values_of(format, reply);
+}
 constexpr void put_found(FieldSink& sink, const Format&, const Found& found) { fields.put(sink, found); }
 constexpr void put_left(FieldSink& sink, const Format&, const Found& found) {
   fields.put(sink, {.page_left = found.selected});
@@ -351,15 +368,18 @@ constexpr auto commands = std::array{
 constexpr auto options = OptionsOf{
     option<&Format::singleturn_bits>("singleturn_bits", "bits of ABS", 1, 24),
     option<&Format::multiturn_bits>("multiturn_bits", "bits of ABM; 0: no turns", 0, 24),
-    option<&Format::encoder_id>("encoder_id", "ENID that every reply must carry; -1: any", -1, 255),
+    in_hex(option<&Format::encoder_id>("encoder_id", "ENID that every reply must carry; -1: any", -1, 255)),
     option<&Format::strict>("strict",
                             "also check what encoders that deviate from the specification fail: SF information bits, "
                             "SF against ALMC, EDF of a busy reply"),
+    option<&Format::battery>("battery",
+                             "false: no battery is connected: the turns are left out, and battery_error and "
+                             "battery_alarm, which such an encoder always shows, are no alarms"),
 };
 constexpr auto models = std::array{
     ModelText{"TS5700N8500", "Smart-Abs SA48-17/33bit-LPS-5V: 17 bits, 65536 turns", 6000,
               "singleturn_bits=17 multiturn_bits=16 encoder_id=0x11"},
-    ModelText{"23-bit", "Tamagawa encoders with 23 bits, 65536 turns and ENID 17", 6000,
+    ModelText{"23-bit", "Tamagawa encoders with 23 bits, 65536 turns and ENID 0x17", 6000,
               "singleturn_bits=23 multiturn_bits=16 encoder_id=0x17"},
 };
 

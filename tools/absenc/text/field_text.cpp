@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace absenc::tool {
 
 Json to_json(const Option& option, std::int64_t value) {
@@ -37,20 +39,36 @@ void JsonFields::put_reading(const Reading& reading) {
   }
 }
 
+namespace {
+
+// Its meaning and what to do.
+std::string in_words(const FlagInfo& flag, bool beside_alarms) {
+  const std::string_view action = action_of(flag, beside_alarms);
+  return action.empty() ? std::string(flag.meaning) : fmt::format("{}: {}", flag.meaning, action);
+}
+
+}  // namespace
+
 void FieldTable::put(const FieldValue& value) {
   const FieldInfo& info = *value.info;
   std::string shown = to_text(value);
   if (!info.unit.empty()) shown += fmt::format(" {}", info.unit);
   if (is_of_reading(info.role)) judged_.push_back({&info, rows.size()});
   rows.push_back({std::string(info.name), shown, std::string(info.meaning)});
-  if (info.kind == FieldInfo::Kind::flags) add_flags(rows, info, static_cast<std::uint64_t>(value.number));
+  if (info.kind == FieldInfo::Kind::flags) put_flags(info, static_cast<std::uint64_t>(value.number));
 }
 
-void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& field, std::uint64_t bits) {
+// Alarms may stand behind the status that sums them up.
+void FieldTable::put_flags(const FieldInfo& field, std::uint64_t bits) {
+  const auto sums_up = [](const FlagInfo& flag) { return flag.action == read_the_alarms; };
+  if (bits != 0 && std::none_of(field.flags.begin(), field.flags.end(), sums_up)) {
+    shows_alarms_ = true;
+    for (const auto& [row, flag] : sends_to_alarms_) rows[row][2] = in_words(*flag, true);
+    sends_to_alarms_.clear();
+  }
   for (const FlagInfo* flag : raised(field, bits)) {
-    std::string words(flag->meaning);
-    if (!flag->action.empty()) words += fmt::format(": {}", flag->action);
-    rows.push_back({fmt::format("  {}", flag->name), "", words});
+    if (sums_up(*flag) && !shows_alarms_) sends_to_alarms_.push_back({rows.size(), flag});
+    rows.push_back({fmt::format("  {}", flag->name), "", in_words(*flag, shows_alarms_)});
   }
 }
 
@@ -59,7 +77,11 @@ std::vector<std::vector<std::string>> to_table(const Row& row) {
   for (std::size_t i = 0; i < row.columns.size(); ++i) {
     const Column& column = row.columns[i];
     rows.push_back({std::string(column.name), to_text(column, row.values[i]), std::string(column.meaning)});
-    if (const auto* flags = std::get_if<Flags>(&row.values[i])) add_flags(rows, *flags->field, flags->bits);
+    const auto* const flags = std::get_if<Flags>(&row.values[i]);
+    if (flags == nullptr) continue;
+    for (const FlagInfo* flag : raised(*flags->field, flags->bits)) {
+      rows.push_back({fmt::format("  {}", flag->name), "", in_words(*flag, false)});
+    }
   }
   return rows;
 }

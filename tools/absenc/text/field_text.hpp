@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absenc/client/row.hpp"
@@ -33,9 +34,6 @@ struct JsonFields final : FieldSink {
   std::vector<Judged> judged_;
 };
 
-/// A row for each flag that is set: "  over_heat", "", its meaning and what to do.
-void add_flags(std::vector<std::vector<std::string>>& rows, const FieldInfo& field, std::uint64_t bits);
-
 /// For `table`: name, value, unit or meaning; a row for each flag that is set.
 [[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
@@ -50,7 +48,11 @@ struct FieldTable final : FieldSink {
     const FieldInfo* info;
     std::size_t row;
   };
+  void put_flags(const FieldInfo& field, std::uint64_t bits);
+
   std::vector<Judged> judged_;
+  std::vector<std::pair<std::size_t, const FlagInfo*>> sends_to_alarms_;  // rows of flags whose action that is
+  bool shows_alarms_ = false;
 };
 
 }  // namespace absenc::tool

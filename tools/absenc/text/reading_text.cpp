@@ -115,12 +115,13 @@ std::string millimetres_text(double millimetres, double unit_um) {
   return fmt::format("{:.{}f}", millimetres, linear_decimals(unit_um));
 }
 
-std::string flags_in_words(const Flags& flags) {
+std::string flags_in_words(const Flags& flags, bool beside_alarms) {
   std::string lines;
   for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
     if (!lines.empty()) lines += '\n';
     lines += fmt::format("  {}: {}", flag->name, flag->meaning);
-    if (!flag->action.empty()) lines += fmt::format(". What to do: {}", flag->action);
+    const std::string_view action = action_of(*flag, beside_alarms);
+    if (!action.empty()) lines += fmt::format(". What to do: {}", action);
   }
   return lines;
 }

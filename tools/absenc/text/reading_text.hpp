@@ -39,7 +39,7 @@ enum class Doubt : std::uint8_t {
 [[nodiscard]] std::string flags_text(const Unit& unit, const Flags& flags);
 
 /// What each flag that is set means and what to do, a line each; "" when there is none.
-[[nodiscard]] std::string flags_in_words(const Flags& flags);
+[[nodiscard]] std::string flags_in_words(const Flags& flags, bool beside_alarms = false);
 /// Of two channels under the name of each; what both raise once.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 

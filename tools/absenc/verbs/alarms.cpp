@@ -35,7 +35,7 @@ bool reports_all(const std::vector<Flags>& all) {
 // Alarms first. Where they were not all reported, the status says what it can.
 void show_alarms(const Unit& unit, const Reading& reading) {
   const auto show = [&](const Flags& flags, bool also_clear) {
-    const std::string words = flags_in_words(flags);
+    const std::string words = flags_in_words(flags, true);
     if (!words.empty()) print_line(fmt::format("{}:\n{}", flags.field->name, words));
     if (!also_clear) return;
     if (!flags.is_complete()) {
@@ -53,10 +53,11 @@ void show_alarms(const Unit& unit, const Reading& reading) {
 
 void show_json(const Unit& unit, const Reading& reading) {
   Json json = Json::object().set("ok", true).set("protocol", unit.id);
+  const auto shown = [](const FlagInfo* flag) { return flag_to_json(flag).set("action", action_of(*flag, true)); };
   for (const std::vector<Flags>& all : {alarms_of(unit, reading), status_of(unit, reading)}) {
     for (const Flags& flags : all) {
       const bool is_known = has_value(value_of(flags));
-      json.set(flags.field->name, is_known ? Json::list(raised(*flags.field, flags.bits), flag_to_json) : Json());
+      json.set(flags.field->name, is_known ? Json::list(raised(*flags.field, flags.bits), shown) : Json());
     }
   }
   print_line(json.line());

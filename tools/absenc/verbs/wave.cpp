@@ -227,7 +227,7 @@ constexpr std::array<Parameter, 8> wave_parameters{{
      true},
     {"file", "", "what to write: .vcd, .sr or .csv (Saleae Logic 2)", "", true},
     {"--command", "COMMAND", "what the host asks, its arguments behind it; several: one after the other",
-     "what `read` asks", false, true},
+     "what `absenc read` asks", false, true},
     {"--count", "N", "how many results", "1"},
     {"--rate", "HZ", "how many a second; less where the line cannot", "1000"},
     {"--samplerate", "HZ", "of .sr files", "16 for each bit of the line"},

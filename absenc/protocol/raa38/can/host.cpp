@@ -35,7 +35,7 @@ void Read::over() {
   if (!all.received.empty() && !is_disturbed()) return finish({Error::unexpected_reply});
   if (!all.sent.empty() || is_disturbed()) return finish({missing()});
   finish(author::only(Error::timeout, "the node sends nothing by itself",
-                      "let it: `run <encoder> cyclic 10`, or ask it: listen=false"));
+                      "let it: `absenc run ... cyclic 10`, or ask it: listen=false"));
 }
 
 unsigned Nodes::count() const {
@@ -62,7 +62,9 @@ Explanation explain(const Format&, Error error, std::span<const CanFrame> reques
             "check supply, CANH and CANL, 120 ohms at both ends, the bit rate, and that no two nodes have one number"};
   }
   if (asks && error == Error::timeout) {
-    return {{}, "check supply, CANH and CANL, 120 ohms at both ends, the bit rate and the node: `scan` asks them all"};
+    return {{},
+            "check supply, CANH and CANL, 120 ohms at both ends, the bit rate and the node: `absenc scan` asks "
+            "them all"};
   }
   if (asks && error == Error::unexpected_reply) {
     return {"nobody sends such a frame to this encoder: its identifiers are 2NN and 7E5",

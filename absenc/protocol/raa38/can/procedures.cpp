@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "absenc/core/bits.hpp"
-#include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/author/look.hpp"
 #include "absenc/protocol/raa38/can/host.hpp"
 
 namespace absenc::raa38::can {
@@ -120,7 +120,7 @@ Part<Outcome> let_send_again(Dialog& dialog, Cadence before, Outcome outcome) {
   const Cadence now = co_await hear_node(dialog);
   if (now.count == 0 && outcome.error == Error::none) {
     co_return only(Error::cross_check_failed, "it was done, but the node no longer sends by itself as it did before",
-                   "let it: `run <encoder> cyclic 10`");
+                   "let it: `absenc run ... cyclic 10`");
   }
   co_return outcome;
 }
@@ -130,8 +130,11 @@ Part<Look> look_twice(Dialog& dialog) {
   const Look first = co_await look(dialog);
   if (first.outcome.error != Error::none) co_return first;
   Look second = co_await look(dialog, between_looks);
-  if (second.outcome.error == Error::none && !is_near(second.counts, first.counts, dialog.format().bits)) {
-    second.outcome = only(Error::invalid_argument, "the shaft turns: it must stand still");
+  const unsigned bits = dialog.format().bits;
+  const Explanation why_not =
+      objection_to_zero(position_reading(first.counts, bits), position_reading(second.counts, bits));
+  if (second.outcome.error == Error::none && !why_not.detail.empty()) {
+    second.outcome = only(Error::invalid_argument, why_not.detail, why_not.advice);
   }
   co_return second;
 }
@@ -240,7 +243,7 @@ constexpr auto most_clashes = 16;  // more numbers that are shared are a line on
 
 constexpr std::string_view alone = "connect this one alone: 7E5 reaches every node on the bus";
 constexpr std::string_view shared = "two nodes share the number, or the line is bad";
-constexpr std::string_view which = "`scan` shows which: set node=";
+constexpr std::string_view which = "`absenc scan` shows which: set node=";
 
 // Nobody was asked yet, or all were.
 constexpr unsigned nobody = 0;
@@ -331,7 +334,7 @@ Part<bool> write(Dialog& dialog, Surveyed& found, Order order, std::uint8_t valu
 }
 
 Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node) {
-  constexpr std::string_view supply = "switch its supply off and on, then `scan`";
+  constexpr std::string_view supply = "switch its supply off and on, then `absenc scan`";
   const MaybeFrame there = co_await read(dialog, node);
   if (node == before) co_return Outcome{there ? Error::none : dialog.missing()};
   const MaybeFrame still = co_await read(dialog, before);

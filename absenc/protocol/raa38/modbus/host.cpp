@@ -2,7 +2,7 @@
 #include "absenc/protocol/raa38/modbus/host.hpp"
 
 #include "absenc/core/bits.hpp"
-#include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/author/look.hpp"
 
 namespace absenc::raa38::rtu {
 
@@ -336,10 +336,9 @@ Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
   const Reply first = co_await look_first(dialog);
   co_await dialog.rest(between_looks);
   const Reply second = co_await look_first(dialog);
-  if (!is_near(second.singleturn, first.singleturn, bits)) {
-    co_return {Error::invalid_argument,
-               "the shaft is turning: setting the zero needs it standing still; nothing was sent", "stop the shaft"};
-  }
+  const Explanation why_not =
+      objection_to_zero(position_reading(first.singleturn, bits), position_reading(second.singleturn, bits));
+  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
   show_position(dialog, found);
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;

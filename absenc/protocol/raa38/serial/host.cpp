@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "absenc/protocol/author/standstill.hpp"
+#include "absenc/protocol/author/look.hpp"
 
 namespace absenc::raa38::serial {
 
@@ -19,7 +19,7 @@ Explanation explain_other(const Format& format, Bytes request, Bytes reply) {
     return {"it is no frame: FF 81 is missing, or on a bus FF Bx", "check mode, baud and second_byte"};
   }
   return {"another unit answered, or no frame came: FF 81 or FF Bx answers BC AA Bx, with the same x",
-          "check unit and second_byte; `scan` shows who answers"};
+          "check unit and second_byte; `absenc scan` shows who answers"};
 }
 
 // Why a stream has no good frame.
@@ -49,7 +49,7 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
     case Error::bad_checksum:
       if (format.mode != Mode::bus) return {};
       return {"two encoders with one number, or a bad line",
-              "`scan` shows who answers; check numbers, termination and baud"};
+              "`absenc scan` shows who answers; check numbers, termination and baud"};
     case Error::unexpected_reply:
       return explain_other(format, request, reply);
     case Error::out_of_range:
@@ -58,7 +58,7 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
       return format.mode == Mode::timing ? explain_stream(error) : Explanation{};
     case Error::timeout:
       if (format.mode == Mode::timing) return explain_stream(error);
-      if (format.mode == Mode::bus) return {{}, "`scan` shows who answers; check supply, A/B polarity and baud"};
+      if (format.mode == Mode::bus) return {{}, "`absenc scan` shows who answers; check supply, A/B polarity and baud"};
       return {"no frame followed the pulse", "check the wire to CLK, its level, the pulse's width, supply and baud"};
     default:
       return {};
@@ -216,10 +216,9 @@ Procedure set_zero(Dialog& dialog, Values& found) {
   co_await dialog.rest(between_looks);
   const Result<Position> second = co_await look(dialog);
   if (!second) co_return {second.error()};
-  if (!is_near(second->singleturn, first->singleturn, format.bits)) {
-    co_return {Error::invalid_argument,
-               "the shaft is turning: setting the zero needs it standing still; nothing was sent", "stop the shaft"};
-  }
+  const Explanation why_not = objection_to_zero(position_reading(first->singleturn, format.bits),
+                                                position_reading(second->singleturn, format.bits));
+  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
   const Request by_command{Request::Kind::zero_clear, format.zeroed_unit()};
   co_await dialog.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command);
   // It is not told whether that worked.

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every command of absenc that a text of the sources names exists, and is written in one form.
+
+tests/kit/advice.cpp carries out what alarms and errors advise; this test reads all other texts: doctor's, the page's,
+help, notes."""
+
+import os
+import re
+import subprocess
+import unittest
+from pathlib import Path
+
+ROOT = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parent.parent))
+ABSENC = os.environ.get("ABSENC", str(ROOT / "build/release/bin/absenc"))
+LITERAL = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
+TWO_WORDS = {"config", "memory", "crc"}
+
+
+def literals(source):
+    """The texts of a source; those that the compiler joins as one."""
+    text = source.read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^\s*//.*$", "", text)
+    text = re.sub(r'"\s*\n\s*"', "", text)
+    return [match[1] for match in LITERAL.finditer(text)]
+
+
+def sources():
+    for folder in ("absenc", "tools"):
+        for suffix in ("*.cpp", "*.hpp"):
+            yield from (path for path in (ROOT / folder).rglob(suffix) if "_test" not in path.name)
+
+
+def named_commands():
+    """(source, "absenc scan") of each command in backquotes."""
+    for source in sources():
+        for text in literals(source):
+            for quoted in re.findall(r"`([^`]*)`", text):
+                yield source.relative_to(ROOT), quoted
+
+
+class NamedCommands(unittest.TestCase):
+    def test_each_exists(self):
+        verbs = {}
+        for source, quoted in named_commands():
+            words = quoted.split()
+            if not words or words[0] != "absenc":
+                continue
+            verb = tuple(words[1:3] if words[1] in TWO_WORDS else words[1:2])
+            if not re.fullmatch(r"[a-z-]+", verb[0]) or verb[0].startswith("-"):
+                continue  # a place for a verb, or an option
+            verbs.setdefault(verb, f"{source}: `{quoted}`")
+        self.assertGreater(len(verbs), 15)
+        for verb, where in verbs.items():
+            with self.subTest(where):
+                result = subprocess.run([ABSENC, *verb, "--help"], capture_output=True, text=True, timeout=30, check=False)
+                self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_each_is_written_with_the_name_of_the_tool(self):
+        refusal = subprocess.run([ABSENC, "no-verb"], capture_output=True, text=True, timeout=30, check=False).stderr
+        verbs = set(re.search(r"known are: (.*)", refusal)[1].split(", "))
+        self.assertIn("clear-alarms", verbs)
+        for source, quoted in named_commands():
+            with self.subTest(f"{source}: `{quoted}`"):
+                self.assertNotIn(quoted.split(" ")[0], verbs)
+
+    def test_what_is_typed_stands_in_backquotes(self):
+        """`sudo ...` and the like, which people copy."""
+        for source in sources():
+            for text in literals(source):
+                rest = re.sub(r"`[^`]*(`|$)", "", text)
+                if text.startswith("sudo "):
+                    continue  # an example, alone on its line
+                with self.subTest(f"{source.relative_to(ROOT)}: {text}"):
+                    self.assertNotRegex(rest, r"\bsudo \w")
+
+
+if __name__ == "__main__":
+    unittest.main()
