@@ -177,7 +177,7 @@ class Reads(Case):
             zero = absenc("zero", address, "--yes", "--json")
             self.assert_good(zero)
             self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 0)
-            scan = absenc("scan", address, "--json")
+            scan = absenc("scan", address, "--yes", "--json")
             self.assert_good(scan)
             self.assertEqual([one["node"] for one in json.loads(scan.stdout)["encoders"]], [0x20])
 

@@ -152,13 +152,37 @@ class OnTheBus(Case):
     def test_scan(self):
         address = self.bus("--singleturn", "500", "--also", "node=0x21&cyclic=0&singleturn=700",
                            "--also", "node=0x30&cyclic=0&singleturn=1", "--also", "node=0x30&cyclic=0&singleturn=9000")
-        result = absenc("scan", address, "--json")
+        result = absenc("scan", address, "--yes", "--json")
         self.assert_good(result)
         nodes = json.loads(result.stdout)["encoders"]
         self.assertEqual([(node["node"], node["clash"]) for node in nodes], [(0x20, False), (0x21, False), (0x30, True)])
         self.assertEqual([node.get("singleturn") for node in nodes], [500, 700, None])
         self.assertTrue(5 <= nodes[0]["readings_per_s"] <= 11, nodes)
         self.assertEqual(nodes[1]["readings_per_s"], 0)
+
+    def test_scan_says_what_it_may_disturb_and_asks(self):
+        address = self.bus("--also", "node=0x42")
+        log = self.file("scan.log")
+        for arguments in (["scan", f"{address}&log={log}"], ["run", f"{address}&log={log}", "scan"]):
+            refused = absenc(*arguments)
+            self.assertEqual(refused.returncode, 2, refused.stderr)
+            self.assertIn("201#8001 to 2FF#80FF", refused.stderr)
+            self.assertIn("process data of other devices", refused.stderr)
+            self.assertIn("--yes", refused.stderr)
+            self.assertFalse(os.path.exists(log), "nothing was sent")
+        result = absenc("scan", address, "--yes")
+        self.assert_good(result)
+        self.assertIn("201#8001 to 2FF#80FF", result.stderr)
+        self.assertNotIn("201#8001", absenc("scan", "sim:raa38-can").stderr, "nobody else is there")
+
+    def test_what_only_reads_asks_the_given_node_alone(self):
+        address = self.bus("--also", "node=0x42", "--option", "cyclic=0")
+        for number, arguments in enumerate((["info"], ["config", "get"], ["read"])):
+            log = self.file(f"{number}.log")
+            self.assert_good(absenc(*arguments, f"{address}&log={log}"))
+            with open(log, encoding="utf-8") as file:
+                sent = {line.split()[2] for line in file if line.split()[2].startswith("2")}
+            self.assertEqual(sent, {"220#8020000000000000"}, arguments)
 
     def test_two_nodes_in_turn(self):
         address = self.bus("--singleturn", "500", "--also", "node=0x21&singleturn=700")

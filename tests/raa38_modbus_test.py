@@ -126,6 +126,27 @@ class Reading(ModbusCase):
         self.assertEqual(json.loads(info.stdout)["answers"]["baud"]["fields"], {"baud": 2400})
 
 
+class WrongAddress(ModbusCase):
+    def test_the_right_one_is_named(self):
+        emulator = self.emulator("--option", "address=42")
+        uri = self.uri(emulator, "&address=5")
+        named = "nobody answers at address 5, but A0 is answered by address 42 at 19200 baud"
+        self.assert_failed(absenc("config", "get", uri), "timeout", named)
+        self.assert_failed(absenc("config", "get", uri, "direction"), "timeout", named)
+        info = absenc("info", uri)
+        self.assertEqual(info.returncode, 1)
+        self.assertIn(named, info.stdout)
+
+    def test_a0_in_both_orders(self):
+        for order in ("low_first", "high_first"):
+            emulator = self.emulator("--option", "address=42", "--option", f"address_crc={order}", name=order)
+            found = self.good_json("config", "get", self.uri(emulator), "address")
+            self.assertEqual(found["settings"]["address"], {"address": 42})
+            self.assertEqual([one["encoder_address"] for one in self.good_json("scan", self.uri(emulator))["encoders"]],
+                             [42])
+            self.assertEqual(self.violations(emulator), [])
+
+
 class Settings(ModbusCase):
     def test_a_baud_rate_is_followed(self):
         emulator = self.emulator("--singleturn", "383", "--memory", self.file("memory"))

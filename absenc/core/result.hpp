@@ -36,7 +36,7 @@ enum class Error : std::uint8_t {
 
 struct ErrorText {
   std::string_view name;         // as printed by the command and written in vectors
-  std::string_view description;  // what happened
+  std::string_view description;  // what happened, true of every frame and link
   std::string_view advice;       // what to try
 };
 
@@ -50,14 +50,13 @@ inline constexpr std::array<ErrorText, 16> error_texts{{
     {"line_stuck", "the data line never changed its level", "check the wiring and the encoder's supply"},
     {"bad_framing", "what came is not a frame of this protocol", "check line settings and wiring"},
     {"truncated", "the frame does not fit into what was sampled", "lower the clock rate"},
-    {"wrong_length", "the reply has the wrong number of bytes",
-     "check the echo setting and that only one encoder answers"},
+    {"wrong_length", "the frame has the wrong length", "check the echo setting and that only one encoder answers"},
     {"unexpected_reply", "the reply does not belong to the request", "check protocol, model and address"},
-    {"bad_checksum", "the checksum of the reply is wrong", "check shielding, termination and baud rate"},
+    {"bad_checksum", "the checksum is wrong", "check shielding, termination and baud rate"},
     {"out_of_range", "bits that must be zero are set", "check the resolution or the model"},
     {"sequence_mismatch", "the sequence counter did not move as it should",
      "do not use the reply; if it stays, find what on the way repeats or delays replies"},
-    {"cross_check_failed", "parts of the reply contradict each other",
+    {"cross_check_failed", "parts of the frame contradict each other",
      "do not use the reply; if it stays, check shielding and termination"},
     {"busy", "the encoder stayed busy", "wait and try again"},
     {"request_rejected", "the encoder refused the request",

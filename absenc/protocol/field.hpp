@@ -18,8 +18,8 @@ struct FlagInfo {
   std::string_view meaning;  // what has happened
   /// What the operator must do, commands as "`absenc clear-alarms`"; "" when nothing: it is no ailment.
   std::string_view action;
-  bool optional = false;     // some encoders have no such flag: one that reports the others and not this one has none
-  std::uint32_t sums = 0;    // of a status flag: the bits of the unit's alarms that it is the sum of; 0: none
+  bool optional = false;   // some encoders have no such flag: one that reports the others and not this one has none
+  std::uint32_t sums = 0;  // of a status flag: the bits of the unit's alarms that it is the sum of; 0: none
 };
 
 /// The action of a status flag that only sums up alarms. Who shows the alarms beside it leaves it out.

@@ -17,11 +17,11 @@ enum class Role : std::uint8_t {
   of_position,  // field: what holds as long as the position does: the same in degrees, or of a second channel
   sequence,     // field: counts the replies, so that one that was seen before can be told
   // Of a line
-  encoder,      // option, field: which of the encoders on the line; in a scan a new record begins with it
-  identity,     // field: says which encoder it is: its type, its serial number
-  clash,        // field of a scan: not 0: whatever answers there is damaged every time
-  trouble,      // field of a scan: what is wrong with an answer that came whole
-  rate,         // option: bits a second
+  encoder,   // option, field: which of the encoders on the line; in a scan a new record begins with it
+  identity,  // field: says which encoder it is: its type, its serial number
+  clash,     // field of a scan: not 0: whatever answers there is damaged every time
+  trouble,   // field of a scan: what is wrong with an answer that came whole
+  rate,      // option: bits a second
   // Of a check at the end of a word, as `crc find` finds one: options
   check_width,       // bits
   check_polynomial,  // without its highest power

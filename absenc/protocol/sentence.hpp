@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string_view>
 
 namespace absenc {
@@ -18,6 +19,15 @@ class Sentence {
       size_ += text.size();
     }
     return *this;
+  }
+  Sentence& add_number(std::uint32_t number) {
+    std::array<char, 10> digits{};
+    std::size_t first = digits.size();
+    do {
+      digits[--first] = static_cast<char>('0' + number % 10);
+      number /= 10;
+    } while (number != 0);
+    return add({digits.data() + first, digits.size() - first});
   }
   /// Behind what is there already, parted from it by "; ".
   Sentence& add_part(std::string_view part) {

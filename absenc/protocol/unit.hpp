@@ -59,6 +59,8 @@ struct Command {
   std::string_view changes_option{};  // config_set: the option that must follow its first argument; who goes on does
                                       // so with the new value, on the same open port
   bool reads_alarms = false;  // read_part: its reading has all the alarms by name, where that of Verb::read may not
+  std::string_view disturbs{};        // what its requests may do to other devices on the line, a sentence without its
+                                      // end; "": nothing. People are asked before it is sent
 };
 
 /// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments with
@@ -163,6 +165,27 @@ struct BitRange {
 
 /// The parts of one value, the least significant first.
 using BitRanges = Buffer<BitRange, 8>;
+
+/// Frames of which several exchanges carry a byte each. They are decoded as others are.
+struct Composed {
+  Bytes request{};
+  Bytes reply{};
+  std::uint64_t first = 0;    // number of the exchange with which it began
+  Error error = Error::none;  // what its bytes alone do not tell: it contradicts the frames that carried it
+};
+
+/// Finds them among the good exchanges of one encoder, as a capture has them.
+struct Follower {
+  /// A good exchange, or a reply that came without a request. `number` counts them.
+  virtual void follow(std::uint64_t number, Bytes request, Bytes reply) = 0;
+  /// Frames were lost or damaged here.
+  virtual void lose() = 0;
+  /// Takes one that ended with the last exchange; false: there is no other. It is valid until the next exchange.
+  virtual bool take(Composed& one) = 0;
+
+ protected:
+  ~Follower() = default;
+};
 
 enum class Direction : std::uint8_t { request, reply };
 
@@ -273,6 +296,9 @@ struct Unit {
   /// was switched on and this one does not carry. `before` is the reading before it, completed in the same way. Null:
   /// each reply says all that there is to say.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
+  /// In storage of `follower_storage` bytes, aligned for any type. Null: each exchange says all that it says by itself.
+  Follower* (*follower)(const Options& options, std::span<std::byte> storage) = nullptr;
+  std::size_t follower_storage = 0;
 };
 
 /// Whether a word format may stand in for some of its options.

@@ -88,7 +88,7 @@ class Truncated(EncoderError):
 
 
 class WrongLength(EncoderError):
-    """The reply has the wrong number of bytes."""
+    """The frame has the wrong length."""
 
     name = "wrong_length"
 
@@ -100,7 +100,7 @@ class UnexpectedReply(EncoderError):
 
 
 class BadChecksum(EncoderError):
-    """The checksum of the reply is wrong."""
+    """The checksum is wrong."""
 
     name = "bad_checksum"
 

@@ -8,6 +8,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/client/way/diagnosis.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/protocol/all.hpp"
 #include "python/src/bind.hpp"
@@ -42,10 +43,11 @@ py::dict decode(const std::string& name, const py::object& reply, const py::obje
   if (error == Error::none) return to_python(sink.answer);
   const Explanation said =
       unit.explain != nullptr ? unit.explain(options, error, asked.frame(), told.frame()) : Explanation{};
-  const ErrorText& text = text_of(error);
+  const client::Subject subject = client::subject_of(unit, options, asked.frame(), told.frame());
+  const std::string_view advice = said.advice.empty() ? text_of(error).advice : said.advice;
   throw client::EncoderFailure({.error = error,
-                                .message = std::string(said.detail.empty() ? text.description : said.detail),
-                                .advice = std::string(said.advice.empty() ? text.advice : said.advice),
+                                .message = client::describe(unit.link, subject, error, said.detail),
+                                .advice = std::string(advice),
                                 .sent = client::to_wire_text(unit.link, asked.frame()),
                                 .received = client::to_wire_text(unit.link, told.frame())});
 }

@@ -53,7 +53,8 @@ void bind_sample(py::module_& module) {
           [](const PySample& one) { return one.when(one.sample.speed_valid, seconds(one.sample.speed_delay)); },
           "Seconds.")
       .def_property_readonly(
-          "confirmed", [](const PySample& one) { return one.sample.confirmed; }, "It was compared with another reading, and they agree within the speed limit.")
+          "confirmed", [](const PySample& one) { return one.sample.confirmed; },
+          "It was compared with another reading, and they agree within the speed limit.")
       .def_property_readonly(
           "restarted", [](const PySample& one) { return one.sample.restarted; },
           "It jumped, or how far it went since the reading before is not known: `position` starts again.")

@@ -165,7 +165,7 @@ class Verbs(OnABus):
         self.emulator("--singleturn", "500", "--also", "node=0x21&singleturn=700&cyclic=20")
         self.assertEqual((self.singleturn(), self.singleturn(f"{ENCODER}&node=0x21")), (500, 700))
         self.assertEqual(self.singleturn(f"{ENCODER}&node=0x21&listen=true"), 700)
-        nodes = self.run_json("scan", ENCODER)["encoders"]
+        nodes = self.run_json("scan", ENCODER, "--yes")["encoders"]
         self.assertEqual([(node["node"], node["singleturn"], node["clash"]) for node in nodes],
                          [(0x20, 500, False), (0x21, 700, False)])
         self.assertEqual(nodes[0]["readings_per_s"], 0)

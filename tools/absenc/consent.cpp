@@ -24,6 +24,25 @@ bool is_yes(std::string_view answer) {
   return word == "y" || word == "yes";
 }
 
+bool says_yes(const std::string& question) {
+  print_prompt(question);
+  pollfd input{0, POLLIN, 0};
+  try {
+    os::wait_for({&input, 1}, never);
+  } catch (const os::Interrupted&) {
+    print_note("");
+    throw;
+  }
+  std::string answer;
+  std::getline(std::cin, answer);
+  return is_yes(answer);
+}
+
+// Nobody else is on the line of sim:, and its encoder is gone afterwards.
+bool disturbs(const EncoderAddress& uri, const Command& command) {
+  return !command.disturbs.empty() && uri.place != Place::sim;
+}
+
 }  // namespace
 
 bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
@@ -37,17 +56,23 @@ bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::stri
 
 bool confirmed(const EncoderAddress& uri, std::string_view meaning) {
   const std::string where = uri.place == Place::tcp ? fmt::format("{}:{}", uri.host, uri.port) : uri.path;
-  print_prompt(fmt::format("This changes the encoder at {}: {}. Go on? [y/N] ", where, meaning));
-  pollfd input{0, POLLIN, 0};
-  try {
-    os::wait_for({&input, 1}, never);
-  } catch (const os::Interrupted&) {
-    print_note("");
-    throw;
+  return says_yes(fmt::format("This changes the encoder at {}: {}. Go on? [y/N] ", where, meaning));
+}
+
+void tell_disturbance(const EncoderAddress& uri, const Command& command) {
+  if (disturbs(uri, command)) print_message(fmt::format("{}: {}", command.name, command.disturbs));
+}
+
+bool may_disturb(const Invocation& invocation, const EncoderAddress& uri, const Command& command) {
+  tell_disturbance(uri, command);
+  if (!disturbs(uri, command) || invocation.has("--yes")) return true;
+  if (!can_ask()) {
+    throw UsageError(
+        fmt::format("nobody is there to be asked whether {} may disturb them: give --yes to do it", command.name));
   }
-  std::string answer;
-  std::getline(std::cin, answer);
-  return is_yes(answer);
+  if (says_yes("Go on? [y/N] ")) return true;
+  print_message("nothing was sent");
+  return false;
 }
 
 }  // namespace absenc::tool

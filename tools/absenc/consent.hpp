@@ -18,4 +18,11 @@ using namespace client;
 /// Asks; only y and yes go on, in upper or lower case. Throws os::Interrupted.
 [[nodiscard]] bool confirmed(const EncoderAddress& uri, std::string_view meaning);
 
+/// Prints what the command's requests may do to other devices on the line, if anything.
+void tell_disturbance(const EncoderAddress& uri, const Command& command);
+
+/// Of a command that changes no encoder: tells what it disturbs, if anything, and asks. False: it is not to be sent.
+/// Throws as the above.
+[[nodiscard]] bool may_disturb(const Invocation& invocation, const EncoderAddress& uri, const Command& command);
+
 }  // namespace absenc::tool

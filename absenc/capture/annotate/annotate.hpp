@@ -60,9 +60,10 @@ class Annotator {
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    bool synchronised = false;  // there was a pause
-    bool in_step = false;       // a frame is known to begin where the run, or what is left of it, begins
-    std::size_t last_size = 0;  // of the last good frame in this run that nobody asked for; 0: none
+    bool synchronised = false;    // there was a pause
+    bool in_step = false;         // a frame is known to begin where the run, or what is left of it, begins
+    std::size_t last_size = 0;    // of the last good frame in this run that nobody asked for; 0: none
+    std::size_t stream_size = 0;  // the same, in any run
   };
 
   // Who sends what, when nobody said.
@@ -80,7 +81,7 @@ class Annotator {
   std::size_t answer_here();
   [[nodiscard]] bool goes_on(std::size_t size);
   [[nodiscard]] std::optional<std::size_t> asked_before(Tick begin) const;
-  [[nodiscard]] std::size_t echoed_answer_size(Bytes request);
+  [[nodiscard]] std::size_t echoed_answer_size(Bytes request, std::size_t from);
   std::size_t echoed_answer_here(std::size_t which, std::size_t size);
   std::size_t repeated_here();
   std::size_t request_here();

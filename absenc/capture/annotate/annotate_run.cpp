@@ -117,7 +117,9 @@ std::size_t Annotator::answer_here() {
     // What leaves a rest may be good by accident; the request again, with its reply behind it that leaves none, is not.
     // Some replies are the same as their requests, and one may come twice.
     const bool may_be_accident = size == 0 || size > asked.bytes().size();
-    const std::size_t echoed = may_be_accident ? echoed_answer_size(asked.bytes()) : 0;
+    // Later than an encoder answers, it is the host that asks again.
+    const bool is_late = settings_.ticks.turnaround != 0 && begin > asked.end + 2 * settings_.ticks.turnaround;
+    const std::size_t echoed = may_be_accident && !is_late ? echoed_answer_size(asked.bytes(), at_) : 0;
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return echoed_answer_here(*which, echoed);
     if (size == 0) return 0;
   }
@@ -143,10 +145,10 @@ bool Annotator::goes_on(std::size_t size) {
 }
 
 // An adapter, or an encoder, sends the request back. The size of both, or 0.
-std::size_t Annotator::echoed_answer_size(Bytes request) {
-  const Bytes bytes = rest(at_);
+std::size_t Annotator::echoed_answer_size(Bytes request, std::size_t from) {
+  const Bytes bytes = rest(from);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
-  const std::size_t size = reply_at(request, at_ + request.size());
+  const std::size_t size = reply_at(request, from + request.size());
   return size == 0 ? 0 : request.size() + size;
 }
 
@@ -196,7 +198,9 @@ bool Annotator::is_request(std::size_t size) {
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
   const bool turns = may_turn(at_ + size);
-  const bool answered = turns && reply_at(rest(at_).first(size), at_ + size) != 0;
+  const Bytes request = rest(at_).first(size);
+  const bool answered = turns && (reply_at(request, at_ + size) != 0 ||
+                                  echoed_answer_size(request, at_ + size) == rest(at_ + size).size());
   const std::size_t as_reply = reply_at({}, at_);
   if (as_reply != 0 && (!answered || channel.last_size != 0)) return false;
   if (answered) return true;
@@ -214,7 +218,7 @@ std::size_t Annotator::unasked_here() {
   const bool trusted = channel_->in_step || good_from(at_);
   if (!trusted) return 0;
   channel_->in_step = true;
-  channel_->last_size = size;
+  channel_->last_size = channel_->stream_size = size;
   last_reply_size_ = 0;
   const bool good = streams || !exchanges_.has_asked();
   static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // the look ahead has other contents
@@ -240,6 +244,10 @@ std::size_t Annotator::bad_size() {
   // In a stream the next frame stands where it would stand if this one were good.
   const std::size_t period = channel_->last_size;
   if (channel_->in_step && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
+  // A frame that nobody asked for may end with the run: the disturbance came before it.
+  const std::size_t last = channel_->stream_size;
+  if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
+    return left - last;
   // The next request may stand right behind it.
   const auto ends_before_request = [&](std::size_t size) {
     return size != 0 && size < left && request_at(at_ + size) == left - size;

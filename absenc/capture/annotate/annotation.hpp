@@ -48,6 +48,7 @@ struct Annotation {
   Kind kind = Kind::noise;
   Remark remark = Remark::none;
   Error error = Error::none;  // of the whole; with one, nothing of it is to be used
+  bool composed = false;      // several exchanges carried a byte of it each
   Tick begin = 0;
   Tick end = 0;
   // These are valid during the call only.

@@ -2,6 +2,7 @@
 // Levels written as the files that waveform viewers and logic analysers' programs open.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
@@ -83,11 +84,12 @@ class WaveformSink final : public Waveform::Sink {
   void change(Time at, std::size_t wire) override { drawing_->change(tick(at), wire); }
   void comment(Time at, std::string_view words) override { drawing_->label(tick(at), words); }
 
-  /// Behind the last item there is `margin`, for decoders that wait for the line to be idle.
-  void finish(Waveform& waveform, Time margin) {
+  /// Behind the last item there is `margin`, for decoders that wait for the line to be idle; the end is not before
+  /// `least`, until when a host waited in vain.
+  void finish(Waveform& waveform, Time margin, Time least = {}) {
     waveform.finish();
     for (const auto& wire : waveform.wires()) drawing_->add_wire(std::string(wire.name), wire.idle);
-    drawing_->set_end(tick(waveform.end() + margin));
+    drawing_->set_end(tick(std::max(waveform.end() + margin, least)));
   }
 
  private:

@@ -29,7 +29,7 @@ struct Sample final : capture::AnnotationSink {
   struct Enough {};
 
   void put(const capture::Annotation& annotation) override {
-    if (annotation.error != Error::none || annotation.reply.empty()) return;
+    if (annotation.error != Error::none || annotation.reply.empty() || annotation.composed) return;
     frames.push_back({{annotation.request.bytes.begin(), annotation.request.bytes.end()},
                       {annotation.reply.bytes.begin(), annotation.reply.bytes.end()}});
     if (frames.size() == enough) throw Enough{};

@@ -11,6 +11,7 @@
 
 #include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/capture/annotate/annotate_frames.hpp"
+#include "absenc/capture/annotate/following.hpp"
 #include "absenc/capture/annotate/remembering.hpp"
 #include "absenc/capture/files/open.hpp"
 #include "absenc/capture/lines/blocks.hpp"
@@ -148,7 +149,8 @@ CaptureRun::~CaptureRun() = default;
 std::uint64_t CaptureRun::ticks_per_second() const { return reader_->layout().ticks_per_second; }
 
 CaptureOutcome CaptureRun::run(capture::AnnotationSink& all, const std::function<void(Tick)>& progress) {
-  capture::Remembering sink(unit_, all);
+  capture::Remembering remembering(unit_, all);
+  capture::Following sink(unit_, options_, remembering);
   const Content content = reader_->layout().content;
   const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi;
   CaptureOutcome outcome = content == Content::bytes     ? run_bytes(sink, progress)

@@ -52,7 +52,7 @@ class CaptureRun {
   const Options& settle_options();
   /// Decodes all of it into `sink`; `progress` is called now and then with how far it is. Throws UsageError,
   /// Failure and what `sink` throws.
-  CaptureOutcome run(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
+  CaptureOutcome run(capture::AnnotationSink& all, const std::function<void(capture::Tick)>& progress);
 
  private:
   // The lines of the capture and who speaks on them.

@@ -347,5 +347,18 @@ TEST(Conformance, SaysWhenNothingCouldBeJudged) {
   EXPECT_EQ(some.verdict(), Verdict::broken);
 }
 
+// A report prints the paragraph behind the document.
+TEST(Clauses, TheDocumentDoesNotNameTheParagraphAgain) {
+  for (const Unit* unit : all_units()) {
+    const auto look = [&](std::string_view id, std::string_view paragraph) {
+      const std::string_view number = paragraph.substr(0, paragraph.find(' '));
+      if (number.find_first_not_of("0123456789.") != std::string_view::npos) return;  // it has a name
+      EXPECT_EQ(unit->document.find(number), std::string_view::npos) << unit->id << " " << id << ": " << unit->document;
+    };
+    for (const Clause& clause : clauses_of(*unit)) look(clause.id, clause.paragraph);
+    for (const HostClause& clause : host_clauses_of(*unit)) look(clause.id, clause.paragraph);
+  }
+}
+
 }  // namespace
 }  // namespace absenc::client

@@ -226,7 +226,7 @@ class Doctor {
   void scan(Examiner<Item>& examiner) {
     const Command* command = find_command(*address_.unit, Verb::scan);
     const Option* option = find_role(address_.unit->options, Role::encoder);
-    if (command == nullptr || command->changes_encoder || option == nullptr) return;
+    if (command == nullptr || command->changes_encoder || !command->disturbs.empty() || option == nullptr) return;
     tell("who else is on the line");
     Clashes clashes;
     examiner.report(*command, complete_arguments(*command, {}), clashes);

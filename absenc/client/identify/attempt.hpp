@@ -344,6 +344,10 @@ class Attempt {
     std::vector<Settings> targets;
     const Command* command = find_command(unit_, Verb::scan);
     if (command == nullptr || command->changes_encoder) return targets;
+    if (!command->disturbs.empty()) {
+      findings_.notes.push_back(fmt::format("{} of {} was not sent: {}", command->name, unit_.id, command->disturbs));
+      return targets;
+    }
     Addresses addresses;
     std::vector<HeardExchange> ignored;
     converse(*command, options, ignored, &addresses);

@@ -115,14 +115,14 @@ class ConnectionOn final : public Connection {
     Trouble trouble{.error = outcome.error};
     const bool callers_fault = outcome.error <= Error::buffer_too_small;
     if (callers_fault) {
-      trouble.message = describe(outcome.error, outcome.detail, {});
+      trouble.message = describe(unit().link, Subject::reply, outcome.error, outcome.detail);
       trouble.advice = outcome.advice;
       return trouble;
     }
     if (line_.request.empty() && line_.clocks == 0) return unasked_trouble(outcome);
     trouble.finding = finding_text(outcome);
     const Diagnosis diagnosis = diagnose_last();
-    trouble.message = describe(outcome.error, outcome.detail, diagnosis);
+    trouble.message = describe(unit().link, Subject::reply, outcome.error, outcome.detail, diagnosis);
     trouble.sent = wire_text(line_.request);
     trouble.received = line_.clocks == 0 ? wire_text(line_.received) : clocked_text();
     trouble.exchange = exchange(trouble);
@@ -176,7 +176,8 @@ class ConnectionOn final : public Connection {
   [[nodiscard]] Trouble unasked_trouble(const Outcome& outcome) const {
     const std::span<const Item> damaged = last_->exchange().received;
     const std::span<const Item> received = damaged.empty() ? std::span<const Item>(line_.received) : damaged;
-    Trouble trouble{.error = outcome.error, .message = describe(outcome.error, outcome.detail, {})};
+    Trouble trouble{.error = outcome.error,
+                    .message = describe(unit().link, Subject::reply, outcome.error, outcome.detail)};
     trouble.received = wire_text(received);
     trouble.exchange = received.empty() ? fmt::format("nothing came from {}", link_->link().place)
                                         : fmt::format("received {} from {}", trouble.received, link_->link().place);

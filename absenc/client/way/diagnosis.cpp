@@ -67,6 +67,30 @@ Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& 
   return {};
 }
 
+// On clocked links and CAN there is one kind of frame, and bits or data bytes are counted.
+std::string meaning(LinkKind link, Subject subject, Error error) {
+  const std::string_view frame = link == LinkKind::clocked || link == LinkKind::can ? "frame"
+                                 : subject == Subject::request                      ? "request"
+                                                                                    : "reply";
+  switch (error) {
+    case Error::wrong_length:
+      return fmt::format("the {} has the wrong number of {}", frame,
+                         link == LinkKind::clocked ? "bits"
+                         : link == LinkKind::can   ? "data bytes"
+                                                   : "bytes");
+    case Error::bad_checksum:
+      return fmt::format("the checksum of the {} is wrong", frame);
+    case Error::cross_check_failed:
+      return fmt::format("parts of the {} contradict each other", frame);
+    case Error::unexpected_reply:
+      if (subject == Subject::request) return "this encoder knows no such request";
+      break;
+    default:
+      break;
+  }
+  return std::string(text_of(error).description);
+}
+
 }  // namespace
 
 Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
@@ -79,8 +103,13 @@ Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& reques
   return other_settings(unit, options, request, reply);
 }
 
-std::string describe(Error error, std::string_view detail, const Diagnosis& diagnosis) {
-  std::string text(text_of(error).description);
+Subject subject_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
+  const bool bad_request = !request.empty() && !is_good(unit, options, request, {});
+  return reply.empty() || bad_request ? Subject::request : Subject::reply;
+}
+
+std::string describe(LinkKind link, Subject subject, Error error, std::string_view detail, const Diagnosis& diagnosis) {
+  std::string text = meaning(link, subject, error);
   if (!detail.empty()) text += fmt::format(": {}", detail);
   const bool said = !diagnosis.setting.empty() && detail.find(diagnosis.setting) != std::string_view::npos;
   if (!diagnosis.finding.empty() && !said) text += fmt::format("; {}", diagnosis.finding);
@@ -92,7 +121,8 @@ std::string sentence_for(const Unit& unit, const Options& options, Error error, 
   const Diagnosis diagnosis = diagnose(unit, options, request, reply);
   const Explanation explanation =
       unit.explain != nullptr ? unit.explain(options, error, request, reply) : Explanation{};
-  const std::string message = describe(error, explanation.detail, diagnosis);
+  const Subject subject = subject_of(unit, options, request, reply);
+  const std::string message = describe(unit.link, subject, error, explanation.detail, diagnosis);
   const std::string_view advice = diagnosis.advice.empty() ? explanation.advice : diagnosis.advice;
   return advice.empty() ? message : fmt::format("{}: {}", message, advice);
 }

@@ -2,6 +2,7 @@
 // What is wrong with an exchange, in words, and which setting would make it right.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -20,12 +21,19 @@ struct Diagnosis {
 /// with another option.
 [[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// "<what the error means>: <detail>; <finding>", each part only if there is one, and the finding only where the detail
-/// does not name its setting already.
-[[nodiscard]] std::string describe(Error error, std::string_view detail, const Diagnosis& diagnosis);
+/// Which frame an error is about.
+enum class Subject : std::uint8_t { request, reply };
 
-/// Of a reply that failed with this error, in one sentence: the same with what the document says of it, and what to
-/// try.
+/// Of frames that `decode` refuses: a request without a reply, or one that is bad itself.
+[[nodiscard]] Subject subject_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
+
+/// "<what the error means for this frame of this link>: <detail>; <finding>", each part only if there is one,
+/// and the finding only where the detail does not name its setting already.
+[[nodiscard]] std::string describe(LinkKind link, Subject subject, Error error, std::string_view detail = {},
+                                   const Diagnosis& diagnosis = {});
+
+/// Of a reply that failed with this error, or with an empty reply of the request, in one sentence: the same with what
+/// the document says of it, and what to try.
 [[nodiscard]] std::string sentence_for(const Unit& unit, const Options& options, Error error, const Frame& request,
                                        const Frame& reply);
 

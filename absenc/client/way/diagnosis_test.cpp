@@ -5,9 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
+#include <sstream>
 #include <string>
+#include <vector>
 
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tests/kit/world.hpp"
 
@@ -25,7 +30,7 @@ struct Message {
 
 Message message_of(const Unit& unit, const Options& options, const Ended& ended) {
   const Diagnosis diagnosis = diagnose(unit, options, {.bytes = ended.sent}, {.bytes = ended.received});
-  return {describe(ended.error, ended.detail, diagnosis), diagnosis};
+  return {describe(unit.link, Subject::reply, ended.error, ended.detail, diagnosis), diagnosis};
 }
 
 /// The clauses that stand in a message more than once. What checks a frame has two names.
@@ -103,6 +108,60 @@ TEST(Diagnosis, AMessageSaysNothingTwice) {
     }
   }
   EXPECT_GT(messages, 100u);
+}
+
+WireFrame without_end(WireFrame frame) {
+  if (frame.can) {
+    --frame.can->size;
+  } else {
+    if (frame.bits % 8 < 2) frame.bytes.pop_back();
+    if (frame.bits != 0) --frame.bits;
+  }
+  return frame;
+}
+
+WireFrame frame_of(const Unit& unit, Bytes bytes) {
+  if (bytes.empty()) return {};
+  const bool is_text = unit.link == LinkKind::can || unit.link == LinkKind::clocked;
+  if (is_text) return parse_wire_text(unit.link, "vector", std::string(bytes.begin(), bytes.end()));
+  return {.bytes = {bytes.begin(), bytes.end()}, .bits = 0, .can = {}};
+}
+
+std::vector<std::string> words_of(std::string_view text) {
+  std::istringstream in{std::string(text)};
+  return {std::istream_iterator<std::string>(in), {}};
+}
+
+// What is said of frames that are refused for their length; "" for others.
+std::string said_of(const Unit& unit, const Options& options, const WireFrame& request, const WireFrame& reply) {
+  NoFields ignored;
+  const Error error = unit.decode(options, request.frame(), reply.frame(), ignored);
+  return error == Error::wrong_length ? sentence_for(unit, options, error, request.frame(), reply.frame()) : "";
+}
+
+// The good vectors of every unit, cut short.
+TEST(FrameWords, WrongLengthIsSaidOfTheFrameThatHasIt) {
+  std::set<LinkKind> links;
+  for (const Unit* const unit : all_units()) {
+    const std::string_view counted = unit->link == LinkKind::can       ? "the frame has the wrong number of data bytes"
+                                     : unit->link == LinkKind::clocked ? "the frame has the wrong number of bits"
+                                                                       : "";
+    for (const Vector& vector : unit->vectors) {
+      if (vector.error != Error::none) continue;
+      const Options options = require_options(*unit, {}, words_of(vector.options));
+      const WireFrame request = frame_of(*unit, vector.request);
+      const bool asks = vector.reply.empty();
+      const std::string said = asks ? said_of(*unit, options, without_end(request), {})
+                                    : said_of(*unit, options, request, without_end(frame_of(*unit, vector.reply)));
+      if (said.empty()) continue;
+      links.insert(unit->link);
+      const std::string_view expected = !counted.empty() ? counted
+                                        : asks           ? "the request has the wrong number of bytes"
+                                                         : "the reply has the wrong number of bytes";
+      EXPECT_EQ(said.substr(0, expected.size()), expected) << vector.id;
+    }
+  }
+  EXPECT_EQ(links.size(), 5u) << "every kind of link was looked at";
 }
 
 }  // namespace

@@ -68,6 +68,8 @@ struct Declaration {
   ExtraWires (*extra_wires)(const Options&) = nullptr;
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
+  Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
+  std::size_t follower_storage = 0;
   const FieldInfo* status = nullptr;
   const FieldInfo* alarms = nullptr;
   const FieldInfo* second_status = nullptr;

@@ -110,6 +110,7 @@ bool streams(const Options&) { return true; }
 ExtraWires wires(const Options&) { return {}; }
 std::optional<std::size_t> control_bit(const Options&, Frame) { return 7; }
 Reading remembered(const Reading& before, Reading) { return before; }
+Follower* follower(const Options&, std::span<std::byte>) { return nullptr; }
 constexpr std::array<MemoryArea, 1> memory{{{0, 0, 1, "a byte"}}};
 constexpr std::array<RegisterInfo, 1> registers{{{"one", 1, 2}}};
 constexpr std::array<Condition, 1> conditions{{{"battery", "", "there", 0, 1, 1}}};
@@ -146,6 +147,8 @@ constexpr Declaration<Toy, Encoder> whole{
     .extra_wires = wires,
     .control_bit = control_bit,
     .remembered = remembered,
+    .follower = follower,
+    .follower_storage = 5,
     .status = &fields.infos[0],
     .alarms = &fields.infos[1],
     .second_status = &fields.infos[1],
@@ -181,6 +184,7 @@ TEST(Declaration, LeavesOutWhatTheUnitDoesNotHave) {
   EXPECT_EQ(unit.extra_wires, nullptr);
   EXPECT_EQ(unit.control_bit, nullptr);
   EXPECT_EQ(unit.remembered, nullptr);
+  EXPECT_EQ(unit.follower, nullptr);
   EXPECT_EQ(unit.over_spi, nullptr);
   EXPECT_TRUE(unit.memory.empty() && unit.registers.empty() && unit.conditions.empty());
   EXPECT_EQ(unit.models[0].values[0].value, 16);
@@ -215,6 +219,8 @@ TEST(Declaration, GivesTheUnitEachMember) {
   EXPECT_EQ(whole_unit.extra_wires, wires);
   EXPECT_EQ(whole_unit.control_bit, control_bit);
   EXPECT_EQ(whole_unit.remembered, remembered);
+  EXPECT_EQ(whole_unit.follower, follower);
+  EXPECT_EQ(whole_unit.follower_storage, 5u);
   EXPECT_EQ(whole_unit.status, &fields.infos[0]);
   EXPECT_EQ(whole_unit.alarms, &fields.infos[1]);
   EXPECT_EQ(whole_unit.second_status, &fields.infos[1]);

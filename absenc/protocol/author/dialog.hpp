@@ -292,9 +292,7 @@ class Run : public ProcedureDialog<P> {
     }
   }
   [[nodiscard]] const Found& found() const { return found_; }
-  [[nodiscard]] const StreamCounts* stream() const final {
-    return goes_on ? &counts_ : ProcedureDialog<P>::stream();
-  }
+  [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
   [[nodiscard]] bool asks() const final { return goes_on; }
   [[nodiscard]] const Reading* reading() const final {
     if constexpr (requires { found_.reading; }) {

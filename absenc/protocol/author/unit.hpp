@@ -300,7 +300,9 @@ struct Descriptor {
               .is_answered = declared.is_answered,
               .conditions = declared.conditions,
               .control_bit = declared.control_bit,
-              .remembered = declared.remembered};
+              .remembered = declared.remembered,
+              .follower = declared.follower,
+              .follower_storage = declared.follower_storage};
     if constexpr (declared.report.explain != nullptr) unit.explain = explain;
     if constexpr (has_requests && declared.is_answered == nullptr) unit.is_answered = is_answered;
     if constexpr (has_requests) unit.pause = pause;

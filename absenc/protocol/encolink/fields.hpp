@@ -27,6 +27,9 @@ inline constexpr std::string_view wrong_resolution =
     "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `absenc info` "
     "asks it";
 
+inline constexpr std::string_view channels_disagree =
+    "channel 2 has another position than channel 1: positions go on, but the detailed status cannot be trusted";
+
 /// Why the registers of an AksIM-4 are refused.
 inline constexpr std::string_view not_described =
     "protocol version 4 (AksIM-4) has its registers at other addresses, which are not described here: its positions "
@@ -201,6 +204,18 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   if (index == calibration_status) sink.put({&calibrations_field, bytes[0] & calibration::count});
 }
 
+/// A register that was read or written.
+constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
+                            std::optional<std::string_view> op = {}) {
+  const Register* known = find_register(address);
+  const bool in_table = known != nullptr && known->size == data.size();
+  Values values{.op = op, .address = address, .length = data.size(), .data = data};
+  if (known != nullptr) values.name = known->name;
+  if (!in_table && data.size() < 8) values.value = load_big_endian(data);
+  frame_fields.put(sink, values);
+  if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
+}
+
 /// What a frame is decoded with where the encoder cannot be asked: all 22 bits, turns as the length tells.
 [[nodiscard]] constexpr Format assumed(const Format& format, Bytes reply) {
   Format known = format;
@@ -270,9 +285,22 @@ constexpr Error decode_request(Bytes request, FieldSink& sink) {
   return Error::none;
 }
 
-/// The length of a reply says what it is: a position frame, a channel 2 cycle or the identity.
+/// The answer to a register access.
+constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink) {
+  const Result<RegisterRequest> access = decode_access(request);
+  if (!access) return access.error();
+  const Result<Bytes> data = decode_answer(*access, reply);
+  if (!data) return data.error();
+  const bool reads = access->operation == RegisterRequest::Operation::read;
+  put_register(sink, access->address, reads ? *data : access->data.view(), reads ? "read" : "write");
+  return Error::none;
+}
+
+/// A register access answers all its `ra` bytes. Of others the length of a reply says what it is: a position frame, a
+/// channel 2 cycle or the identity.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
+  if (request.size() > request_bytes) return decode_access_answer(request, reply, sink);
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) {
     const Result<Identity> identity = decode_identity(reply);
     if (identity) frame_fields.put(sink, {.identity = *identity});

@@ -293,8 +293,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return position.singleturn == 0 && position.multiturn == 0;
 }
 
-/// Returns the alarms that the two bits of a frame report clear: all errors, all warnings. A bit that is set does not say
-/// which alarm it is for. Without channel 2 an encoder has no alarms by name.
+/// Returns the alarms that the two bits of a frame report clear: all errors, all warnings. A bit that is set does not
+/// say which alarm it is for. Without channel 2 an encoder has no alarms by name.
 [[nodiscard]] constexpr std::uint32_t clear_by(const Format& format, const Position& position) {
   if (!format.has_ch2) return 0;
   return (position.error ? 0u : status::errors) | (position.warning ? 0u : status::warnings);
@@ -317,6 +317,21 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   reading.status_reported = general::error | general::warning;
   reading.alarms_reported = detailed ? 0xFFFFu : clear_by(format, position);
   return reading;
+}
+
+/// See Unit. The status of a cycle of channel 2 holds as long as the error and warning bits of position frames agree
+/// with it: which alarm has come or gone the next cycle tells.
+[[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
+  if (now.alarms_reported != 0 || before.alarms_reported == 0 || now.singleturn_bits == 0) return now;
+  const bool has_error = (before.alarms & status::errors) != 0;
+  const bool has_warning = (before.alarms & status::warnings) != 0;
+  const std::uint32_t general = (has_error ? general::error : 0) | (has_warning ? general::warning : 0);
+  if (now.status != general) return now;
+  now.alarms = before.alarms;
+  now.alarms_reported = before.alarms_reported;
+  if ((now.alarms & status::position_invalid) != 0) now.singleturn_valid_bits = 0;
+  if ((now.alarms & status::multiturn_mismatch) != 0) now.multiturn_valid = false;
+  return now;
 }
 
 }  // namespace absenc::encolink

@@ -19,8 +19,6 @@ constexpr unsigned access_attempts = 5;  // each is some hundred frames, all of 
 constexpr unsigned write_attempts = 3;
 constexpr unsigned idle_cycles_allowed = 8;  // after the last byte of an access
 
-constexpr std::string_view channels_disagree =
-    "channel 2 has another position than channel 1: positions go on, but the detailed status cannot be trusted";
 constexpr std::string_view channel2_damaged = "channel 2 is damaged: positions go on, but registers cannot be reached";
 constexpr std::string_view no_channel2 = "without channel 2 (has_ch2=false) there is neither status nor register";
 constexpr std::string_view busy_too_long =

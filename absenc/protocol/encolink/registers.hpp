@@ -214,4 +214,15 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return request;
 }
 
+/// What the encoder says to an access, a byte a cycle, from `channel3::read_ready` or `write_ready` on: a status, and
+/// the data of a register that was read. Errors in this order: wrong_length, unexpected_reply, request_rejected.
+[[nodiscard]] constexpr Result<Bytes> decode_answer(const RegisterRequest& request, Bytes answer) {
+  if (answer.size() < 2) return Error::wrong_length;
+  const bool reads = request.operation == RegisterRequest::Operation::read;
+  if (answer[0] != (reads ? channel3::read_ready : channel3::write_ready)) return Error::unexpected_reply;
+  if (static_cast<AccessStatus>(answer[1]) != AccessStatus::ok) return Error::request_rejected;
+  if (answer.size() != 2u + (reads ? request.length : 0u)) return Error::wrong_length;
+  return answer.subspan(2);
+}
+
 }  // namespace absenc::encolink

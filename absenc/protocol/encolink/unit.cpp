@@ -5,6 +5,7 @@
 #include <array>
 
 #include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/encolink/channel_follower.hpp"
 #include "absenc/protocol/encolink/device.hpp"
 #include "absenc/protocol/encolink/fields.hpp"
 #include "absenc/protocol/encolink/listen.hpp"
@@ -143,6 +144,7 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
 // the identity.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = options.format(values);
+  if (request.bytes.size() > request_bytes) return bit / 8 < 2;  // cycles of channel 2 have the checksums
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
 }
@@ -153,15 +155,6 @@ using Host = author::HostOf<Frames>;
 
 void put_channels(FieldSink& sink, const Host& host, const Channels& channels) {
   put_position(sink, host.format(), host.last(), channels.status);
-}
-void put_register(FieldSink& sink, std::uint32_t address, Bytes data) {
-  const Register* known = find_register(address);
-  const bool in_table = known != nullptr && known->size == data.size();
-  Values values{.address = address, .length = data.size(), .data = data};
-  if (known != nullptr) values.name = known->name;
-  if (!in_table && data.size() < 8) values.value = load_big_endian(data);
-  frame_fields.put(sink, values);
-  if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
 }
 void put_found(FieldSink& sink, const Host& host, const Found& found) {
   if (found.identity) {
@@ -204,8 +197,13 @@ Explanation explain_host(const Host& host) {
       return {};
   }
 }
-/// Of a frame, which captures have.
-constexpr Explanation explain(const Format&, Error error, Bytes, Bytes reply) {
+/// Of a frame, which captures have; of a register access all its bytes.
+constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
+  if (request.size() > request_bytes) {
+    if (error != Error::request_rejected || reply.size() < 2) return {};
+    return {text_of(static_cast<AccessStatus>(reply[1]))};
+  }
+  if (error == Error::cross_check_failed) return {channels_disagree};
   const bool frame = reply.size() < identity_bytes;
   return {error == Error::out_of_range && frame ? wrong_resolution : std::string_view{}};
 }
@@ -403,8 +401,15 @@ constexpr bool is_streaming(const Options& values) {
   return streams(format_of<interface>(values));
 }
 template <Interface interface>
-BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
+BitRanges bits_in(const Options& values, Frame request, Frame reply, const FieldInfo& field) {
+  if (request.bytes.size() > request_bytes) return {};
   return bits_of(format_of<interface>(values), reply.bytes, field);
+}
+
+template <Interface interface>
+Follower* make_follower(const Options& values, std::span<std::byte> storage) {
+  if (storage.size() < sizeof(ChannelFollower)) return nullptr;
+  return new (storage.data()) ChannelFollower(format_of<interface>(values));
 }
 
 /// What the document says of both interfaces, and of each.
@@ -431,6 +436,9 @@ constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
     .bits = bits_in<interface>,
     .probe = probe,
     .streams = is_streaming<interface>,
+    .remembered = remembered,
+    .follower = make_follower<interface>,
+    .follower_storage = sizeof(ChannelFollower),
     .status = &general_status_field,
     .alarms = frame_fields.of<detail::alarms_of>(),
     .registers = register_infos,

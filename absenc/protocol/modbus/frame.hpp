@@ -41,12 +41,13 @@ enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
   return right == (crc[1] | crc[0] << 8) ? CrcOrder::high_first : CrcOrder::wrong;
 }
 
-/// Appends the CRC, low byte first. The buffer must have room for it.
+/// Appends the CRC. The buffer must have room for it.
 template <std::size_t Capacity>
-constexpr void append_crc(ByteBuffer<Capacity>& frame) {
+constexpr void append_crc(ByteBuffer<Capacity>& frame, CrcOrder order = CrcOrder::low_first) {
   const std::uint16_t crc = Crc<crc_parameters, CrcTable::nibble>::of(frame.view());
-  frame.push_back(static_cast<std::uint8_t>(crc));
-  frame.push_back(static_cast<std::uint8_t>(crc >> 8));
+  const bool low_first = order == CrcOrder::low_first;
+  frame.push_back(static_cast<std::uint8_t>(low_first ? crc : crc >> 8));
+  frame.push_back(static_cast<std::uint8_t>(low_first ? crc >> 8 : crc));
 }
 
 /// Why a server refuses (A 7).

@@ -92,9 +92,10 @@ void Server::frame_ended(Time at) {
   if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
     reply_.clear();
     company_ = false;
+    crc_order_ = CrcOrder::low_first;
     request(frame_.view().first(frame_.size() - crc_size), at, reply_);
     if (!reply_.empty()) {
-      append_crc(reply_);
+      append_crc(reply_, crc_order_);
       reply_at_ = at + answer_time;
       reply_pending_ = transmitting_ = true;
       ++answer_count_;

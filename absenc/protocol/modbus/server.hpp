@@ -43,6 +43,8 @@ class Server : public Device<std::uint8_t> {
   void heed_line(Time at);
   /// The request that is being answered may be answered by others at the same time.
   void expect_company() { company_ = true; }
+  /// Of the reply to this request: low_first, if this is not called, or high_first.
+  void order_crc(CrcOrder order) { crc_order_ = order; }
   /// Appends a refusal.
   static void refuse(FrameBytes& reply, std::uint8_t address, std::uint8_t function, Exception exception);
 
@@ -66,6 +68,7 @@ class Server : public Device<std::uint8_t> {
   bool company_ = false;
   Time quiet_since_{};
   FrameBytes reply_;
+  CrcOrder crc_order_ = CrcOrder::low_first;
   bool reply_pending_ = false;
   bool transmitting_ = false;
   bool interrupted_ = false;  // something came while it was

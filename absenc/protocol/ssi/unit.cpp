@@ -124,7 +124,7 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
 constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .id = "ssi",
     .name = "SSI",
-    .document = "RAA38S6 manual, 3.5 SSI",
+    .document = "Absolute Encoder Operation Manual, RAA38S6 series",
     .link = LinkKind::clocked,
     .options = options.infos,
     .format = format_by,

@@ -75,6 +75,7 @@ constexpr std::array<Example, 2> run_examples{{
 
 int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments) {
   os::catch_interrupts();
+  tell_disturbance(uri, command);
   if (command.changes_encoder && must_ask(invocation, uri, command.name, command.meaning) &&
       !confirmed(uri, command.meaning)) {
     print_message("nothing was changed");

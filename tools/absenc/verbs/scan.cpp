@@ -8,6 +8,7 @@
 
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
+#include "tools/absenc/consent.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/text/encoder_text.hpp"
@@ -67,6 +68,7 @@ struct Records final : FieldSink {
 int run_scan_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command,
                      Arguments arguments) {
   os::catch_interrupts();
+  if (!may_disturb(invocation, uri, command)) return exit_failed;
   const std::unique_ptr<Connection> encoder = open_connection(uri);
   Records records;
   run_into(*encoder, command, arguments, records);
@@ -99,7 +101,12 @@ int run_scan(const Invocation& invocation) {
   throw UsageError(fmt::format("{} has no addresses to scan: there is one encoder on its line", uri.unit->id));
 }
 
-constexpr std::array<Parameter, 3> scan_parameters{{parameter::encoder, parameter::json, parameter::option}};
+constexpr std::array<Parameter, 4> scan_parameters{{
+    parameter::encoder,
+    {"--yes", "", "do not ask, where the requests may disturb other devices"},
+    parameter::json,
+    parameter::option,
+}};
 
 constexpr std::array<Example, 2> scan_examples{{
     {"absenc scan esl:/dev/ttyUSB0", "every address with an encoder, and what that is"},
@@ -112,7 +119,8 @@ const Subcommand scan_subcommand{
     "scan",
     "find out which encoders answer on a line",
     "Asks every address. An answer that is damaged every time is a clash: two encoders have one address, or the\n"
-    "line is bad. Nothing is changed. Exit status 1 when nobody answers well.",
+    "line is bad. No encoder is changed. Where other devices on the line may take the requests for their own (CAN),\n"
+    "it says so and asks first; without a terminal it needs --yes. Exit status 1 when nobody answers well.",
     scan_parameters,
     scan_examples,
     run_scan};

@@ -84,6 +84,7 @@ int run_set(const Invocation& invocation) {
   const bool readable = setting.getter != nullptr;
   const std::string_view name = setting.name();
   const std::vector<std::int64_t> values = setter_arguments(invocation, *uri.unit, *setting.setter);
+  tell_disturbance(uri, *setting.setter);
   const bool asks = must_ask(invocation, uri, name, setting.setter->meaning);
 
   const std::unique_ptr<Connection> encoder = open_connection(uri);

@@ -90,6 +90,7 @@ struct Conversations {
 
   std::uint64_t results = 0;
   std::uint64_t failures = 0;
+  Time end{};  // of the last of them, which may have waited for nothing
 
   template <class Item>
   void hold(Machine<Item>& device) {
@@ -99,6 +100,7 @@ struct Conversations {
       pass(port, next);
       for (const Spoken& one : commands) hold(port, one);
     }
+    end = port.now();
   }
 
  private:
@@ -207,7 +209,7 @@ int run_wave(const Invocation& invocation) {
                               waveform,
                               progress};
   converse(conversations);
-  sink.finish(waveform, idle_around(uri.line));
+  sink.finish(waveform, idle_around(uri.line), conversations.end);
   progress.show(fmt::format("writing {}", name));
   drawing.watch([] {
     if (os::interrupted()) throw os::Interrupted{};

@@ -42,13 +42,6 @@ unsigned Nodes::count() const {
   return static_cast<unsigned>(std::count_if(at.begin(), at.end(), [](const Heard& node) { return node.is_there(); }));
 }
 
-std::uint8_t Nodes::first() const {
-  for (unsigned node = 1; node < at.size(); ++node) {
-    if (at[node].is_there()) return static_cast<std::uint8_t>(node);
-  }
-  return 0;
-}
-
 // ---- In words
 
 Explanation explain(const Format&, Error error, std::span<const CanFrame> request, std::span<const CanFrame> reply) {

@@ -84,6 +84,10 @@ author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments)
 /// effect of 22).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
+/// The number of the node, if it answers. No other is asked: on a CANopen bus the requests to them are process data of
+/// other devices. Errors: timeout, bad_framing (frames are destroyed: two nodes may have the number).
+author::Procedure look_for_node(Dialog& dialog, Values& found);
+
 // ---- Every node of the bus
 
 /// What was heard of one number.
@@ -107,8 +111,6 @@ struct Nodes {
 
   /// How many numbers somebody has.
   [[nodiscard]] unsigned count() const;
-  /// The first number that somebody has; 0: none.
-  [[nodiscard]] std::uint8_t first() const;
 };
 
 /// Listens, because after power on nodes send unasked, then asks every number. Error: timeout when nobody is there.
@@ -118,10 +120,6 @@ struct Surveyed : Values {
   Nodes nodes{};
   bool verified = false;  // what was written
 };
-
-/// The number of the node: of the only one, or of the one that is meant. Errors: timeout, unexpected_reply (only others
-/// are there).
-author::Procedure find_node(Dialog& dialog, Surveyed& found);
 
 /// 11: another number; it must answer under the new one and no longer under the old one. 13: another bit rate, to which
 /// this end of the line goes too; back when the node is not there. On 7E5, which reaches every node: only with one on

@@ -218,6 +218,14 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   co_return outcome;
 }
 
+Procedure look_for_node(Dialog& dialog, Values& found) {
+  const std::uint8_t node = dialog.format().node;
+  const MaybeFrame frame = co_await read(dialog, node);
+  if (!frame) co_return {dialog.missing()};
+  found.node = node;
+  co_return done;
+}
+
 Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments) {
   const std::uint8_t value = order == Order::zero ? 0 : *value_of(dialog.format(), order, arguments[0]);
   found.node = dialog.format().node;
@@ -274,12 +282,10 @@ Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
   co_return true;
 }
 
-Part<bool> survey(Dialog& dialog, Nodes& nodes, bool listen_first) {
+Part<bool> survey(Dialog& dialog, Nodes& nodes) {
   dialog.overhear();
-  if (listen_first) {
-    dialog.listen(listening_time);
-    co_await hear_nodes(dialog, nodes, nobody);
-  }
+  dialog.listen(listening_time);
+  co_await hear_nodes(dialog, nodes, nobody);
   for (unsigned number = 1; number < nodes.at.size(); ++number) {
     bool once_more = true;
     while (once_more) {
@@ -296,7 +302,7 @@ Part<bool> survey(Dialog& dialog, Nodes& nodes, bool listen_first) {
 
 // 7E5 reaches every node: goes on when this one is the only one.
 Part<bool> be_alone(Dialog& dialog, Nodes& nodes) {
-  co_await survey(dialog, nodes, true);
+  co_await survey(dialog, nodes);
   const Heard& node = nodes.at[dialog.format().node];
   if (nodes.count() == 0) co_await dialog.stop(only(Error::timeout, "no node answers"));
   if (!node.is_there()) {
@@ -370,26 +376,12 @@ Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
 }  // namespace
 
 Procedure scan(Dialog& dialog, Nodes& nodes) {
-  co_await survey(dialog, nodes, true);
+  co_await survey(dialog, nodes);
   const auto damaged =
       std::count_if(nodes.at.begin(), nodes.at.end(), [](const Heard& node) { return node.damaged > 1; });
   if (damaged > most_clashes) co_return {Error::bad_framing};
   if (nodes.count() == 0) co_return only(Error::timeout, {});
   co_return done;
-}
-
-Procedure find_node(Dialog& dialog, Surveyed& found) {
-  const std::uint8_t meant = dialog.format().node;
-  const Nodes& nodes = found.nodes;
-  co_await survey(dialog, found.nodes, false);
-  if (nodes.count() == 0) co_return only(Error::timeout, "no node answers");
-  const std::uint8_t node = nodes.at[meant].is_there() ? meant : nodes.first();
-  found.node = node;
-  if (node != meant && nodes.count() > 1) {
-    co_return only(Error::unexpected_reply, "several nodes answer, but not this one", which);
-  }
-  if (!nodes.at[node].clash()) co_return done;
-  co_return only(Error::bad_framing, shared, "connect the nodes one by one");
 }
 
 Procedure configure(Dialog& dialog, Surveyed& found, Order order, Arguments arguments) {

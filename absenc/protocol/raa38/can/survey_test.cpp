@@ -37,7 +37,7 @@ TEST(CanScan, TwoNodesWithOneNumber) {
   EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::invalid_argument, "other nodes"));
   bench.encoders.back().power_off(bench.line.now());
   EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::invalid_argument, "share the number"));
-  EXPECT_TRUE(ended(bench.does("node"), Error::bad_framing, "share the number"));
+  EXPECT_TRUE(ended(bench.does("node"), Error::bad_framing, "no two nodes have one number"));
 }
 
 TEST(CanScan, AWrongBitRateIsNotManyClashes) {
@@ -46,23 +46,53 @@ TEST(CanScan, AWrongBitRateIsNotManyClashes) {
   EXPECT_TRUE(ended(with(noise, "scan", {}, {}, 500'000), Error::bad_framing, "bit rate"));
 }
 
-TEST(CanFindNode, TheOnlyOneOrTheOneThatIsMeant) {
-  Bench bench({.node = 0x55});
-  EXPECT_EQ(bench.does(Format{}, "node").fields, "node=85 ");
-  bench.add({.node = 0x56, .cyclic = 0});
-  EXPECT_EQ(bench.does(Format{.node = 0x56}, "node").fields, "node=86 ");
-  EXPECT_TRUE(ended(bench.does(Format{}, "node"), Error::unexpected_reply, "several"));
+/// Every identifier that a host sends with one command, to a bus on which nobody is.
+std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format& format) {
+  sim::Line<CanFrame> line(LinkKind::can, {.rate = format.bit_rate()});
+  std::vector<std::uint32_t> sent;
+  line.observe([&](std::size_t, Time, Time, const CanFrame& frame) { sent.push_back(frame.id); });
+  Scripted listener([](const CanFrame&) { return Frames{}; });  // who acknowledges
+  line.attach(sim::Role::device, listener);
+  raa38::testing::Talk<CanFrame> talk(can_unit, options_of(format), command, {});
+  EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 20s));
+  return sent;
 }
 
-TEST(CanFindNode, WhatItSendsByItselfIsNoSecondAnswer) {
-  Bench bench({.node = 1, .cyclic = 50});
-  EXPECT_EQ(bench.does("node").fields, "node=1 ");
+// On a CANopen bus 201 to 27F are process data of other devices.
+TEST(CanNode, AsksTheGivenNodeOnly) {
+  EXPECT_EQ(identifiers_of("node", {.node = 0x42}), std::vector<std::uint32_t>{0x242});
+  EXPECT_EQ(identifiers_of("scan", {.node = 0x42}).size(), 255u);
+}
+
+// By the words that people see before it is sent.
+TEST(CanNode, EveryCommandThatAsksOthersSaysSo) {
+  for (const Command& command : can_unit.commands) {
+    if (!command.arguments.empty() && command.verb != Verb::config_set) continue;
+    std::vector<std::int64_t> arguments;
+    for (const Argument& argument : command.arguments) arguments.push_back(argument.maximum);
+    Scripted silent([](const CanFrame&) { return Frames{}; });
+    sim::Line<CanFrame> line(LinkKind::can, {.rate = 250'000});
+    bool asks_others = false;
+    line.observe([&](std::size_t, Time, Time, const CanFrame& frame) {
+      asks_others = asks_others || (function_of(frame) == Function::command && node_of(frame) != 0x20);
+    });
+    line.attach(sim::Role::device, silent);
+    raa38::testing::Talk<CanFrame> talk(can_unit, options_of({}), command.name, arguments);
+    EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 60s)) << command.name;
+    EXPECT_EQ(asks_others, !command.disturbs.empty()) << command.name;
+  }
+}
+
+TEST(CanNode, IsTheOneThatAnswers) {
+  Bench bench({.node = 0x55, .cyclic = 50});
+  EXPECT_EQ(bench.does("node").fields, "node=85 ");
+  EXPECT_TRUE(ended(bench.does(Format{}, "node"), Error::timeout, "`scan` asks them all"));
 }
 
 // A slow adapter hands answers out while the next number is being asked; what comes before a number was asked is none.
-TEST(CanFindNode, AnswersThatComeWhileItIsSendingAreHeard) {
+TEST(CanScan, AnswersThatComeWhileItIsSendingAreHeard) {
   for (const bool unasked_too : {false, true}) {
-    Talk find("node");
+    Talk find("scan");
     Time now{};
     const auto tell = [&](std::uint8_t node) {
       const CanFrame frame = encode_position(node, 5);
@@ -77,25 +107,27 @@ TEST(CanFindNode, AnswersThatComeWhileItIsSendingAreHeard) {
       if (step.out[0].id == 0x221) tell(0x20);
       find->feed({.kind = Event<CanFrame>::Kind::sent, .at = now});
     }
-    EXPECT_TRUE(ended(raa38::testing::end_of<CanFrame>(*find), Error::none));
+    EXPECT_EQ(raa38::testing::end_of<CanFrame>(*find).fields, "node=32 clash=0 readings_per_s=0 singleturn=5 ");
   }
 }
 
-TEST(CanFindNode, TheLastAnswersAreWaitedFor) {
-  Talk find("node");
+TEST(CanScan, TheLastAnswersAreWaitedFor) {
+  Talk find("scan");
   Time now{};
+  unsigned asked = 0;
   for (;;) {
     const Step<CanFrame> step = find->next(now);
     if (step.kind == Step<CanFrame>::Kind::done) break;
     if (step.kind == Step<CanFrame>::Kind::transfer) {
+      ++asked;
       find->feed({.kind = Event<CanFrame>::Kind::sent, .at = now});
-    } else if (step.at >= now + 50ms) {  // every number was asked
+    } else if (asked == 255 && step.at >= now + 50ms) {
       const CanFrame late = encode_position(0xFF, 5);
       find->feed({.kind = Event<CanFrame>::Kind::received, .at = now, .items = {&late, 1}});
     }
     now = std::max(now, step.at);
   }
-  EXPECT_EQ(raa38::testing::end_of<CanFrame>(*find).fields, "node=255 ");
+  EXPECT_EQ(raa38::testing::end_of<CanFrame>(*find).fields, "node=255 clash=0 readings_per_s=0 singleturn=5 ");
 }
 
 // ---- Settings

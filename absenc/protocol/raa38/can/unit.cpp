@@ -37,6 +37,10 @@ constexpr auto options = author::OptionsOf{
 };
 
 constexpr Argument force{"force", "1: write even what is set already", 0, 1, 0, false, Role::force};
+// RPDO1 of CANopen, by which a master moves drives, has the identifiers 201 to 27F, TPDO2 those from 281 on.
+constexpr std::string_view asks_all =
+    "asks every number, by 201#8001 to 2FF#80FF: on a CANopen bus these are process data of other devices, which may "
+    "obey them";
 constexpr std::array<Argument, 1> cyclic_arguments{{{"readings", "a second", 1, 255}}};
 constexpr std::array<Argument, 2> node_arguments{{{"node", "new number", 1, 255}, force}};
 constexpr std::array<Argument, 2> rate_arguments{{{"rate", "1000000, 500000 or 250000", 1, 1'000'000}, force}};
@@ -132,14 +136,31 @@ constexpr auto commands = std::array{
     author::command<report, found, change, to<Order::zero>, Order::zero>(
         {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
     author::command<report, nodes, scan, to<Order::read>>(
-        {"scan", Verb::scan, 0, "who is on the bus", {}, false, false}),
-    author::command<report, surveyed, find_node, to<Order::read>>(
+        {"scan", Verb::scan, 0, "who is on the bus", {}, false, false, {}, {}, asks_all}),
+    author::command<report, found, look_for_node, to<Order::read>>(
         {"node", Verb::config_get, 0, "number of the node", {}, false, false}),
     author::command<report, surveyed, configure, to<Order::node>, Order::node>(
-        {"set-node", Verb::config_set, 0, "give the only node on the bus another number", node_arguments, true, false,
-         "node"}),
+        {"set-node",
+         Verb::config_set,
+         0,
+         "give the only node on the bus another number",
+         node_arguments,
+         true,
+         false,
+         "node",
+         {},
+         asks_all}),
     author::command<report, surveyed, configure, to<Order::rate>, Order::rate>(
-        {"bitrate", Verb::config_set, 0, "set the bit rate of the only node on the bus", rate_arguments, true, false}),
+        {"bitrate",
+         Verb::config_set,
+         0,
+         "set the bit rate of the only node on the bus",
+         rate_arguments,
+         true,
+         false,
+         {},
+         {},
+         asks_all}),
     author::command<report, found, change, to<Order::direction>, Order::direction>(
         {"direction", Verb::config_set, 0, "set the counting direction", direction_arguments, true, false}),
 };
@@ -181,7 +202,7 @@ bool awaits_answer(const Options&, Frame request) {
 constexpr author::Declaration<Protocol, VirtualNode> declaration{
     .id = "raa38-can",
     .name = "RAA38S6 on CAN",
-    .document = "RAA38S6 manual, 3.4.1 CANopen",
+    .document = "Absolute Encoder Operation Manual, RAA38S6 series",
     .link = LinkKind::can,
     .options = options.infos,
     .format = author::format_of<options>,

@@ -9,8 +9,12 @@ namespace absenc::raa38::rtu {
 
 [[nodiscard]] inline Options options_of(const Format& format) {
   Options options;
-  options.values = {format.address, format.bits, format.registers, static_cast<std::int64_t>(format.baud),
-                    static_cast<std::int64_t>(format.data)};
+  options.values = {format.address,
+                    format.bits,
+                    format.registers,
+                    static_cast<std::int64_t>(format.baud),
+                    static_cast<std::int64_t>(format.data),
+                    static_cast<std::int64_t>(format.address_crc)};
   return options;
 }
 

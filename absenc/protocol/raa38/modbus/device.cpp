@@ -34,6 +34,7 @@ void VirtualEncoder::request(Bytes body, Time at, FrameBytes& reply) {
     expect_company();
     reply.append(body);
     reply.push_back(address());
+    order_crc(format_.address_crc);
     return;
   }
   if (body[0] != address()) return;

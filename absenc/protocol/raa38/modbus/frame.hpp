@@ -75,6 +75,7 @@ struct Format {
   unsigned registers = 0;  // to ask for: 1, 2; 0: as many as the bits need
   std::size_t baud = baud_at_shipping;
   Data data = Data::four_bytes;
+  CrcOrder address_crc = CrcOrder::low_first;  // virtual: of its reply to A0; low_first or high_first
 
   [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }

@@ -79,7 +79,7 @@ Explanation explain_request(Error error, Bytes request) {
       return {"this is not the length of a request with this function", {}};
     case Error::bad_checksum:
       if (modbus::crc_order(request) == CrcOrder::high_first) return other_crc_order;
-      return {"the checksum of the request is wrong", "check whether it was captured as a whole"};
+      return {{}, "check whether it was captured as a whole"};
     case Error::unsupported:
       return {"the encoder knows functions 03, A0, A1 and CC", "check that the request is for this encoder"};
     case Error::unexpected_reply:
@@ -134,10 +134,37 @@ Part<Result<Reply>> look(Dialog& dialog, std::uint8_t address, unsigned attempts
   co_return reply;
 }
 
-// The encoder before its setting is changed.
-Part<Reply> look_first(Dialog& dialog) {
-  const Result<Reply> reply = co_await look(dialog, dialog.format().address, 3);
-  if (!reply) co_await dialog.stop({reply.error()});
+void set_rate(Dialog& dialog, std::uint32_t rate) {
+  dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
+}
+
+// Nobody answered at the address of the format: ends the command if the encoder tells another one by A0, at the baud
+// rate to which the line is set.
+Part<bool> ask_who_is_there(Dialog& dialog, Found& found, std::uint32_t baud) {
+  const std::uint8_t asked = dialog.format().address;
+  const Result<Reply> told = co_await dialog.attempt(which_address).repeated(2);
+  if (!told || told->address == asked) co_return false;
+  if (baud != dialog.format().line().rate) set_rate(dialog, dialog.format().line().rate);
+  found.words.add("nobody answers at address ").add_number(asked);
+  found.words.add(", but A0 is answered by address ")
+      .add_number(told->address)
+      .add(" at ")
+      .add_number(baud)
+      .add(" baud");
+  co_await dialog.stop(
+      only(Error::timeout, found.words.view(), "set address and baud to these; `absenc scan` asks every address"));
+  co_return true;
+}
+
+// The encoder at the address of the format, so often at the most.
+Part<Reply> look_at_it(Dialog& dialog, Found& found, unsigned attempts) {
+  const Result<Reply> reply = co_await look(dialog, dialog.format().address, attempts);
+  if (!reply) {
+    const Outcome failed{reply.error()};
+    const bool silent = reply.error() == Error::timeout && !dialog.is_noisy();
+    if (silent) co_await ask_who_is_there(dialog, found, dialog.format().line().rate);
+    co_await dialog.stop(failed);
+  }
   co_return *reply;
 }
 
@@ -146,10 +173,6 @@ void show_position(const Dialog& dialog, Found& found) {
   found.reading = dialog.last_reading();
   found.singleturn = dialog.last().singleturn;
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
-}
-
-void set_rate(Dialog& dialog, std::uint32_t rate) {
-  dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
 }
 
 // Where a setting put the encoder it must answer, or else, when it did not take it, where it was.
@@ -175,17 +198,16 @@ Part<Outcome> look_for_it(Dialog& dialog, std::uint8_t address, std::uint32_t ra
 // ---- Reading
 
 Procedure look_once(Dialog& dialog, Found& found) {
-  const Result<Reply> reply = co_await look(dialog, dialog.format().address, 1);
-  if (!reply) co_return {reply.error()};
+  co_await look_at_it(dialog, found, 1);
   show_position(dialog, found);
   co_return done;
 }
 
 Procedure look_at_direction(Dialog& dialog, Found& found) {
-  const Result<Reply> reply = co_await look(dialog, dialog.format().address, 1);
-  found.singleturn = reply->singleturn;
+  const Reply reply = co_await look_at_it(dialog, found, 1);
+  found.singleturn = reply.singleturn;
   found.direction = "the encoder does not tell: turn the shaft and see";
-  co_return {reply.error()};
+  co_return done;
 }
 
 Procedure ask_address(Dialog& dialog, Found& found) {
@@ -204,12 +226,15 @@ Procedure find_baud(Dialog& dialog, Found& found) {
   if (first || first.error() == Error::request_rejected) co_return done;  // a refusal is understood
   if (dialog.is_noisy()) co_return {first.error()};
   const Explanation reason = explain_reply(read_request(dialog.format()), first.error(), dialog.reply());
+  if (first.error() == Error::timeout) co_await ask_who_is_there(dialog, found, bauds[own]);
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (i == own) continue;
     found.baud = bauds[i];
     set_rate(dialog, bauds[i]);
     const Result<Reply> reply = co_await look(dialog, dialog.format().address, 2);
     const bool there = reply || reply.error() == Error::request_rejected;
+    const bool silent = reply.error() == Error::timeout && !dialog.is_noisy();
+    if (silent) co_await ask_who_is_there(dialog, found, bauds[i]);
     if (!there && !dialog.is_noisy()) continue;
     set_rate(dialog, bauds[own]);
     co_return {there ? Error::none : reply.error()};
@@ -261,7 +286,7 @@ Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
   const Format& format = dialog.format();
   found.address = address;
   found.written = false;
-  co_await look_first(dialog);
+  co_await look_at_it(dialog, found, 3);
   if (address == format.address && arguments[1] == 0) co_return done;
   if (address != format.address) {
     const Result<Reply> other = co_await look(dialog, address, 3);
@@ -294,7 +319,7 @@ Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
   found.baud = bauds[*baud];
   found.written = false;
   set_rate(dialog, format.line().rate);  // a port that cannot change its rate must say so before the encoder has
-  co_await look_first(dialog);
+  co_await look_at_it(dialog, found, 3);
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
   // Its reply may come at the new rate.
@@ -310,7 +335,7 @@ Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
   const auto value = static_cast<std::uint8_t>(arguments[0]);
   found.parameter = value;
   found.setting = name_of_setting(value);
-  const std::uint32_t before = (co_await look_first(dialog)).singleturn;
+  const std::uint32_t before = (co_await look_at_it(dialog, found, 3)).singleturn;
   found.written = true;
   const Result<Reply> echo = co_await dialog.attempt(setting(dialog.format(), value));
   if (!echo) {
@@ -333,9 +358,9 @@ Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
 
 Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
   const unsigned bits = dialog.format().bits;
-  const Reply first = co_await look_first(dialog);
+  const Reply first = co_await look_at_it(dialog, found, 3);
   co_await dialog.rest(between_looks);
-  const Reply second = co_await look_first(dialog);
+  const Reply second = co_await look_at_it(dialog, found, 3);
   const Explanation why_not =
       objection_to_zero(position_reading(first.singleturn, bits), position_reading(second.singleturn, bits));
   if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};

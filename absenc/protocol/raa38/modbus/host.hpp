@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "absenc/protocol/raa38/modbus/frame.hpp"
+#include "absenc/protocol/sentence.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::raa38::rtu {
@@ -42,9 +43,12 @@ struct Values {
 /// What became of a command.
 struct Found : Values {
   Reading reading{};
+  Sentence words{};  // of the error
 };
 
 using Dialog = author::DialogOf<Protocol>;
+
+// Where nobody answers at the address of the format, all of these ask A0, and name the address that it told.
 
 /// One position.
 author::Procedure look_once(Dialog& dialog, Found& found);

@@ -126,6 +126,38 @@ TEST(Raa38ModbusHost, TheAddressIsAskedOfWhoeverIsThere) {
   EXPECT_TRUE(ended(bench.does(Format{.address = 7}, "address"), Error::timeout));
 }
 
+TEST(Raa38ModbusHost, TheAddressIsTakenInBothOrdersOfItsCrc) {
+  for (const CrcOrder order : {CrcOrder::low_first, CrcOrder::high_first}) {
+    Bench bench({.address = 42, .address_crc = order});
+    const Wire reply = bench.raw(framed({0xFF, 0xA0}));
+    EXPECT_EQ(modbus::crc_order(reply), order);
+    EXPECT_EQ(bench.does("address").fields, "address=42 ");
+    EXPECT_EQ(bench.does("scan").fields, "encoder_address=42 clash=0 ");
+    EXPECT_EQ(modbus::crc_order(bench.raw(framed({42, 3, 0, 0, 0, 1}))), CrcOrder::low_first) << "no other reply";
+  }
+}
+
+TEST(Raa38ModbusHost, AtAWrongAddressTheRightOneIsNamed) {
+  const std::pair<std::string_view, std::vector<std::int64_t>> commands[]{{"baud", {}},           {"direction", {}},
+                                                                          {"set-address", {2}},   {"set-baud", {9600}},
+                                                                          {"set-direction", {1}}, {"zero", {0}}};
+  for (const auto& [command, arguments] : commands) {
+    Bench bench({.address = 42});
+    const End end = bench.does(Format{.address = 5}, command, arguments);
+    EXPECT_TRUE(
+        ended(end, Error::timeout, "nobody answers at address 5, but A0 is answered by address 42 at 19200 baud"))
+        << command;
+    EXPECT_EQ(bench.encoder().settings().writes(), 0u);
+    bench.add({.address = 43});  // their answers to A0 collide
+    EXPECT_TRUE(ended(bench.does(Format{.address = 5}, command, arguments), Error::timeout, "nobody answers at this"));
+  }
+  Bench bench({.address = 42});
+  bench.encoder().memory()[1] = 4;
+  bench.encoder().power_on(bench.line.now(), PowerOn::skip);
+  bench.line.wake(0);
+  EXPECT_TRUE(ended(bench.does(Format{.address = 5}, "baud"), Error::timeout, "by address 42 at 57600 baud"));
+}
+
 TEST(Raa38ModbusHost, TheBaudRateIsFound) {
   for (std::size_t set = 0; set < bauds.size(); ++set) {
     for (std::size_t told = 0; told < bauds.size(); ++told) {
@@ -137,8 +169,10 @@ TEST(Raa38ModbusHost, TheBaudRateIsFound) {
     }
   }
   Bench bench;
-  EXPECT_TRUE(ended(bench.does(Format{.address = 2}, "baud"), Error::timeout, "any of the five"));
+  EXPECT_TRUE(ended(bench.does(Format{.address = 2}, "baud"), Error::timeout, "by address 1"));
   EXPECT_TRUE(ended(bench.does("position"), Error::none)) << "the line is as it was";
+  bench.encoder().power_off(bench.line.now());
+  EXPECT_TRUE(ended(bench.does("baud"), Error::timeout, "any of the five"));
 }
 
 TEST(Raa38ModbusHost, ScanFindsASingleOneByAskingAll) {

@@ -22,6 +22,7 @@ using author::probeable;
 constexpr std::array<std::string_view, 3> register_choices{"auto", "1", "2"};
 constexpr std::array<std::string_view, bauds.size()> baud_choices{"2400", "4800", "9600", "19200", "57600"};
 constexpr std::array<std::string_view, 3> data_choices{"four", "three", "three_as_four"};
+constexpr std::array<std::string_view, 2> crc_choices{"low_first", "high_first"};
 
 constexpr auto options = author::OptionsOf{
     author::with_role<Role::encoder>(
@@ -33,6 +34,10 @@ constexpr auto options = author::OptionsOf{
     option<&Format::data>("reply_data",
                           "virtual encoder: bytes of data for two registers, and how many the byte count says",
                           data_choices),
+    option<&Format::address_crc>("address_crc",
+                                 "virtual encoder: which byte of the CRC comes first in its reply to A0; the document "
+                                 "can be read in both ways",
+                                 crc_choices),
 };
 
 constexpr Argument force{"force",    "1: also what is so already (each time wears the memory)", 0, 1, 0, false,
@@ -268,7 +273,7 @@ constexpr Result<Request> guess_request(const Format& format, Bytes reply) { ret
 constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .id = "raa38-modbus",
     .name = "RAA38S6 over Modbus RTU",
-    .document = "RAA38S6 Operation Manual, 3.1.7",
+    .document = "Absolute Encoder Operation Manual, RAA38S6 series",
     .link = LinkKind::half_duplex,
     .options = options.infos,
     .format = author::format_of<options>,

@@ -11,11 +11,16 @@ namespace absenc::raa38::serial {
 
 namespace {
 
+// A request of a bus tells the mode, whatever the option says.
+bool is_on_bus(const Format& format, Bytes request) {
+  return format.mode == Mode::bus || decode_request(request).has_value();
+}
+
 Explanation explain_other(const Format& format, Bytes request, Bytes reply) {
   if (reply.empty()) return {"a request is BC AA Bx or BC AA Cx", {}};
   const Result<Request> asked = decode_request(request);
   if (asked && asked->kind == Request::Kind::zero_clear) return {"nothing answers BC AA Cx", {}};
-  if (format.mode != Mode::bus) {
+  if (!is_on_bus(format, request)) {
     return {"it is no frame: FF 81 is missing, or on a bus FF Bx", "check mode, baud and second_byte"};
   }
   return {"another unit answered, or no frame came: FF 81 or FF Bx answers BC AA Bx, with the same x",
@@ -47,7 +52,7 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
           "make three",
           "check bits and baud"};
     case Error::bad_checksum:
-      if (format.mode != Mode::bus) return {};
+      if (!is_on_bus(format, request)) return {};
       return {"two encoders with one number, or a bad line",
               "`absenc scan` shows who answers; check numbers, termination and baud"};
     case Error::unexpected_reply:

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/protocol/encolink/channel_follower.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absenc/protocol/encolink/unit.hpp"
+
+namespace absenc::encolink {
+namespace {
+
+constexpr Format format{.resolution = 20, .multiturn_bits = 16};
+constexpr Position here{.singleturn = 12'345, .multiturn = 7};
+
+struct Told {
+  std::vector<std::uint8_t> request;
+  std::vector<std::uint8_t> reply;
+  std::uint64_t first;
+  Error error;
+};
+
+/// Exchanges of an encoder that stands still, as a capture has them.
+struct Conversation {
+  /// `channel2`: the byte behind the reply.
+  void exchange(std::uint8_t config, std::uint8_t ra, std::uint8_t channel2, const Position& at = here) {
+    Position position = at;
+    position.channel2 = channel2;
+    const std::array<std::uint8_t, 2> request{config, ra};
+    follower.follow(number++, request, encode_position(format, position));
+    take();
+  }
+  void reset() { exchange(0xAA, 0, 0); }
+  /// All frames of a cycle, with these `ra` bytes.
+  void cycle(std::uint8_t channel3 = channel3::idle, std::uint16_t status = 0, Bytes ra = {}, Position at = here) {
+    const ReplyBytes bytes = encode_cycle(format, {at, status, channel3});
+    for (std::size_t i = 0; i < bytes.size(); ++i) exchange(0, i < ra.size() ? ra[i] : std::uint8_t{0}, bytes[i]);
+  }
+  /// As many cycles as it takes.
+  void ask(const RegisterRequest& request) {
+    for (Bytes left = encode_access(request).view(); !left.empty();) {
+      const AccessBytes all = encode_access(request);
+      cycle(channel3::idle, 0, all.view().subspan(asked));
+      asked += format.cycle_bytes();
+      left = all.view().subspan(std::min(asked, all.size()));
+    }
+    asked = 0;
+  }
+  void take() {
+    Composed one;
+    while (follower.take(one)) {
+      told.push_back(
+          {{one.request.begin(), one.request.end()}, {one.reply.begin(), one.reply.end()}, one.first, one.error});
+    }
+  }
+  /// Accesses, not cycles.
+  [[nodiscard]] std::vector<Told> accesses() const {
+    std::vector<Told> all;
+    for (const Told& one : told) {
+      if (!one.request.empty()) all.push_back(one);
+    }
+    return all;
+  }
+
+  ChannelFollower follower{format};
+  std::uint64_t number = 0;
+  std::size_t asked = 0;
+  std::vector<Told> told;
+};
+
+struct Fields final : FieldSink {
+  void put(const FieldValue& value) override {
+    text += std::string(value.info->name) + "=" + std::to_string(value.number) + " ";
+  }
+  std::string text;
+};
+
+Error decode_as_unit(const Told& one, std::string& fields) {
+  Options options;
+  EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
+  Fields sink;
+  const Error error = unit.decode(options, {.bytes = one.request}, {.bytes = one.reply}, sink);
+  fields = sink.text;
+  return error;
+}
+
+TEST(EncolinkFollower, ACycleIsWhatItsFramesCarry) {
+  Conversation line;
+  line.reset();
+  line.cycle(channel3::idle, status::temperature);
+  line.cycle();
+  ASSERT_EQ(line.told.size(), 2u);
+  const ReplyBytes expected = encode_cycle(format, {here, status::temperature, channel3::idle});
+  EXPECT_EQ(line.told[0].reply, std::vector(expected.view().begin(), expected.view().end()));
+  EXPECT_EQ(line.told[0].first, 1u);
+  EXPECT_EQ(line.told[1].first, 10u);
+  std::string fields;
+  EXPECT_EQ(decode_as_unit(line.told[0], fields), Error::none);
+  EXPECT_NE(fields.find(" alarms=16 "), std::string::npos) << fields;
+}
+
+TEST(EncolinkFollower, WithoutAResetACycleIsFoundByChecksumAndPosition) {
+  Conversation line;
+  for (int i = 0; i < 4; ++i) line.exchange(0, 0, 0x55);
+  line.cycle();
+  line.cycle();
+  ASSERT_EQ(line.told.size(), 2u);
+  EXPECT_EQ(line.told[0].first, 4u);
+  EXPECT_EQ(line.told[0].error, Error::none);
+}
+
+TEST(EncolinkFollower, APositionOfItsOwnIsAnError) {
+  Conversation line;
+  Position other = here;
+  other.singleturn ^= 1;
+  line.cycle(channel3::idle, 0, {}, other);
+  EXPECT_TRUE(line.told.empty()) << "it may be no cycle";
+  line.reset();
+  line.cycle(channel3::idle, 0, {}, other);
+  ASSERT_EQ(line.told.size(), 1u);
+  EXPECT_EQ(line.told[0].error, Error::cross_check_failed);
+}
+
+TEST(EncolinkFollower, ALostFrameEndsTheCycleAndTheNextIsFound) {
+  Conversation line;
+  line.reset();
+  line.exchange(0, 0, 1);
+  line.follower.lose();
+  for (int i = 0; i < 3; ++i) line.exchange(0, 0, 0x55);
+  EXPECT_TRUE(line.told.empty());
+  line.cycle();
+  EXPECT_EQ(line.told.size(), 1u);
+}
+
+TEST(EncolinkFollower, ARegisterIsReadOverManyFrames) {
+  Conversation line;
+  line.reset();
+  line.ask(read_request(0x4C, 2));
+  for (const std::uint8_t byte : {channel3::busy, channel3::read_ready, std::uint8_t{0x09}, std::uint8_t{0x01}}) {
+    line.cycle(byte);
+  }
+  EXPECT_TRUE(line.accesses().empty()) << "a byte of its data is missing";
+  line.cycle(0x5E);
+  line.cycle();
+  const std::vector<Told> told = line.accesses();
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0].reply, (std::vector<std::uint8_t>{0x88, 0x09, 0x01, 0x5E}));
+  EXPECT_EQ(told[0].first, 1u);
+  std::string fields;
+  EXPECT_EQ(decode_as_unit(told[0], fields), Error::none);
+  EXPECT_NE(fields.find("address=76 "), std::string::npos) << fields;
+}
+
+TEST(EncolinkFollower, ARefusalIsOneWithItsReason) {
+  for (const bool writes : {false, true}) {
+    Conversation line;
+    line.reset();
+    line.ask(writes ? write_request(0x4C, 2, 1) : read_request(0x4C, 3));
+    line.cycle(writes ? channel3::write_ready : channel3::read_ready);
+    line.cycle(static_cast<std::uint8_t>(writes ? AccessStatus::denied : AccessStatus::byte_count));
+    for (int i = 0; i < 4; ++i) line.cycle(0);  // bytes that mean nothing follow
+    const std::vector<Told> told = line.accesses();
+    ASSERT_EQ(told.size(), 1u);
+    std::string fields;
+    EXPECT_EQ(decode_as_unit(told[0], fields), Error::request_rejected);
+    Options options;
+    EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
+    const Explanation why =
+        unit.explain(options, Error::request_rejected, {.bytes = told[0].request}, {.bytes = told[0].reply});
+    EXPECT_EQ(why.detail, text_of(writes ? AccessStatus::denied : AccessStatus::byte_count));
+  }
+}
+
+TEST(EncolinkFollower, AResetForgetsWhatWasAsked) {
+  Conversation line;
+  line.reset();
+  line.ask(read_request(0x4C, 2));
+  line.reset();
+  for (const std::uint8_t byte : {channel3::read_ready, std::uint8_t{0x09}, std::uint8_t{1}, std::uint8_t{2}}) {
+    line.cycle(byte);
+  }
+  EXPECT_TRUE(line.accesses().empty());
+  EXPECT_EQ(line.told.size(), 6u);
+}
+
+}  // namespace
+}  // namespace absenc::encolink
