@@ -49,8 +49,6 @@ enum class Ailment : std::uint8_t {
   bytes_missing,
   same_address,
   wrong_settings,
-  contradiction,
-  other_content,
   other_checksum,
   contradictory,
   always_damaged,
