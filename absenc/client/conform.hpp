@@ -47,6 +47,7 @@ struct Conformance {
 struct ConformChoices {
   std::size_t readings = 100;    // at least 1
   bool changes = false;          // also the clauses that change the encoder, which is put back as it was
+  bool resets = false;           // of these also what loses a zero, turns and alarms, which nothing brings back
   std::function<bool()> over{};  // from the moment on in which it is true, all ends with Cancelled; empty: never
 };
 

@@ -12,37 +12,79 @@
 
 namespace absenc {
 
-/// What is looked at. Up to `unknown_reported` it is seen by reading; the others change the encoder, and only such
-/// things as can be put back.
+/// What is looked at.
 enum class Demand : std::uint8_t {
-  answered,  // each request of a reading gets a reply
+  // Of readings, whose requests any host sends
+  answered,  // each request, pulse or transfer gets a reply
+  streamed,  // frames come by themselves
   in_time,   // the reply begins within the time that the unit waits for it: documents give typical times, no limits
   whole,     // replies have the length of the document
   checked,   // their checksum is right
   as_drawn,  // fixed bits, echoes, ranges, and what must agree
-  foreign_silent,    // a request to another address is not answered
-  damaged_silent,    // nor is one whose last byte has a wrong bit
-  unknown_silent,    // nor is `request`
-  unknown_reported,  // `request` gets a reply of `reply_size` bytes
-  byte_written,      // what is written to the byte at `page` and `address` is read again
-  byte_alone,        // and the bytes beside it stay as they are
-  set,               // `setting` is what it was set to: `value`, or `other` where it is that already
-  zeroed,   // the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
-  reset,    // the command `verb` is obeyed: only where what it resets is so already
+  does,      // `command` ends well each time, with all that it compares
+  // Of requests that no host sends
+  foreign_silent,  // a request to another address is not answered
+  reacts,          // to `ask` the encoder does as `reaction` says
+  // Of changes, which are put back
+  byte_written,  // what is written to the byte at `page` and `address` is read again
+  byte_alone,    // and the bytes beside it stay as they are
+  page_alone,    // and so does the byte of page `other` at the same address
+  byte_busy,     // while it is written, a request to read it is answered as busy, and the byte is read again later
+  page_closed,   // what `page` does not have at `address` is asked for by `ask`
+  set,           // `setting` is what it was set to: `value`, or `other` where it is that already
+  zeroed,        // the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
+  mirrored,      // of the directions 0 and 1 of `setting`, which nothing reads, one mirrors the position
+  paced,         // after `command` with `value` so many frames a second come by themselves; `stop` ends them
+  // Of what nothing can bring back
+  zero,     // after the zero command the position is 0, which it was not
+  reset,    // after `verb` what it resets is reset, and was not
   restarts  // after the command `command` it is silent at first, and has the same position behind `value` ms
 };
 
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
+/// Whether something may be lost by it: a position, turns, an alarm.
+[[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
 
+/// A bit for each Error.
+using Errors = std::uint32_t;
+template <class... Some>
+[[nodiscard]] constexpr Errors any_of(Some... errors) {
+  return ((Errors{1} << static_cast<unsigned>(errors)) | ...);
+}
+/// Of replies that are not as the document draws them.
+inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpected_reply, Error::out_of_range,
+                                             Error::sequence_mismatch, Error::cross_check_failed, Error::line_stuck);
+
+/// A request that a clause sends beside those of readings.
+struct Ask {
+  std::string_view wire{};  // as it stands on the wire: "a2"
+  Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;  // where options matter
+  bool wrong_end = false;      // the request for a position, its last byte with a wrong bit
+  std::uint32_t permille = 0;  // sent at this part of the rate, so that its last bit is where the stop bit should be
+};
+
+enum class Reaction : std::uint8_t {
+  silent,
+  reply,              // a good one to the request of the command `as`
+  refusal,            // the same, which says that the request was wrong
+  refusal_or_silent,  // the document says both
+};
+
+/// What the document demands of an encoder. It is kept only by a run that saw what it is about: the requests that it
+/// names were sent, good replies came, a wrong bit in one of these would have been seen, a value was another before.
+/// The engine (client/conform) counts that, by the demand alone.
 struct Clause {
   std::string_view id;         // unique in its unit: "crc"
   std::string_view paragraph;  // of the unit's document
   std::string_view words;
   Demand demand;
-  std::uint8_t request = 0;     // a whole request of one byte
-  std::uint8_t reply_size = 0;  // to it
-  std::string_view option{};    // with which it is read for this; "": as the user has it
-  std::int64_t value = 0;       // of this option, or as the demand says
+  std::string_view needs{};  // options with which the document demands it: "carries=biss", "crc_width!=0"
+  Errors errors = 0;         // as_drawn: those that break it; 0: form_errors
+  Ask ask{};
+  Reaction reaction = Reaction::silent;
+  std::string_view as{};      // the command whose reply is demanded; "": a reply to what was sent
+  std::string_view option{};  // with which it is read for this; "": as the user has it
+  std::int64_t value = 0;     // of this option, or as the demand says
   std::uint32_t page = 0;
   std::uint32_t address = 0;
   std::string_view setting{};  // by which it is written and read, as `config set` has it
@@ -50,6 +92,8 @@ struct Clause {
   std::int64_t other = 0;
   Verb verb = Verb::run;
   std::string_view command{};
+  std::string_view stop{};
+  std::string_view shown_with{};  // options of a virtual encoder that shows it, where its defaults do not
 };
 
 /// What is looked at when a host is tested.

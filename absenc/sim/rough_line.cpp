@@ -210,7 +210,7 @@ void RoughLine<Item>::run_device() {
 template <class Item>
 void RoughLine<Item>::feed(const Event<Item>& event) {
   using Kind = typename Event<Item>::Kind;
-  if (event.kind == Kind::received) side_.silence.heard(event.at);
+  if (event.kind == Kind::received || event.kind == Kind::line_error) side_.silence.heard(event.at);
   if (event.kind == Kind::sent) side_.silence.sent(event.at);
   device_.feed(event);
   serve_device();

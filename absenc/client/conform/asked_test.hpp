@@ -5,8 +5,12 @@
 #include <fmt/format.h>
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absenc/client/conform.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
 
 namespace absenc::client {
@@ -24,6 +28,48 @@ inline EncoderAddress asked_address(const std::string& text) {
     }
   }
   return usual;
+}
+
+/// The unit with its defaults, and with each option at another value: each choice, both ends of a range, and beside its
+/// default. Those that no virtual encoder has are left out.
+inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
+  std::vector<EncoderAddress> all{parse_address(fmt::format("sim:{}", unit.id))};
+  const auto add = [&](const Option& option, std::int64_t value) {
+    try {
+      const std::string text = fmt::format("sim:{}?{}={}", unit.id, option.name, to_text(option, value));
+      EncoderAddress address = parse_address(text);
+      const VirtualDevice device(unit, address.options, address.device);
+      all.push_back(std::move(address));
+    } catch (const UsageError&) {  // such an encoder there is not
+    }
+  };
+  for (const Option& option : unit.options) {
+    for (std::size_t i = 0; i < option.choices.size(); ++i) add(option, static_cast<std::int64_t>(i));
+    if (!option.choices.empty()) continue;
+    for (const std::int64_t value :
+         {option.minimum, option.maximum, option.default_value - option.step, option.default_value + option.step}) {
+      if (value >= option.minimum && value <= option.maximum && value != option.default_value) add(option, value);
+    }
+  }
+  return all;
+}
+/// "crc_width=0": in what it is not as usual.
+inline std::string variation_name(const EncoderAddress& address) {
+  const EncoderAddress usual = parse_address(fmt::format("sim:{}", address.unit->id));
+  for (std::size_t i = 0; i < address.unit->options.size(); ++i) {
+    const Option& option = address.unit->options[i];
+    const std::int64_t value = address.options.values[i];
+    if (value != usual.options.values[i])
+      return fmt::format("{} {}={}", address.unit->id, option.name, to_text(option, value));
+  }
+  return std::string(address.unit->id);
+}
+
+/// Of a test that is made for each unit.
+inline std::string test_name(const Unit& unit) {
+  std::string name(unit.id);
+  for (char& letter : name) letter = letter == '-' ? '_' : letter;
+  return name;
 }
 
 inline bool all_kept(const Conformance& conformance) {

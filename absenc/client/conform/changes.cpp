@@ -12,6 +12,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/error.hpp"
 
 namespace absenc::client {
@@ -36,6 +37,14 @@ std::int64_t number_of(const Answer& answer, std::string_view field) {
   throw Refused{fmt::format("{} was not told", field)};
 }
 
+struct BusySink final : FieldSink {
+  void put(const FieldValue& field) override {
+    if (field.info->name == "busy") reply.busy = field.number != 0;
+    if (field.info->role == Role::value) reply.value = field.number;
+  }
+  BusyReply reply;
+};
+
 }  // namespace
 
 bool is_near(const Reading& reading, std::uint64_t wanted) {
@@ -59,14 +68,28 @@ void Changes::test_one(const Clause& clause, ClauseResult& result) {
   try {
     switch (clause.demand) {
       case Demand::byte_written:
-      case Demand::byte_alone:
         return test_byte(clause, result);
+      case Demand::byte_alone:
+      case Demand::page_alone:
+        return test_bytes_beside(clause, result);
+      case Demand::byte_busy:
+        return test_busy(clause, result);
+      case Demand::page_closed:
+        return test_closed(clause, result);
       case Demand::set:
         return test_setting(clause, result);
       case Demand::zeroed:
-        return test_zero(clause, result);
+        return test_offset(clause, result);
+      case Demand::mirrored:
+        return test_direction(clause, result);
+      case Demand::paced:
+        return test_pace(clause, result);
+      case Demand::zero:
+        return test_zero(result);
       case Demand::reset:
         return test_reset(clause, result);
+      case Demand::restarts:
+        return test_restart(clause, result);
       default:
         return;
     }
@@ -78,89 +101,268 @@ void Changes::test_one(const Clause& clause, ClauseResult& result) {
   }
 }
 
+// ---- The memory
+
 void Changes::test_byte(const Clause& clause, ClauseResult& result) {
-  const bool alone = clause.demand == Demand::byte_alone;
   if (!clause.setting.empty()) save_setting(clause);  // which reading the memory changes
-  const std::uint32_t first = alone && clause.address >= beside ? clause.address - beside : clause.address;
-  for (std::uint32_t at = first; at <= clause.address; ++at) save_byte(clause, at);
+  const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Saved& byte = saved_.back();
-  const std::int64_t written = byte.value ^ 0xFF;
-  write(byte, written);
-  if (!alone) {
-    const std::int64_t now = value_of(byte);
-    return conclude(result, now == written, fmt::format("0x{:02X} was written, 0x{:02X} is read", written, now));
-  }
-  const auto others = std::span(saved_).first(saved_.size() - 1).last(clause.address - first);
-  const auto same =
-      std::count_if(others.begin(), others.end(), [&](const Saved& other) { return value_of(other) == other.value; });
-  conclude(result, same == std::ssize(others), fmt::format("{} of {} are as before", same, others.size()));
+  byte.write(written);
+  const std::int64_t now = byte.look();
+  conclude(result, now == written,
+           fmt::format("0x{:02X} was there, 0x{:02X} was written, 0x{:02X} is read", byte.value, written, now));
 }
+
+void Changes::test_bytes_beside(const Clause& clause, ClauseResult& result) {
+  if (!clause.setting.empty()) save_setting(clause);
+  const std::size_t settings = saved_.size();
+  if (clause.demand == Demand::page_alone) {
+    save_byte(static_cast<std::uint32_t>(clause.other), clause.address);
+  } else {
+    for (std::uint32_t at = clause.address - beside; at < clause.address; ++at) save_byte(clause.page, at);
+  }
+  const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
+  saved_.back().write(written);
+  const auto others = std::span(saved_).subspan(settings).first(saved_.size() - settings - 1);
+  const auto same =
+      std::count_if(others.begin(), others.end(), [](const Saved& other) { return other.look() == other.value; });
+  const std::int64_t now = saved_.back().look();
+  std::string seen = fmt::format("{} of {} others are as before, when 0x{:02X} was written and 0x{:02X} is read", same,
+                                 others.size(), written, now);
+  if (same != std::ssize(others)) return conclude(result, false, std::move(seen));
+  // What was not written could not reach them.
+  result.evidence = seen;
+  if (now == written) conclude(result, true, std::move(seen));
+}
+
+// The requests by themselves: the commands wait until the memory is ready.
+void Changes::test_busy(const Clause& clause, ClauseResult& result) {
+  const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
+  const Command& reader = *find_command(unit_, Verb::memory_read);
+  const Command& writer = *find_command(unit_, Verb::memory_write);
+  const Sent wrote = send(
+      writer,
+      role_arguments(writer, {{Role::page, clause.page}, {Role::address, clause.address}, {Role::value, written}}));
+  const auto where =
+      role_arguments(reader, {{Role::page, clause.page}, {Role::address, clause.address}, {Role::count, 1}});
+  const Sent asked = send(reader, where);
+  line_.rest(settling);
+  const std::int64_t now = saved_.back().look();
+  std::string seen = fmt::format("{}; later 0x{:02X} is read, 0x{:02X} was written",
+                                 what_came(unit_.link, asked.request.frame(), asked.reply.frame()), now, written);
+  const std::optional<BusyReply> accepted = busy_reply(wrote);
+  const std::optional<BusyReply> reply = busy_reply(asked);
+  result.evidence = "the byte could not be written: " + seen;
+  if (!accepted || accepted->busy || now != written) return;
+  // It may be ready already: nothing says how long it takes at least.
+  result.evidence = "it was not busy any more: " + seen;
+  if (reply && !reply->busy && reply->value == written) return;
+  conclude(result, reply && reply->busy, std::move(seen));
+}
+
+// The page that is selected after power on is selected again, by reading a byte of it.
+void Changes::test_closed(const Clause& clause, ClauseResult& result) {
+  save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
+  static_cast<void>(read_byte(clause.page, clause.address));
+  const Sent sent = line_.send(parse_wire_text(unit_.link, "a request", clause.ask.wire).bytes);
+  const bool as_demanded = reply_error(unit_, line_.options(), clause.as, {sent.request, sent.reply}) == Error::none;
+  const std::string seen = what_came(unit_.link, sent.request.frame(), sent.reply.frame());
+  static_cast<void>(read_byte(clause.page, clause.address));  // it answers, and this page is selected
+  conclude(result, as_demanded, seen);
+}
+
+// ---- Settings
 
 void Changes::test_setting(const Clause& clause, ClauseResult& result) {
-  const std::int64_t wanted = save_setting(clause) == clause.value ? clause.other : clause.value;
-  write(saved_.back(), wanted);
-  const std::int64_t now = value_of(saved_.back());
-  conclude(result, now == wanted, fmt::format("set to {}, reads as {}", wanted, now));
+  const std::int64_t before = save_setting(clause);
+  const std::int64_t wanted = before == clause.value ? clause.other : clause.value;
+  saved_.back().write(wanted);
+  const std::int64_t now = saved_.back().look();
+  conclude(result, now == wanted, fmt::format("it was {}, was set to {}, reads as {}", before, wanted, now));
 }
 
-void Changes::test_zero(const Clause& clause, ClauseResult& result) {
+void Changes::test_offset(const Clause& clause, ClauseResult& result) {
   save_setting(clause);
+  const Reading before = read();
   const Command& zero = *find_command(unit_, Verb::zero);
   static_cast<void>(run(zero, complete_arguments(zero, std::array{clause.value})));
-  const Reading reading = read();
-  conclude(result, is_near(reading, 0), fmt::format("then the position is {}", reading.singleturn));
-}
-
-// A reset cannot be undone: it is sent only where it changes nothing.
-void Changes::test_reset(const Clause& clause, ClauseResult& result) {
-  const Reading before = read();
-  const bool turns = clause.verb == Verb::reset_multiturn;
-  if (before.alarms != 0 || (turns && before.multiturn != 0)) {
-    result.evidence = before.alarms != 0
-                          ? "there are alarms, which nothing could raise again"
-                          : fmt::format("there are {} turns, which nothing could bring back", before.multiturn);
-    return;
-  }
-  const Command& command = *find_command(unit_, clause.verb);
-  static_cast<void>(run(command, complete_arguments(command, {})));
   const Reading after = read();
-  conclude(result, after.alarms == 0 && after.multiturn == before.multiturn && is_near(after, before.singleturn),
-           fmt::format("position {}, turns {} before, {}, {} after", before.singleturn, before.multiturn,
-                       after.singleturn, after.multiturn));
+  const std::string seen = fmt::format("the position is {} after {}", after.singleturn, before.singleturn);
+  if (!is_near(after, 0)) return conclude(result, false, seen);
+  result.evidence = seen + ": it was 0 before";
+  if (!is_near(before, 0)) conclude(result, true, seen);
 }
 
-std::int64_t Changes::save_byte(const Clause& clause, std::uint32_t address) {
-  Saved one{.getter = find_command(unit_, Verb::memory_read), .setter = find_command(unit_, Verb::memory_write)};
-  one.where = role_arguments(*one.getter, {{Role::page, clause.page}, {Role::address, address}, {Role::count, 1}});
-  one.arguments = role_arguments(*one.setter, {{Role::page, clause.page}, {Role::address, address}});
-  one.value = value_of(one);
-  const bool paged = find_role(one.setter->arguments, Role::page) != nullptr;
-  one.by_hand = fmt::format("absenc memory write {} 0x{:02X} 0x{:02X}{}", name_, address, one.value,
-                            paged ? fmt::format(" --page {}", clause.page) : "");
+// Which direction it has, only the position shows: as it is now, or mirrored.
+void Changes::test_direction(const Clause& clause, ClauseResult& result) {
+  const Reading before = read();
+  const std::uint64_t turn = std::uint64_t{1} << before.singleturn_bits;
+  const std::uint64_t mirror = (turn - before.singleturn) & (turn - 1);
+  result.evidence = fmt::format("the position is {}, which mirrored is the same", before.singleturn);
+  if (is_near(before, mirror)) return;
+  const Command& setter = *require_setting(unit_, clause.setting).setter;
+  const auto is_mirrored = [this, before, mirror] {
+    const Reading now = read();
+    if (is_near(now, mirror)) return std::int64_t{1};
+    if (is_near(now, before.singleturn)) return std::int64_t{0};
+    throw Refused{
+        fmt::format("the position is {}, neither {} as before nor {}", now.singleturn, before.singleturn, mirror)};
+  };
+  const auto set = [this, &setter](std::int64_t value) {
+    static_cast<void>(run(setter, complete_arguments(setter, std::array{value})));
+  };
+  // The one that brings back the position as it was.
+  save({.look = is_mirrored,
+        .write =
+            [is_mirrored, set, values = std::array{clause.other, clause.value}](std::int64_t wanted) {
+              for (const std::int64_t value : values) {
+                set(value);
+                if (is_mirrored() == wanted) return;
+              }
+            },
+        .by_hand = fmt::format("absenc config set {} {} {}, or {}, until the position is {} again", name_,
+                               clause.setting, clause.other, clause.value, before.singleturn)});
+  set(clause.value);
+  const std::int64_t first = is_mirrored();
+  set(clause.other);
+  const std::int64_t second = is_mirrored();
+  const auto words = [](std::int64_t mirrored) { return mirrored != 0 ? "mirrored" : "as before"; };
+  conclude(
+      result, first != second,
+      fmt::format("with {} the position is {}, with {} {}", clause.value, words(first), clause.other, words(second)));
+}
+
+void Changes::test_pace(const Clause& clause, ClauseResult& result) {
+  constexpr Time heard_for = std::chrono::milliseconds(2200);  // of one a second two are heard
+  const Command& start = *find_command(unit_, clause.command);
+  const Command& stop = *find_command(unit_, clause.stop);
+  const auto look = [this] { return line_.hear(heard_for).per_second(); };
+  const auto write = [this, &start, &stop](std::int64_t value) {
+    if (value == 0) static_cast<void>(run(stop, complete_arguments(stop, {})));
+    if (value != 0) static_cast<void>(run(start, complete_arguments(start, std::array{value})));
+  };
+  const std::int64_t before = save({.look = look, .write = write});
+  saved_.back().by_hand = before == 0 ? fmt::format("absenc run {} {}", name_, clause.stop)
+                                      : fmt::format("absenc run {} {} {}", name_, clause.command, before);
+  const std::int64_t wanted = before == clause.value ? clause.value / 2 : clause.value;
+  write(wanted);
+  const std::int64_t now = look();
+  write(0);
+  const std::int64_t stopped = look();
+  conclude(result, now == wanted && stopped == 0,
+           fmt::format("{} a second came by themselves, {} when it was told {}, {} when it was told to stop", before,
+                       now, wanted, stopped));
+}
+
+// ---- What nothing can bring back
+
+// Where there is nothing to lose, the command is sent all the same: it may be refused, or do harm.
+bool Changes::may_lose(std::string_view what, ClauseResult& result) const {
+  if (what.empty() || resets_) return true;
+  result.evidence = fmt::format("there is {}, which nothing could bring back: --resets gives it up", what);
+  return false;
+}
+
+void Changes::test_zero(ClauseResult& result) {
+  const Command& zero = *find_command(unit_, Verb::zero);
+  const Reading before = read();
+  const bool differs = !is_near(before, 0);
+  if (!may_lose(before.singleturn != 0 ? fmt::format("a position of {}", before.singleturn) : "", result)) return;
+  static_cast<void>(run(zero, complete_arguments(zero, {})));
+  const Reading after = read();
+  const std::string seen = fmt::format("the position is {} after {}", after.singleturn, before.singleturn);
+  if (!is_near(after, 0)) return conclude(result, false, seen);
+  result.evidence = seen + ": it was 0 before, a command that is ignored would not show";
+  if (differs) conclude(result, true, seen);
+}
+
+void Changes::test_reset(const Clause& clause, ClauseResult& result) {
+  const bool turns = clause.verb == Verb::reset_multiturn;
+  const auto demanded = static_cast<std::uint32_t>(clause.value);
+  const Reading before = read();
+  std::string lost;
+  if (before.alarms != 0) lost = "an alarm";
+  if (turns && before.multiturn != 0) lost = fmt::format("a count of {} turns", before.multiturn);
+  if (!may_lose(lost, result)) return;
+  const Command& command = *find_command(unit_, clause.verb);
+  const Ran ran = line_.run(command, complete_arguments(command, {}));
+  const Reading after = read();
+  std::string seen = fmt::format("position {}, turns {}, alarms {:x} before; {}, {}, {:x} after", before.singleturn,
+                                 before.multiturn, before.alarms, after.singleturn, after.multiturn, after.alarms);
+  // That other alarms remain, which this cannot clear, is said as an error too.
+  const bool obeyed = ran.error == Error::none || (ran.error == Error::cross_check_failed && after.alarms != 0);
+  const bool cleared = (after.alarms & demanded) == 0 && (!turns || after.multiturn == 0);
+  const bool nothing_else = is_near(after, before.singleturn) && (turns || after.multiturn == before.multiturn);
+  if (!obeyed) seen = fmt::format("{} {}; {}", text_of(ran.error).name, ran.detail, seen);
+  if (!obeyed || !cleared || !nothing_else) return conclude(result, false, std::move(seen));
+  const bool differs = turns ? before.multiturn != 0 : (before.alarms & demanded) != 0;
+  result.evidence = fmt::format("{}: there was nothing to reset, a command that is ignored would not show", seen);
+  if (differs) conclude(result, true, std::move(seen));
+}
+
+void Changes::test_restart(const Clause& clause, ClauseResult& result) {
+  const Reading before = read();
+  const bool turns = before.multiturn_bits != 0 && before.multiturn != 0;
+  if (!may_lose(turns ? fmt::format("a count of {} turns", before.multiturn) : "", result)) return;
+  static_cast<void>(send(*find_command(unit_, clause.command), {}));
+  const Ran at_once = line_.run(*find_command(unit_, Verb::read), {});
+  line_.rest(std::chrono::milliseconds(clause.value) + settling);
+  const Reading after = read();
+  const bool silent = !at_once.heard;
+  conclude(result, silent && is_near(after, before.singleturn),
+           fmt::format("at once: {}; later position {}, {} before", silent ? "no answer" : "an answer",
+                       after.singleturn, before.singleturn));
+}
+
+// ---- What was there before
+
+std::int64_t Changes::save(Saved one) {
+  one.value = one.look();
   saved_.push_back(std::move(one));
   return saved_.back().value;
+}
+
+std::int64_t Changes::save_byte(std::uint32_t page, std::uint32_t address) {
+  const Command& setter = *find_command(unit_, Verb::memory_write);
+  const auto write = [this, &setter, page, address](std::int64_t value) {
+    const auto arguments = role_arguments(setter, {{Role::page, page}, {Role::address, address}, {Role::value, value}});
+    static_cast<void>(run(setter, arguments));
+  };
+  const std::int64_t value =
+      save({.look = [this, page, address] { return std::int64_t{read_byte(page, address)}; }, .write = write});
+  const bool paged = find_role(setter.arguments, Role::page) != nullptr;
+  saved_.back().by_hand = fmt::format("absenc memory write {} 0x{:02X} 0x{:02X}{}", name_, address, value,
+                                      paged ? fmt::format(" --page {}", page) : "");
+  return value;
 }
 
 std::int64_t Changes::save_setting(const Clause& clause) {
   const Setting setting = require_setting(unit_, clause.setting);
-  Saved one{.getter = setting.getter, .field = clause.field, .setter = setting.setter};
-  one.where = complete_arguments(*setting.getter, {});
-  one.arguments = complete_arguments(*setting.setter, std::array{clause.value});
-  one.value = value_of(one);
-  one.by_hand = fmt::format("absenc config set {} {} {}", name_, clause.setting, one.value);
+  const auto look = [this, setting, field = clause.field] {
+    const Ran ran = run(*setting.getter, complete_arguments(*setting.getter, {}));
+    const std::int64_t value = number_of(ran.answer, field);
+    line_.follow(*setting.setter, value);
+    return value;
+  };
+  const auto write = [this, setting](std::int64_t value) {
+    static_cast<void>(run(*setting.setter, complete_arguments(*setting.setter, std::array{value})));
+    line_.follow(*setting.setter, value);
+  };
+  const std::int64_t value = save({.look = look, .write = write});
+  std::string by_hand = fmt::format("absenc config set {} {} {}", name_, clause.setting, value);
   if (!setting.setter->changes_option.empty()) {
-    const std::int64_t wanted = one.value == clause.value ? clause.other : clause.value;
-    one.by_hand += fmt::format(" --option {}={}", setting.setter->changes_option, wanted);
+    const std::int64_t wanted = value == clause.value ? clause.other : clause.value;
+    by_hand += fmt::format(" --option {}={}", setting.setter->changes_option, wanted);
   }
-  saved_.push_back(std::move(one));
-  return saved_.back().value;
+  saved_.back().by_hand = std::move(by_hand);
+  return value;
 }
 
 void Changes::put_back() {
   while (!saved_.empty()) {
     const Saved one = std::move(saved_.back());
     saved_.pop_back();
-    if (!put_back(one)) left_.push_back(one.by_hand);
+    if (!put_back(one) && !one.by_hand.empty()) left_.push_back(one.by_hand);
   }
 }
 
@@ -169,9 +371,9 @@ bool Changes::put_back(const Saved& one) {
   for (unsigned i = 0; i < tries; ++i) {
     try {
       line_.rest(settling);
-      if (value_of(one) == one.value) return true;
-      write(one, one.value);
-      if (value_of(one) == one.value) return true;
+      if (one.look() == one.value) return true;
+      one.write(one.value);
+      if (one.look() == one.value) return true;
     } catch (const os::Interrupted&) {
       interrupted_ = true;
     } catch (const os::Ended&) {
@@ -183,36 +385,41 @@ bool Changes::put_back(const Saved& one) {
   return false;
 }
 
-std::int64_t Changes::value_of(const Saved& one) const {
-  const Ran ran = run(*one.getter, one.where);
-  if (!one.field.empty()) {
-    const std::int64_t value = number_of(ran.answer, one.field);
-    line_.follow(*one.setter, value);
-    return value;
-  }
-  if (ran.data.empty()) throw Refused{"no byte was told"};
-  return ran.data.front();
-}
-
-void Changes::write(const Saved& one, std::int64_t value) const {
-  std::vector<std::int64_t> arguments = one.arguments;
-  const Argument* place = find_role(one.setter->arguments, Role::value);
-  arguments[place != nullptr ? static_cast<std::size_t>(place - one.setter->arguments.data()) : 0] = value;
-  static_cast<void>(run(*one.setter, arguments));
-  if (!one.field.empty()) line_.follow(*one.setter, value);
-}
+// ---- The line
 
 Ran Changes::run(const Command& command, Arguments arguments) const {
   Ran ran = line_.run(command, arguments);
   if (ran.error == Error::none) return ran;
-  const std::string_view name = error_texts[static_cast<std::size_t>(ran.error)].name;
-  throw Refused{fmt::format("{}: {} {}", command.name, name, ran.detail)};
+  throw Refused{fmt::format("{}: {} {}", command.name, text_of(ran.error).name, ran.detail)};
+}
+
+// Nothing: it is no good one.
+std::optional<BusyReply> Changes::busy_reply(const Sent& sent) const {
+  BusySink sink;
+  const Error error = unit_.decode(line_.options(), sent.request.frame(), sent.reply.frame(), sink);
+  if (error == Error::busy) sink.reply.busy = true;
+  return error == Error::none || error == Error::busy ? std::optional(sink.reply) : std::nullopt;
+}
+
+Sent Changes::send(const Command& command, Arguments arguments) const {
+  std::vector<std::uint8_t> request(longest_request);
+  const auto size = unit_.encode(line_.options(), command, arguments, request);
+  if (!size) throw Refused{fmt::format("{}: {}", command.name, text_of(size.error()).name)};
+  request.resize(*size);
+  return line_.send(request);
 }
 
 Reading Changes::read() const {
   const Ran ran = run(*find_command(unit_, Verb::read), {});
   if (!ran.reading) throw Refused{"no position was told"};
   return *ran.reading;
+}
+
+std::uint8_t Changes::read_byte(std::uint32_t page, std::uint32_t address) const {
+  const Command& getter = *find_command(unit_, Verb::memory_read);
+  const Ran ran = run(getter, role_arguments(getter, {{Role::page, page}, {Role::address, address}, {Role::count, 1}}));
+  if (ran.data.empty()) throw Refused{"no byte was told"};
+  return ran.data.front();
 }
 
 }  // namespace absenc::client

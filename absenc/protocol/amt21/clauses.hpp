@@ -8,14 +8,18 @@
 
 namespace absenc::amt21 {
 
-inline constexpr std::array<Clause, 6> clauses{{
+inline constexpr std::array<Clause, 7> clauses{{
     {"answer", "serial interface", "a request is answered", Demand::answered},
     {"answer-time", "serial interface",
      "the answer begins after the turn-around time of its rate: no later than a host waits", Demand::in_time},
     {"length", "serial interface", "an answer is two bytes", Demand::whole},
     {"check", "serial interface, checksum", "K1 and K0 make the odd and the even bits odd in number", Demand::checked},
     {"address", "serial interface, address", "a request to another address is not answered", Demand::foreign_silent},
-    // Its zero is moved by a command that no other takes back.
+    {.id = "zero",
+     .paragraph = "serial interface, extended commands",
+     .words = "5E makes this the zero of the turn",
+     .demand = Demand::zero,
+     .needs = "multiturn_bits=0"},
     {.id = "reset",
      .paragraph = "serial interface, extended commands",
      .words = "a reset restarts the encoder, which answers again 200 ms later, at the same position",

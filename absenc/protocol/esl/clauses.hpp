@@ -5,39 +5,100 @@
 #include <array>
 
 #include "absenc/protocol/clause.hpp"
+#include "absenc/protocol/esl/frame.hpp"
 
 namespace absenc::esl {
 
-inline constexpr std::array<Clause, 10> clauses{{
-    {"answer", "Figure 2", "a read request is answered", Demand::answered},
-    {"answer-time", "Figure 2",
-     "the answer begins 2.0 us after the request, which is typical: no later than a host waits", Demand::in_time},
-    {"length", "Table 12", "a reply has the frames of its command", Demand::whole},
-    {"crc", "Figures 10 and 11", "each channel ends with its CRC", Demand::checked},
-    {"fields", "Figures 7 and 8", "the command frame is that of the request, each channel names itself, and both agree",
-     Demand::as_drawn},
-    {"address", "Figure 7", "a request to another encoder address is not answered", Demand::foreign_silent},
-    {.id = "eeprom-write",
-     .paragraph = "Figure 5",
-     .words = "a byte that was written to the EEPROM is read again",
-     .demand = Demand::byte_written,
-     .address = 0x7E},
-    {.id = "eeprom-beside",
-     .paragraph = "Figure 5",
-     .words = "writing a byte leaves those beside it",
-     .demand = Demand::byte_alone,
-     .address = 0x7E},
-    {.id = "clear-alarms",
-     .paragraph = "Table 4",
-     .words = "eight requests with command C clear the errors, and nothing else",
-     .demand = Demand::reset,
-     .verb = Verb::clear_alarms},
-    {.id = "reset-multiturn",
-     .paragraph = "Table 4",
-     .words = "eight requests with command D clear the turn counter",
-     .demand = Demand::reset,
-     .verb = Verb::reset_multiturn},
-}};
+// ---- Requests that no host sends
+
+namespace request {
+// A command frame of this address, and its CRC where requests have one.
+inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, MutableBytes request) {
+  const std::size_t size = request_length(profile, DataId::position);
+  if (request.size() < size) return Error::buffer_too_small;
+  request[0] = field;
+  if (size > 1) request[1] = checksum8(profile.crc_bit_order, Bytes(request).first(1));
+  return size;
+}
+// Only the parity is wrong.
+inline Result<std::size_t> wrong_parity(const Options& values, MutableBytes request) {
+  const Profile profile = options.format(values);
+  const std::uint8_t good = control_field(profile, profile.address, DataId::position);
+  return seal(profile, static_cast<std::uint8_t>(good ^ 0x80U), request);
+}
+// Table 3 has no ID 3; its parity is right.
+inline Result<std::size_t> unknown_id(const Options& values, MutableBytes request) {
+  const Profile profile = options.format(values);
+  return seal(profile, control_field(profile, profile.address, DataId{3}), request);
+}
+}  // namespace request
+
+// Table 8: the others need more than command C. Of both channels.
+inline constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
+
+inline constexpr auto clauses = std::array{
+    Clause{"answer", "Figure 2", "a read request is answered", Demand::answered},
+    Clause{"answer-time", "Figure 2",
+           "the answer begins 2.0 us after the request, which is typical: no later than a host waits", Demand::in_time},
+    Clause{"length", "Table 12", "a reply has the frames of its command", Demand::whole},
+    Clause{"crc", "Figures 10 and 11", "each channel ends with its CRC", Demand::checked},
+    Clause{"fields", "Figures 7 and 8",
+           "the command frame is that of the request, each channel names itself, and both agree", Demand::as_drawn},
+    Clause{.id = "safe-position",
+           .paragraph = "Tables 5 and 6",
+           .words = "a safe position passes every check: both channels ready, no error, the sequence counter moves",
+           .demand = Demand::does,
+           .needs = "require_forced_test=false",
+           .command = "safe-position"},
+    Clause{"address", "Figure 7", "a request to another encoder address is not answered", Demand::foreign_silent},
+    Clause{.id = "bad-crc",
+           .paragraph = "Overview of Communication",
+           .words = "a request with a wrong CRC is not answered",
+           .demand = Demand::reacts,
+           .needs = "request_crc=true",
+           .ask = {.wrong_end = true}},
+    Clause{.id = "unknown-id",
+           .paragraph = "Table 3, Overview of Communication",
+           .words = "a request with an ID that Table 3 does not list is not answered",
+           .demand = Demand::reacts,
+           .ask = {.make = request::unknown_id}},
+    Clause{.id = "eeprom-write",
+           .paragraph = "Figure 5",
+           .words = "a byte that was written to the EEPROM is read again",
+           .demand = Demand::byte_written,
+           .address = 0x7E},
+    Clause{.id = "eeprom-beside",
+           .paragraph = "Figure 5",
+           .words = "writing a byte leaves those beside it",
+           .demand = Demand::byte_alone,
+           .address = 0x7E},
+    Clause{.id = "eeprom-page",
+           .paragraph = "Table 11, note 2",
+           .words = "each page has bytes of its own",
+           .demand = Demand::page_alone,
+           .address = 0x7E,
+           .other = 1},
+    Clause{.id = "eeprom-busy",
+           .paragraph = "Table 10",
+           .words = "while a byte is written, a readout is answered with the busy bit and 00",
+           .demand = Demand::byte_busy,
+           .address = 0x7E},
+    Clause{.id = "zero",
+           .paragraph = "Table 4",
+           .words = "eight requests with command B make this the zero of the turn",
+           .demand = Demand::zero},
+    Clause{.id = "clear-alarms",
+           .paragraph = "Table 4, Table 8",
+           .words = "eight requests with command C clear the errors that it can clear, and nothing else",
+           .demand = Demand::reset,
+           .value = cleared_by_c,
+           .verb = Verb::clear_alarms},
+    Clause{.id = "reset-multiturn",
+           .paragraph = "Table 4",
+           .words = "eight requests with command D clear the turn counter",
+           .demand = Demand::reset,
+           .verb = Verb::reset_multiturn},
+};
 
 // ---- What hosts do that break a clause, or are about one
 

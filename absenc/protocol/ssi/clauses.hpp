@@ -13,8 +13,10 @@ inline constexpr std::array<Clause, 1> clauses{{
      .paragraph = "3.5",
      .words = "when the clock goes on, the word comes again from its MSB",
      .demand = Demand::as_drawn,
+     .needs = "after_word=repeat",
      .option = "extra_clocks",
-     .value = 1},
+     .value = 1,
+     .shown_with = "singleturn=1000"},
 }};
 
 inline constexpr std::array<HostClause, 5> host_clauses{{

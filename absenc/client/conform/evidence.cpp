@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/conform/evidence.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+using capture::HeardExchange;
+using capture::HeardFrame;
+
+std::size_t bits_of(const HeardFrame& frame) {
+  if (frame.can) return std::size_t{frame.can->size} * 8;
+  return frame.bits != 0 ? frame.bits : frame.bytes.size() * 8;
+}
+
+// On clocked links the first bit is the highest of its byte.
+void flip(HeardFrame& frame, std::size_t bit) {
+  std::uint8_t& byte = frame.can ? frame.can->data[bit / 8] : frame.bytes[bit / 8];
+  byte = static_cast<std::uint8_t>(byte ^ (frame.bits != 0 ? 0x80U >> bit % 8 : 1U << bit % 8));
+}
+
+void resize(HeardFrame& frame, int by) {
+  if (frame.can) {
+    frame.can->size = static_cast<std::uint8_t>(std::min(8, frame.can->size + by));
+  } else {
+    frame.bytes.resize(frame.bytes.size() + static_cast<std::size_t>(by));
+  }
+}
+
+// Empty: there is none with these options.
+HeardFrame request_of(const Unit& unit, const Options& options, const Command& command) {
+  std::array<std::uint8_t, longest_request> bytes{};
+  std::vector<std::int64_t> arguments;
+  for (const Argument& one : command.arguments) {
+    arguments.push_back(one.required ? std::max<std::int64_t>(one.minimum, 1) : one.default_value);
+  }
+  const auto size = unit.encode(options, command, arguments, bytes);
+  if (!size || *size == 0) return {};
+  const Bytes request = Bytes(bytes).first(*size);
+  if (unit.link != LinkKind::can) return {.bytes = {request.begin(), request.end()}};
+  const std::string text(request.begin(), request.end());
+  return {.can = parse_wire_text(unit.link, "a request", text).can};
+}
+
+// The requests of all commands, and of all of another address.
+std::vector<HeardFrame> other_requests(const Unit& unit, const Options& options) {
+  std::vector<HeardFrame> requests;
+  const auto add = [&](const Options& with, const Command& command) {
+    HeardFrame request = request_of(unit, with, command);
+    if (!request.frame().empty()) requests.push_back(std::move(request));
+  };
+  for (const Command& command : unit.commands) add(options, command);
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    if (unit.options[i].role != Role::encoder) continue;
+    Options other = options;
+    other.values[i] += options.values[i] == unit.options[i].maximum ? -1 : 1;
+    for (const Command& command : unit.commands) add(other, command);
+  }
+  return requests;
+}
+
+bool holds(const Unit& unit, const Options& options, std::string_view need) {
+  const std::size_t end = need.find_first_of("!=");
+  const bool equal = need[end] == '=';
+  const std::string_view name = need.substr(0, end);
+  const std::string_view wanted = need.substr(need.find('=') + 1);
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    if (unit.options[i].name == name) return (to_text(unit.options[i], options.values[i]) == wanted) == equal;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool is_flat(const capture::HeardFrame& reply) {
+  const Frame frame = reply.frame();
+  const std::size_t bits = frame.bits;
+  for (std::size_t i = 1; i < bits; ++i) {
+    if ((frame.bytes[i / 8] >> (7 - i % 8) & 1) != (frame.bytes[0] >> 7 & 1)) return false;
+  }
+  return bits != 0;
+}
+
+const Attempted* Readings::first_good() const {
+  const auto found = std::find_if(all.begin(), all.end(), [](const Attempted& one) {
+    return one.error == Error::none && !is_flat(one.exchange.reply);
+  });
+  return found == all.end() ? nullptr : &*found;
+}
+
+std::string reason_against(const Unit& unit, const Options& options, const Clause& clause) {
+  std::string_view rest = clause.needs;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find(' '), rest.size());
+    const std::string_view need = rest.substr(0, end);
+    if (!holds(unit, options, need)) return fmt::format("it is demanded with {} only", need);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return {};
+}
+
+Error error_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
+  struct Nothing final : FieldSink {
+    void put(const FieldValue&) override {}
+  } nothing;
+  return unit.decode(options, request, reply, nothing);
+}
+
+Error reply_error(const Unit& unit, const Options& options, std::string_view command, const HeardExchange& exchange) {
+  const HeardFrame request =
+      command.empty() ? exchange.request : request_of(unit, options, *find_command(unit, command));
+  return error_of(unit, options, request.frame(), exchange.reply.frame());
+}
+
+std::size_t changes_noticed(const Unit& unit, const Options& options, const HeardExchange& good, Errors errors) {
+  std::size_t noticed = 0;
+  const auto try_one = [&](const HeardFrame& request, const HeardFrame& reply) {
+    noticed += (errors & any_of(error_of(unit, options, request.frame(), reply.frame()))) != 0 ? 1 : 0;
+  };
+  for (std::size_t bit = 0; bit < bits_of(good.reply); ++bit) {
+    HeardFrame changed = good.reply;
+    flip(changed, bit);
+    try_one(good.request, changed);
+  }
+  for (const int by : {-1, 1}) {
+    if (good.reply.bytes.empty() && !good.reply.can) break;
+    HeardFrame changed = good.reply;
+    resize(changed, by);
+    try_one(good.request, changed);
+  }
+  for (const HeardFrame& request : other_requests(unit, options)) try_one(request, good.reply);
+  // A checksum hides what stands before it: wrong bits with a last byte that makes it right again.
+  for (std::size_t bit = 0; noticed == 0 && good.reply.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
+    HeardFrame changed = good.reply;
+    flip(changed, bit);
+    for (unsigned last = 0; last < 256; ++last) {
+      changed.bytes.back() = static_cast<std::uint8_t>(last);
+      if (changed.bytes != good.reply.bytes) try_one(good.request, changed);
+    }
+  }
+  return noticed;
+}
+
+std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options, const Frame& request) {
+  struct Found final : FieldSink {
+    void put(const FieldValue& field) override {
+      if (field.info->role == Role::encoder) encoder = field.number;
+    }
+    std::optional<std::int64_t> encoder;
+  } found;
+  return unit.decode(options, request, {}, found) == Error::none ? found.encoder : std::nullopt;
+}
+
+std::string what_came(LinkKind link, const Frame& request, const Frame& reply) {
+  return fmt::format("to {} came {}", request.empty() ? "a pulse" : to_wire_text(link, request),
+                     reply.empty() ? "nothing" : to_wire_text(link, reply));
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a verdict stands on: how often the thing was seen that a clause is about.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/capture/search/evidence.hpp"
+#include "absenc/client/conform.hpp"
+#include "absenc/client/way/runner.hpp"
+#include "absenc/protocol/clause.hpp"
+
+namespace absenc::client {
+
+inline constexpr std::size_t longest_request = 64;  // bytes, of a unit or as text
+
+inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
+  result.verdict = kept ? Verdict::kept : Verdict::broken;
+  result.evidence = std::move(evidence);
+}
+
+/// Whether all bits of a clocked word are alike: a line that nobody drives shows the same.
+[[nodiscard]] bool is_flat(const capture::HeardFrame& reply);
+
+/// What readings with one set of options brought.
+struct Readings {
+  std::vector<Attempted> all{};
+  std::uint64_t requests = 0;   // requests, pulses and transfers that were sent
+  std::uint64_t answered = 0;   // of them
+  std::uint64_t good = 0;       // replies, or frames that came by themselves, of which a reading was made
+  std::uint64_t discarded = 0;  // damaged frames of a stream
+
+  /// Null: none, or nothing but words whose bits are all alike.
+  [[nodiscard]] const Attempted* first_good() const;
+};
+
+/// Why these options leave out what the clause is about: "" where they do not.
+[[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
+
+/// In how many ways a good reply can be changed that then breaks it by one of these errors: a wrong bit, a missing or
+/// an additional byte, or that it answers another request. 0: these options have no such check.
+[[nodiscard]] std::size_t changes_noticed(const Unit& unit, const Options& options, const capture::HeardExchange& good,
+                                          Errors errors);
+
+/// What the unit makes of a reply.
+[[nodiscard]] Error error_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
+
+/// What the unit makes of the reply as one to the request of this command; "": to its own.
+[[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
+                                const capture::HeardExchange& exchange);
+
+/// Whose request this is, as it says itself. Nothing: it is none, or names nobody.
+[[nodiscard]] std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options, const Frame& request);
+
+/// "to 9a came 1a 40 ..."
+[[nodiscard]] std::string what_came(LinkKind link, const Frame& request, const Frame& reply);
+
+}  // namespace absenc::client

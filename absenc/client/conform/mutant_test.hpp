@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Encoders that break a clause: what stands between a virtual encoder and its line, in virtual time.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absenc/client/conform/asked_test.hpp"
+#include "absenc/client/conform/conform_link.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/virtual_link_test.hpp"
+#include "absenc/protocol/clause.hpp"
+
+namespace absenc::client {
+
+/// Changes what the encoder hears, and what it says for some of the requests.
+template <class Item>
+class Mutant final : public Machine<Item> {
+ public:
+  using Kind = typename Event<Item>::Kind;
+
+  explicit Mutant(Machine<Item>& device, LinkKind link)
+      : driven(link == LinkKind::clocked || link == LinkKind::spi), device_(device) {}
+
+  void feed(const Event<Item>& event) override {
+    Event<Item> changed = event;
+    if (event.kind == Kind::selected || event.kind == Kind::triggered) ++requests;
+    if (event.kind == Kind::line_error) {
+      note_special({});
+      if (is_special && on_damage) {
+        heard_ = good;
+        changed = {.kind = Kind::received, .at = event.at, .items = heard_};
+      }
+    } else if (event.kind == Kind::received) {
+      if (!driven) ++requests;
+      heard_.assign(event.items.begin(), event.items.end());
+      if (good.empty()) good = heard_;
+      note_special(heard_);
+      if (hear) hear(heard_);
+      changed.items = heard_;
+      if (heard_.empty()) return;
+    }
+    device_.feed(changed);
+  }
+
+  Step<Item> next(Time now) override {
+    for (;;) {
+      Step<Item> step = device_.next(now);
+      if (step.kind != Step<Item>::Kind::transfer) return step;
+      said.assign(step.out.begin(), step.out.end());
+      if (!driven && heard_.empty()) ++requests;  // it sends by itself
+      if (say && mutates()) {
+        say(said, step);
+        if (said.empty() && driven) continue;
+        // A reply that is swallowed has left for the device.
+        if (said.empty()) {
+          device_.feed({.kind = Kind::sent, .at = now});
+          continue;
+        }
+      }
+      step.out = said;
+      return step;
+    }
+  }
+
+  [[nodiscard]] std::span<const Item> heard() const { return heard_; }
+
+  std::function<void(std::vector<Item>&)> hear{};
+  std::function<void(std::vector<Item>&, Step<Item>&)> say{};
+  bool on_damage = false;   // a damaged request is heard as the good one
+  bool of_special = false;  // it says so to other requests than the first alone
+  bool always = false;      // it says so from request `mutated` on
+  unsigned mutated = 3;     // the first may be the one that finds the echo
+  bool driven = false;
+  unsigned requests = 0;
+  std::vector<Item> said;
+  std::vector<Item> good;  // the first request
+  int special = -1;        // which other request is meant, in the order in which they come; -1: each
+  std::function<bool(const std::vector<Item>&)> is_meant{};  // and of which kind; empty: any
+  bool is_special = false;                                   // the last request was that
+
+ private:
+  // Of a damaged request nothing is known.
+  void note_special(const std::vector<Item>& request) {
+    is_special = false;
+    if (!request.empty() && request == good) return;
+    const auto found = std::find(specials_.begin(), specials_.end(), request);
+    const auto index = found - specials_.begin();
+    if (found == specials_.end()) specials_.push_back(request);
+    is_special = (special < 0 || special == index) && (!is_meant || is_meant(request));
+  }
+  [[nodiscard]] bool mutates() const {
+    if (of_special) return is_special;
+    return requests == mutated || (always && requests > mutated);
+  }
+
+  Machine<Item>& device_;
+  std::vector<Item> heard_;
+  std::vector<std::vector<Item>> specials_;
+};
+
+/// What is wrong with an encoder, and the conditions that make it so.
+template <class Item>
+struct Change {
+  std::function<void(Mutant<Item>&)> change{};
+  std::string condition{};
+};
+
+template <class Item>
+Machine<Item>& machine_of(const VirtualDevice& device) {
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    return *device.frames();
+  } else {
+    return *device.bytes();
+  }
+}
+
+template <class Item>
+Conformance conform_mutant(EncoderAddress address, const Change<Item>& change, const ConformChoices& choices) {
+  if (!change.condition.empty()) address.device.conditions.push_back(change.condition);
+  Link link;
+  link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
+  link.device->power_on(Time{});
+  Mutant<Item> mutant(machine_of<Item>(*link.device), address.unit->link);
+  if (change.change) change.change(mutant);
+  put_on_line(link, address, mutant, {.rough = sim::RoughRates{}});
+  return conform(address, std::move(link), choices, "NAME");
+}
+
+inline std::vector<std::string> with_verdict(const Conformance& conformance, Verdict verdict) {
+  std::vector<std::string> ids;
+  for (const ClauseResult& one : conformance.clauses) {
+    if (one.verdict == verdict) ids.emplace_back(one.id);
+  }
+  return ids;
+}
+inline Verdict verdict_of(const Conformance& conformance, std::string_view id) {
+  for (const ClauseResult& one : conformance.clauses) {
+    if (one.id == id) return one.verdict;
+  }
+  return Verdict::untested;
+}
+
+/// "sim:raa38?mode=bus", which shows this clause.
+inline std::string address_showing(const Unit& unit, const Clause& clause) {
+  return fmt::format("sim:{}{}{}", unit.id, clause.shown_with.empty() ? "" : "?", clause.shown_with);
+}
+
+}  // namespace absenc::client

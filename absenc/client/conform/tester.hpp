@@ -1,0 +1,465 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests the clauses about readings and about requests that no host sends, and carries what changes the encoder.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "absenc/client/conform/changes.hpp"
+#include "absenc/client/conform/evidence.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/text/wire_text.hpp"
+#include "absenc/client/way/runner.hpp"
+#include "absenc/protocol/clause.hpp"
+
+namespace absenc::client {
+
+template <class Item>
+class Tester {
+ public:
+  Tester(const EncoderAddress& address, Port<Item>& port, Time latency, const ConformChoices& choices)
+      : unit_(*address.unit),
+        options_(address.options),
+        latency_(latency),
+        rate_(address.line.with_some_rate().rate),
+        runner_(address),
+        read_(*find_command(unit_, Verb::read)),
+        count_(std::max<std::size_t>(1, choices.readings)) {
+    runner_.attach(port, latency);
+    // Once, so that what was changed can still be put back.
+    runner_.port().over = [this, over = choices.over] {
+      if (!over || ended_ || !over()) return false;
+      ended_ = true;
+      throw os::Interrupted{};
+    };
+  }
+  Tester(const Tester&) = delete;
+  Tester& operator=(const Tester&) = delete;
+
+  /// Before all tests.
+  void read() { readings_ = read_all(options_); }
+
+  /// Whether the choice `over` ended it.
+  [[nodiscard]] bool ended() const { return ended_; }
+
+  /// What tests that change the encoder need of the line.
+  [[nodiscard]] ChangesLine line() {
+    return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments, 3); },
+            .send = [this](const std::vector<std::uint8_t>& request) { return send(request); },
+            .hear = [this](Time time) { return hear(time); },
+            .rest = [this](Time time) { runner_.listen(time); },
+            .follow = [this](const Command& setter,
+                             std::int64_t value) { options_ = options_behind(unit_, options_, setter, value); },
+            .options = [this]() -> const Options& { return options_; }};
+  }
+
+  void test(const Clause& clause, ClauseResult& result) {
+    switch (clause.demand) {
+      case Demand::answered:
+        return test_answered(result);
+      case Demand::streamed:
+        return test_streamed(result);
+      case Demand::in_time:
+        return test_time(result);
+      case Demand::whole:
+        return test_frames(clause, any_of(Error::wrong_length, Error::truncated), result);
+      case Demand::checked:
+        return test_frames(clause, any_of(Error::bad_checksum), result);
+      case Demand::as_drawn:
+        return test_frames(clause, clause.errors != 0 ? clause.errors : form_errors, result);
+      case Demand::does:
+        return test_command(clause, result);
+      case Demand::foreign_silent:
+        return test_foreign(result);
+      case Demand::reacts:
+        return test_reaction(clause, result);
+      default:
+        return;
+    }
+  }
+
+ private:
+  static constexpr Time listening =
+      std::chrono::milliseconds(20);    // for what comes though nobody waits for it any more
+  static constexpr unsigned times = 3;  // that a request is sent which no host sends
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
+
+  // ---- The line
+
+  // A conversation that changes the encoder for its own use leaves it as it was when somebody asks to end.
+  Ran run(const Command& command, Arguments arguments, unsigned attempts) {
+    runner_.set_options(options_);
+    runner_.start_again(attempts);
+    const std::uint64_t before = runner_.port().requests;
+    const Conversation<Item>* ended = runner_.run(command, arguments);
+    if (runner_.port().take_aborted()) throw os::Interrupted{};
+    if (ended == nullptr) throw UsageError(fmt::format("{} cannot run {} with these options", unit_.id, command.name));
+    Ran ran{.error = ended->error(),
+            .detail = std::string(ended->detail()),
+            .requests = runner_.port().requests - before,
+            .heard = !runner_.last().reply().empty()};
+    if (ran.error != Error::none) return ran;
+    if (const Reading* reading = ended->reading()) ran.reading = *reading;
+    Told told(ran);
+    ended->report(told);
+    ran.answer = std::move(told.sink.answer);
+    return ran;
+  }
+  struct Told final : FieldSink {
+    explicit Told(Ran& into) : ran(into) {}
+    void put(const FieldValue& field) override {
+      if (field.info->role == Role::data) ran.data.assign(field.bytes.begin(), field.bytes.end());
+      if (field.info->role == Role::value && ran.data.empty()) ran.data = {static_cast<std::uint8_t>(field.number)};
+      sink.put(field);
+    }
+    Ran& ran;
+    AnswerSink sink;
+  };
+
+  // What one request owes is nothing to the next. What comes when the host has asked again is late, not missing.
+  Attempted once(const Options& options, Time listen_for = listening) {
+    runner_.set_options(options);
+    if (!is_streamed(options)) runner_.start_again();
+    Attempted one = runner_.once(read_);
+    if (!one.possible || one.error == Error::invalid_argument) {
+      throw UsageError(fmt::format("{} cannot be read with these options{}{}", unit_.id, one.detail.empty() ? "" : ": ",
+                                   one.detail));
+    }
+    if (one.error == Error::none || !is_asked() || is_streamed(options)) return one;
+    // What a host makes of silence is no matter of what came.
+    if (!one.answered) one.error = Error::timeout;
+    runner_.listen(listen_for);
+    runner_.keep_exchange(one);
+    return one;
+  }
+  [[nodiscard]] Readings read_all(const Options& options) {
+    Readings readings;
+    const auto attempt = [&] {
+      const std::uint64_t before = runner_.port().requests;
+      const Attempted one = once(options);
+      const std::uint64_t requests = runner_.port().requests - before;
+      const std::uint64_t unanswered = std::min(requests, one.unanswered + (came(one) ? 0 : 1));
+      readings.requests += requests;
+      // One that comes when the host has asked again is late, not missing.
+      readings.answered += came(one) && one.is_late() ? requests : requests - unanswered;
+      readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
+      readings.discarded += one.discarded;
+      return one;
+    };
+    runner_.repeat({.count = count_}, attempt, readings.all);
+    return readings;
+  }
+  [[nodiscard]] static bool came(const Attempted& one) { return one.answered && one.error != Error::line_stuck; }
+  [[nodiscard]] bool is_streamed(const Options& options) const {
+    return unit_.streams != nullptr && unit_.streams(options);
+  }
+  // Else the host is the clock.
+  [[nodiscard]] bool is_asked() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
+  // Silence tells only of an encoder that answers else.
+  [[nodiscard]] bool answers() {
+    for (unsigned i = 0; i < times; ++i) {
+      if (once(options_).error == Error::none) return true;
+    }
+    return false;
+  }
+
+  /// In place of the first request of a reading. Nothing, where readings ask for nothing.
+  std::optional<Attempted> send_instead(const std::function<void(std::vector<Item>&)>& edit, std::uint32_t permille = 0,
+                                        Time listen_for = listening) {
+    const std::uint64_t before = runner_.port().requests;
+    bool edited = false;
+    runner_.edit = [&](std::vector<Item>& request) {
+      if (std::exchange(edited, true)) return;
+      edit(request);
+      if (permille != 0) set_rate(rate_ / 1000 * permille);
+    };
+    runner_.on_event = [&](const Event<Item>& event) {
+      if (permille != 0 && event.kind == Event<Item>::Kind::sent) set_rate(rate_);
+    };
+    struct Restore {
+      Runner<Item>& runner;
+      ~Restore() {
+        runner.edit = {};
+        runner.on_event = {};
+      }
+    } const restore{runner_};
+    Attempted one = once(options_, listen_for);
+    if (runner_.port().requests == before) return std::nullopt;
+    return one;
+  }
+  void set_rate(std::uint32_t rate) { runner_.port().begin({.kind = Step<Item>::Kind::configure, .rate = rate}); }
+  /// As bytes, or on a CAN bus as text.
+  Sent send(const std::vector<std::uint8_t>& request) {
+    Sent sent;
+    const auto attempted = send_instead([&](std::vector<Item>& edited) { edited = items_of(request); }, 0,
+                                        2 * unit_.timing.turnaround + latency_);
+    if (attempted) sent = {.request = attempted->exchange.request, .reply = attempted->exchange.reply};
+    return sent;
+  }
+  [[nodiscard]] std::vector<Item> items_of(const std::vector<std::uint8_t>& request) const {
+    if constexpr (is_can) {
+      const std::string text(request.begin(), request.end());
+      return {*parse_wire_text(unit_.link, "a request", text).can};
+    } else {
+      return request;
+    }
+  }
+  /// Frames that come by themselves as the replies of readings do.
+  Heard hear(Time time) {
+    Heard heard;
+    const Attempted* const good = readings_.first_good();
+    if constexpr (is_can) {
+      if (good == nullptr || !good->exchange.reply.can) return heard;
+      runner_.listen(time, [&](std::span<const CanFrame> frames) {
+        for (const CanFrame& frame : frames) {
+          if (frame.id != good->exchange.reply.can->id) continue;
+          if (client::error_of(unit_, options_, {}, {.can = &frame}) != Error::none) continue;
+          heard.last = runner_.last().received_at;
+          if (heard.frames++ == 0) heard.first = heard.last;
+        }
+        return true;
+      });
+    }
+    return heard;
+  }
+
+  // ---- Readings
+
+  void test_answered(ClauseResult& result) const {
+    result.evidence = "with these options nothing is asked";
+    if (readings_.requests == 0) return;
+    std::string seen = fmt::format("{} of {} requests answered, {} of them well", readings_.answered,
+                                   readings_.requests, readings_.good);
+    if (readings_.answered != readings_.requests) return conclude(result, false, std::move(seen));
+    result.evidence = seen + ": what else came may be anything";
+    if (readings_.good != 0) conclude(result, true, std::move(seen));
+  }
+
+  void test_streamed(ClauseResult& result) const {
+    result.evidence = "with these options the encoder is asked";
+    if (readings_.requests != 0 || readings_.all.empty()) return;
+    std::string seen = fmt::format("{} good frames came by themselves", readings_.good);
+    const auto stopped = std::find_if(readings_.all.begin(), readings_.all.end(),
+                                      [](const Attempted& one) { return one.error == Error::timeout; });
+    const bool comes = readings_.good != 0 && stopped == readings_.all.end();
+    const Attempted& worst = stopped != readings_.all.end() ? *stopped : readings_.all.front();
+    if (!comes) seen += fmt::format("; {}", words_of(worst));
+    conclude(result, comes, std::move(seen));
+  }
+
+  void test_time(ClauseResult& result) const {
+    const Attempted* worst = nullptr;
+    std::size_t timed = 0;
+    for (const Attempted& one : readings_.all) {
+      if (!came(one) || one.limit == Time{}) continue;
+      const bool is_good = one.error == Error::none || client::error_of(unit_, options_, one.exchange.request.frame(),
+                                                                        one.exchange.reply.frame()) == Error::none;
+      if (!is_good) continue;
+      ++timed;
+      if (worst == nullptr || one.answered_after > worst->answered_after) worst = &one;
+    }
+    result.evidence = "no good reply to a request came";
+    if (worst == nullptr) return;
+    const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
+    std::string seen = fmt::format("{} good replies, after at most {:.1f} us, of {:.1f} us that a host waits", timed,
+                                   us(worst->answered_after), us(worst->limit));
+    if (latency_ > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(latency_));
+    conclude(result, worst->answered_after <= worst->limit, std::move(seen));
+  }
+
+  static std::string words_of(const Attempted& one) {
+    const std::string_view name = error_texts[static_cast<std::size_t>(one.error)].name;
+    return one.detail.empty() ? std::string(name) : fmt::format("{} {}", name, one.detail);
+  }
+
+  void test_frames(const Clause& clause, Errors errors, ClauseResult& result) {
+    Options options = options_;
+    for (std::size_t i = 0; i < unit_.options.size(); ++i) {
+      if (unit_.options[i].name == clause.option) options.values[i] = clause.value;
+    }
+    const Readings other = clause.option.empty() ? Readings{} : read_all(options);
+    const Readings& readings = clause.option.empty() ? readings_ : other;
+    std::size_t bad = 0;
+    std::string first;
+    for (const Attempted& one : readings.all) {
+      if (one.error == Error::none || (errors & any_of(one.error)) == 0) continue;
+      if (++bad == 1) first = fmt::format(": {}", words_of(one));
+    }
+    std::string seen = fmt::format("{} good replies, {} that break it{}", readings.good, bad, first);
+    if (readings.discarded != 0) seen += fmt::format("; {} frames of the stream were discarded", readings.discarded);
+    if (bad != 0) return conclude(result, false, std::move(seen));
+    const Attempted* const good = readings.first_good();
+    result.evidence = readings.good == 0
+                          ? "no good reply came"
+                          : "all bits were alike, as on a line that nobody drives: turn the shaft a little";
+    if (good == nullptr) return;
+    const std::size_t noticed = changes_noticed(unit_, options, good->exchange, errors);
+    result.evidence = "with these options nothing could be wrong with it";
+    if (noticed == 0) return;
+    conclude(result, true, fmt::format("{}; of one changed it would be seen in {} ways", seen, noticed));
+  }
+
+  void test_command(const Clause& clause, ClauseResult& result) {
+    const Command& command = *find_command(unit_, clause.command);
+    const std::vector<std::int64_t> arguments = complete_arguments(command, {});
+    std::uint64_t requests = 0;
+    for (unsigned i = 0; i < times; ++i) {
+      const Ran ran = run(command, arguments, 1);
+      requests += ran.requests;
+      if (ran.error == Error::none) continue;
+      const std::string_view name = error_texts[static_cast<std::size_t>(ran.error)].name;
+      result.evidence = fmt::format("{}: {} {}", command.name, name, ran.detail);
+      const bool has_none = ran.error == Error::unsupported || ran.error == Error::invalid_argument;
+      if (i != 0 || !has_none) conclude(result, false, result.evidence);
+      return;
+    }
+    result.evidence = "with these options nothing is asked";
+    if (requests != 0) conclude(result, true, fmt::format("{} of {} times, {} requests", times, times, requests));
+  }
+
+  // ---- Requests that no host sends
+
+  // A neighbour on the line answers at its own address: then another address is asked. What answers in our encoder's
+  // name, or at every address with its position, is our encoder.
+  void test_foreign(ClauseResult& result) {
+    constexpr std::size_t most_addresses = 8;
+    const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),
+                                   [](const Option& one) { return one.role == Role::encoder; });
+    if (role == unit_.options.end()) return;
+    const auto index = static_cast<std::size_t>(role - unit_.options.begin());
+    const std::int64_t own = options_.values[index];
+    std::vector<std::int64_t> addresses;
+    for (std::int64_t value = role->maximum; value >= role->minimum && addresses.size() < most_addresses;
+         value -= role->step) {
+      if (value != own && is_address(index, value)) addresses.push_back(value);
+    }
+    result.evidence = "the encoder does not answer";
+    if (!answers()) return;
+    std::string seen;
+    std::size_t alike = 0;
+    for (const std::int64_t address : addresses) {
+      Options other = options_;
+      other.values[index] = address;
+      const std::uint64_t before = runner_.port().requests;
+      const Attempted one = once(other);
+      result.evidence = "with these options nothing is asked";
+      if (runner_.port().requests == before) return;
+      seen = fmt::format("address {}: {}", address,
+                         what_came(unit_.link, one.exchange.request.frame(), one.exchange.reply.frame()));
+      if (is_silent(one)) {
+        result.evidence = seen + ", but the encoder does not answer its own address any more";
+        if (answers()) conclude(result, true, seen + ", and to its own address a good reply");
+        return;
+      }
+      const bool of_own = error_of(own_request(), one) == Error::none;
+      if (one.error != Error::none && of_own) return conclude(result, false, seen + ", which is the reply of this one");
+      const Ran here = run(read_, {}, times);
+      const bool same = one.reading && here.reading && is_near(*here.reading, one.reading->singleturn);
+      alike += one.error != Error::none || same ? 1 : 0;
+    }
+    result.evidence =
+        fmt::format("{} other addresses were asked, and all are answered; the last: {}", addresses.size(), seen);
+    if (!addresses.empty() && alike == addresses.size()) conclude(result, false, result.evidence);
+  }
+  [[nodiscard]] bool is_address(std::size_t index, std::int64_t value) const {
+    Options other = options_;
+    other.values[index] = value;
+    std::vector<std::uint8_t> request(longest_request);
+    const auto size = unit_.encode(other, read_, {}, request);
+    if (!size || *size == 0) return false;
+    if constexpr (is_can) return true;
+    const Frame frame{.bytes = Bytes(request).first(*size)};
+    return client::error_of(unit_, options_, frame, {}) == Error::none &&
+           encoder_of(unit_, options_, frame).value_or(value) == value;
+  }
+  // On CAN not what comes counts, but what would be an answer: a node may say something else at any time.
+  [[nodiscard]] static bool is_silent(const Attempted& one) {
+    if constexpr (is_can) return one.error == Error::timeout;
+    return !one.answered;
+  }
+  [[nodiscard]] capture::HeardFrame own_request() const {
+    const Attempted* const good = readings_.first_good();
+    return good != nullptr ? good->exchange.request : capture::HeardFrame{};
+  }
+  [[nodiscard]] Error error_of(const capture::HeardFrame& request, const Attempted& one) const {
+    return client::error_of(unit_, options_, request.frame(), one.exchange.reply.frame());
+  }
+
+  enum class Seen : std::uint8_t { as_demanded, contrary, unclear };
+
+  void test_reaction(const Clause& clause, ClauseResult& result) {
+    const bool slow = clause.ask.permille != 0;
+    result.evidence = "the encoder does not answer";
+    if (!answers()) return;
+    unsigned as_demanded = 0;
+    std::string last;
+    for (unsigned i = 0; i < times; ++i) {
+      const auto one = ask(clause.ask);
+      result.evidence = "with these options nothing is asked";
+      if (!one) return;
+      last = what_came(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
+      const Seen seen = reaction_of(clause, *one);
+      // Which port is at the right rate again when the reply begins, is not known.
+      const bool missed = slow && (is_silent(*one) || seen == Seen::unclear);
+      result.evidence = last + ": a port that changes its rate may be too late to hear the reply";
+      if (missed) return;
+      if (seen == Seen::contrary) return conclude(result, false, std::move(last));
+      as_demanded += seen == Seen::as_demanded ? 1 : 0;
+      result.evidence = last + ", but the encoder does not answer any more";
+      if (!answers()) return;
+    }
+    conclude(result, as_demanded != 0, fmt::format("{} of {} times; {}", as_demanded, times, last));
+  }
+  std::optional<Attempted> ask(const Ask& ask) {
+    return send_instead([&](std::vector<Item>& request) { request = items_of(bytes_of(ask, request)); }, ask.permille);
+  }
+  [[nodiscard]] std::vector<std::uint8_t> bytes_of(const Ask& ask, const std::vector<Item>& request) const {
+    if (ask.make != nullptr) {
+      std::vector<std::uint8_t> made(longest_request);
+      const auto size = ask.make(options_, made);
+      made.resize(size ? *size : 0);
+      return made;
+    }
+    if constexpr (!is_can) {
+      if (ask.wrong_end) {
+        std::vector<std::uint8_t> wrong = request;
+        if (!wrong.empty()) wrong.back() ^= 1;
+        return wrong;
+      }
+    }
+    if constexpr (is_can) return {ask.wire.begin(), ask.wire.end()};
+    return parse_wire_text(unit_.link, "a request", ask.wire).bytes;
+  }
+  [[nodiscard]] Seen reaction_of(const Clause& clause, const Attempted& one) const {
+    if (is_silent(one)) {
+      const bool silent = clause.reaction == Reaction::silent || clause.reaction == Reaction::refusal_or_silent;
+      return silent ? Seen::as_demanded : Seen::contrary;
+    }
+    if (clause.reaction == Reaction::silent) return Seen::contrary;
+    const Error error = reply_error(unit_, options_, clause.as, one.exchange);
+    const Error wanted = clause.reaction == Reaction::reply ? Error::none : Error::request_rejected;
+    if (error == wanted) return Seen::as_demanded;
+    return error == Error::bad_checksum || error == Error::wrong_length ? Seen::unclear : Seen::contrary;
+  }
+
+  const Unit& unit_;
+  Options options_;
+  Time latency_;
+  std::uint32_t rate_;
+  Runner<Item> runner_;
+  const Command& read_;
+  std::size_t count_;
+  bool ended_ = false;  // because of the choice `over`
+  Readings readings_{};
+};
+
+}  // namespace absenc::client
