@@ -58,9 +58,9 @@ struct Command {
                                   // can, the setting has the name of this command, which looks at the effect itself
   std::string_view changes_option{};  // config_set: the option that must follow its first argument; who goes on does
                                       // so with the new value, on the same open port
-  bool reads_alarms = false;  // read_part: its reading has all the alarms by name, where that of Verb::read may not
   std::string_view disturbs{};        // what its requests may do to other devices on the line, a sentence without its
                                       // end; "": nothing. People are asked before it is sent
+  bool reads_alarms = false;  // read_part: its reading has all the alarms by name, where that of Verb::read may not
 };
 
 /// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments with
