@@ -395,6 +395,7 @@ Ran Changes::run(const Command& command, Arguments arguments) const {
 
 // Nothing: it is no good one.
 std::optional<BusyReply> Changes::busy_reply(const Sent& sent) const {
+  if (sent.reply.frame().empty()) return std::nullopt;
   BusySink sink;
   const Error error = unit_.decode(line_.options(), sent.request.frame(), sent.reply.frame(), sink);
   if (error == Error::busy) sink.reply.busy = true;

@@ -115,6 +115,7 @@ Error error_of(const Unit& unit, const Options& options, const Frame& request, c
 }
 
 Error reply_error(const Unit& unit, const Options& options, std::string_view command, const HeardExchange& exchange) {
+  if (exchange.reply.frame().empty()) return Error::timeout;
   const HeardFrame request =
       command.empty() ? exchange.request : request_of(unit, options, *find_command(unit, command));
   return error_of(unit, options, request.frame(), exchange.reply.frame());
@@ -138,13 +139,14 @@ std::size_t changes_noticed(const Unit& unit, const Options& options, const Hear
   }
   for (const HeardFrame& request : other_requests(unit, options)) try_one(request, good.reply);
   // A checksum hides what stands before it: wrong bits with a last byte that makes it right again.
-  for (std::size_t bit = 0; noticed == 0 && good.reply.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
-    HeardFrame changed = good.reply;
+  HeardFrame changed = good.reply;
+  for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);
-    for (unsigned last = 0; last < 256; ++last) {
+    for (unsigned last = 0; last < 256 && noticed == 0; ++last) {
       changed.bytes.back() = static_cast<std::uint8_t>(last);
-      if (changed.bytes != good.reply.bytes) try_one(good.request, changed);
+      try_one(good.request, changed);
     }
+    flip(changed, bit);
   }
   return noticed;
 }

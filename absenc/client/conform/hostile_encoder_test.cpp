@@ -273,7 +273,7 @@ void let_strangers_answer(const EncoderAddress& address, const ConformChoices& c
   const std::vector<Item> own = said_by<Item>(address);
   const Conformance silence = answered_by("silence", [] { return std::vector<Item>{}; });
   EXPECT_EQ(with_verdict(silence, Verdict::kept), std::vector<std::string>{}) << variation_name(address) << "\n"
-                                                                             << silence.report();
+                                                                              << silence.report();
   sim::Random random(1);
   answered_by("noise", [&] { return noise<Item>(random, own.size() + 3); });
   answered_by("zeros", [&] { return zeros(own); });

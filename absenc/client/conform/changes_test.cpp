@@ -1,0 +1,444 @@
+// SPDX-License-Identifier: Apache-2.0
+// The clauses that change an encoder: each is broken by two mutants, by one of them alone, and whatever ends them at
+// whatever step leaves the memory of the virtual encoder as it was.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/client/conform/mutant_test.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/row.hpp"
+#include "absenc/client/settings.hpp"
+#include "absenc/client/text/wire_text.hpp"
+#include "absenc/host/session.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/protocol/all.hpp"
+#include "absenc/sim/rough_line.hpp"
+#include "tests/cases.hpp"
+
+namespace absenc::client {
+namespace {
+
+using ByteList = std::vector<std::uint8_t>;
+
+template <class Item>
+Device<Item>& device_of(const VirtualDevice& device) {
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    return *device.device().frames;
+  } else {
+    return *device.device().bytes;
+  }
+}
+
+/// An encoder that obeys, but not all of it.
+template <class Item>
+class Disobedient final : public Machine<Item> {
+ public:
+  using Kind = typename Event<Item>::Kind;
+
+  explicit Disobedient(const VirtualDevice& device)
+      : line_(machine_of<Item>(device)), device_(device_of<Item>(device)) {}
+
+  void feed(const Event<Item>& event) override {
+    // What a clock asks for has no bytes.
+    if (event.kind == Kind::received || event.kind == Kind::selected) {
+      ++requests;
+      const bool deaf = requests >= deaf_from && requests < deaf_until;
+      const bool meant =
+          !deaf_to.empty() && std::equal(event.items.begin(), event.items.end(), deaf_to.begin(), deaf_to.end());
+      if (deaf || (meant && heard_++ >= heard_before)) return;
+    }
+    const ByteList before = memory();
+    line_.feed(event);
+    look(before);
+  }
+  Step<Item> next(Time now) override {
+    const ByteList before = memory();
+    Step<Item> step = line_.next(now);
+    look(before);
+    if (step.kind != Step<Item>::Kind::transfer || requests != damaged_at || step.out.empty()) return step;
+    said_.assign(step.out.begin(), step.out.end());
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      said_.back().data[0] ^= 1;
+    } else {
+      said_.back() ^= 1;
+    }
+    step.out = said_;
+    return step;
+  }
+
+  std::vector<Item> deaf_to{};                                 // a request that it does not hear
+  unsigned heard_before = 0;                                   // but the first times
+  unsigned deaf_from = 0;                                      // the number of a request that it does not hear, from 1
+  unsigned deaf_until = 0;                                     // and of the next that it does
+  unsigned damaged_at = 0;                                     // the request whose reply has a wrong bit
+  unsigned change = 0;                                         // which change of its memory, from 1
+  std::function<void(MutableBytes, const ByteList&)> spoil{};  // what was the memory before
+  unsigned requests = 0;
+
+ private:
+  [[nodiscard]] ByteList memory() const { return {device_.memory().begin(), device_.memory().end()}; }
+  void look(const ByteList& before) {
+    if (std::equal(before.begin(), before.end(), device_.memory().begin()) || ++changes_ != change) return;
+    spoil(device_.memory(), before);
+  }
+
+  Machine<Item>& line_;
+  Device<Item>& device_;
+  unsigned changes_ = 0;
+  unsigned heard_ = 0;
+  std::vector<Item> said_;
+};
+
+/// Somebody asks to end, or the line is lost, at the step of this number.
+template <class Item>
+class EndingPort final : public Port<Item> {
+ public:
+  explicit EndingPort(Port<Item>& port) : port_(port) {}
+  Time now() override { return port_.now(); }
+  void begin(const Step<Item>& step) override { port_.begin(step); }
+  Event<Item> wait(const Step<Item>& step) override {
+    if (++steps == at && end) end();
+    if (lost && steps >= at) throw os::Failure(os::Failure::Kind::lost, "the line is lost");
+    return port_.wait(step);
+  }
+
+  unsigned steps = 0;
+  unsigned at = 0;
+  bool lost = false;
+  std::function<void()> end{};
+
+ private:
+  Port<Item>& port_;
+};
+
+template <class Item>
+struct Bench {
+  explicit Bench(const EncoderAddress& where) : address(where) {
+    link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
+    link.device->power_on(Time{});
+    device = &device_of<Item>(*link.device);
+    mutant = std::make_unique<Disobedient<Item>>(*link.device);
+    line = std::make_unique<sim::RoughLine<Item>>(address.unit->link, address.line.with_some_rate(), *mutant, 1);
+    port = std::make_unique<EndingPort<Item>>(*line);
+  }
+  [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
+  /// What the encoder tells of what the clauses set and of its position: its memory may also count how often it was
+  /// written.
+  [[nodiscard]] std::string settings() const {
+    const Step<Item> rest{.at = line->now() + std::chrono::milliseconds(50)};
+    while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
+    }
+    std::string text;
+    const auto tell = [&](const Command& command, std::string_view field) {
+      std::vector<std::byte> storage(address.unit->host_storage);
+      host::Session<Item> session(*address.unit, address.options, *line, storage);
+      const Conversation<Item>* ended = session.run(command);
+      AnswerSink sink;
+      ended->report(sink);
+      text += fmt::format("{} {}\n", command.name, to_text(sink.answer[field]));
+    };
+    for (const Clause& clause : clauses_of(*address.unit)) {
+      if (!clause.field.empty()) tell(*find_command(*address.unit, clause.setting), clause.field);
+    }
+    const auto position = std::ranges::find(address.unit->fields, Role::position, &FieldInfo::role);
+    if (position != address.unit->fields.end()) tell(*find_command(*address.unit, Verb::read), position->name);
+    return text;
+  }
+  // The device stays, to be looked at.
+  [[nodiscard]] Conformance run(bool resets = false, const std::function<bool()>& over = {}) const {
+    Link way;
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      way.frames = port.get();
+    } else {
+      way.bytes = port.get();
+    }
+    return conform(address, std::move(way), {.readings = 3, .changes = true, .resets = resets, .over = over}, "NAME");
+  }
+
+  EncoderAddress address;
+  Link link;
+  Device<Item>* device = nullptr;
+  std::unique_ptr<Disobedient<Item>> mutant;
+  std::unique_ptr<sim::RoughLine<Item>> line;
+  std::unique_ptr<EndingPort<Item>> port;
+};
+
+std::vector<const Clause*> changing(const Unit& unit) {
+  std::vector<const Clause*> clauses;
+  for (const Clause& clause : clauses_of(unit)) {
+    if (changes_encoder(clause.demand)) clauses.push_back(&clause);
+  }
+  return clauses;
+}
+
+/// At a third of a turn: a position that is neither zero nor its own mirror image.
+EncoderAddress address_of_unit(const Unit& unit, std::string_view more = {}) {
+  const std::string text = fmt::format("sim:{}?{}", unit.id, more);
+  const Resolution resolution = unit.resolution(parse_address(text).options);
+  return parse_address(fmt::format("{}{}singleturn={}", text, more.empty() ? "" : "&",
+                                   (std::uint64_t{1} << resolution.singleturn_bits) / 3));
+}
+/// With what a reset has to reset.
+EncoderAddress address_showing_change(const Unit& unit, const Clause& clause) {
+  std::string more(clause.shown_with);
+  const auto add = [&](const std::string& setting) { more += (more.empty() ? "" : "&") + setting; };
+  if (clause.demand == Demand::reset) {
+    if (clause.verb == Verb::reset_multiturn) add("multiturn=7");
+    for (unsigned bit = 0; bit < 32; ++bit) {
+      if ((clause.value >> bit & 1) == 0) continue;
+      add(fmt::format("alarm={}", unit.alarms->flags[bit].name));
+      break;
+    }
+  }
+  return address_of_unit(unit, more);
+}
+
+template <class Item>
+using Spoil = std::function<void(Disobedient<Item>&)>;
+
+template <class Item>
+std::vector<Item> request_of(const EncoderAddress& address, const Command& command, Arguments given = {}) {
+  ByteList request(64);
+  const auto size = address.unit->encode(address.options, command, complete_arguments(command, given), request);
+  if (!size) return {};
+  request.resize(*size);
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    return {*parse_wire_text(LinkKind::can, "a request", {reinterpret_cast<char*>(request.data()), *size}).can};
+  } else {
+    return request;
+  }
+}
+
+template <class Item>
+std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& clause, std::size_t memory,
+                                   unsigned requests) {
+  using Encoder = Disobedient<Item>;
+  std::vector<Spoil<Item>> all;
+  if (loses(clause.demand)) {
+    const Verb verb = clause.demand == Demand::zero ? Verb::zero : clause.verb;
+    const Command* const command =
+        clause.command.empty() ? find_command(*address.unit, verb) : find_command(*address.unit, clause.command);
+    const std::vector<Item> request = request_of<Item>(address, *command);
+    for (unsigned before = 0; before < 10 && !request.empty(); ++before) {
+      all.push_back([=](Encoder& one) {
+        one.deaf_to = request;
+        one.heard_before = before;
+      });
+    }
+  }
+  // By what the clause sets it: `config set`, or a command of its own.
+  const Command* setter = clause.demand == Demand::paced ? find_command(*address.unit, clause.command) : nullptr;
+  if (clause.demand == Demand::set || clause.demand == Demand::mirrored) {
+    setter = require_setting(*address.unit, clause.setting).setter;
+  }
+  for (const std::int64_t value : {clause.value, clause.other}) {
+    if (setter == nullptr) break;
+    const std::vector<Item> request = request_of<Item>(address, *setter, std::array{value});
+    if (!request.empty()) all.push_back([=](Encoder& one) { one.deaf_to = request; });
+  }
+  const bool by_itself = clause.demand == Demand::byte_busy || clause.demand == Demand::page_closed;
+  for (unsigned at = 1; by_itself && at <= requests; ++at) {
+    all.push_back([=](Encoder& one) {
+      one.deaf_from = at;
+      one.deaf_until = at + 1;
+    });
+    all.push_back([=](Encoder& one) { one.damaged_at = at; });
+  }
+  const bool of_memory = clause.demand < Demand::set || loses(clause.demand);
+  for (unsigned change = 1; change <= 12 && of_memory && !by_itself; ++change) {
+    all.push_back([=](Encoder& one) {
+      one.change = change;
+      one.spoil = [](MutableBytes now, const ByteList& before) {
+        std::copy(before.begin(), before.end(), now.begin());
+      };
+    });
+    for (std::size_t at = 0; at < std::min<std::size_t>(memory, 300); ++at) {
+      all.push_back([=](Encoder& one) {
+        one.change = change;
+        one.spoil = [at](MutableBytes now, const ByteList&) { now[at] ^= 0x55; };
+      });
+    }
+  }
+  // What is set may be in no memory.
+  const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
+  for (const unsigned window : {30u, 1000u}) {
+    for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
+      all.push_back([=](Encoder& one) {
+        one.deaf_from = from;
+        one.deaf_until = from + window;  // longer than anybody repeats
+      });
+    }
+  }
+  return all;
+}
+
+template <class Item>
+void check_mutants(const Unit& unit) {
+  std::size_t tried = 0;
+  for (const Clause* const clause : changing(unit)) {
+    const EncoderAddress address = address_showing_change(unit, *clause);
+    const Bench<Item> good(address);
+    const Conformance held = good.run(true);
+    EXPECT_EQ(verdict_of(held, clause->id), Verdict::kept) << clause->id << "\n" << held.report();
+    EXPECT_EQ(with_verdict(held, Verdict::broken), std::vector<std::string>{}) << held.report();
+    unsigned alone = 0;
+    unsigned broken = 0;
+    std::string last;
+    for (const Spoil<Item>& spoil : spoils_of<Item>(address, *clause, good.memory().size(), good.mutant->requests)) {
+      ++tried;
+      const Bench<Item> bench(address);
+      spoil(*bench.mutant);
+      const Conformance mutant = bench.run(true);
+      last = mutant.report();
+      if (verdict_of(mutant, clause->id) != Verdict::broken) continue;
+      ++broken;
+      alone += with_verdict(mutant, Verdict::broken).size() == 1 ? 1 : 0;
+      if (alone >= 1 && broken >= 2) break;
+    }
+    EXPECT_GE(alone, 1U) << clause->id << "\n" << last;
+    EXPECT_GE(broken, 2U) << clause->id << "\n" << last;
+  }
+  std::printf("%s: %zu clauses that change, %zu mutants\n", std::string(unit.id).c_str(), changing(unit).size(), tried);
+}
+
+template <class Item>
+void check_ends(const EncoderAddress& address) {
+  const Bench<Item> whole(address);
+  const ByteList before = whole.memory();
+  const Conformance held = whole.run();
+  ASSERT_EQ(held.verdict(), Verdict::kept) << held.report();
+  const unsigned steps = whole.port->steps;
+  const std::string settings = whole.settings();
+  // What only counts how often it was written is not put back.
+  const bool counts = whole.memory() != before;
+  // Of long ones each step has one of the three ends.
+  const unsigned kinds = steps < 1000 ? 3 : 1;
+  const unsigned stride = 10 / test_cases(10);
+  for (unsigned i = 0; i < steps * kinds; i += stride) {
+    const unsigned at = 1 + i / kinds;
+    const unsigned kind = i % 3;
+    const Bench<Item> bench(address);
+    bench.port->at = at;
+    bool over = false;
+    bench.port->end = [&] {
+      if (kind == 0) throw os::Interrupted{};
+      if (kind == 1) throw os::Failure(os::Failure::Kind::lost, "the line is lost for a moment");
+      over = true;
+    };
+    bool ended = false;
+    try {
+      static_cast<void>(bench.run(false, [&] { return over; }));
+    } catch (const os::Interrupted&) {
+      ended = kind == 0;
+    } catch (const os::Failure&) {
+      ended = kind == 1;
+    } catch (const Cancelled&) {
+      ended = kind == 2;
+    }
+    EXPECT_TRUE(ended || kind != 0) << at;  // while it puts back, a moment without a line does no harm
+    if (!counts) {
+      ASSERT_EQ(bench.memory(), before) << "end " << kind << " at " << at << " of " << steps;
+    }
+    ASSERT_EQ(bench.settings(), settings) << "end " << kind << " at " << at << " of " << steps;
+  }
+  std::printf("%s: ended at each of %u steps\n", std::string(address.unit->id).c_str(), steps);
+}
+
+class ChangingClauses : public ::testing::TestWithParam<const Unit*> {};
+
+TEST_P(ChangingClauses, EachIsBrokenByTwoMutantsOneAlone) {
+  if (GetParam()->link == LinkKind::can) {
+    check_mutants<CanFrame>(*GetParam());
+  } else {
+    check_mutants<std::uint8_t>(*GetParam());
+  }
+}
+
+TEST_P(ChangingClauses, LeaveTheMemoryAsItWasWhateverStepIsTheLast) {
+  const EncoderAddress address = address_of_unit(*GetParam());
+  if (GetParam()->link == LinkKind::can) {
+    check_ends<CanFrame>(address);
+  } else {
+    check_ends<std::uint8_t>(address);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, ChangingClauses, ::testing::ValuesIn([] {
+                           std::vector<const Unit*> units;
+                           for (const Unit* unit : all_units()) {
+                             if (!changing(*unit).empty()) units.push_back(unit);
+                           }
+                           return units;
+                         }()),
+                         [](const auto& one) { return test_name(*one.param); });
+
+// What cannot be put back is said, with what puts it back.
+TEST(Conformance, SaysHowToPutBackWhatALostLineLeftChanged) {
+  const EncoderAddress address = parse_address("sim:tformat");
+  const Bench<std::uint8_t> whole(address);
+  const ByteList before = whole.memory();
+  ASSERT_EQ(whole.run().verdict(), Verdict::kept);
+  unsigned changed = 0;
+  for (unsigned at = 1; at <= whole.port->steps; ++at) {
+    const Bench<std::uint8_t> bench(address);
+    bench.port->at = at;
+    bench.port->lost = true;
+    std::string words;
+    try {
+      static_cast<void>(bench.run());
+    } catch (const std::exception& error) {
+      words = error.what();
+    }
+    if (bench.memory() == before) continue;
+    ++changed;
+    EXPECT_NE(words.find(fmt::format("absenc memory write NAME 0x7E 0x{:02X} --page 0", before[0x7E])),
+              std::string::npos)
+        << at << ": " << words;
+  }
+  EXPECT_GT(changed, 4U);
+}
+
+// What nothing could bring back is given up only when that is asked for; a counter that is 0 already shows nothing.
+TEST(Conformance, ResetsOnlyWhatMayBeLost) {
+  const auto found = [](std::string_view text, bool resets) {
+    const Bench<std::uint8_t> bench(parse_address(text));
+    const Conformance conformance = bench.run(resets);
+    std::array<Verdict, 3> verdicts{};
+    std::ranges::transform(std::array{"zero", "clear-alarms", "reset-multiturn"}, verdicts.begin(),
+                           [&](std::string_view id) { return verdict_of(conformance, id); });
+    const Reading after = [&] {
+      std::vector<std::byte> storage(bench.address.unit->host_storage);
+      host::Session<std::uint8_t> session(*bench.address.unit, bench.address.options, *bench.line, storage);
+      const Conversation<std::uint8_t>* ended = session.run(*find_command(*bench.address.unit, Verb::read));
+      return *ended->reading();
+    }();
+    return std::pair(verdicts, after);
+  };
+  constexpr auto kept = Verdict::kept;
+  constexpr auto untested = Verdict::untested;
+  for (const char* const unit : {"tformat", "esl"}) {
+    const std::string alarm = std::string_view(unit) == "esl" ? "xc_error" : "over_speed";
+    const std::string text = fmt::format("sim:{}?singleturn=50000&multiturn=7&alarm={}", unit, alarm);
+    const auto [left_alone, as_before] = found(text, false);
+    EXPECT_EQ(left_alone, (std::array{untested, untested, untested})) << unit;
+    EXPECT_EQ(as_before.singleturn, 50000U);
+    EXPECT_EQ(as_before.multiturn, 7U);
+    EXPECT_NE(as_before.alarms, 0U);
+    EXPECT_EQ(found(fmt::format("sim:{}", unit), true).first, (std::array{untested, untested, untested})) << unit;
+  }
+  const auto [given_up, after] = found("sim:tformat?singleturn=50000&multiturn=7&alarm=over_speed", true);
+  EXPECT_EQ(given_up, (std::array{kept, kept, kept}));
+  EXPECT_EQ(after.multiturn, 0U);
+  EXPECT_EQ(after.alarms, 0U);
+}
+
+}  // namespace
+}  // namespace absenc::client
