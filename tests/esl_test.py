@@ -478,12 +478,12 @@ class Doctor(EslCase):
         self.assertNotIn("good: ", result.stdout)
 
     def test_channels_that_disagree(self):
-        self.verdict("condition=redundant_offset=3", "contradiction: ", "redundant position of channel 2")
-        self.verdict("condition=ch2_sequence=5", "contradiction: ", "sequence counters of the two channels")
+        self.verdict("condition=redundant_offset=3", "contradictory: ", "redundant position of channel 2")
+        self.verdict("condition=ch2_sequence=5", "contradictory: ", "sequence counters of the two channels")
 
     def test_status_bits(self):
-        self.verdict("condition=ch2_status_set=4", "alarm: ", "safety_error in ch2_status alone")
-        self.verdict("condition=temperature=120", "alarm: ", "temperature_warning")
+        self.verdict("condition=ch2_status_set=4", "status: ", "safety_error in ch2_status alone")
+        self.verdict("condition=temperature=120", "status: ", "temperature_warning")
         self.verdict("alarm=singleturn_error", "alarm: ", "singleturn_error")
         result = absenc("doctor", "sim:esl?alarm=singleturn_error", "--json")
         self.assertEqual(len(json.loads(result.stdout)["findings"]), 1)  # safety_error is the sum of it

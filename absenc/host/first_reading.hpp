@@ -13,8 +13,8 @@ namespace absenc::host {
 
 /// Compares each position with the one before: no shaft gets farther than its fastest in the time between. Where the
 /// fastest gets farther than half of what the encoder counts, less a sixteenth, only a position that is farther away
-/// than that is refused. A shaft that is faster is seen by its third position, which is as far from the second as that
-/// from the first.
+/// than that is refused. A shaft that is faster, by `most_excess` at the most, is seen by its third position, which is
+/// as far from the second as that from the first.
 class FirstReading {
  public:
   /// 0: nobody says it, which counts as the usual limit of `SpeedLimit`.
@@ -47,9 +47,11 @@ class FirstReading {
     const Place place = place_of(reading);
     if (!is_like_last(place)) return false;
     const std::uint64_t step = place.counts - last_.counts;
-    const std::uint64_t allowed = least(reach(place, between), most_told(place.bits));
-    if (distance(step, place.bits) <= allowed) return true;
-    if (!has_step_ || distance(step_, place.bits) <= allowed) return false;
+    const std::uint64_t reached = reach(place, between);
+    const std::uint64_t allowed = least(reached, most_told(place.bits));
+    const std::uint64_t moved = distance(step, place.bits);
+    if (moved <= allowed) return true;
+    if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
     return distance(step - step_, place.bits) <= least(allowed, most_told(place.bits) / 8);
   }
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {

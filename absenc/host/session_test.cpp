@@ -564,6 +564,15 @@ TEST(FirstReading, AShaftThatIsFasterIsSeenByItsThirdPosition) {
   EXPECT_FALSE(first.confirms(of_bits(13, 0, 5ms)));
 }
 
+TEST(FirstReading, AShaftThatIsMuchFasterIsNotBelieved) {
+  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // of 819 in a millisecond
+    FirstReading first(6000);
+    EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));
+    EXPECT_FALSE(first.confirms(of_bits(15, 4 * step, 1ms)));
+    EXPECT_EQ(first.confirms(of_bits(15, 8 * step, 2ms)), step <= 3276);
+  }
+}
+
 TEST(FirstReading, TwoDamagedPositionsMakeNoSpeed) {
   FirstReading first(6000);
   EXPECT_FALSE(first.confirms(of_bits(13, 100, 0ms)));

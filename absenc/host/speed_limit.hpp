@@ -16,6 +16,9 @@ struct SpeedLimit {
   std::uint32_t mm_s = 20'000;  // linear encoders
 };
 
+/// Up to so many times its limit a shaft is too fast, but has not jumped.
+inline constexpr unsigned most_excess = 4;
+
 /// The model's, or else the usual one.
 [[nodiscard]] constexpr SpeedLimit speed_limit(const Options& options) {
   SpeedLimit limit;

@@ -36,15 +36,16 @@ class Unwrapper {
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
   }
 
-  /// Whether it is farther from the one before than any shaft turns in that time: by four times the limit, for one that
-  /// is too fast is no jump. It was damaged in a way that its check does not see, or somebody moved the zero.
+  /// Whether it is farther from the one before than any shaft turns in that time: by `most_excess` times the limit, for
+  /// one that is too fast is no jump. It was damaged in a way that its check does not see, or somebody moved the zero.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
     constexpr Time vague{1'000'000};  // when it was latched: not known better where others make us wait
     constexpr double noise = 4;       // counts
     const double seconds = static_cast<double>((apart(reading) + vague).count()) / 1e9;
     const auto moved = static_cast<double>(way(reading));
-    return (moved < 0 ? -moved : moved) > 4 * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
+    return (moved < 0 ? -moved : moved) >
+           most_excess * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
   }
 
   /// Counts of the single-turn resolution; at the start the encoder's own turns and counts.

@@ -125,7 +125,8 @@ class LetThrough {
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();
     const double allowed = std::min(reached, most);
     if (distance(step) <= allowed) return true;
-    return distance(before) > allowed && distance(step - before) <= std::min(allowed, most / 8);
+    return distance(step) <= 4 * reached && distance(before) > allowed &&
+           distance(step - before) <= std::min(allowed, most / 8);
   }
   [[nodiscard]] double distance(std::uint64_t step) const {
     return std::abs(static_cast<double>(wrapped(step, bits_)));
