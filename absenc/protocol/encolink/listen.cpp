@@ -73,9 +73,11 @@ bool Listen::find() {
     const Result<Position> position = decode_position(format_, first);
     const bool good = position && (in_step_ || decode_position(format_, waiting().subspan(size, size)));
     if (good) {
-      in_step_ = true;
+      // Of the two that show where frames begin the older one is passed over: when it began is not known any more.
+      if (!std::exchange(in_step_, true)) begin_ += size;
       discarded_.found();
-      take(first, *position);
+      const Bytes frame = waiting().first(size);
+      take(frame, *decode_position(format_, frame));
       begin_ += size;
       return true;
     }

@@ -86,7 +86,7 @@ TEST(CanNode, EveryCommandThatAsksOthersSaysSo) {
 TEST(CanNode, IsTheOneThatAnswers) {
   Bench bench({.node = 0x55, .cyclic = 50});
   EXPECT_EQ(bench.does("node").fields, "node=85 ");
-  EXPECT_TRUE(ended(bench.does(Format{}, "node"), Error::timeout, "`scan` asks them all"));
+  EXPECT_TRUE(ended(bench.does(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
 }
 
 // A slow adapter hands answers out while the next number is being asked; what comes before a number was asked is none.
