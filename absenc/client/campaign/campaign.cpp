@@ -12,7 +12,7 @@
 
 #include "absenc/client/campaign/check_code.hpp"
 #include "absenc/client/campaign/guarded.hpp"
-#include "absenc/client/campaign/rough_bench.hpp"
+#include "absenc/client/campaign/rough_setup.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "absenc/client/campaign.hpp"
-#include "absenc/client/campaign/rough_bench.hpp"
+#include "absenc/client/campaign/rough_setup.hpp"
 
 namespace absenc::client {
 

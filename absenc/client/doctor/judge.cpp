@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
@@ -170,6 +171,8 @@ namespace {
 struct RaisedFlag {
   const FlagInfo* flag = nullptr;
   bool is_alarm = false;
+  std::set<std::string_view> channels{};  // the fields that report it
+  const Reading* last = nullptr;          // the last of the readings
   std::size_t readings = 0;
   std::size_t invalid = 0;  // of them, with a position or turns that do not hold
 };
@@ -195,6 +198,10 @@ void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& re
         return known.is_alarm == is_alarm && known.flag->name == flag->name;
       });
       if (count == counts.end()) count = counts.insert(counts.end(), {.flag = flag, .is_alarm = is_alarm});
+      // A reading in which both channels report it counts once.
+      const bool is_known = std::exchange(count->last, &reading) == &reading;
+      count->channels.insert(flags.field->name);
+      if (is_known) continue;
       ++count->readings;
       count->invalid += is_invalid(reading) ? 1 : 0;
     }
@@ -253,7 +260,11 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   for (const RaisedFlag& raised : flags) {
     const std::string_view action =
         raised.flag->action.empty() ? "what the encoder's document says of it" : raised.flag->action;
-    std::string evidence = fmt::format("{} in {} readings", raised.flag->name, share(raised.readings, ready.size()));
+    const bool in_one =
+        raised.channels.size() == 1 && (raised.is_alarm ? one.unit.second_alarms : one.unit.second_status) != nullptr;
+    const std::string channel = in_one ? fmt::format(" in {} alone,", *raised.channels.begin()) : "";
+    std::string evidence =
+        fmt::format("{}{} in {} readings", raised.flag->name, channel, share(raised.readings, ready.size()));
     if (raised.invalid > 0)
       evidence += fmt::format(", whose position is invalid in {}", share(raised.invalid, raised.readings));
     findings.push_back(finding(raised.is_alarm ? Ailment::alarm : Ailment::status,
