@@ -87,7 +87,7 @@ class OnALine(EncoderCase):
         result = absenc("identify", f"{emulator.path}?baud=2500000")
         self.assert_good(result)
         self.assertIn("6 of 6", result.stdout)
-        self.assertIn("\n1 says: encoder_id 23\n", result.stdout)
+        self.assertIn("\n1 says: encoder_id 0x17\n", result.stdout)
         self.assertRegex(result.stdout, r'go on with: absenc read "tformat:.*\?model=23-bit')
 
     def test_nothing_that_changes_an_encoder_is_sent(self):

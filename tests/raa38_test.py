@@ -254,7 +254,7 @@ class Frames(RaaCase):
     def test_a_request_of_a_bus_tells_the_mode(self):
         for mode in ("timing", "bus"):
             other = absenc("decode", "raa38", "--request", "bcaab1", "--hex", "ffb2017f31", "--option", f"mode={mode}")
-            self.assert_failed(other, "unexpected_reply", "another unit answered", "`scan` shows who answers")
+            self.assert_failed(other, "unexpected_reply", "another unit answered", "`absenc scan` shows who answers")
             clash = absenc("decode", "raa38", "--request", "bcaab1", "--hex", "ffb1017f31", "--option", f"mode={mode}")
             self.assert_failed(clash, "bad_checksum", "two encoders with one number")
         self.assert_failed(absenc("decode", "raa38", "--hex", "fe81017fff"), "unexpected_reply", "it is no frame")

@@ -293,8 +293,9 @@ class Comparison {
 
   std::string compare_good(const Said& live) const {
     for (const Said* row : within_) {
-      // A procedure may ask for somebody who is not there.
-      const bool is_silence = row->error == Error::timeout && live.exchanges > 1;
+      // A procedure may ask for somebody who is not there, or wake an encoder that is silent at first.
+      const bool silent = row->error == Error::timeout || row->error == Error::line_stuck;
+      const bool is_silence = silent && live.exchanges > 1;
       if (row->error != Error::none && !is_silence && !faulty_ && !live.tries) return "a row has an error";
     }
     if (live.reading) {
@@ -330,9 +331,8 @@ class Comparison {
       if (one->reading && one->error == Error::none && fits) row = one;
     }
     // How long the frames of a stream are the first good one tells.
-    const bool knows_size = std::any_of(rows_.begin(), rows_.end(), [&](const Said& one) {
-      return one.reading && one.end < live.reading->received;
-    });
+    const bool knows_size = std::any_of(
+        rows_.begin(), rows_.end(), [&](const Said& one) { return one.reading && one.end < live.reading->received; });
     if (row == nullptr) return live.exchanges != 0 || knows_size ? "no row has a position" : "";
     Reading all = *row->reading;
     for (const Said* one : within_) {

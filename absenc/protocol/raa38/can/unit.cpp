@@ -148,7 +148,7 @@ constexpr auto commands = std::array{
          true,
          false,
          "node",
-         {},
+         "node",
          asks_all}),
     author::command<report, surveyed, configure, to<Order::rate>, Order::rate>(
         {"bitrate",
