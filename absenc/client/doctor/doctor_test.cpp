@@ -282,9 +282,68 @@ std::vector<Fault> other_faults() {
   return faults;
 }
 
+/// Replies to requests of which some are cut, have bytes before them, or are refused.
+std::vector<Fault> partial_faults() {
+  std::vector<Fault> faults;
+  faults.push_back({"extra_bytes", [] {
+                      return examine_line([](const ByteList&) {
+                        ByteList reply = good_reply();
+                        reply.insert(reply.begin(), 0x55);
+                        return reply;
+                      });
+                    }});
+  faults.push_back({"bytes_missing", [] {
+                      return examine_line([](const ByteList&) {
+                        ByteList reply = good_reply();
+                        reply.resize(reply.size() - 3);
+                        return reply;
+                      });
+                    }});
+  faults.push_back({"contradictory", [] {
+                      Observations seen;
+                      for (int i = 0; i < 5; ++i) {
+                        seen.readings.push_back({.error = Error::cross_check_failed, .raw = {1}, .heard = true});
+                      }
+                      return judged(seen);
+                    }});
+  faults.push_back({"requests_damaged", [] {
+                      Observations seen = positions([](std::size_t) { return 5; });
+                      for (int i = 0; i < 5; ++i) {
+                        seen.readings.push_back({.error = Error::request_rejected, .raw = {1}, .heard = true});
+                      }
+                      return judged(seen);
+                    }});
+  faults.push_back({"counter_stands", [] {
+                      static const FieldInfo counter{"sequence", FieldInfo::Kind::number, "", "counts the replies"};
+                      Observations seen = positions([](std::size_t) { return 5; });
+                      for (Attempted& one : seen.readings) {
+                        one.counter = 7;
+                        one.counter_field = &counter;
+                      }
+                      return judged(seen);
+                    }});
+  faults.push_back({"sometimes_late", [] {
+                      Observations seen = positions([](std::size_t) { return 5; });
+                      seen.late = 3;
+                      seen.lateness = 20ms;
+                      return judged(seen);
+                    }});
+  faults.push_back({"status", [] {
+                      Observations seen = positions([](std::size_t) { return 5; });
+                      for (Attempted& one : seen.readings) one.reading->status = one.reading->status_reported = 1U << 6;
+                      return judged(seen);
+                    }});
+  faults.push_back({"position_invalid", [] {
+                      Observations seen = positions([](std::size_t) { return 5; });
+                      for (Attempted& one : seen.readings) one.reading->singleturn_valid_bits = 0;
+                      return judged(seen);
+                    }});
+  return faults;
+}
+
 std::vector<Fault> all_faults() {
   std::vector<Fault> faults;
-  for (const auto& some : {port_faults(), line_faults(), frame_faults(), other_faults()}) {
+  for (const auto& some : {port_faults(), line_faults(), frame_faults(), partial_faults(), other_faults()}) {
     faults.insert(faults.end(), some.begin(), some.end());
   }
   return faults;

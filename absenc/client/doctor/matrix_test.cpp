@@ -156,19 +156,21 @@ const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradic
 /// And of each fault, by its kind. Damage shows as what the frames make of it.
 const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   using enum sim::FaultKind;
-  static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
-                          "position_jumps", "position_noise", "stuck_bits",        "can_errors"};
+  static const Ids damage{"extra_bytes",    "damaged_bits",  "damaged_bursts", "sometimes_damaged",
+                          "always_damaged", "bytes_missing", "extra_bytes",    "position_jumps",
+                          "position_noise", "stuck_bits",    "can_errors"};
   static const std::map<sim::FaultKind, Ids> others{
-      {delay, {"reply_late", "sometimes_late"}},
+      // Where the next request is answered before the late reply comes, nothing shows that one came.
+      {delay, {"reply_late", "sometimes_late", "sometimes_silent"}},
       {echo, {"wrong_echo", "two_answer", "extra_bytes"}},
       {garbage,
-       {"extra_bytes", "bytes_missing", "sometimes_damaged", "damaged_bits", "damaged_bursts", "always_damaged",
-        "position_jumps", "position_noise", "stuck_bits"}},
+       {"same_address", "extra_bytes", "bytes_missing", "sometimes_damaged", "damaged_bits", "damaged_bursts",
+        "always_damaged", "position_jumps", "position_noise", "stuck_bits"}},
       {silence, {"no_answer", "sometimes_silent", "miso_stuck"}},
       {repeat, {"two_answer", "extra_bytes"}},
       // A request that is taken for another has a reply that does not fit; which way was damaged cannot be seen then.
       {request_corrupt,
-       {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
+       {"extra_bytes", "requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
         "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory"}},
   };
   // Where the host is the clock, something is always clocked in: whatever the encoder does wrong is damage, or a level
