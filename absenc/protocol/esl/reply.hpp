@@ -67,7 +67,7 @@ inline constexpr std::array<CheckText, 32> check_texts{{
     {Error::wrong_length, "channel 2 is missing: the reply ends after channel 1"},
     {Error::bad_checksum, "the CRC of channel 1 is wrong, channel 2 is good: nothing of the reply is used"},
     {Error::bad_checksum, "the CRC of channel 2 is wrong, channel 1 is good: nothing of the reply is used"},
-    {Error::bad_checksum, "the CRC of the reply is wrong"},
+    {Error::bad_checksum, "the CRC of a channel is wrong"},
     {Error::bad_checksum, "the channels are swapped: channel 2 came first"},
     {Error::unexpected_reply, "the control field carries the address of another encoder"},
     {Error::unexpected_reply, "the control field is that of another request"},

@@ -189,15 +189,15 @@ TEST(TformatFrame, WithoutABatteryStatusTellsNothingOfFourAlarms) {
     const auto almc = static_cast<std::uint8_t>(alarms::without_battery | more);
     return to_reading(format, {.id = DataId::everything, .status = status_for(almc), .alarms = almc});
   };
-  EXPECT_EQ(whole(0).alarms_reported, 0xFFu & ~alarms::without_battery);
+  EXPECT_EQ(whole(0).alarms_reported, 0xFFu ^ alarms::without_battery);
   EXPECT_EQ(whole(0).status, 0u);
   EXPECT_EQ(whole(0).status_reported, 0xFFu);
   EXPECT_EQ(whole(alarms::over_heat).status, unsigned{status::alarm});
   const Reading part = to_reading(format, {.id = DataId::singleturn, .status = status::alarm});
-  EXPECT_EQ(part.status_reported, 0xFFu & ~status::alarm);
+  EXPECT_EQ(part.status_reported, 0xFFu ^ status::alarm);
   EXPECT_EQ(part.alarms_reported, unsigned{alarms::counting_error});
   EXPECT_EQ(remembered(whole(alarms::over_heat), part).alarms, unsigned{alarms::over_heat});
-  EXPECT_EQ(remembered(whole(0), part).alarms_reported, 0xFFu & ~alarms::shown_in_status);
+  EXPECT_EQ(remembered(whole(0), part).alarms_reported, 0xFFu ^ alarms::shown_in_status);
   EXPECT_EQ(remembered(whole(0), part).singleturn_validity(), Validity::valid);
   EXPECT_EQ(remembered(part, whole(0)).alarms_reported, whole(0).alarms_reported);
 }
@@ -214,7 +214,7 @@ TEST(TformatFrame, LaterRepliesCompleteWhatEarlierOnesReported) {
   EXPECT_EQ(clear.alarms_reported, 0xFFu);
   const Reading one_of_four = remembered(clear, part(status::alarm));
   EXPECT_EQ(one_of_four.singleturn_validity(), Validity::valid);
-  EXPECT_EQ(one_of_four.alarms_reported, 0xFFu & ~alarms::shown_in_status);
+  EXPECT_EQ(one_of_four.alarms_reported, 0xFFu ^ alarms::shown_in_status);
   EXPECT_EQ(remembered(one_of_four, part(status::alarm)).alarms_reported, one_of_four.alarms_reported);
   EXPECT_EQ(remembered(one_of_four, part(0)).alarms_reported, 0xFFu);
   const Reading coarse = remembered(whole(alarms::full_absolute_status | alarms::over_heat), part(status::alarm));

@@ -274,7 +274,7 @@ TEST(TformatProcedures, AnEncoderWithoutBatteryIsDeclared) {
   bench.tell("battery=false");
   const auto declared = bench.run("position");
   EXPECT_EQ(declared.reading->alarms, 0u);
-  EXPECT_EQ(declared.reading->alarms_reported, 0xFFu & ~alarms::without_battery);
+  EXPECT_EQ(declared.reading->alarms_reported, 0xFFu ^ alarms::without_battery);
   EXPECT_EQ(declared.reading->status, 0u);
   EXPECT_EQ(declared.reading->multiturn_validity(), Validity::absent);
   EXPECT_EQ(declared.reading->singleturn_validity(), Validity::valid);
