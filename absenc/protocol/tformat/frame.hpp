@@ -439,8 +439,16 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // an ID 3 reply
   const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
-  const unsigned sf = now.status | (~now.status_reported & status::alarm);  // which tells nothing without a battery
-  detail::judge(now, known_after(known, static_cast<std::uint8_t>(sf)));
+  KnownAlarms after = known_after(known, static_cast<std::uint8_t>(now.status));
+  // Without a battery the bit of four alarms tells nothing: what was known of them stays.
+  if ((now.status_reported & status::alarm) == 0) {
+    constexpr unsigned together = alarms::shown_in_status;
+    const auto kept = [](unsigned was, unsigned is) {
+      return static_cast<std::uint8_t>((was & together) | (is & ~together));
+    };
+    after = {kept(known.reported, after.reported), kept(known.raised, after.raised)};
+  }
+  detail::judge(now, after);
   return now;
 }
 

@@ -197,7 +197,7 @@ TEST(TformatFrame, WithoutABatteryStatusTellsNothingOfFourAlarms) {
   EXPECT_EQ(part.status_reported, 0xFFu ^ status::alarm);
   EXPECT_EQ(part.alarms_reported, unsigned{alarms::counting_error});
   EXPECT_EQ(remembered(whole(alarms::over_heat), part).alarms, unsigned{alarms::over_heat});
-  EXPECT_EQ(remembered(whole(0), part).alarms_reported, 0xFFu ^ alarms::shown_in_status);
+  EXPECT_EQ(remembered(whole(0), part).alarms_reported, 0xFFu ^ alarms::without_battery);
   EXPECT_EQ(remembered(whole(0), part).singleturn_validity(), Validity::valid);
   EXPECT_EQ(remembered(part, whole(0)).alarms_reported, whole(0).alarms_reported);
 }
