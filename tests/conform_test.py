@@ -47,7 +47,9 @@ class Conform(EncoderCase):
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            self.assertIn(clause["verdict"], ("kept", "untested"), clause)
+            # A simulated port changes its rate at once, and then the reply was at the rate before.
+            expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
+            self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)
 
     def test_tap_and_junit_say_the_same(self):

@@ -55,7 +55,7 @@ struct CheckWorth {
   double taken_deviation = 0;  // standard deviation of `taken`, which is drawn by chance
 };
 
-/// What comes of positions that are confirmed.
+/// Counts of confirmed positions, right and wrong.
 struct Guarded {
   Share confirmed{};       // readings: that were presented as confirmed
   Share wrong{};           // of these: the position is not that of the shaft when it was taken

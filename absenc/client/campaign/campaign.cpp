@@ -72,7 +72,7 @@ struct Hand final : Shaft {
   std::int64_t position = 0;
 };
 
-/// What comes of readings of which each finds the shaft somewhere else.
+/// Counts of readings that each find the shaft at another position.
 template <class Item>
 class Campaign {
  public:

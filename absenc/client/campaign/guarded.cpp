@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Of positions of so many bits, of a circle.
+// Positions of this many bits on a circle.
 std::int64_t wrapped(std::uint64_t difference, unsigned bits) {
   const unsigned unused = 64 - bits;
   return static_cast<std::int64_t>(difference << unused) >> unused;
@@ -119,7 +119,7 @@ class LetThrough {
     std::int64_t before;
   };
 
-  // What README and docs/line-faults.md say of it, by floating point.
+  // The formula of the README, in floating point.
   [[nodiscard]] bool agrees(Time between, std::uint64_t step, std::uint64_t before) const {
     const double most = std::ldexp(15.0 / 32, static_cast<int>(bits_));
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();

@@ -87,7 +87,7 @@ struct RoughBench {
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// What nobody asks for is counted by its frames.
+  /// A stream is counted by its frames, since no request asks for them.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);

@@ -34,7 +34,7 @@ namespace {
 using namespace std::chrono_literals;
 using capture::Annotation;
 
-/// What one result of a conversation, or one exchange of a capture, says.
+/// The values of one result of a conversation, or of one exchange of a capture.
 struct Said {
   std::string what;  // the command, or the kind of the exchange and its frames
   Time begin{};
@@ -180,7 +180,7 @@ class Stage {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       said.is_verdict = said.error == Error::cross_check_failed;
     } else {
-      // What the last reply says by itself: beyond that a procedure has its own verdict.
+      // Only the last reply is compared: a procedure adds a verdict of its own.
       const Exchange<Item> last = conversation->exchange();
       NoFields nowhere;
       const bool has_bytes = address.unit->link != LinkKind::clocked && !last.received.empty();
@@ -263,7 +263,7 @@ class Comparison {
     tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
   }
 
-  /// What contradicts; "" for nothing.
+  /// The contradiction in words; "" if there is none.
   std::string operator()(const Said& live) {
     within_.clear();
     for (const Said& row : rows_) {
@@ -343,7 +343,7 @@ class Comparison {
         all.multiturn_valid = one->reading->multiturn_valid;
       }
     }
-    // What a capture remembers of earlier conversations, a host that reads once does not know.
+    // A capture remembers earlier conversations; a host that reads once does not.
     const Reading& known = *live.reading;
     all.alarms &= known.alarms_reported;
     all.alarms_reported &= known.alarms_reported;

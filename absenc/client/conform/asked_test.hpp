@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tests of conform need of every unit.
+// Addresses and names that the tests of conform share.
 #pragma once
 
 #include <fmt/format.h>
@@ -65,7 +65,7 @@ inline std::string variation_name(const EncoderAddress& address) {
   return std::string(address.unit->id);
 }
 
-/// Of a test that is made for each unit.
+/// The name of a test that is made for each unit.
 inline std::string test_name(const Unit& unit) {
   std::string name(unit.id);
   for (char& letter : name) letter = letter == '-' ? '_' : letter;
