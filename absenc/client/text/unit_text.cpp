@@ -256,7 +256,7 @@ std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits) 
 }
 
 std::string_view action_of(const FlagInfo& flag, bool beside_alarms) {
-  return beside_alarms && flag.action == read_the_alarms ? std::string_view{} : flag.action;
+  return beside_alarms && flag.sums != 0 ? std::string_view{} : flag.action;
 }
 
 std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits) {
