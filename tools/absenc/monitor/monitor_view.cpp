@@ -247,19 +247,28 @@ int draw_alarms(Screen& screen, int row, int end, const Shown& shown) {
   return row;
 }
 
-// In columns; returns the row behind them. The last two rows are left to what comes below.
+// In columns, of which a long field takes several; returns the row behind them. The last two rows are left to what
+// comes below.
 int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
   if (!is_live(snapshot)) return row;
-  std::size_t longest = 0;
-  for (const std::string& field : snapshot.fields) longest = std::max(longest, field.size());
-  const int width = static_cast<int>(longest) + 3;
-  const int columns = std::max(1, (screen.columns() - 2) / width);
+  constexpr int between = 3;
+  const int room = screen.columns() - 2 + between;
+  int width = 1;  // of a column: every field that has room beside another one fits
+  for (const std::string& field : snapshot.fields) {
+    const int needed = static_cast<int>(field.size()) + between;
+    if (needed <= room / 2) width = std::max(width, needed);
+  }
+  const int columns = room / width;
   int column = 0;
   for (const std::string& field : snapshot.fields) {
-    if (row >= end - 3) break;
+    const int needed = std::min(columns, (static_cast<int>(field.size()) + between + width - 1) / width);
+    if (column + needed > columns) {
+      column = 0;
+      ++row;
+    }
+    if (row >= end - 3) return row;
     screen.put(row, 2 + column * width, field);
-    column = (column + 1) % columns;
-    if (column == 0) ++row;
+    column += needed;
   }
   return column == 0 ? row : row + 1;
 }
