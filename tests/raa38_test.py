@@ -4,6 +4,7 @@
 import csv
 import io
 import json
+import re
 import unittest
 
 from command_support import BabblingLine, Emulator, EncoderCase, FakeEncoder, absenc, json_lines
@@ -64,6 +65,15 @@ class Stream(RaaCase):
         self.assert_good(result)
         self.assertRegex(result.stderr, r"[1-9][0-9]* failed \(.*bad_checksum")
         self.assertEqual({line["reading"]["singleturn"] for line in json_lines(result.stdout)}, {383})
+
+    def test_dropped_frames_are_counted_where_no_reading_shows_them(self):
+        result = absenc("read", "sim:raa38?fault=corrupt=0.3&refresh_hz=1000", "--rate", "0", "--count", "100")
+        self.assert_good(result)
+        dropped = int(re.search(r"(\d+) damaged frames of the stream were dropped", result.stderr).group(1))
+        # With 30 of 100 damaged, about 43 are dropped while 100 come through, and more on a busy machine.
+        self.assertGreater(dropped, 15, result.stderr)
+        result = absenc("read", "sim:raa38?refresh_hz=1000", "--rate", "0", "--count", "100")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
 
     def test_record(self):
         emulator = self.emulator("--option", "refresh_hz=200", "--singleturn", "383")

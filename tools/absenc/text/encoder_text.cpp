@@ -28,6 +28,8 @@ std::string summary(const host::Counters& counters) {
     }
     text += fmt::format(", {} failed ({}), {} repeated", counters.bad(), fmt::join(kinds, ", "), counters.repeated);
   }
+  if (counters.discarded != 0)
+    text += fmt::format(", {} damaged frames of the stream were dropped", counters.discarded);
   if (counters.late != 0) text += fmt::format(", {} came too late and were dropped", counters.late);
   return text;
 }

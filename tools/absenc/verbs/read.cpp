@@ -119,6 +119,13 @@ void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, 
   }
 }
 
+void print_tally(const Encoder& live, const Tally& tally, Time time) {
+  const host::Counters& counters = live.connection().counters();
+  print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}; the port went away: {}",
+                            tally.good, tally.bad, to_text(time), exchanges_text(counters, live.readings()),
+                            live.losses()));
+}
+
 int run_read(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), reading_settings(invocation));
@@ -132,18 +139,18 @@ int run_read(const Invocation& invocation) {
   print_notes(live.connection());
   Display display(live, format);
   Tally tally;
+  const Time start = os::now();
   if (count != 0) {
     read_all(live, display, count, pace, tally);
+    // Damage that no reading shows.
+    if (live.connection().counters().discarded != 0) print_tally(live, tally, os::now() - start);
     return tally.bad == 0 ? exit_good : exit_failed;
   }
-  const Time start = os::now();
   try {
     read_all(live, display, 0, pace, tally);
   } catch (const os::Interrupted&) {
   }
-  print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}; the port went away: {}",
-                            tally.good, tally.bad, to_text(os::now() - start),
-                            exchanges_text(live.connection().counters(), live.readings()), live.losses()));
+  print_tally(live, tally, os::now() - start);
   return tally.last_good ? exit_good : exit_failed;
 }
 
