@@ -11,7 +11,7 @@ import tty
 import unittest
 import xml.etree.ElementTree
 
-from command_support import PATIENCE, EncoderCase, absenc, end, read_line
+from command_support import PATIENCE, EncoderCase, absenc, end, json_lines, read_line
 
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -93,6 +93,35 @@ class Conform(EncoderCase):
         status, out, _ = end(process, signal.SIGINT)
         self.assertEqual(content(memory), before)
         self.assertEqual((status, out), (1, ""))
+
+    def verdicts(self, encoder, *more):
+        result = absenc("conform", encoder, "--changes", "--yes", "--readings", "2", "--json", *more)
+        return {one["id"]: (one["verdict"], one["evidence"]) for one in json.loads(result.stdout)["clauses"]}
+
+    def place(self, encoder):
+        reading = json_lines(absenc("read", encoder, "--json").stdout)[0]
+        return reading["singleturn"], reading["multiturn"]
+
+    def test_a_zero_and_turns_are_lost_only_when_asked(self):
+        encoder = self.encoder("--singleturn", "1000", "--multiturn", "7")
+        before = self.place(encoder)
+        self.assertTrue(all(before), before)
+        kept = self.verdicts(encoder)
+        for clause in ("zero", "reset-multiturn"):
+            self.assertEqual(kept[clause][0], "untested")
+            self.assertIn("--resets gives it up", kept[clause][1])
+        self.assertEqual(self.place(encoder), before)
+        lost = self.verdicts(encoder, "--resets")
+        self.assertEqual({clause: lost[clause][0] for clause in ("zero", "reset-multiturn")},
+                         {"zero": "kept", "reset-multiturn": "kept"}, lost)
+        self.assertEqual(self.place(encoder), (0, 0))
+
+    def test_resets_ask_first_and_say_what_is_lost(self):
+        encoder = self.encoder("--singleturn", "1000", "--multiturn", "7")
+        self.assert_wrong_usage(absenc("conform", encoder, "--resets"), "--changes", "give both")
+        self.assert_wrong_usage(absenc("conform", encoder, "--changes", "--resets"), "--yes", "its turns and its alarms are")
+        self.assertTrue(all(self.place(encoder)))
+
 
 class ConformHost(EncoderCase):
     def test_our_host_holds_all(self):

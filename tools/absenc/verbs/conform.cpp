@@ -77,11 +77,18 @@ int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
 int run_conform(const Invocation& invocation) {
   os::catch_interrupts();
   const ConformChoices choices{.readings = static_cast<std::size_t>(invocation.number("--readings", 100, 1, 1'000'000)),
-                               .changes = invocation.has("--changes")};
+                               .changes = invocation.has("--changes"),
+                               .resets = invocation.has("--resets")};
+  if (choices.resets && !choices.changes) {
+    throw UsageError("--resets says what --changes may lose: give both, or neither");
+  }
   if (choices.changes) {
     const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
-    const std::string_view meaning = "memory and settings are written and put back, resets are sent";
-    if (must_ask(invocation, uri, "conform --changes", meaning) && !confirmed(uri, meaning)) {
+    const std::string_view meaning =
+        choices.resets ? "memory and settings are written and put back; its zero, its turns and its alarms are lost"
+                       : "memory and settings are written and put back, resets are sent";
+    const std::string_view what = choices.resets ? "conform --changes --resets" : "conform --changes";
+    if (must_ask(invocation, uri, what, meaning) && !confirmed(uri, meaning)) {
       print_message("nothing was changed");
       return exit_failed;
     }
@@ -174,10 +181,12 @@ int run_conform_host(const Invocation& invocation) {
                                                              : conform_host(text, place, choices));
 }
 
-constexpr std::array<Parameter, 8> conform_parameters{{
+constexpr std::array<Parameter, 9> conform_parameters{{
     parameter::encoder,
     {"--readings", "N", "how many readings are looked at", "100"},
     {"--changes", "", "test also what is written, set and reset; it is put back as it was"},
+    {"--resets", "",
+     "with --changes: send resets also where the zero, turns or alarms are lost, which nothing brings back"},
     parameter::yes,
     {"--tap", "", "print the Test Anything Protocol"},
     {"--junit", "FILE", "write JUnit's XML to it as well"},
@@ -185,9 +194,11 @@ constexpr std::array<Parameter, 8> conform_parameters{{
     parameter::option,
 }};
 
-constexpr std::array<Example, 3> conform_examples{{
+constexpr std::array<Example, 4> conform_examples{{
     {"absenc conform sim:tformat", "what its document demands, and whether it does so"},
     {"absenc conform sim:tformat --changes", "also memory, settings and resets"},
+    {"absenc conform tformat:/dev/ttyUSB0 --changes --resets",
+     "an encoder on the bench, whose zero and turns may be lost"},
     {"absenc conform amt21:/dev/ttyUSB0 --tap --junit amt21.xml", "for programs that count tests"},
 }};
 
@@ -221,7 +232,8 @@ const Subcommand conform_subcommand{
     "time, whole, with a right checksum and as drawn; requests that must not be answered. Nothing is written to\n"
     "the encoder without --changes, which asks first: it saves what it writes and puts it back, also after Ctrl-C, "
     "and\n"
-    "says with which commands to do it by hand what it could not. A reset is sent only where it changes nothing.\n"
+    "says with which commands to do it by hand what it could not. A reset is sent only where nothing is lost by\n"
+    "it; with --resets also where the zero, turns or alarms are lost, which nothing brings back.\n"
     "A clause is kept only when what it is about was seen: a request that was really sent and its reply, a check that\n"
     "these options have, a value that was another before. All else is untested, with the reason.\n"
     "Exit status 1 when a clause is broken, else 0 when one is kept, else 3: nothing was seen that could be judged.",
