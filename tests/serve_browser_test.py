@@ -88,8 +88,7 @@ class Page(ServeCase):
         self.assertEqual(paper, "rgb(16, 19, 22)")
         self.shot("dark")
         self.browser.set_window_size(500, 800)
-        wide = self.browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
-        self.assertLessEqual(wide, 0)
+        self.assertLessEqual(self.too_wide(), 0)
         self.shot("phone")
         self.assert_no_errors()
 
@@ -106,6 +105,53 @@ class Page(ServeCase):
         self.wait_for("alarms not reported")
         self.shot("not-reported")
         self.assert_no_errors()
+
+    def resize(self, width):
+        """Also narrower than a window of this browser can be."""
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                                     {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": False})
+        self.addCleanup(self.browser.execute_cdp_cmd, "Emulation.clearDeviceMetricsOverride", {})
+
+    def broken_words(self):
+        """The words of values that do not stand on one line."""
+        return self.browser.execute_script("""
+            const broken = [];
+            for (const node of document.querySelectorAll('dd')) {
+              const text = node.firstChild;
+              for (const word of text === null ? [] : text.data.matchAll(/\\S+/g)) {
+                const range = document.createRange();
+                range.setStart(text, word.index);
+                range.setEnd(text, word.index + word[0].length);
+                if (range.getClientRects().length > 1) broken.push(word[0]);
+              }
+            }
+            return broken;""")
+
+    def too_wide(self):
+        return self.browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
+
+    def test_values_stand_on_one_line(self):
+        """On a phone, a laptop and a large screen: turned, invalid, unknown and many."""
+        encoders = ["sim:encolink?motion=rpm=-3000&multiturn=60000", "sim:tformat?alarm=battery_error", "sim:ssi",
+                    "sim:esl?alarm=memory_error", "sim:tformat?fault=corrupt=0.2&model=23-bit&motion=rpm=3000"]
+        served = self.without_history(*encoders)
+        for width in (390, 1280, 1920):
+            self.resize(width)
+            for place in ["", *encoders]:
+                self.browser.get("about:blank")
+                self.browser.get(served.url + (place and "#encoder=" + urllib.parse.quote(place, safe="")))
+                self.wait_for("connected: 5 of 5 live", "#connection")
+                wait_until(lambda: "°" in self.text("dd") or "INVALID" in self.text("dd"), "there are values")
+                self.shot(f"values-{width}-{encoders.index(place) if place else 'all'}")
+                with self.subTest(place, width=width):
+                    self.assertEqual(self.broken_words(), [])
+                    self.assertLessEqual(self.too_wide(), 0)
+
+    def test_a_plot_that_is_not_yet_drawn_anew_widens_nothing(self):
+        self.open("#encoder=sim:esl%3Fmotion%3Drpm%3D60")
+        wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, ".plot canvas"), "there are plots")
+        self.browser.execute_script("document.querySelector('.plot').firstChild.style.width = '3000px'")
+        self.assertLessEqual(self.too_wide(), 0)
 
     def test_an_encoder_is_lost_and_comes_back(self):
         self.open()
@@ -269,8 +315,7 @@ class Page(ServeCase):
             self.browser.set_window_size(width, 1400)
             self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia",
                                          {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
-            wide = self.browser.execute_script("return document.documentElement.scrollWidth - innerWidth")
-            self.assertLessEqual(wide, 0)
+            self.assertLessEqual(self.too_wide(), 0)
             self.browser.execute_script("arguments[0].scrollIntoView()", node)
             self.shot(f"{name}-{width}-{scheme}")
 
