@@ -320,15 +320,17 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 }
 
 /// See Unit. The status of a cycle of channel 2 holds as long as the error and warning bits of position frames agree
-/// with it: which alarm has come or gone the next cycle tells.
+/// with it: which alarm has come or gone the next cycle tells. A bit that is set does not say which alarm it is for,
+/// and a bit that is clear says only that the alarms of its own kind are.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
-  if (now.alarms_reported != 0 || before.alarms_reported == 0 || now.singleturn_bits == 0) return now;
+  const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
+  if (unknown == 0 || now.singleturn_bits == 0) return now;
   const bool has_error = (before.alarms & status::errors) != 0;
   const bool has_warning = (before.alarms & status::warnings) != 0;
   const std::uint32_t general = (has_error ? general::error : 0) | (has_warning ? general::warning : 0);
   if (now.status != general) return now;
-  now.alarms = before.alarms;
-  now.alarms_reported = before.alarms_reported;
+  now.alarms |= before.alarms & unknown;
+  now.alarms_reported |= unknown;
   if ((now.alarms & status::position_invalid) != 0) now.singleturn_valid_bits = 0;
   if ((now.alarms & status::multiturn_mismatch) != 0) now.multiturn_valid = false;
   return now;

@@ -74,6 +74,23 @@ TEST(EncolinkFrame, BitsOfAFrameReportAlarmsOnlyWhereTheyAreClear) {
   EXPECT_EQ(to_reading(alone, {}).status_reported, general::error | general::warning);
 }
 
+// Which alarm it is the cycle before said; the clear bit of the frame says only that there is no warning.
+TEST(EncolinkFrame, ACycleIsRememberedWhereABitOfTheFrameIsSet) {
+  constexpr Position bad{.singleturn = 5, .error = true};
+  constexpr Position warned{.singleturn = 5, .warning = true};
+  const Reading lost = to_reading(multi, bad, status::signal_lost);
+  const Reading hot = to_reading(multi, warned, status::temperature);
+  EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms, status::signal_lost);
+  EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms_reported, 0xFFFFu);
+  EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms, status::temperature);
+  EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms_reported, 0xFFFFu);
+  // An alarm that has come or gone: which one the next cycle tells.
+  EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms, 0u);
+  EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms_reported, status::warnings);
+  EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms, 0u);
+  EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms_reported, 0xFFFFu);
+}
+
 TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
   ReplyBytes padded = encode_identity({.frame_bytes = 7, .resolution = 18});
   padded.push_back(0x5A);
