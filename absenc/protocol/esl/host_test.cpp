@@ -206,7 +206,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
        [](unsigned, Wire& reply) { std::rotate(reply.begin(), reply.begin() + 11, reply.end()); }},
       {"channel 2 is missing", Error::wrong_length, [](unsigned, Wire& reply) { reply.resize(11); }},
       {"number of bytes", Error::wrong_length, [](unsigned, Wire& reply) { reply.pop_back(); }},
-      {"CRC of the reply is wrong", Error::bad_checksum, [](unsigned, Wire& reply) { reply[4] ^= 1, reply[13] ^= 1; }},
+      {"CRC of a channel is wrong", Error::bad_checksum, [](unsigned, Wire& reply) { reply[4] ^= 1, reply[13] ^= 1; }},
       {"address of another encoder", Error::unexpected_reply,
        [&](unsigned, Wire& reply) { reply = wire({.encoder_address = 1, .one = {.status = status::ready}}); }},
       {"wrong parity bit in the request", Error::request_rejected,
