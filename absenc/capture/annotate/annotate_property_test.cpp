@@ -134,6 +134,7 @@ class Truth {
  private:
   ControlFrames control_;
   bool after_low_ = false;
+  std::size_t stream_size_ = 0;  // of the last good frame that nobody asked for
   std::optional<Reading> reading(Error error) {
     return error == Error::none && judge_.contents().reading != nullptr ? std::optional(*judge_.contents().reading)
                                                                         : std::nullopt;
@@ -146,8 +147,25 @@ class Truth {
   }
 
   void unasked(const Said& said) {
+    const std::size_t size = stream_size_;
     const Error error = judge_.decode({}, {.bytes = said.bytes});
+    if (error == Error::none) stream_size_ = said.bytes.size();
+    if (error != Error::none && judge_.streams() && size != 0 && said.bytes.size() > size) {
+      const auto middle = said.bytes.end() - static_cast<std::ptrdiff_t>(size);
+      const Wire last(middle, said.bytes.end());
+      if (judge_.decode({}, {.bytes = last}) == Error::none) return add_disturbed(said, middle, last);
+    }
     add(Kind::reply, Remark::none, error, said, reading(error));
+  }
+
+  // The frame behind a disturbance is as good as any: a host that listens takes it.
+  void add_disturbed(const Said& said, Wire::const_iterator middle, const Wire& last) {
+    const Wire before(said.bytes.begin(), middle);
+    const Tick each = (said.end - said.begin) / said.bytes.size();
+    const Tick turn = said.begin + each * before.size();
+    add(Kind::reply, Remark::none, judge_.decode({}, {.bytes = before}), {said.by, before, said.begin, turn}, {});
+    static_cast<void>(judge_.decode({}, {.bytes = last}));
+    add(Kind::reply, Remark::none, Error::none, {said.by, last, turn, said.end}, reading(Error::none));
   }
 
   void answered(const Said& asked, const Said& said) {
