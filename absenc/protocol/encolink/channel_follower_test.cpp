@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/encolink/channel_follower.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "absenc/core/hex.hpp"
 #include "absenc/protocol/encolink/unit.hpp"
 
 namespace absenc::encolink {
@@ -84,6 +86,19 @@ Error decode_as_unit(const Told& one, std::string& fields) {
   const Error error = unit.decode(options, {.bytes = one.request}, {.bytes = one.reply}, sink);
   fields = sink.text;
   return error;
+}
+
+TEST(EncolinkSpiUnit, DecodesReplyOfRequestThatIsClockedWithZeros) {
+  Options options;
+  ASSERT_EQ(resolve_options(spi_unit, {}, {}, options).kind, OptionError::Kind::none);
+  const auto frame = hex<"E8A6D050DF695A">;
+  const auto clocked = hex<"00CD0000000000">;
+  Fields reply;
+  ASSERT_EQ(spi_unit.decode(options, {.bytes = clocked}, {.bytes = frame}, reply), Error::none);
+  EXPECT_THAT(reply.text, ::testing::HasSubstr("singleturn=3413047 multiturn=59558"));
+  constexpr std::size_t channel2_bit = 8 * 6;
+  EXPECT_TRUE(spi_unit.is_checked(options, {.bytes = clocked}, {.bytes = frame}, channel2_bit - 1));
+  EXPECT_FALSE(spi_unit.is_checked(options, {.bytes = clocked}, {.bytes = frame}, channel2_bit));
 }
 
 TEST(EncolinkFollower, ACycleIsWhatItsFramesCarry) {

@@ -300,7 +300,7 @@ constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink
 /// channel 2 cycle or the identity.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
-  if (request.size() > request_bytes) return decode_access_answer(request, reply, sink);
+  if (is_access(request)) return decode_access_answer(request, reply, sink);
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) {
     const Result<Identity> identity = decode_identity(reply);
     if (identity) frame_fields.put(sink, {.identity = *identity});

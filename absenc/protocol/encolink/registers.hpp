@@ -2,6 +2,7 @@
 // Channel 3: the registers of an AksIM-2 as one table, and the bytes that ask for them, one in each request.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -192,6 +193,14 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   if (request.operation == RegisterRequest::Operation::write) bytes.append(request.data);
   bytes.push_back(checksum(bytes.view().subspan(access_keys.size() + 1)));
   return bytes;
+}
+
+/// Whether `request` is all the `ra` bytes of a register access. SPI clocks zeros behind the two bytes of a request; an
+/// access is longer than these two, and its keys have no zeros there.
+[[nodiscard]] constexpr bool is_access(Bytes request) {
+  if (request.size() <= request_bytes) return false;
+  const Bytes behind = request.subspan(request_bytes);
+  return std::any_of(behind.begin(), behind.end(), [](std::uint8_t byte) { return byte != 0; });
 }
 
 /// Errors in this order: bad_framing (keys), unsupported (no such operation), wrong_length, bad_checksum.

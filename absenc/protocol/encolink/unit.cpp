@@ -143,10 +143,10 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
 // The byte of channel 2 stands behind the checksum of a position frame; one that means nothing may stand behind that of
 // the identity.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
-  const Format format = options.format(values);
-  if (request.bytes.size() > request_bytes) return bit / 8 < 2;  // cycles of channel 2 have the checksums
+  const Format format = assumed(options.format(values), reply.bytes);
+  if (is_access(request.bytes)) return bit / 8 < 2;  // cycles of channel 2 have the checksums
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
-  return request.bytes.size() != request_bytes || !format.has_ch2 || bit / 8 != format.frame_bytes() - 1;
+  return !format.has_ch2 || reply.bytes.size() != format.frame_bytes() || bit / 8 != format.frame_bytes() - 1;
 }
 
 // ---- What is shown
@@ -199,7 +199,7 @@ Explanation explain_host(const Host& host) {
 }
 /// Of a frame, which captures have; of a register access all its bytes.
 constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
-  if (request.size() > request_bytes) {
+  if (is_access(request)) {
     if (error != Error::request_rejected || reply.size() < 2) return {};
     return {text_of(static_cast<AccessStatus>(reply[1]))};
   }
@@ -402,7 +402,7 @@ constexpr bool is_streaming(const Options& values) {
 }
 template <Interface interface>
 BitRanges bits_in(const Options& values, Frame request, Frame reply, const FieldInfo& field) {
-  if (request.bytes.size() > request_bytes) return {};
+  if (is_access(request.bytes)) return {};
   return bits_of(format_of<interface>(values), reply.bytes, field);
 }
 
