@@ -256,6 +256,7 @@ class Campaign {
     const Seen& seen = result.seen;
     if (seen.reading.has_value() != truth.reading.has_value()) return {"has another reading"};
     if (seen.reading && !sim::is_at(*seen.reading, places_[place_])) return {"another position than the shaft's", true};
+    if (seen.reading && is_part_of(*seen.reading, *truth.reading)) return {};
     for (const auto& [name, value] : truth.fields) {
       if (std::find(asked.varying.begin(), asked.varying.end(), name) != asked.varying.end()) continue;
       const auto found = seen.fields.find(name);
@@ -264,6 +265,15 @@ class Campaign {
       if (!(found->second == value)) return {"another " + name + " than on a good line"};
     }
     return {};
+  }
+
+  // Whether the reading says that a part of the conversation was lost: it reports fewer alarms than on a good line.
+  // What it reports is right, and the position is the shaft's.
+  [[nodiscard]] static bool is_part_of(const Reading& seen, const Reading& truth) {
+    const std::uint32_t reported = seen.alarms_reported;
+    if (reported == truth.alarms_reported || (reported & ~truth.alarms_reported) != 0) return false;
+    return ((seen.alarms ^ truth.alarms) & reported) == 0 &&
+           ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
   // Options may say what a frame is checked with: what was counted with others is no measure.
