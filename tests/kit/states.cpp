@@ -8,33 +8,34 @@
 namespace absenc::kit {
 namespace {
 
-/// What one field of flags of a reading says, whichever channel it is of.
-struct State {
+/// One field of flags of a reading, of one channel.
+struct Flags {
   const FieldInfo* field;
   std::uint32_t bits;
   std::uint32_t reported;
 };
 
-std::vector<State> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits, std::uint32_t reported) {
-  std::vector<State> states;
-  if (first != nullptr) states.push_back({first, bits, reported});
-  if (second != nullptr) states.push_back({second, bits >> first->flags.size(), reported >> first->flags.size()});
-  return states;
-}
-
-std::vector<State> alarms_of(const Unit& unit, const Reading& reading) {
-  return both(unit.alarms, unit.second_alarms, reading.alarms, reading.alarms_reported);
-}
-std::vector<State> status_of(const Unit& unit, const Reading& reading) {
-  return both(unit.status, unit.second_status, reading.status, reading.status_reported);
-}
-
+/// The bits of `field` that have a name.
 std::uint32_t named(const FieldInfo& field) {
   std::uint32_t mask = 0;
   for (std::size_t i = 0; i < field.flags.size(); ++i) {
-    if (!field.flags[i].name.empty()) mask |= 1u << i;
+    if (!field.flags[i].name.empty()) mask |= std::uint32_t{1} << i;
   }
   return mask;
+}
+
+std::vector<Flags> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits, std::uint32_t reported) {
+  std::vector<Flags> flags;
+  if (first != nullptr) flags.push_back({first, bits, reported});
+  if (second != nullptr) flags.push_back({second, bits >> first->flags.size(), reported >> first->flags.size()});
+  return flags;
+}
+
+std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading) {
+  return both(unit.alarms, unit.second_alarms, reading.alarms, reading.alarms_reported);
+}
+std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
+  return both(unit.status, unit.second_status, reading.status, reading.status_reported);
 }
 
 /// A command's reading, and the fields and the reading of its last reply as a capture has them.
@@ -116,31 +117,45 @@ class States {
     if (!reading) return;
     bool is_reported = false;
     bool is_shown = false;
-    for (const State& state : alarms_of(unit_, *reading)) {
+    for (const Flags& state : alarms_of(unit_, *reading)) {
       require((state.bits & ~state.reported & named(*state.field)) == 0, "an alarm is raised and not reported");
       is_reported = is_reported || (state.reported >> bit & 1) != 0;
       is_shown = is_shown || (state.bits >> bit & 1) != 0;
     }
-    for (const State& state : status_of(unit_, *reading)) {
+    for (const Flags& state : status_of(unit_, *reading)) {
       require((state.bits & ~state.reported & named(*state.field)) == 0, "a status is set and not reported");
     }
     if (is_raised) require(is_shown || !is_reported, "it is raised and reported clear");
     if (!is_raised) require(!is_shown, "it is reported raised and is not");
   }
 
+  // A flag that options say this encoder does not have, and a status flag that sums it up.
+  [[nodiscard]] std::uint32_t absent(const FieldInfo& field, const Reading& reading) const {
+    std::uint32_t alarms = 0;
+    for (std::size_t i = 0; i < unit_.alarms->flags.size(); ++i) {
+      if (unit_.alarms->flags[i].optional) alarms |= std::uint32_t{1} << i & ~reading.alarms_reported;
+    }
+    if (&field == unit_.alarms) return alarms;
+    std::uint32_t mask = 0;
+    for (std::size_t i = 0; i < field.flags.size(); ++i) {
+      if ((field.flags[i].sums & alarms) != 0) mask |= 1u << i;
+    }
+    return mask;
+  }
+
   // What a reply shows as a field, its reading reports.
   void carries(const Seen& seen) {
     if (!seen.reading) return;
-    const auto agrees = [&](const State& state) {
+    const auto agrees = [&](const Flags& state) {
       const auto field = seen.fields.find(std::string(state.field->name));
       if (field == seen.fields.end()) return;
-      const std::uint32_t mask = named(*state.field);
+      const std::uint32_t mask = named(*state.field) & ~absent(*state.field, *seen.reading);
       require((~state.reported & mask) == 0, "a reply carries flags that its reading does not report");
       require(((static_cast<std::uint32_t>(field->second.number) ^ state.bits) & mask) == 0,
               "a reply carries other flags than its reading");
     };
-    for (const State& state : alarms_of(unit_, *seen.reading)) agrees(state);
-    for (const State& state : status_of(unit_, *seen.reading)) agrees(state);
+    for (const Flags& state : alarms_of(unit_, *seen.reading)) agrees(state);
+    for (const Flags& state : status_of(unit_, *seen.reading)) agrees(state);
   }
 
   void promises(const std::optional<Reading>& part, const std::optional<Reading>& whole) {

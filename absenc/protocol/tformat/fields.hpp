@@ -99,16 +99,17 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Without a battery the turns mean nothing, and are not shown.
+/// Without a battery the turns mean nothing, and are not shown; the battery's alarms, which are always set then,
+/// neither.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Reply& reply) {
   if (is_memory_access(reply.id)) {
     return {.data_id = reply.id, .address = reply.address, .busy = reply.busy, .value = reply.value};
   }
-  Values all{.data_id = reply.id, .status = reply.status};
   const bool everything = reply.id == DataId::everything;
+  Values all{.data_id = reply.id, .status = reply.status};
   if (everything || reply.id == DataId::encoder_id) all.encoder_id = reply.encoder_id;
   if (format.battery && (everything || reply.id == DataId::multiturn)) all.multiturn = reply.multiturn;
-  if (everything) all.alarms = reply.alarms;
+  if (everything) all.alarms = static_cast<std::uint8_t>(reply.alarms & ~expected_alarms(format));
   if (reply.id != DataId::multiturn && reply.id != DataId::encoder_id) all.singleturn = reply.singleturn;
   return all;
 }
@@ -126,7 +127,7 @@ inline constexpr auto fields = [] {
   if (&field == fields.of<&Values::singleturn>()) return bits_of(2, 0, format.singleturn_bits);
   if (&field == fields.of<&Values::encoder_id>()) return bits_of(everything ? 5 : 2, 0, 8);
   if (&field == fields.of<&Values::multiturn>()) return bits_of(everything ? 6 : 2, 0, format.multiturn_bits);
-  if (&field == fields.of<&Values::alarms>()) return bits_of(9, 0, 8);
+  if (&field == fields.of<&Values::alarms>()) return bits_of(9, 0, format.battery ? 8 : 6);
   return {};
 }
 

@@ -359,13 +359,16 @@ struct KnownAlarms {
 
 /// Returns what is known after a reply that carries SF and no ALMC. SF has counting_error, and one bit for over_heat,
 /// multiturn_error, battery_error and battery_alarm together: 0 reports all four clear. 1 says nothing new where one of
-/// them is known to be raised; otherwise one is raised, and nobody knows which.
-[[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf) {
+/// them is known to be raised; otherwise one is raised, and nobody knows which. `sf_reported` are the bits of SF that
+/// this encoder reports: without a battery that one bit is always 1, and what is known of the four stays.
+[[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf, unsigned sf_reported) {
   constexpr unsigned together = alarms::shown_in_status;
   unsigned reported = before.reported | alarms::counting_error;
   unsigned raised = before.raised & ~unsigned{alarms::counting_error};
   if ((sf & status::counting_error) != 0) raised |= alarms::counting_error;
-  if ((sf & status::alarm) == 0) {
+  if ((sf_reported & status::alarm) == 0) {
+    // `together` stays as it was.
+  } else if ((sf & status::alarm) == 0) {
     reported |= together;
     raised &= ~together;
   } else if ((before.raised & together) == 0) {
@@ -424,7 +427,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
                   .status_reported = has_status ? detail::reported_status(format, has_all) : 0u};
   const KnownAlarms before = known_alarms ? KnownAlarms::all(*known_alarms) : KnownAlarms{};
   detail::judge(reading, has_all      ? KnownAlarms::all(reply.alarms)
-                         : has_status ? known_after(before, reply.status)
+                         : has_status ? known_after(before, reply.status, reading.status_reported)
                                       : before);
   reading.alarms &= ~expected_alarms(format);
   reading.alarms_reported &= ~expected_alarms(format);
@@ -439,16 +442,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // an ID 3 reply
   const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
-  KnownAlarms after = known_after(known, static_cast<std::uint8_t>(now.status));
-  // Without a battery the bit of four alarms tells nothing: what was known of them stays.
-  if ((now.status_reported & status::alarm) == 0) {
-    constexpr unsigned together = alarms::shown_in_status;
-    const auto kept = [](unsigned was, unsigned is) {
-      return static_cast<std::uint8_t>((was & together) | (is & ~together));
-    };
-    after = {kept(known.reported, after.reported), kept(known.raised, after.raised)};
-  }
-  detail::judge(now, after);
+  detail::judge(now, known_after(known, static_cast<std::uint8_t>(now.status), now.status_reported));
   return now;
 }
 
