@@ -63,7 +63,8 @@ class Disobedient final : public Machine<Item> {
     const ByteList before = memory();
     Step<Item> step = line_.next(now);
     look(before);
-    if (step.kind != Step<Item>::Kind::transfer || requests != damaged_at || step.out.empty()) return step;
+    const bool is_damaged = damaged_at != 0 && requests == damaged_at;
+    if (step.kind != Step<Item>::Kind::transfer || !is_damaged || step.out.empty()) return step;
     said_.assign(step.out.begin(), step.out.end());
     if constexpr (std::is_same_v<Item, CanFrame>) {
       said_.back().data[0] ^= 1;
@@ -78,7 +79,7 @@ class Disobedient final : public Machine<Item> {
   unsigned heard_before = 0;                                   // but the first times
   unsigned deaf_from = 0;                                      // the number of a request that it does not hear, from 1
   unsigned deaf_until = 0;                                     // and of the next that it does
-  unsigned damaged_at = 0;                                     // the request whose reply has a wrong bit
+  unsigned damaged_at = 0;                                     // the request whose reply has a wrong bit; 0: none
   unsigned change = 0;                                         // which change of its memory, from 1
   std::function<void(MutableBytes, const ByteList&)> spoil{};  // what was the memory before
   unsigned requests = 0;
@@ -133,7 +134,9 @@ struct Bench {
   /// What the encoder tells of what the clauses set and of its position: its memory may also count how often it was
   /// written.
   [[nodiscard]] std::string settings() const {
-    const Step<Item> rest{.at = line->now() + std::chrono::milliseconds(50)};
+    // Conform may have been ended at another rate, or just after a restart. Who opens the port anew sets the rate.
+    line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
+    const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
     }
     std::string text;
@@ -143,6 +146,8 @@ struct Bench {
       const Conversation<Item>* ended = session.run(command);
       AnswerSink sink;
       ended->report(sink);
+      EXPECT_EQ(ended->error(), Error::none) << command.name << " of an encoder that conform has left";
+      if (ended->error() != Error::none) return;
       text += fmt::format("{} {}\n", command.name, to_text(sink.answer[field]));
     };
     for (const Clause& clause : clauses_of(*address.unit)) {
@@ -234,15 +239,17 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // By what the clause sets it: `config set`, or a command of its own.
-  const Command* setter = clause.demand == Demand::paced ? find_command(*address.unit, clause.command) : nullptr;
-  if (clause.demand == Demand::set || clause.demand == Demand::mirrored) {
-    setter = require_setting(*address.unit, clause.setting).setter;
-  }
-  for (const std::int64_t value : {clause.value, clause.other}) {
-    if (setter == nullptr) break;
-    const std::vector<Item> request = request_of<Item>(address, *setter, std::array{value});
+  const auto be_deaf_to = [&](const Command& command, Arguments given) {
+    const std::vector<Item> request = request_of<Item>(address, command, given);
     if (!request.empty()) all.push_back([=](Encoder& one) { one.deaf_to = request; });
+  };
+  if (clause.demand == Demand::set || clause.demand == Demand::mirrored) {
+    const Command& setter = *require_setting(*address.unit, clause.setting).setter;
+    for (const std::int64_t value : {clause.value, clause.other}) be_deaf_to(setter, std::array{value});
+  }
+  if (clause.demand == Demand::paced) {
+    be_deaf_to(*find_command(*address.unit, clause.command), std::array{clause.value});
+    be_deaf_to(*find_command(*address.unit, clause.stop), {});
   }
   const bool by_itself = clause.demand == Demand::byte_busy || clause.demand == Demand::page_closed;
   for (unsigned at = 1; by_itself && at <= requests; ++at) {
