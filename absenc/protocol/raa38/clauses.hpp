@@ -154,6 +154,7 @@ inline constexpr std::array configuration_17{enter, HostStep{milliseconds(1), "7
 inline constexpr std::array number_0{enter, HostStep{milliseconds(1), "7e5:1100000000000000"}};
 inline constexpr std::array number_0_later{enter, HostStep{milliseconds(1), "7e5:1121000000000000"},
                                            HostStep{milliseconds(1), "7e5:1100000000000000"}};
+inline constexpr std::array number_32{enter, HostStep{milliseconds(1), "7e5:1120000000000000"}};
 inline constexpr std::array rate_1{enter, HostStep{milliseconds(1), "7e5:1300010000000000"}};
 inline constexpr std::array rate_9{enter, HostStep{milliseconds(1), "7e5:1300090000000000"}};
 inline constexpr std::array rate_3{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
@@ -234,7 +235,8 @@ inline constexpr std::array<HostClause, 10> can_host_clauses{{
      .words = "a node is given a number from 1 on",
      .demand = HostDemand::rule,
      .rule = "a node number of 0",
-     .breaks = {script::number_0, script::number_0_later}},
+     .breaks = {script::number_0, script::number_0_later},
+     .keeps = script::number_32},
     {.id = "rate",
      .paragraph = "3.4.1 (3) 3",
      .words = "a baud rate is 00, 02 or 03",
