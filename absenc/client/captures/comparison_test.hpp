@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compares what commands said live with the rows of a capture of the same conversation.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absenc/client/captures/stage_test.hpp"
+#include "absenc/client/row.hpp"
+#include "absenc/core/angle.hpp"
+#include "absenc/core/result.hpp"
+
+namespace absenc::client {
+
+inline std::string to_text(const Reading& reading) {
+  std::string text = "singleturn=" + std::to_string(reading.singleturn) + "/" +
+                     std::to_string(reading.singleturn_bits) +
+                     " valid_bits=" + std::to_string(reading.singleturn_valid_bits) +
+                     " multiturn=" + std::to_string(reading.multiturn) + "/" + std::to_string(reading.multiturn_bits);
+  text += std::string(" multiturn_valid=") + (reading.multiturn_valid ? "1" : "0");
+  text += std::string(" known=") + (reading.singleturn_known ? "1" : "0") + (reading.multiturn_known ? "1" : "0");
+  text += std::string(" ready=") + (reading.ready ? "1" : "0");
+  text += " status=" + std::to_string(reading.status) + " of " + std::to_string(reading.status_reported);
+  text += " alarms=" + std::to_string(reading.alarms) + " of " + std::to_string(reading.alarms_reported);
+  return text;
+}
+
+inline std::string to_text(const Said& said) {
+  std::string text = said.what + " [" + std::to_string(said.begin.count()) + ".." + std::to_string(said.end.count()) +
+                     "] " + std::string(text_of(said.error).name) + " (" + said.words + ")";
+  for (std::size_t i = 0; i < said.answer.columns.size(); ++i) {
+    text += " " + std::string(said.answer.columns[i].name) + "=" + client::to_text(said.answer.values[i]);
+  }
+  if (said.reading) text += "\n      " + to_text(*said.reading);
+  return text;
+}
+
+/// Compares one result with the rows of its time.
+class Comparison {
+ public:
+  Comparison(const Unit& unit, const LineSettings& line, bool faulty, const std::vector<Said>& rows)
+      : rows_(rows), faulty_(faulty) {
+    // The row of a CAN frame is there where the waveform's frame ends, whose receiver waits for the bus to be idle.
+    tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
+  }
+
+  /// The contradiction in words; "" if there is none.
+  std::string operator()(const Said& live) {
+    within_.clear();
+    for (const Said& row : rows_) {
+      if (row.end >= live.begin && row.begin < live.end + tolerance_ && row.words != "cut") within_.push_back(&row);
+    }
+    const std::string why = live.error == Error::none ? compare_good(live) : compare_bad(live);
+    if (why.empty()) return {};
+    std::string text = why + "\n  live: " + to_text(live);
+    constexpr std::size_t most_shown = 8;
+    for (std::size_t i = within_.size() - std::min(most_shown, within_.size()); i < within_.size(); ++i) {
+      text += "\n  row:  " + to_text(*within_[i]);
+    }
+    return text;
+  }
+
+ private:
+  std::string compare_bad(const Said& live) const {
+    const bool told = std::any_of(within_.begin(), within_.end(), [&](const Said* row) {
+      return live.is_verdict ? row->error == Error::none : row->error == live.error;
+    });
+    if (told) return {};
+    const bool any =
+        std::any_of(within_.begin(), within_.end(), [](const Said* row) { return row->error != Error::none; });
+    // A host may be more careful: what answers a request that it repeated may answer the one before.
+    return (any || faulty_) && live.exchanges != 1 ? "" : "no row has the error";
+  }
+
+  std::string compare_good(const Said& live) const {
+    for (const Said* row : within_) {
+      // A procedure may ask for somebody who is not there, or wake an encoder that is silent at first.
+      const bool silent = row->error == Error::timeout || row->error == Error::line_stuck;
+      const bool is_silence = silent && live.exchanges > 1;
+      if (row->error != Error::none && !is_silence && !faulty_ && !live.is_special) return "a row has an error";
+    }
+    if (live.reading) {
+      if (std::string why = compare_position(live); !why.empty()) return why;
+    }
+    std::map<std::string, std::string> told;
+    for (const Said* row : within_) {
+      if (live.exchanges == 0 && live.reading && !is_of(*row, *live.reading)) continue;
+      for (std::size_t i = 0; i < row->answer.columns.size(); ++i) {
+        told[std::string(row->answer.columns[i].name)] = client::to_text(row->answer.values[i]);
+      }
+    }
+    for (std::size_t i = 0; i < live.answer.columns.size(); ++i) {
+      const std::string name(live.answer.columns[i].name);
+      const auto found = told.find(name);
+      if (found == told.end() && live.reads && live.exchanges != 0) return "no row has " + name;
+      if (found != told.end() && found->second != client::to_text(live.answer.values[i])) {
+        return "another " + name + ": " + found->second;
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] bool is_of(const Said& row, const Reading& reading) const {
+    return row.end > reading.received - tolerance_ && row.end < reading.received + tolerance_;
+  }
+
+  // The last row has it, or its parts are in several.
+  std::string compare_position(const Said& live) const {
+    const Said* row = nullptr;
+    for (const Said* one : within_) {
+      const bool fits = live.exchanges != 0 || is_of(*one, *live.reading);
+      if (one->reading && one->error == Error::none && fits) row = one;
+    }
+    // How long the frames of a stream are the first good one tells.
+    const bool knows_size = std::any_of(
+        rows_.begin(), rows_.end(), [&](const Said& one) { return one.reading && one.end < live.reading->received; });
+    if (row == nullptr) return live.exchanges != 0 || knows_size ? "no row has a position" : "";
+    Reading all = *row->reading;
+    for (const Said* one : within_) {
+      if (!one->reading) continue;
+      if (all.multiturn_bits == 0 && live.reading->multiturn_bits != 0 && one->reading->singleturn_bits == 0) {
+        all.multiturn = one->reading->multiturn;
+        all.multiturn_bits = one->reading->multiturn_bits;
+        all.multiturn_valid = one->reading->multiturn_valid;
+      }
+    }
+    const Reading& known = *live.reading;
+    // A command of one unit alone may leave turns out that the reply carries: a safe position has none.
+    if (live.is_special && known.multiturn_bits == 0) {
+      all.multiturn = known.multiturn;
+      all.multiturn_bits = known.multiturn_bits;
+      all.multiturn_valid = known.multiturn_valid;
+    }
+    // A capture remembers earlier conversations; a host that reads once does not.
+    all.alarms &= known.alarms_reported;
+    all.alarms_reported &= known.alarms_reported;
+    all.status &= known.status_reported;
+    all.status_reported &= known.status_reported;
+    if (!known.singleturn_known) {
+      all.singleturn_known = false;
+      all.singleturn_valid_bits = known.singleturn_valid_bits;
+    }
+    if (!known.multiturn_known) {
+      all.multiturn_known = false;
+      all.multiturn_valid = known.multiturn_valid;
+    }
+    return to_text(known) == to_text(all) ? "" : "another position: " + to_text(all);
+  }
+
+  const std::vector<Said>& rows_;
+  bool faulty_;
+  Time tolerance_{};
+  std::vector<const Said*> within_;
+};
+
+}  // namespace absenc::client
