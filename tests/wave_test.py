@@ -14,6 +14,8 @@ from command_support import ABSENC, PATIENCE, Case, absenc, end
 UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
          "clocked": {"clock", "data"}, "can": {"can"}}
+# A frame that no exchange carried whole: EncoLink's channels 2 and 3.
+IN_PARTS = "each of the last exchanges carried a byte of it"
 
 
 class Wave(Case):
@@ -123,9 +125,27 @@ class Wave(Case):
                     with self.subTest(unit=unit, count=count, ending=ending):
                         self.assert_good(result)
                         rows = [json.loads(line) for line in result.stdout.splitlines()]
+                        rows = [row for row in rows if row.get("message") != IN_PARTS]
                         self.assertEqual({row["kind"] for row in rows} - {kind, "request"}, set())
                         self.assertFalse(any("begins or ends" in row.get("message", "") for row in rows), rows)
                         self.assertGreaterEqual(sum(row["kind"] == kind for row in rows), count)
+
+    def test_frames_in_parts_are_no_replies(self):
+        """Cycles of EncoLink's channel 2 are rows; statistics do not take them for replies that nobody asked for."""
+        for unit in ("encolink", "encolink-spi"):
+            with self.subTest(unit):
+                path = self.file(unit + ".vcd")
+                self.wave(f"{unit}?motion=rpm=600&alarm=signal_lost", path, "--command", "alarms", "--count", "3")
+                rows = self.decoded(unit, path)
+                cycles = [row for row in rows if row.get("message") == IN_PARTS]
+                self.assertEqual(len(cycles), 3)
+                self.assertEqual({tuple(row["alarms"]) for row in cycles}, {("signal_lost",)})
+                result = absenc("decode", unit, path, "--stats", "--json")
+                self.assert_good(result)
+                told = json.loads(result.stdout)
+                self.assertEqual((told["replies"], told["in_parts"]), (0, 3))
+                self.assertEqual(told["exchanges"], len(rows) - 3)
+                self.assertEqual(told["positions"], 0)
 
     def edges(self, *arguments):
         """The times of each wire's changes, and the levels at first."""

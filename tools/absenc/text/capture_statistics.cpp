@@ -53,7 +53,11 @@ CaptureStatistics::CaptureStatistics(const Unit& unit, const Options& options, c
 void CaptureStatistics::put(const Annotation& annotation) {
   if (count_++ == 0) begin_ = annotation.begin;
   end_ = std::max(end_, annotation.end);
-  ++kinds_[static_cast<std::size_t>(annotation.kind)];
+  if (annotation.composed) {
+    ++composed_;
+  } else {
+    ++kinds_[static_cast<std::size_t>(annotation.kind)];
+  }
   if (annotation.turnaround && clock_.has_time()) {
     const Time turnaround = clock_.time(*annotation.turnaround);
     turnarounds_.add(turnaround);
@@ -67,7 +71,9 @@ void CaptureStatistics::put(const Annotation& annotation) {
   }
   if (annotation.error != Error::none) return put_error(annotation);
   row_.count = 0;
-  if (annotation.contents.reading != nullptr) trace_.add(annotation.begin, *annotation.contents.reading);
+  // The position of a composed frame was there before, with the first exchange that carried a byte of it.
+  if (annotation.contents.reading != nullptr && !annotation.composed)
+    trace_.add(annotation.begin, *annotation.contents.reading);
 }
 
 void CaptureStatistics::put_error(const Annotation& annotation) {
@@ -105,7 +111,7 @@ Annotation CaptureStatistics::restored(const Kept& kept) const {
 Time CaptureStatistics::span() const { return clock_.time(end_ - std::min(begin_, end_)); }
 
 double CaptureStatistics::per_second() const {
-  return span().count() > 0 ? static_cast<double>(count_) * 1e9 / static_cast<double>(span().count()) : 0;
+  return span().count() > 0 ? static_cast<double>(count_ - composed_) * 1e9 / static_cast<double>(span().count()) : 0;
 }
 
 // ---- For people
@@ -132,6 +138,7 @@ std::string CaptureStatistics::counts_text(const CaptureOutcome& outcome) const 
   if (kinds_[1] != 0) row("requests", kinds_[1], "without a reply");
   if (kinds_[2] != 0) row("replies", kinds_[2], "without a request");
   if (kinds_[3] != 0) row("noise", kinds_[3], "neither request nor reply");
+  if (composed_ != 0) row("in parts", composed_, "frames of which each exchange carried a byte");
   if (cut_ != 0) row("of them cut", cut_, "by the beginning or the end of the capture");
   if (echoes_ != 0) row("echoes", echoes_, "the request came back before its reply");
   if (repeated_ != 0) row("repeated", repeated_, "replies that came once more");
@@ -205,7 +212,11 @@ Json CaptureStatistics::json(const CaptureOutcome& outcome) const {
   }
   Json json = Json::object();
   json.set("protocol", unit_.id).set("exchanges", kinds_[0]).set("requests", kinds_[1]).set("replies", kinds_[2]);
-  json.set("noise", kinds_[3]).set("cut", cut_).set("echoes", echoes_).set("repeated", repeated_);
+  json.set("noise", kinds_[3])
+      .set("in_parts", composed_)
+      .set("cut", cut_)
+      .set("echoes", echoes_)
+      .set("repeated", repeated_);
   json.set("good", good()).set("bad", errors_).set("errors", errors).set("positions", trace_.count());
   if (clock_.has_time()) {
     json.set("begin_s", clock_.seconds(begin_)).set("end_s", clock_.seconds(end_)).set("per_second", per_second());

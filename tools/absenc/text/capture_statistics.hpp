@@ -93,7 +93,8 @@ class CaptureStatistics final : public capture::AnnotationSink {
   std::uint64_t count_ = 0;
   std::uint64_t errors_ = 0;
   std::uint64_t cut_ = 0;
-  std::array<std::uint64_t, 4> kinds_{};
+  std::uint64_t composed_ = 0;            // of which exchanges carried parts
+  std::array<std::uint64_t, 4> kinds_{};  // of the others
   std::array<std::uint64_t, error_kinds> by_error_{};
   std::uint64_t echoes_ = 0;
   std::uint64_t repeated_ = 0;
