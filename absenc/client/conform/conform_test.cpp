@@ -367,6 +367,37 @@ TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
   }
 }
 
+// As a TCP bridge or a pseudo-terminal.
+class FixedRatePort final : public Port<std::uint8_t> {
+ public:
+  explicit FixedRatePort(Port<std::uint8_t>& port) : port_(port) {}
+  Time now() override { return port_.now(); }
+  void begin(const ByteStep& step) override {
+    if (step.kind == ByteStep::Kind::configure) {
+      throw os::Failure(os::Failure::Kind::unsupported, "this port has one rate");
+    }
+    port_.begin(step);
+  }
+  ByteEvent wait(const ByteStep& step) override { return port_.wait(step); }
+
+ private:
+  Port<std::uint8_t>& port_;
+};
+
+TEST(Conformance, LeavesClauseUntestedThatNeedsARateWhichThePortDoesNotHave) {
+  const EncoderAddress address = parse_address("sim:tformat");
+  Link link;
+  link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
+  link.device->power_on(Time{});
+  sim::SimPort<std::uint8_t> line(address.unit->link, address.line.with_some_rate(), *link.device->bytes());
+  FixedRatePort port(line);
+  link.bytes = &port;
+  const Conformance found = conform(address, std::move(link), {.readings = 8});
+  EXPECT_EQ(found.verdict(), Verdict::kept) << found.report();
+  EXPECT_EQ(with_verdict(found, Verdict::untested), std::vector<std::string>{"bad-delimiter"});
+  EXPECT_NE(found.report().find("this port has one rate"), std::string::npos);
+}
+
 TEST(Conformance, TellsProgramsAndPeople) {
   const Conformance one{.protocol = "toy",
                         .clauses = {{"a", "doc", "1", "x < y", Verdict::kept, "seen"},

@@ -19,6 +19,7 @@
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/client/way/runner.hpp"
+#include "absenc/os/error.hpp"
 #include "absenc/protocol/clause.hpp"
 
 namespace absenc::client {
@@ -403,7 +404,14 @@ class Tester {
     unsigned as_demanded = 0;
     std::string last;
     for (unsigned i = 0; i < times; ++i) {
-      const auto one = ask(clause.ask);
+      std::optional<Attempted> one;
+      try {
+        one = ask(clause.ask);
+      } catch (const os::Failure& failure) {
+        if (failure.kind() != os::Failure::Kind::unsupported && failure.kind() != os::Failure::Kind::bad_rate) throw;
+        result.evidence = failure.what();
+        return;
+      }
       result.evidence = "with these options nothing is asked";
       if (!one) return;
       last = what_came(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
