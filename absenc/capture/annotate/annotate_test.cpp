@@ -343,7 +343,7 @@ TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
     }
     bool known = false;
   } last;
-  Remembering remembering(unit, last);
+  Remembering remembering(unit, {}, last);
   const auto is_known_after = [&](std::int64_t node, std::uint32_t reported, Error error = Error::none) {
     const Reading reading{.singleturn_known = false, .alarms_reported = reported};
     const FieldValue value{.info = &fields[0], .number = node};
@@ -356,6 +356,44 @@ TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
   EXPECT_TRUE(is_known_after(1, 1));
   EXPECT_TRUE(is_known_after(1, 0));
   EXPECT_FALSE(is_known_after(2, 0)) << "another encoder";
+  remembering.put({.kind = Kind::request, .remark = Remark::unanswered, .error = Error::timeout});
+  EXPECT_FALSE(is_known_after(1, 0)) << "it may have been switched off";
+  EXPECT_TRUE(is_known_after(1, 1));
+  EXPECT_TRUE(is_known_after(1, 0));
+}
+
+// An ID 3 reply with counter_overflow, resets of all errors, and an ID 0 reply, which does not carry that alarm.
+TEST(Remembering, ForgetsAlarmsThatWereCleared) {
+  const Unit& unit = *find_unit("tformat");
+  const Options options = testing::options_of(unit);
+  struct Last final : AnnotationSink {
+    void put(const Annotation& one) override { reading = *one.contents.reading; }
+    Reading reading{};
+  } last;
+  Remembering remembering(unit, options, last);
+  const auto after = [&](std::uint8_t asked, std::vector<std::uint8_t> reply) {
+    const std::vector<std::uint8_t> request{asked};
+    std::uint8_t check = 0;
+    for (const std::uint8_t byte : reply) check ^= byte;
+    reply.push_back(check);
+    Judge judge(unit, options);
+    const Frame sent{.bytes = request};
+    const Frame received{.bytes = reply};
+    EXPECT_EQ(judge.decode(sent, received), Error::none);
+    remembering.put({.kind = Kind::exchange,
+                     .error = Error::none,
+                     .request = sent,
+                     .reply = received,
+                     .contents = judge.contents()});
+    return last.reading;
+  };
+  constexpr std::uint32_t counter_overflow = 0x08;
+  EXPECT_EQ(after(0x1A, {0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, counter_overflow}).alarms, counter_overflow);
+  EXPECT_EQ(after(0x02, {0x02, 0, 0, 0, 0}).alarms, counter_overflow);
+  EXPECT_EQ(after(0xBA, {0xBA, 0, 0, 0, 0}).alarms, counter_overflow) << "the tenth still has the old ones";
+  const Reading cleared = after(0x02, {0x02, 0, 0, 0, 0});
+  EXPECT_EQ(cleared.alarms, 0u);
+  EXPECT_EQ(cleared.alarms_reported & counter_overflow, 0u) << "not reported by any reply since";
 }
 
 // Who asks again has given the others up, and what answers badly has answered.

@@ -3,8 +3,12 @@
 // does.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
 
@@ -12,35 +16,55 @@ namespace absenc::capture {
 
 /// Hands annotations on. Behind the annotators, where replies are in their order whoever decoded them.
 ///
-/// An encoder that is switched off and on says so in no frame: it is taken to stay on for the whole capture. What it
-/// reported before holds until a reply reports otherwise, also for alarms that the host has cleared meanwhile.
+/// An encoder that is switched off and on says so in no frame, but does not answer meanwhile: a request that nobody
+/// answers ends what is known. So does, for its encoder, a request that clears alarms, from the reply behind it on.
+/// Else the encoder is taken to stay on.
 class Remembering final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive it.
-  Remembering(const Unit& unit, AnnotationSink& sink) : unit_(&unit), sink_(&sink) {}
+  Remembering(const Unit& unit, const Options& options, AnnotationSink& sink) : unit_(&unit), sink_(&sink) {
+    if (unit.remembered == nullptr) return;
+    for (const Command& command : unit.commands) {
+      if (command.verb != Verb::clear_alarms && command.verb != Verb::reset_multiturn) continue;
+      std::array<std::uint8_t, longest_request> bytes{};
+      const Result<std::size_t> size = unit.encode(options, command, {}, bytes);
+      if (size && *size != 0) clearing_.emplace_back(bytes.data(), bytes.data() + *size);
+    }
+  }
 
   void put(const Annotation& annotation) override {
+    if (annotation.remark == Remark::unanswered && annotation.error == Error::timeout) last_.clear();
     const Reading* const now = annotation.contents.reading;
     const bool is_good = annotation.error == Error::none && annotation.remark != Remark::cut;
     if (unit_->remembered == nullptr || now == nullptr || !is_good) return sink_->put(annotation);
-    Reading& last = last_[address_of(annotation.contents)];
+    const std::int64_t address = address_of(annotation.contents);
+    Reading& last = last_[address];
     last = unit_->remembered(last, *now);
     Annotation completed = annotation;
     completed.contents.reading = &last;
     sink_->put(completed);
+    if (clears(annotation.request.bytes)) last_.erase(address);
   }
 
  private:
+  static constexpr std::size_t longest_request = 64;
+
   [[nodiscard]] static std::int64_t address_of(const Contents& contents) {
     for (const FieldValue& field : contents.fields) {
       if (field.info->role == Role::encoder) return field.number;
     }
     return 0;
   }
+  [[nodiscard]] bool clears(Bytes request) const {
+    return std::any_of(clearing_.begin(), clearing_.end(), [&](const auto& one) {
+      return std::equal(one.begin(), one.end(), request.begin(), request.end());
+    });
+  }
 
   const Unit* unit_;
   AnnotationSink* sink_;
-  std::map<std::int64_t, Reading> last_;  // by the address of the encoder
+  std::vector<std::vector<std::uint8_t>> clearing_;  // requests
+  std::map<std::int64_t, Reading> last_;             // by the address of the encoder
 };
 
 }  // namespace absenc::capture

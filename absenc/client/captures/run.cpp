@@ -149,7 +149,7 @@ CaptureRun::~CaptureRun() = default;
 std::uint64_t CaptureRun::ticks_per_second() const { return reader_->layout().ticks_per_second; }
 
 CaptureOutcome CaptureRun::run(capture::AnnotationSink& all, const std::function<void(Tick)>& progress) {
-  capture::Remembering remembering(unit_, all);
+  capture::Remembering remembering(unit_, options_, all);
   capture::Following sink(unit_, options_, remembering);
   const Content content = reader_->layout().content;
   const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi;
