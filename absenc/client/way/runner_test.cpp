@@ -3,6 +3,7 @@
 // same for all who look.
 #include "absenc/client/way/runner.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "absenc/capture/search/hypotheses.hpp"
@@ -39,6 +40,18 @@ struct Bench {
   Link link;
   Runner<std::uint8_t> runner;
 };
+
+// ---- Silence
+
+TEST(Runner, SilenceIsATimeoutInEveryUnit) {
+  for (const Unit* unit : all_units()) {
+    if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
+    Bench bench(with_faults(parse_address(fmt::format("sim:{}", unit->id)), {"silence=1"}));
+    const Attempted one = bench.once();
+    EXPECT_EQ(one.error, Error::timeout) << unit->id;
+    EXPECT_FALSE(one.heard) << unit->id;
+  }
+}
 
 // ---- Echo
 

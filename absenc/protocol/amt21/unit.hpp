@@ -102,6 +102,7 @@ struct Protocol {
     return bytes;
   }
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
+    if (bytes.empty() && request.is_answered()) return Error::timeout;
     if (bytes.size() != reply_size(format, request)) return Error::wrong_length;
     const auto word = static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
     if (!checks(word)) return Error::bad_checksum;
