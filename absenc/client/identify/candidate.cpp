@@ -38,6 +38,12 @@ std::vector<std::string> differences(const Unit& unit, std::string_view model, c
 
 bool is_found(const Candidate& candidate) { return candidate.hypothesis.chance() <= capture::is_found; }
 
+bool is_as_likely(const Candidate& one, const Candidate& best) {
+  constexpr double same_likelihood = 0.5;  // a factor of three
+  return one.hypothesis.is_proven() == best.hypothesis.is_proven() &&
+         one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;
+}
+
 void rank(std::vector<Candidate>& candidates, std::size_t searches) {
   for (Candidate& one : candidates) one.hypothesis.tried *= std::max<std::size_t>(searches, 1);
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& one, const Candidate& other) {

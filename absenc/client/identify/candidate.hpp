@@ -25,6 +25,9 @@ struct Candidate {
 /// Whether it is more than chance could do.
 [[nodiscard]] bool is_found(const Candidate& candidate);
 
+/// Whether `one` explains what came as well as `best` does: nothing in the frames tells them apart.
+[[nodiscard]] bool is_as_likely(const Candidate& one, const Candidate& best);
+
 /// The likeliest first. `searches`: in which any of them could have been found by chance; each of them pays for all.
 void rank(std::vector<Candidate>& candidates, std::size_t searches);
 

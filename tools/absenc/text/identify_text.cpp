@@ -19,7 +19,6 @@ namespace absenc::tool {
 namespace {
 
 constexpr std::size_t most_shown = 8;
-constexpr double same_likelihood = 0.5;  // a factor of three
 
 // "1 in 16384", "1 in 10^9"
 std::string chance_text(double log10) {
@@ -87,29 +86,40 @@ std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   return all;
 }
 
-std::string advice(std::span<const Candidate> candidates) {
+// Where nothing in the frames tells several candidates of one encoder apart.
+std::vector<std::string> ties(std::span<const Candidate> candidates, std::span<const Candidate* const> found) {
+  std::vector<std::string> notes;
+  for (const Candidate* best : found) {
+    const auto equal = std::count_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
+      return same_encoder(one, *best) && is_as_likely(one, *best);
+    });
+    if (equal < 2) continue;
+    const std::string who = found.size() > 1 ? fmt::format(" from {}", best->encoder) : std::string();
+    notes.push_back(
+        fmt::format("note: {} of them explain what came{} equally well: compare their positions while the shaft turns",
+                    equal, who));
+  }
+  return notes;
+}
+
+std::vector<std::string> advice(std::span<const Candidate> candidates) {
   const Candidate& best = candidates.front();
   if (!is_found(best)) {
-    return "this may be chance: nothing speaks for it that noise could not do as well\n"
-           "  Try: turn the shaft a little while it is asked, so that the frames differ; capture more frames";
+    return {
+        "this may be chance: nothing speaks for it that noise could not do as well\n"
+        "  Try: turn the shaft a little while it is asked, so that the frames differ; capture more frames"};
   }
-  const auto equal = std::count_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
-    return same_encoder(one, best) && one.hypothesis.is_proven() == best.hypothesis.is_proven() &&
-           one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;
-  });
-  if (equal > 1) {
-    return fmt::format("note: {} of them explain what came equally well: compare their positions while the shaft turns",
-                       equal);
-  }
-  if (const auto found = encoders(candidates); found.size() > 1) {
+  const std::vector<const Candidate*> found = encoders(candidates);
+  std::vector<std::string> notes = ties(candidates, found);
+  if (found.size() > 1) {
     std::vector<std::string> names;
     for (const Candidate* one : found) names.push_back(one->encoder);
-    return fmt::format("note: {} encoders are on the line: {}", found.size(), fmt::join(names, ", "));
+    notes.push_back(fmt::format("note: {} encoders are on the line: {}", found.size(), fmt::join(names, ", ")));
   }
-  if (best.hypothesis.at_least) {
-    return "note: the position may have more bits: these are the fewest that hold all that came; turn the shaft once";
+  if (notes.empty() && best.hypothesis.at_least) {
+    return {"note: the position may have more bits: these are the fewest that hold all that came; turn the shaft once"};
   }
-  return {};
+  return notes;
 }
 
 }  // namespace
@@ -141,12 +151,12 @@ int show_candidates(std::span<const Candidate> candidates, const std::function<s
   const auto shown = candidates.first(std::min(candidates.size(), most_shown));
   show_table(shown);
   show_identities(shown);
-  const std::string more = advice(candidates);
+  const std::vector<std::string> notes = advice(candidates);
   std::string next = found ? "\ngo on with: " : "";
   for (const Candidate* one : encoders(candidates)) {
     print_line(std::exchange(next, "       and: ") + command(*one));
   }
-  if (!more.empty()) print_message(more);
+  for (const std::string& note : notes) print_message(note);
   return found ? exit_good : exit_failed;
 }
 
