@@ -13,11 +13,10 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/identify/line.hpp"
-#include "absenc/client/identify/recorded_conversation.hpp"
+#include "absenc/client/identify/patience.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/link.hpp"
-#include "absenc/host/drive.hpp"
-#include "absenc/host/echo.hpp"
+#include "absenc/client/way/runner.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/protocol/all.hpp"
@@ -85,6 +84,19 @@ struct Addresses final : FieldSink {
   std::vector<std::int64_t> all;
 };
 
+/// Why a conversation was broken off.
+enum class Stop : std::uint8_t {
+  silent,   // nobody answers, or nobody who makes sense
+  harmful,  // it was about to send what another encoder would take for a command
+};
+
+/// Who an encoder says it is, and whether that agrees with the options with which it was asked.
+struct Introduction {
+  Answer identity{};
+  bool agrees = false;          // it said something, and nothing that contradicts them
+  std::string contradiction{};  // in the words of the unit
+};
+
 /// Of what an encoder says only who it is.
 struct IdentitySink final : FieldSink {
   void put(const FieldValue& value) override {
@@ -119,32 +131,45 @@ class Attempt {
         unit_(unit),
         settings_(std::move(settings)),
         patience_(patience),
-        deadline_(deadline),
-        findings_(findings) {
-    uri_ = parse_address(fmt::format("{}:{}", unit.id, search.place), settings_);
+        findings_(findings),
+        address_(parse_address(fmt::format("{}:{}", unit.id, search.place), settings_)),
+        runner_(address_) {
     for (const Unit* other : all_units()) {
-      if (other != &unit && fits(*other, search) && hears(*other, uri_.line.rate, search)) add_harmful(*other);
+      if (other != &unit && fits(*other, search) && hears(*other, address_.line.rate, search)) add_harmful(*other);
     }
-    storage_ = std::make_unique<std::byte[]>(unit.host_storage);
+    runner_.port().deadline = deadline;
+    runner_.on_event = [this](const Event<Item>& event) {
+      if (talk_ != nullptr) talk_->patience.see(event);
+    };
+    runner_.on_step = [this](Step<Item>& step, Time now) {
+      if (talk_ != nullptr) look_at(step, now, *talk_);
+    };
+    runner_.on_exchange = [this](const LineExchange<Item>& exchange) {
+      if (talk_ != nullptr) keep_exchange(exchange, *talk_);
+    };
   }
+  Attempt(const Attempt&) = delete;
+  Attempt& operator=(const Attempt&) = delete;
 
-  [[nodiscard]] const LineSettings& line() const { return uri_.line; }
+  [[nodiscard]] const LineSettings& line() const { return address_.line; }
   /// Whether a scan was ended before it had asked everybody.
   [[nodiscard]] bool cut() const { return cut_; }
   void open() {
-    link_ = open_link(uri_);
-    echo_ = host::EchoFilter(uri_.echo);
+    link_ = search_.open(address_);
+    if constexpr (is_can) {
+      runner_.attach(*link_.frames, link_.latency);
+    } else {
+      runner_.attach(*link_.bytes, link_.latency);
+    }
   }
 
   /// What comes without being asked for.
   std::vector<Item> listen() {
     std::vector<Item> items;
-    const Step<Item> step{.at = port().now() + listening};
-    while (items.size() < stream_size) {
-      const Event<Item> event = port().wait(step);
-      if (event.kind == Event<Item>::Kind::timer || event.at >= step.at) break;
-      items.insert(items.end(), event.items.begin(), event.items.end());
-    }
+    runner_.listen(listening, [&items](std::span<const Item> more) {
+      items.insert(items.end(), more.begin(), more.end());
+      return items.size() < stream_size;
+    });
     return items;
   }
 
@@ -168,135 +193,139 @@ class Attempt {
   }
 
   /// Who the encoder with these options says it is: who was found may be asked more than who is looked for.
-  Answer introduce(const Options& options) {
+  Introduction introduce(const Options& options) {
+    Introduction all;
     IdentitySink identity;
     for (const Command& command : unit_.commands) {
       const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
                                               [](const Argument& argument) { return argument.required; });
       if (command.verb != Verb::info || command.changes_encoder || needs_argument) continue;
       std::vector<HeardExchange> ignored;
-      converse(command, options, ignored, &identity);
+      const Conversed one = converse(command, options, ignored, &identity);
+      all.agrees = all.agrees || one.error == Error::none;
+      const bool contradicts = one.error == Error::unexpected_reply || one.error == Error::out_of_range;
+      if (contradicts) all.contradiction = fmt::format("{}: {}", command.name, one.detail);
     }
-    return std::move(identity.all.answer);
+    all.agrees = all.agrees && all.contradiction.empty();
+    all.identity = std::move(identity.all.answer);
+    return all;
   }
 
  private:
-  [[nodiscard]] Port<Item>& port() {
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      return *link_.frames;
-    } else {
-      return *link_.bytes;
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
+
+  /// The conversation that is under way.
+  struct Talk {
+    const Options& options;
+    std::vector<HeardExchange> exchanges{};
+    Patience<Item> patience;
+    bool understood = false;  // a good reply came
+  };
+
+  // Throws Stop.
+  void look_at(Step<Item>& step, Time now, Talk& talk) {
+    using Kind = typename Step<Item>::Kind;
+    if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw Stop::harmful;
+    if (talk.patience.is_over(now) && !talk.understood) {
+      talk.understood = is_good(heard_exchange(runner_.last()), talk.options);
+      if (!talk.understood) throw Stop::silent;
     }
+    if (step.answer != Time{}) step.answer += allowance_;
+    talk.patience.see(step, now);
+    if (step.kind != Kind::transfer) return;
+    for (const std::vector<Item>& one : harmful_) {
+      if (step.out.size() >= one.size() && std::equal(one.begin(), one.end(), step.out.begin())) throw Stop::harmful;
+    }
+  }
+  void keep_exchange(const LineExchange<Item>& line, Talk& talk) {
+    talk.exchanges.push_back(heard_exchange(line));
+    talk.understood = talk.understood || is_good(talk.exchanges.back(), talk.options);
+  }
+  [[nodiscard]] bool is_good(const HeardExchange& one, const Options& options) const {
+    return !one.reply.frame().empty() && capture::explains(unit_, options, one);
   }
 
   void add_harmful(const Unit& other) {
-    if constexpr (std::is_same_v<Item, CanFrame>) return;  // identifiers tell them apart
+    if constexpr (is_can) return;  // identifiers tell them apart
     Options defaults;
     for (std::size_t i = 0; i < other.options.size(); ++i) defaults.values[i] = other.options[i].default_value;
     for (const Command& command : other.commands) {
       if (!command.changes_encoder) continue;
       const std::vector<std::uint8_t> request = request_of(other, defaults, command);
-      if constexpr (!std::is_same_v<Item, CanFrame>) {
+      if constexpr (!is_can) {
         if (!request.empty()) harmful_.push_back(request);
       }
     }
   }
 
-  // One conversation; what was exchanged goes to `exchanges`. Returns the items that came. A reply that comes after its
-  // time would be taken for the answer to what is asked next: then all is asked once more, with more time for each
-  // answer.
-  std::size_t converse(const Command& command, const Options& options, std::vector<HeardExchange>& exchanges,
-                       FieldSink* sink = nullptr) {
+  struct Conversed {
+    std::size_t heard = 0;  // items, when somebody sent them
+    Error error = Error::timeout;
+    std::string detail{};  // in the words of the unit
+  };
+
+  // One conversation; its exchanges go to `exchanges`. Where a reply was late, all is asked once more, with more time
+  // for each reply.
+  Conversed converse(const Command& command, const Options& options, std::vector<HeardExchange>& exchanges,
+                     FieldSink* sink = nullptr) {
     for (;;) {
-      const std::vector<HeardExchange>::size_type known = exchanges.size();
+      if (std::exchange(asked_, true)) runner_.settle(settled, longest_settling);
+      const std::uint64_t late = runner_.late();
+      const auto known = static_cast<std::ptrdiff_t>(exchanges.size());
       Conversed one = converse_once(command, options, exchanges, sink);
-      if (one.open) one.late = settle(late_window) ? std::max(port().now() - one.sent_at, Time{1}) : Time{};
-      if (one.late == Time{} || allowance_ == most_allowance) return one.heard;
-      allowance_ = std::min(most_allowance, 2 * std::max(one.late, allowance_));
-      exchanges.resize(known);
-      settle(late_window);
+      if (is_can || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) return one;
+      if (is_unanswered_) runner_.settle(late_window, longest_settling);
+      if (runner_.late() == late || allowance_ == most_allowance) return one;
+      allowance_ = std::min(most_allowance, 2 * std::max(runner_.lateness(), allowance_));
+      exchanges.erase(exchanges.begin() + known, exchanges.end());
+      runner_.settle(late_window, longest_settling);
     }
   }
 
-  struct Conversed {
-    std::size_t heard = 0;  // items, when somebody sent them
-    bool open = false;      // its last request was not answered
-    Time sent_at{};         // when that had left
-    Time late{};            // how long after its request a reply came that was given up
-  };
-
   Conversed converse_once(const Command& command, const Options& options, std::vector<HeardExchange>& exchanges,
                           FieldSink* sink) {
-    const std::vector<std::int64_t> arguments = require_arguments(command, {});
-    const Any<Conversation> made = unit_.host(options, command, arguments, {storage_.get(), unit_.host_storage});
-    Conversation<Item>* conversation = nullptr;
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      conversation = made.frames;
-    } else {
-      conversation = made.bytes;
-    }
-    if (conversation == nullptr) return {};
-    if (std::exchange(asked_, true)) settle(settled);
     const bool scans = command.verb == Verb::scan;
     const Time quiet = (scans ? patience_ : 500ms) + 5 * (link_.latency + allowance_);
-    RecordedConversation<Item> recorded(
-        *conversation, harmful_,
-        {.quiet = quiet,
-         .nonsense = scans ? 2 * quiet : quiet,
-         .deadline = deadline_,
-         .latency = link_.latency,
-         .allowance = allowance_},
-        [&](const HeardExchange& one) { return capture::explains(unit_, options, one); });
-    const auto keep = [&] {
-      findings_.requests += recorded.exchanges.size();
-      findings_.heard += recorded.heard;
-      exchanges.insert(exchanges.end(), recorded.exchanges.begin(), recorded.exchanges.end());
-    };
+    Talk talk{
+        .options = options,
+        .patience = Patience<Item>({.quiet = quiet, .nonsense = scans ? 2 * quiet : quiet, .latency = link_.latency})};
+    runner_.set_options(options);
+    runner_.start_again();
+    const std::vector<std::int64_t> arguments = require_arguments(command, {});
+    Conversed one;
     try {
-      drive(recorded, conversation->streams());
+      talk_ = &talk;
+      const Conversation<Item>* ended = runner_.run(command, arguments);
+      talk_ = nullptr;
+      if (runner_.port().take_aborted()) throw os::Interrupted{};
+      if (ended == nullptr) return one;
+      one.error = ended->error();
+      one.detail = ended->detail();
+      if (sink != nullptr && one.error == Error::none) ended->report(*sink);
     } catch (const Stop& stop) {
-      keep();
-      if (stop == Stop::out_of_time) throw;
-      cut_ = cut_ || (scans && stop == Stop::silent && recorded.heard == 0);
+      talk_ = nullptr;
+      cut_ = cut_ || (scans && stop == Stop::silent && talk.patience.heard() == 0);
       if (stop == Stop::harmful) {
         findings_.notes.push_back(
             fmt::format("{} of {} was not sent: to another encoder it might be a command", command.name, unit_.id));
       }
-      return {recorded.heard, recorded.is_unanswered(), recorded.sent_at(), recorded.lateness()};
+    } catch (...) {
+      talk_ = nullptr;
+      take(talk, exchanges);
+      throw;
     }
-    findings_.only_echo = findings_.only_echo || echo_.only_echo();
-    echo_.conclude(conversation->error() == Error::none);
-    if (sink != nullptr && conversation->error() == Error::none) conversation->report(*sink);
-    keep();
-    const auto alive = [this](const HeardExchange& one) { return is_alive(one); };
-    const bool answered = std::any_of(recorded.exchanges.begin(), recorded.exchanges.end(), alive);
-    return {answered ? recorded.heard : 0, recorded.is_unanswered(), recorded.sent_at()};
+    if constexpr (!is_can) findings_.only_echo = findings_.only_echo || runner_.session().echo().only_echo();
+    const auto alive = [this](const HeardExchange& exchange) { return is_alive(exchange); };
+    const bool answered = std::any_of(talk.exchanges.begin(), talk.exchanges.end(), alive);
+    is_unanswered_ = !talk.exchanges.empty() && talk.exchanges.back().reply.frame().empty();
+    one.heard = answered ? talk.patience.heard() : 0;
+    take(talk, exchanges);
+    return one;
   }
-
-  // Until nothing has come for that time: what was asked before may be answered only now, which is no answer to what
-  // will be asked. Returns whether anything came of which that may be said.
-  bool settle(Time quiet) {
-    if (unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) return false;
-    bool heard = false;
-    const Time end = port().now() + longest_settling;
-    while (port().now() < std::min(end, deadline_)) {
-      const Step<Item> step{.at = port().now() + quiet};
-      const Event<Item> event = port().wait(step);
-      if (event.kind == Event<Item>::Kind::timer || event.at >= step.at) break;
-      heard = heard || event.kind == Event<Item>::Kind::received;
-    }
-    return heard && unit_.link != LinkKind::can;
-  }
-
-  // Of one that goes on for ever the first result is enough.
-  void drive(Machine<Item>& machine, bool endless) {
-    const auto go_on = [endless] { return !endless; };
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      host::drive(machine, port(), go_on);
-    } else {
-      echo_.attach(machine);
-      host::drive(echo_, port(), go_on);
-    }
+  void take(Talk& talk, std::vector<HeardExchange>& exchanges) {
+    findings_.requests += talk.exchanges.size();
+    findings_.heard += talk.patience.heard();
+    exchanges.insert(exchanges.end(), talk.exchanges.begin(), talk.exchanges.end());
   }
 
   // Whether anybody sent it: what nobody drives is clocked in all the same.
@@ -364,9 +393,9 @@ class Attempt {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
     std::vector<HeardExchange> exchanges;
-    if (converse(read, options, exchanges) == 0) {
+    if (converse(read, options, exchanges).heard == 0) {
       exchanges.clear();  // it may have been late, or have missed the first request
-      if (converse(read, options, exchanges) == 0) return false;
+      if (converse(read, options, exchanges).heard == 0) return false;
     }
     read_all(read, options, exchanges);
     if (exchanges.empty()) return false;
@@ -389,7 +418,7 @@ class Attempt {
     unsigned unanswered = 0;
     for (unsigned i = 1; i < reads + unanswered; ++i) {
       if (os::interrupted()) throw os::Interrupted{};
-      if (converse(read, options, exchanges) == 0 && ++unanswered == most_unanswered) break;
+      if (converse(read, options, exchanges).heard == 0 && ++unanswered == most_unanswered) break;
     }
     // On a busy machine an answer may come too late for one of them.
     std::erase_if(exchanges,
@@ -411,7 +440,7 @@ class Attempt {
       if (find_link_parameter(split_setting(setting).name) != nullptr) of_port.push_back(setting);
     }
     for (const Hypothesis& one : found) {
-      findings_.candidates.push_back({&unit_, one, of_port, false, line_of(unit_.link, uri_.line), encoder});
+      findings_.candidates.push_back({&unit_, one, of_port, false, line_of(unit_.link, address_.line), encoder});
     }
   }
 
@@ -419,16 +448,16 @@ class Attempt {
   const Unit& unit_;
   Settings settings_;
   Time patience_;
-  Time deadline_;
   LineFindings& findings_;
-  bool cut_ = false;
-  bool asked_ = false;  // anything
-  Time allowance_{};    // beside the limit of each answer, where replies are late
-  EncoderAddress uri_;
+  EncoderAddress address_;
+  Link link_;  // outlives the runner
+  Runner<Item> runner_;
   std::vector<std::vector<Item>> harmful_;
-  std::unique_ptr<std::byte[]> storage_;
-  Link link_;
-  host::EchoFilter echo_{host::EchoMode::off};
+  Talk* talk_ = nullptr;
+  bool cut_ = false;
+  bool asked_ = false;          // anything
+  bool is_unanswered_ = false;  // the last request
+  Time allowance_{};            // beside the limit of each answer, where replies are late
 };
 
 }  // namespace absenc::client

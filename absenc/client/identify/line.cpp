@@ -21,10 +21,11 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time short_patience = 700ms;  // with a scan that nobody answers,
-constexpr Time long_patience = 5s;      // and at the end, when nothing was found
-constexpr std::size_t busy_line = 32;   // bytes while listening: nobody can be asked
-constexpr double beyond_doubt = -3;     // log10 of chance: then no further rates are tried
+constexpr Time short_patience = 700ms;      // with a scan that nobody answers,
+constexpr Time long_patience = 5s;          // and at the end, when nothing was found
+constexpr std::size_t busy_line = 32;       // bytes while listening: nobody can be asked
+constexpr std::size_t most_introduced = 4;  // of candidates that explain the same encoder equally well
+constexpr double beyond_doubt = -3;         // log10 of chance: then no further rates are tried
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
@@ -66,7 +67,7 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
 /// All attempts, the usual settings of every unit first.
 class Search {
  public:
-  explicit Search(const LineSearch& search) : search_(search), deadline_(os::now() + search.limit) {}
+  explicit Search(const LineSearch& search) : search_(search), deadline_(search.now() + search.limit) {}
 
   LineFindings run() {
     while_there_is_time([this] { ask_everybody(); });
@@ -83,7 +84,7 @@ class Search {
     if (findings_.out_of_time || findings_.interrupted) return;
     try {
       work();
-    } catch (const Stop&) {
+    } catch (const OutOfTime&) {
       findings_.out_of_time = true;
     } catch (const os::Interrupted&) {
       findings_.interrupted = true;
@@ -102,30 +103,64 @@ class Search {
     for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
   }
 
-  // Who was found, each of them once: the likeliest candidate.
+  // Who was found: the likeliest candidate of each, and those that explain what came as well. What an encoder says of
+  // itself may tell them apart.
   void ask_who_they_are() {
+    std::vector<Candidate>& all = findings_.candidates;
     std::set<std::pair<const Unit*, std::string>> asked;
-    for (Candidate& one : findings_.candidates) {
-      if (one.unasked || !is_found(one) || find_role(one.unit->fields, Role::identity) == nullptr) continue;
-      if (!asked.emplace(one.unit, one.encoder).second) continue;
-      if (search_.progress) search_.progress(fmt::format("{}: who it is", one.unit->id));
-      if (one.unit->link == LinkKind::can) {
-        introduce<CanFrame>(one);
-      } else {
-        introduce<std::uint8_t>(one);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (all[i].unit == nullptr || all[i].unasked || !is_found(all[i])) continue;
+      if (!asked.emplace(all[i].unit, all[i].encoder).second) continue;
+      const std::vector<std::size_t> alike = same_as(i);
+      if (alike.size() == 1 && find_role(all[i].unit->fields, Role::identity) == nullptr) continue;
+      if (search_.progress) search_.progress(fmt::format("{}: who it is", all[i].unit->id));
+      std::vector<Introduction> said;
+      for (const std::size_t one : alike) said.push_back(introduce(all[one]));
+      judge(alike, said);
+    }
+    std::erase_if(all, [](const Candidate& one) { return one.unit == nullptr; });
+  }
+
+  // The candidate and all others of this encoder that are as likely.
+  [[nodiscard]] std::vector<std::size_t> same_as(std::size_t first) const {
+    const std::vector<Candidate>& all = findings_.candidates;
+    std::vector<std::size_t> alike;
+    for (std::size_t i = first; i < all.size() && alike.size() < most_introduced; ++i) {
+      const bool same = all[i].unit == all[first].unit && all[i].encoder == all[first].encoder && !all[i].unasked;
+      if (same && is_as_likely(all[i], all[first])) alike.push_back(i);
+    }
+    return alike;
+  }
+
+  // Those that the encoder contradicts are dropped, where it agrees with another one; else the contradiction is said.
+  void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
+    const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
+    for (std::size_t i = 0; i < alike.size(); ++i) {
+      Candidate& candidate = findings_.candidates[alike[i]];
+      candidate.identity = said[i].identity;
+      if (said[i].contradiction.empty()) continue;
+      if (known) {
+        candidate.unit = nullptr;
+      } else if (i == 0) {
+        findings_.notes.push_back(fmt::format("{}: {}", candidate.unit->id, said[i].contradiction));
       }
     }
   }
 
+  Introduction introduce(const Candidate& candidate) {
+    if (candidate.unit->link == LinkKind::can) return introduce_on<CanFrame>(candidate);
+    return introduce_on<std::uint8_t>(candidate);
+  }
   // A port that was open a moment ago may be gone: what was found stays.
   template <class Item>
-  void introduce(Candidate& candidate) {
+  Introduction introduce_on(const Candidate& candidate) {
     try {
       Attempt<Item> one(search_, *candidate.unit, all_settings(candidate), short_patience, deadline_, findings_);
       one.open();
-      candidate.identity = one.introduce(candidate.hypothesis.options);
+      return one.introduce(candidate.hypothesis.options);
     } catch (const os::Failure& failure) {
       findings_.notes.push_back(fmt::format("not asked who it is: {}: {}", candidate.unit->id, failure.what()));
+      return {};
     }
   }
 
@@ -168,7 +203,7 @@ class Search {
 
   template <class Item>
   void attempt_on(const Unit& unit, const Settings& settings) {
-    if (os::now() >= deadline_) throw Stop::out_of_time;
+    if (search_.now() >= deadline_) throw OutOfTime{};
     Attempt<Item> one(search_, unit, settings, patience_, deadline_, findings_);
     if (one.line().rate == 0 && way_of(search_) == Way::serial) return;  // the rates come later
     const std::string line = line_of(unit.link, one.line());

@@ -11,6 +11,8 @@
 
 #include "absenc/client/identify/candidate.hpp"
 #include "absenc/client/way/address.hpp"
+#include "absenc/client/way/link.hpp"
+#include "absenc/os/signals.hpp"
 
 namespace absenc::client {
 
@@ -19,6 +21,8 @@ struct LineSearch {
   std::vector<std::string> settings{};  // of the port: "latency=5"
   Time limit{};                         // of the whole search
   std::function<void(const std::string&)> progress{};
+  OpenLink open = open_link;
+  std::function<Time()> now = os::now;  // the clock of the ports
 };
 
 struct LineFindings {

@@ -45,6 +45,27 @@ struct Attempted {
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
 };
 
+/// A request and its reply, without echo. `clocks`: of a clocked link. Of several CAN frames the last one is the reply:
+/// what came before it was for others.
+template <class Item>
+[[nodiscard]] capture::HeardExchange heard_exchange(std::span<const Item> request, std::span<const Item> reply,
+                                                    std::size_t clocks) {
+  capture::HeardExchange exchange;
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    if (!request.empty()) exchange.request.can = request.front();
+    if (!reply.empty()) exchange.reply.can = reply.back();
+  } else {
+    exchange.request.bytes.assign(request.begin(), request.end());
+    exchange.reply.bytes.assign(reply.begin(), reply.end());
+    exchange.reply.bits = std::min(clocks, reply.size() * 8);
+  }
+  return exchange;
+}
+template <class Item>
+[[nodiscard]] capture::HeardExchange heard_exchange(const LineExchange<Item>& line) {
+  return heard_exchange<Item>(line.request, line.reply(), line.clocks);
+}
+
 /// Takes the counter of the replies out of what a command reports.
 class CounterSink final : public FieldSink {
  public:
@@ -127,7 +148,13 @@ class Runner {
     received_before_ = port_.last.received.size();
     unanswered_ = 0;
     port_.return_to(line_settings(unit_, options_).rate);
-    const Conversation<Item>* ended = use(*session_);
+    const Conversation<Item>* ended = nullptr;
+    try {
+      ended = use(*session_);
+    } catch (...) {
+      close_exchange();
+      throw;
+    }
     close_exchange();
     answered_ = ended != nullptr && ended->error() == Error::none ? port_.last.received.size() : 0;
     return ended;
@@ -257,15 +284,8 @@ class Runner {
       one.after = line.received_at - line.sent_at;
       one.allowed = line.answer + static_cast<std::int64_t>(received.size()) * character_;
     }
-    if constexpr (is_can) {
-      if (asked && !line.request.empty()) one.exchange.request.can = line.request.front();
-      if (!reply.empty()) one.exchange.reply.can = reply.back();
-    } else {
-      one.raw.assign(received.begin(), received.end());
-      if (asked) one.exchange.request.bytes = line.request;
-      one.exchange.reply.bytes.assign(reply.begin(), reply.end());
-      one.exchange.reply.bits = std::min(line.clocks, reply.size() * 8);
-    }
+    one.exchange = heard_exchange<Item>(asked ? line.request : std::span<const Item>{}, reply, line.clocks);
+    if constexpr (!is_can) one.raw.assign(received.begin(), received.end());
   }
 
   /// The time of a character on the line; 0: it carries none.
@@ -326,9 +346,11 @@ class Runner {
     }
     close_exchange();
     open_ = true;
+    opened_at_ = port_.requests;
   }
+  // A hook may have thrown before its request was sent: then the last exchange is the one before.
   void close_exchange() {
-    if (std::exchange(open_, false) && on_exchange) on_exchange(last());
+    if (std::exchange(open_, false) && opened_at_ != port_.requests && on_exchange) on_exchange(last());
   }
   // With a session anew the last exchange may be of the one before.
   void keep_echo() {
@@ -351,6 +373,7 @@ class Runner {
   Filter filter_;
   std::optional<host::Session<Item>> session_;
   bool open_ = false;                  // the last exchange was not handed to `on_exchange`
+  std::uint64_t opened_at_ = 0;        // requests before it
   std::uint64_t requests_before_ = 0;  // the present run
   std::size_t received_before_ = 0;    // that run, behind an older request
   std::uint64_t unanswered_ = 0;       // in this run

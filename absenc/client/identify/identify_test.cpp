@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who is found on lines in virtual time. Damage, echo and late replies are what the runner of all exchanges says.
+#include <gtest/gtest.h>
+
+#include "absenc/client/identify/attempt.hpp"
+#include "absenc/client/identify/line.hpp"
+#include "absenc/client/virtual_link_test.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::client {
+namespace {
+
+/// Whoever opens this line finds the same encoder, switched on anew.
+struct Place {
+  explicit Place(const std::string& text, std::vector<std::string> faults = {}, VirtualWay between = {})
+      : encoder(parse_address(text)), way(between) {
+    encoder.device.faults = std::move(faults);
+    way.clock = &clock;
+  }
+  [[nodiscard]] LineSearch search() {
+    const bool is_can = encoder.unit->link == LinkKind::can;
+    return {.place = is_can ? "slcan:/dev/here" : "tcp:here:1",
+            .limit = std::chrono::hours(1),
+            .open = [this](const EncoderAddress&) { return virtual_link(encoder, way); },
+            .now = [this] { return clock.time; }};
+  }
+
+  EncoderAddress encoder;
+  VirtualWay way;
+  VirtualClock clock;
+};
+
+/// What speaks for the unit when it alone is asked, and how many requests that took.
+std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const std::vector<std::string>& faults,
+                                                const VirtualWay& way = {}) {
+  Place place(text, faults, way);
+  const LineSearch search = place.search();
+  LineFindings findings;
+  Attempt<std::uint8_t> attempt(search, *place.encoder.unit, {}, std::chrono::milliseconds(700), never, findings);
+  attempt.open();
+  attempt.ask();
+  return {findings.candidates.empty() ? capture::Evidence{} : findings.candidates.front().hypothesis.evidence,
+          findings.requests};
+}
+
+/// How many of so many readings the runner takes for damaged, and how many requests it sends for them.
+struct Counted {
+  std::size_t damaged = 0;
+  std::size_t requests = 0;
+};
+Counted damaged_by_runner(const std::string& text, const std::vector<std::string>& faults, std::size_t count,
+                          const VirtualWay& way = {}) {
+  Place place(text, faults, way);
+  Link link = virtual_link(place.encoder, place.way);
+  Runner<std::uint8_t> runner(place.encoder);
+  runner.attach(*link.bytes, link.latency);
+  std::size_t damaged = 0;
+  // Who scans first has the replies that come later.
+  if (const Command* scan = find_command(*place.encoder.unit, Verb::scan)) static_cast<void>(runner.once(*scan));
+  for (std::size_t i = 0; i < count; ++i) {
+    runner.start_again();
+    damaged += runner.once(*find_command(*place.encoder.unit, Verb::read)).error != Error::none ? 1 : 0;
+  }
+  return {damaged, runner.port().requests};
+}
+
+std::string name_of_case(const ::testing::TestParamInfo<const Unit*>& one) {
+  std::string name(one.param->id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+// ---- Damage
+
+class Damage : public ::testing::TestWithParam<const Unit*> {};
+
+TEST_P(Damage, IsWhatTheRunnerSaysWithAndWithoutEcho) {
+  const Unit& unit = *GetParam();
+  const std::string text = fmt::format("sim:{}", unit.id);
+  const EncoderAddress address = parse_address(text);
+  const bool is_asked = unit.link == LinkKind::half_duplex && find_command(unit, Verb::read) != nullptr &&
+                        !host::sends_unasked(unit, address.options);
+  if (!is_asked) GTEST_SKIP() << "a reading is not one request with its reply";
+  std::size_t damaged = 0;
+  for (const char* const fault : {"corrupt=0.4", "garbage=0.4", "truncate=0.4"}) {
+    for (const bool echo : {false, true}) {
+      SCOPED_TRACE(fmt::format("{}{}", fault, echo ? " with echo" : ""));
+      const auto [evidence, requests] = asked(text, {fault}, {.echo = echo});
+      const Counted wanted = damaged_by_runner(text, {fault}, evidence.tried, {.echo = echo});
+      // Where the scan was repeated or found more than one, the faults do not meet the same readings.
+      if (wanted.requests != requests) continue;
+      EXPECT_EQ(evidence.tried - evidence.explained, wanted.damaged);
+      damaged += wanted.damaged;
+    }
+  }
+  if (find_command(unit, Verb::scan) == nullptr) {
+    EXPECT_GT(damaged, 3u) << "nothing was compared";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, Damage, ::testing::ValuesIn(all_units().begin(), all_units().end()), name_of_case);
+
+// ---- Late replies
+
+TEST(Identify, GivesLateRepliesMoreTimeAndTakesEachForItsOwnRequest) {
+  for (const char* const fault : {"delay=1", "delay=0.3"}) {
+    const capture::Evidence evidence = asked("sim:tformat", {fault}).first;
+    EXPECT_GT(evidence.tried, 4u) << fault;
+    EXPECT_EQ(evidence.explained, evidence.tried) << fault;
+  }
+}
+
+// ---- Which encoder it is
+
+/// The setting of an encoder that has the last number of a bus; "": there is no bus, or who is on it is not asked.
+std::string at_last_number(const Unit& unit) {
+  const Option* option = find_role(unit.options, Role::encoder);
+  const Command* scan = find_command(unit, Verb::scan);
+  if (option == nullptr || scan == nullptr || !scan->disturbs.empty()) return {};
+  return fmt::format("{}={}", option->name, to_text(*option, option->maximum));
+}
+
+class Found : public ::testing::TestWithParam<const Unit*> {};
+
+TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
+  const Unit& unit = *GetParam();
+  if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) GTEST_SKIP() << "an SPI controller is needed";
+  std::vector<std::string> settings{""};
+  // Who sends by himself tells no number, and takes the search seconds.
+  if (!host::sends_unasked(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
+    settings.push_back(at_last_number(unit));
+    for (const Model& model : unit.models) settings.push_back(fmt::format("model={}", model.name));
+  }
+  for (const std::string& setting : settings) {
+    SCOPED_TRACE(setting);
+    Place place(fmt::format("sim:{}?motion=rpm=60&singleturn=300{}{}", unit.id, setting.empty() ? "" : "&", setting));
+    const LineFindings findings = search_line(place.search());
+    ASSERT_FALSE(findings.candidates.empty());
+    const Candidate& best = findings.candidates.front();
+    EXPECT_EQ(best.unit, &unit);
+    EXPECT_TRUE(is_found(best));
+    const unsigned found = unit.resolution(best.hypothesis.options).singleturn_bits;
+    const unsigned wanted = unit.resolution(place.encoder.options).singleturn_bits;
+    EXPECT_TRUE(found == wanted || best.hypothesis.at_least) << found << " of " << wanted;
+    const Option* number = find_role(unit.options, Role::encoder);
+    if (number == nullptr || best.unasked) continue;
+    const auto index = static_cast<std::size_t>(number - unit.options.data());
+    EXPECT_EQ(best.hypothesis.options[index], place.encoder.options[index]);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, Found, ::testing::ValuesIn(all_units().begin(), all_units().end()), name_of_case);
+
+// ---- What only the encoder can say
+
+TEST(Identify, TheEncoderItselfTellsModelsApartWhoseRepliesAreAlike) {
+  for (const Unit* unit : all_units()) {
+    if (find_role(unit->fields, Role::identity) == nullptr || unit->models.size() < 2) continue;
+    for (const Model& model : unit->models) {
+      SCOPED_TRACE(fmt::format("{} {}", unit->id, model.name));
+      Place place(fmt::format("sim:{}?model={}", unit->id, model.name));
+      if (unit->link != LinkKind::half_duplex) continue;
+      const LineFindings findings = search_line(place.search());
+      ASSERT_FALSE(findings.candidates.empty());
+      const Candidate& best = findings.candidates.front();
+      EXPECT_EQ(best.unit, unit);
+      EXPECT_EQ(best.hypothesis.options.values, place.encoder.options.values);
+      const auto alike =
+          std::count_if(findings.candidates.begin(), findings.candidates.end(),
+                        [&](const Candidate& one) { return one.unit == best.unit && is_as_likely(one, best); });
+      EXPECT_EQ(alike, 1);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace absenc::client
