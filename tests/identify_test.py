@@ -13,30 +13,43 @@ import unittest
 
 from command_support import ABSENC, Case, Emulator, EncoderCase, absenc, end, json_lines
 
-# Protocol, how it is emulated, and what of the options must be found.
-ENCODERS = [
-    ("tformat", [], {"singleturn_bits": 17}),
-    ("tformat", ["--model", "23-bit", "--multiturn", "7"], {"singleturn_bits": 23, "encoder_id": 23}),
-    ("esl", ["--option", "address=3", "--option", "crc_bit_order=msb"], {"address": 3, "crc_bit_order": "msb"}),
-    ("encolink", ["--motion", "rpm=60"], {"stream_rate": 0}),
-    ("encolink", ["--motion", "rpm=60", "--option", "stream_rate=500", "--option", "resolution=20"], {"resolution": 20}),
-    ("e201", ["--model", "rotary-19-16"], {"singleturn_bits": 19, "multiturn_bits": 16}),
-    ("raa38", ["--motion", "rpm=60", "--option", "bits=17"], {"mode": "timing"}),
-    ("raa38", ["--option", "mode=bus", "--option", "unit=2"], {"mode": "bus", "unit": 2}),
-    ("raa38-modbus", ["--option", "address=9"], {"address": 9}),
-    ("raa38-modbus", ["--option", "baud=9600"], {"baud": "9600"}),
-    ("raa38-can", ["--option", "node=0x21"], {"node": 0x21}),
-    ("amt21", ["--motion", "rpm=60", "--model", "AMT21xB"], {}),
-]
+UNITS = json_lines(absenc("list", "--json").stdout)
 
 
-# What those that are asked say of themselves.
-IDENTITIES = {
-    "tformat": {"encoder_id"},
-    "esl": {"encoder_id"},
-    "encolink": {"part_number", "serial_number", "order_number", "serial_number_extended"},
-    "e201": {"version", "serial"},
-}
+def with_role(infos, role):
+    """The options or fields of a unit that are this to those who know no protocol."""
+    return [one for one in infos if one.get("role") == role]
+
+
+def another(option):
+    """A value of an option that is not its usual one."""
+    if "choices" in option:
+        return next(one for one in option["choices"] if one != option["default"])
+    return option["maximum"] if option["maximum"] != option["default"] else option["minimum"]
+
+
+def cases(unit):
+    """How an encoder of this protocol is emulated, and which of its options must be found."""
+    yield {}, {}
+    model = unit["models"][-1] if unit["models"] else {"options": {}}
+    if model["options"]:
+        yield {"model": model["name"]}, model["options"]
+    for role in ("encoder", "rate"):
+        for option in with_role(unit["options"], role):
+            if role == "rate" and unit["link"] == "can":
+                continue  # an slcan adapter of a pseudo-terminal has no rate
+            yield {option["name"]: another(option)}, {option["name"]: another(option)}
+
+
+def usual(unit, settings):
+    """These settings at the usual rate, as behind the port of an address."""
+    rates = {option["name"]: option["default"] for option in with_role(unit["options"], "rate")}
+    texts = [f"{name}={value}" for name, value in {**settings, **rates}.items()]
+    return "?" + "&".join(texts) if texts else ""
+
+
+# What no line of characters or CAN frames carries needs an SPI controller.
+ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
 
 SEARCH = 300  # seconds for a search on a busy machine; alone it takes ten
 
@@ -48,39 +61,48 @@ def identify(*arguments, **settings):
 
 
 class OnALine(EncoderCase):
-    def find(self, index, protocol, arguments):
-        with Emulator(self.directory, *arguments, protocol=protocol, name=f"line{index}") as emulator:
-            place = ("slcan:" if protocol == "raa38-can" else "") + emulator.path
+    def find(self, index, unit, settings):
+        protocol = unit["protocol"]
+        arguments = [word for name, value in settings.items()
+                     for word in (("--model", value) if name == "model" else ("--option", f"{name}={value}"))]
+        with Emulator(self.directory, "--motion", "rpm=60", *arguments, protocol=protocol,
+                      name=f"line{index}") as emulator:
+            place = ("slcan:" if unit["link"] == "can" else "") + emulator.path
             result, found = identify(place, "--for", str(SEARCH), timeout=2 * SEARCH)
             self.assertEqual(result.returncode, 0, f"{protocol}: {result.stdout}{result.stderr}")
-            best = found["candidates"][0]
             # One reading on a busy machine: with more time for the encoder to be let run.
-            verb, encoder = best["command"].replace('"', "").split()[1:3]
+            verb, encoder = found["candidates"][0]["command"].replace('"', "").split()[1:3]
             again = absenc(verb, encoder + ("&" if "?" in encoder else "?") + "latency=1000", "--json")
-            return best, again
+            # A pseudo-terminal has no rate: another one is seen only by who answers too slowly for the usual one.
+            at_usual_rate = absenc("read", f"{protocol}:{place}{usual(unit, settings)}", "--json").returncode == 0
+            return found["candidates"], again, at_usual_rate
 
     def test_every_encoder_is_the_first_candidate(self):
-        covered = {protocol for protocol, _, _ in ENCODERS}
-        over_lines = {unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout)
-                      if unit["link"] not in ("exchange", "clocked")}
-        self.assertEqual(covered, over_lines)
         with concurrent.futures.ThreadPoolExecutor(6) as pool:
-            searches = [pool.submit(self.find, i, protocol, arguments)
-                        for i, (protocol, arguments, _) in enumerate(ENCODERS)]
-        for (protocol, arguments, wanted), search in zip(ENCODERS, searches):
-            with self.subTest(protocol, arguments=arguments):
-                best, again = search.result()
-                self.assertEqual(best["protocol"], protocol)
-                self.assertEqual({name: best["options"][name] for name in wanted}, wanted)
-                self.assertTrue(best["found"])
-                self.assertGreater(best["explained"], 0.9 * best["tried"])
-                said = set() if best["unasked"] else IDENTITIES.get(protocol, set())
-                self.assertEqual(set(best["identity"]), said)
-                if "encoder_id" in wanted:
-                    self.assertEqual(best["identity"]["encoder_id"], wanted["encoder_id"])
+            searches = [pool.submit(self.find, i, unit, settings) for i, (unit, settings, _) in enumerate(ENCODERS)]
+        for (unit, settings, wanted), search in zip(ENCODERS, searches):
+            with self.subTest(unit["protocol"], settings=settings):
+                candidates, again, at_usual_rate = search.result()
+                rates = [] if at_usual_rate else with_role(unit["options"], "rate")
+                self.check(unit, wanted, candidates[0], with_role(unit["options"], "encoder") + rates)
                 # The command to go on with does.
                 self.assertEqual(again.returncode, 0, again.stderr)
                 self.assertTrue(json_lines(again.stdout)[0]["ok"])
+
+    def check(self, unit, wanted, best, shown):
+        """`shown`: the options that replies tell; of others any value is as good."""
+        self.assertEqual(best["protocol"], unit["protocol"])
+        self.assertTrue(best["found"])
+        self.assertGreater(best["explained"], 0.9 * best["tried"])
+        if best["unasked"] and not best["encoder"]:
+            return  # it tells no more than its position
+        for option in shown:
+            if option["name"] in wanted:
+                self.assertEqual(best["options"][option["name"]], wanted[option["name"]])
+        identity = best["identity"]
+        self.assertEqual(bool(identity), bool(with_role(unit["fields"], "identity")) and not best["unasked"])
+        for name in wanted.keys() & identity.keys():
+            self.assertEqual((best["options"][name], identity[name]), (wanted[name], wanted[name]))
 
     def test_people_are_told_how_to_go_on(self):
         emulator = self.emulator("--model", "23-bit")

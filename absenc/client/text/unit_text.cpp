@@ -347,6 +347,17 @@ std::string to_text(Time time) {
   return fmt::format("{:.4g} s", nanoseconds / 1e9);
 }
 
+std::string_view name_of(Role role) {
+  static constexpr std::array<std::string_view, 21> names{
+      "",           "position",       "turns",       "of_position",
+      "sequence",   "encoder",        "identity",    "clash",
+      "trouble",    "rate",           "check_width", "check_polynomial",
+      "check_init", "check_inverted", "address",     "page",
+      "count",      "force",          "value",       "data",
+      "written"};
+  return names[static_cast<std::size_t>(role)];
+}
+
 std::string_view name_of(Verb verb) {
   static constexpr std::array<std::string_view, 13> names{
       "read",        "read_part",    "info",       "temperature", "clear_alarms", "zero", "reset_multiturn",

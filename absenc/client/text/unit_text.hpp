@@ -93,6 +93,8 @@ struct RoleArgument {
 [[nodiscard]] std::string line_of(const Unit& unit);
 [[nodiscard]] std::string line_of(LinkKind link, const LineSettings& line);
 [[nodiscard]] std::string_view name_of(Verb verb);
+/// "identity"; empty for `other`.
+[[nodiscard]] std::string_view name_of(Role role);
 
 /// Whether what this field shows of the position holds, by the reading of the same frame; what is no part of it is
 /// `valid`. The one rule for all that shows fields.

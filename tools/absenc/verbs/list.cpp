@@ -198,10 +198,17 @@ Json models_json(const Unit& unit) {
   });
 }
 
+// Sets what it is to those who know no protocol, where it is anything.
+Json with_role(Json json, Role role) {
+  const std::string_view name = name_of(role);
+  return name.empty() ? json : json.set("role", name);
+}
+
 Json options_json(const Unit& unit) {
   return Json::list(unit.options, [](const Option& option) {
     Json json = Json::object().set("name", option.name).set("meaning", option.meaning);
     json.set("default", to_json(option, option.default_value));
+    json = with_role(std::move(json), option.role);
     if (option.choices.empty()) {
       return json.set("minimum", to_json(option, option.minimum)).set("maximum", to_json(option, option.maximum));
     }
@@ -262,6 +269,7 @@ Json fields_json(const Unit& unit) {
   return Json::list(unit.fields, [](const FieldInfo& field) {
     Json json = Json::object().set("name", field.name).set("kind", kinds[static_cast<std::size_t>(field.kind)]);
     json.set("unit", field.unit).set("meaning", field.meaning);
+    json = with_role(std::move(json), field.role);
     const Json flags = Json::list(raised(field, ~0ull), flag_to_json);
     return flags.empty() ? json : json.set("flags", flags);
   });
