@@ -101,6 +101,7 @@ enum class HostDemand : std::uint8_t {
   asks,           // its requests are such that they are answered
   after_silence,  // it asks again when no reply came
   after_damage,   // and when the reply was damaged
+  after_refusal,  // and when its request was damaged, so that the encoder refused it
   rule,           // it never breaks `rule`
   row             // nor does it this one, of requests in a row: looked at while replies are good, as a host may give up
 };

@@ -51,7 +51,7 @@ void require_host(const Unit& unit, const Options& options) {
 }
 
 Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices) {
-  HostTrial trial(choices.answers);
+  HostTrial trial(unit, choices.answers);
   HostTrial::Fault fault = HostTrial::Fault::none;
   std::uint64_t sent = 0;
   Time heard_at = os::now();
@@ -68,7 +68,7 @@ Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoi
     stage.play(os::now() + between_looks);
   }
   trial.look(stage.seen());
-  return trial.judge(unit);
+  return trial.judge();
 }
 
 Conformance conform_host(std::string_view text, const EmulateChoices& place, const ConformHostChoices& choices) {

@@ -12,14 +12,16 @@
 namespace absenc::client {
 
 std::uint64_t HostTrial::length() const {
-  if (phase_ == Phase::silence || phase_ == Phase::damage) return asked_again;
-  if (phase_ == Phase::between) return asked_again;
-  return answers_ / 2;
+  if (phase_ == Phase::good || phase_ == Phase::last) return answers_ / 2;
+  const auto demands = [](const HostClause& clause) { return clause.demand == HostDemand::after_refusal; };
+  const bool is_asked = phase_ != Phase::refusal || std::ranges::any_of(host_clauses_of(unit_), demands);
+  return is_asked ? asked_again : 0;
 }
 
 // What the present phase is about: of a fault, how often it really was.
 std::uint64_t HostTrial::counted() const {
   if (phase_ == Phase::silence) return seen_.missing;
+  if (phase_ == Phase::refusal) return seen_.requests.good + seen_.requests.bad;
   return phase_ == Phase::damage ? seen_.damaged : seen_.answered;
 }
 
@@ -39,19 +41,21 @@ HostTrial::Fault HostTrial::look(Seen seen) {
     }
   }
   seen_ = std::move(seen);
+  if (phase_ == Phase::refusal) refused_ = counted() - begun_at_;
   while (phase_ != Phase::over && counted() - begun_at_ >= length()) {
     phase_ = static_cast<Phase>(static_cast<unsigned>(phase_) + 1);
     begun_at_ = counted();
   }
   if (phase_ == Phase::silence) return Fault::silence;
+  if (phase_ == Phase::refusal) return Fault::damaged_request;
   return phase_ == Phase::damage ? Fault::damage : Fault::none;
 }
 
-Conformance HostTrial::judge(const Unit& unit) const {
-  Conformance conformance{.protocol = std::string(unit.id)};
-  for (const HostClause& clause : host_clauses_of(unit)) {
+Conformance HostTrial::judge() const {
+  Conformance conformance{.protocol = std::string(unit_.id)};
+  for (const HostClause& clause : host_clauses_of(unit_)) {
     ClauseResult result{.id = clause.id,
-                        .document = unit.document,
+                        .document = unit_.document,
                         .paragraph = clause.paragraph,
                         .words = clause.words,
                         .verdict = Verdict::untested};
@@ -66,9 +70,11 @@ void HostTrial::judge_one(const HostClause& clause, ClauseResult& result) const 
     case HostDemand::asks:
       return judge_requests(result);
     case HostDemand::after_silence:
-      return judge_going_on(Phase::silence, result);
+      return judge_going_on(Phase::silence, "replies were missing", seen_.missing, result);
     case HostDemand::after_damage:
-      return judge_going_on(Phase::damage, result);
+      return judge_going_on(Phase::damage, "replies were damaged", seen_.damaged, result);
+    case HostDemand::after_refusal:
+      return judge_going_on(Phase::refusal, "requests came damaged", refused_, result);
     case HostDemand::rule:
     case HostDemand::row:
       return judge_rule(clause, result);
@@ -95,15 +101,12 @@ void HostTrial::conclude_if_all_are_requests(ClauseResult& result, bool kept, st
   result.evidence = fmt::format("{}, but the host also sent what is no request", evidence);
 }
 
-void HostTrial::judge_going_on(Phase phase, ClauseResult& result) const {
-  const std::string_view lacking = phase == Phase::silence ? "missing" : "damaged";
-  const std::uint64_t lacked = phase == Phase::silence ? seen_.missing : seen_.damaged;
-  result.evidence = fmt::format("the host asked for so little that no reply was {}", lacking);
-  if (lacked == 0) return;
+void HostTrial::judge_going_on(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const {
+  result.evidence = fmt::format("the host asked for so little that no {}", what);
+  if (count == 0) return;
   const bool goes_on = phase_ > phase;
   conclude_if_all_are_requests(
-      result, goes_on,
-      fmt::format("{} replies were {}, {}", lacked, lacking, goes_on ? "and it asked on" : "then it asked no more"));
+      result, goes_on, fmt::format("{} {}, {}", count, what, goes_on ? "and it asked on" : "then it asked no more"));
 }
 
 void HostTrial::judge_rule(const HostClause& clause, ClauseResult& result) const {

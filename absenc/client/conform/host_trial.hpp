@@ -17,9 +17,9 @@ namespace absenc::client {
 
 class HostTrial {
  public:
-  enum class Fault : std::uint8_t { none, silence, damage };
+  enum class Fault : std::uint8_t { none, silence, damage, damaged_request };
 
-  explicit HostTrial(std::size_t answers) : answers_(answers) {}
+  HostTrial(const Unit& unit, std::size_t answers) : unit_(unit), answers_(answers) {}
 
   /// What was counted up to now.
   struct Seen {
@@ -29,15 +29,15 @@ class HostTrial {
     RequestCounts requests{};
     std::vector<RuleCount> rules{};
   };
-  /// The fault that replies are to have from now on.
+  /// The fault that requests or replies are to have from now on.
   Fault look(Seen seen);
   [[nodiscard]] bool over() const { return phase_ == Phase::over; }
 
   /// By what the last look saw.
-  [[nodiscard]] Conformance judge(const Unit& unit) const;
+  [[nodiscard]] Conformance judge() const;
 
  private:
-  enum class Phase : std::uint8_t { good, silence, between, damage, last, over };
+  enum class Phase : std::uint8_t { good, silence, after_silence, damage, after_damage, refusal, last, over };
   static constexpr std::uint64_t asked_again = 3;  // requests that show that it goes on
 
   [[nodiscard]] std::uint64_t counted() const;
@@ -45,27 +45,39 @@ class HostTrial {
   [[nodiscard]] bool is_calm() const;
   void judge_one(const HostClause& clause, ClauseResult& result) const;
   void judge_requests(ClauseResult& result) const;
-  void judge_going_on(Phase phase, ClauseResult& result) const;
+  /// Of the fault of `phase` there were `count`.
+  void judge_going_on(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const;
   void judge_rule(const HostClause& clause, ClauseResult& result) const;
   void conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const;
 
+  const Unit& unit_;
   std::size_t answers_;
   Phase phase_ = Phase::good;
   std::uint64_t begun_at_ = 0;  // of `counted`
+  std::uint64_t refused_ = 0;   // requests that came while each byte of them is damaged on its way
   Seen seen_{};
   std::vector<RuleCount> calm_{};  // of them those while replies were good, and no host had to give anything up
 };
 
-/// How often the virtual encoder did so.
+/// How often the virtual encoder did so to a reply.
 [[nodiscard]] inline std::uint64_t count_of(const VirtualDevice& encoder, HostTrial::Fault fault) {
   const sim::FaultKind kind = fault == HostTrial::Fault::silence ? sim::FaultKind::silence : sim::FaultKind::corrupt;
   return encoder.faults() != nullptr ? (*encoder.faults())[static_cast<std::size_t>(kind)] : 0;
 }
 
-/// The virtual encoder's fault that makes replies so: "" for none.
+/// The virtual encoder's fault that does so: "" for none.
 [[nodiscard]] constexpr std::string_view name_of(HostTrial::Fault fault) {
-  if (fault == HostTrial::Fault::none) return "";
-  return fault == HostTrial::Fault::silence ? "silence" : "corrupt";
+  switch (fault) {
+    case HostTrial::Fault::silence:
+      return "silence";
+    case HostTrial::Fault::damage:
+      return "corrupt";
+    case HostTrial::Fault::damaged_request:
+      return "request_corrupt";
+    case HostTrial::Fault::none:
+      break;
+  }
+  return "";
 }
 
 }  // namespace absenc::client

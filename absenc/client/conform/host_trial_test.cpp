@@ -41,6 +41,7 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
   for (const unsigned asked : {1u, 2u}) {
     all.push_back({.stops_at_silence = asked});
     all.push_back({.stops_at_damage = asked});
+    all.push_back({.stops_at_refusal = asked});
   }
   for (const Time hasty : {Time(100'000), Time(1'000'000), Time(19'000'000), Time(100'000'000)}) {
     all.push_back({.hasty = hasty});

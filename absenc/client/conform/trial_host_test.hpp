@@ -31,6 +31,7 @@ struct Flaws {
   bool is_silent = false;
   unsigned stops_at_silence = 0;  // when it has asked so often without a reply; 0: it goes on
   unsigned stops_at_damage = 0;   // and with damaged ones
+  unsigned stops_at_refusal = 0;  // and of requests that came damaged
   Time hasty{};                   // waits of up to so long are left out
   std::vector<HostStep> sends{};
   // Of an SPI controller:
@@ -150,20 +151,20 @@ class Host {
   template <class Next>
   Conformance judged_sending(const Next& next) {
     constexpr unsigned most = 60;
-    HostTrial trial(20);
+    HostTrial trial(unit_, 20);
     for (unsigned i = 0; i < most; ++i) {
       set_fault(trial.look(seen()));
       send(next());
       listen(std::chrono::milliseconds(25));  // longer than any encoder needs
     }
     trial.look(seen());
-    return trial.judge(unit_);
+    return trial.judge();
   }
 
   /// `all`: at its end it runs every command once.
   Conformance judged(bool all = false) {
     constexpr unsigned most_rounds = 40;
-    HostTrial trial(20);
+    HostTrial trial(unit_, 20);
     for (unsigned i = 0; i < most_rounds && !stopped_ && !trial.over(); ++i) {
       round(trial);
     }
@@ -174,7 +175,7 @@ class Host {
       if (all && !moves) run(command, complete_arguments(command, given(command)));
     }
     trial.look(seen());
-    return trial.judge(unit_);
+    return trial.judge();
   }
 
  private:
@@ -236,9 +237,10 @@ class Host {
     if (stopped_ || trial.over()) return;
     const HostTrial::Fault fault = trial.look(seen());
     set_fault(fault);
-    const unsigned stops = fault == HostTrial::Fault::silence  ? flaws_.stops_at_silence
-                           : fault == HostTrial::Fault::damage ? flaws_.stops_at_damage
-                                                               : 0;
+    const unsigned stops = fault == HostTrial::Fault::silence           ? flaws_.stops_at_silence
+                           : fault == HostTrial::Fault::damage          ? flaws_.stops_at_damage
+                           : fault == HostTrial::Fault::damaged_request ? flaws_.stops_at_refusal
+                                                                        : 0;
     port_.requests_left = stops != 0 ? stops : UINT_MAX;
     try {
       run(command, arguments);

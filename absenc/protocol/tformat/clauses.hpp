@@ -137,10 +137,12 @@ inline constexpr std::array two_at_once{HostStep{{}, "1a 1a"}};
 inline constexpr std::array three_at_once{HostStep{{}, "1a 1a 1a"}};
 }  // namespace script
 
-inline constexpr std::array<HostClause, 10> host_clauses{{
+inline constexpr std::array<HostClause, 11> host_clauses{{
     {"asks", "6.2", "requests are as drawn", HostDemand::asks},
     {"silence", "8.4 Table 5 (1)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "6.3.4", "after a damaged reply it asks again", HostDemand::after_damage},
+    {"refusal", "6.3.2 (4)", "after ca0 or ca1, or silence, for a damaged request it asks again",
+     HostDemand::after_refusal},
     {.id = "turn",
      .paragraph = "11",
      .words = "a request waits until the reply before it is over",
