@@ -147,6 +147,24 @@ class Page(ServeCase):
                     self.assertEqual(self.broken_words(), [])
                     self.assertLessEqual(self.too_wide(), 0)
 
+    def test_the_lines_of_a_grid_have_labels_of_their_own(self):
+        served = self.without_history("sim:encolink?multiturn=60000&motion=rpm=0.5")  # many degrees, of which few change
+        self.browser.get(served.url + "#encoder=sim%3Aencolink%3Fmultiturn%3D60000%26motion%3Drpm%3D0.5")
+
+        def labels():
+            return self.browser.execute_script("""
+                return Array.from(document.querySelectorAll('.plot'), (plot) =>
+                  Array.from(plot.querySelectorAll('.dygraph-axis-label-y'), (label) => label.textContent));""")
+        wait_until(lambda: any(float(one) > 1e7 for one in labels()[0]), "the position is drawn")
+        for _ in range(20):  # while the range grows
+            for plot in labels():
+                self.assertEqual(len(set(plot)), len(plot), plot)
+        cut = """return Array.from(document.querySelectorAll('.dygraph-axis-label-y'))
+                   .filter((label) => label.scrollWidth > label.clientWidth).map((label) => label.textContent);"""
+        self.assertEqual(self.browser.execute_script(cut), [])
+        self.shot("grid")
+        self.assert_no_errors()
+
     def test_a_plot_that_is_not_yet_drawn_anew_widens_nothing(self):
         self.open("#encoder=sim:esl%3Fmotion%3Drpm%3D60")
         wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, ".plot canvas"), "there are plots")

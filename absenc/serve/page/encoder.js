@@ -14,12 +14,20 @@ const MOST_EVENTS = 100;
 
 const ink = () => getComputedStyle(document.body).color;
 
+// Labels with as many decimals as tell one line of the grid from the next.
+function gridLines(...range) {
+  const lines = Dygraph.numericTicks(...range);
+  if (lines.length < 2) return lines;
+  const decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(Math.abs(lines[1].v - lines[0].v)))));
+  return lines.map((line) => ({...line, label: line.v.toFixed(decimals)}));
+}
+
 // One point that is none, until there is something.
 function plot(node, title, options) {
   const nothing = options.customBars ? [NaN, NaN, NaN] : NaN;
   return new Dygraph(node, [[new Date(), nothing]], {
     title, labels: ["time", title], axisLabelColor: ink(), axisLabelWidth: 72, axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
-    colors: ["#2f7fd0", "#d07a1f"], strokeWidth: 1.5, legend: "never", ...options,
+    colors: ["#2f7fd0", "#d07a1f"], strokeWidth: 1.5, legend: "never", axes: {y: {ticker: gridLines, axisLabelWidth: 96}}, ...options,
   });
 }
 
