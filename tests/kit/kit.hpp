@@ -22,6 +22,10 @@ namespace absenc::kit {
 /// reads, and a command without a request, are findings.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
+/// Silence is no reply: a command whose requests nobody answers ends with `timeout`, a scan too. Links whose host
+/// clocks the line have no silence.
+[[nodiscard]] Findings check_silence(const Unit& unit);
+
 /// Requests of every command with random arguments: what `encode` makes is a good request with these arguments in its
 /// fields. Arguments outside their ranges are refused.
 [[nodiscard]] Findings check_requests(const Unit& unit, std::uint64_t seed);

@@ -49,6 +49,12 @@ TEST_P(Kit, HostsTakeWhatVectorsSay) {
   expect_none(findings);
 }
 
+TEST_P(Kit, SilenceIsATimeout) {
+  const Findings findings = check_silence(unit);
+  EXPECT_EQ(findings.looks() > 1, unit.link != LinkKind::clocked && unit.link != LinkKind::spi);
+  expect_none(findings);
+}
+
 TEST_P(Kit, CommandsEndWell) {
   const Findings findings = check_commands(unit);
   EXPECT_GT(findings.looks(), 10u);

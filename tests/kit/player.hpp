@@ -33,6 +33,8 @@ class Player {
   /// What comes back for the request under test: `clocks` bits or items are what is asked for, 0: unknown.
   using Reply = std::function<Pieces(std::size_t clocks)>;
 
+  /// On a line on which nobody is.
+  Player() = default;
   Player(const Unit& unit, const Options& options) : device_storage_(unit.device_storage) {
     device_ = machine_of<Item>(unit.device(options, still_, device_storage_));
     if (device_ != nullptr) device_->power_on(now_, Device<Item>::PowerOn::skip);
@@ -41,11 +43,12 @@ class Player {
   /// False when the conversation does not end. An empty request is one that sends nothing: a pulse, or a wait.
   /// `on_emit` is called for each result of one that streams.
   template <class OnEmit>
-  bool run(Conversation<Item>& conversation, const std::vector<Item>& request, const Reply& reply, OnEmit&& on_emit) {
+  bool run(Conversation<Item>& conversation, const std::vector<Item>& request, const Reply& reply, OnEmit&& on_emit,
+           unsigned most_steps = 2000) {
     using Kind = typename Event<Item>::Kind;
     using Wanted = typename Step<Item>::Kind;
     bool unasked = request.empty();
-    for (unsigned steps = 0; steps < 2000; ++steps) {
+    for (unsigned steps = 0; steps < most_steps; ++steps) {
       const Step<Item> step = conversation.next(now_);
       if (step.kind == Wanted::done) return true;
       if (step.kind == Wanted::emit && conversation.streams()) on_emit();
@@ -63,6 +66,7 @@ class Player {
       const std::size_t clocks = step.bits != 0 ? step.bits : step.expect;
       now_ = std::max(now_, step.at);
       conversation.feed({.kind = Kind::sent, .at = now_});
+      ++sent_;
       const bool tested = sent == request;
       if (tested) ++asked_;
       unasked = false;
@@ -72,6 +76,8 @@ class Player {
   }
   /// How often the request under test came.
   [[nodiscard]] unsigned asked() const { return asked_; }
+  /// How many requests came.
+  [[nodiscard]] unsigned sent() const { return sent_; }
 
  private:
   void play(Conversation<Item>& conversation, const Pieces& pieces) {
@@ -98,6 +104,7 @@ class Player {
   std::vector<std::byte> device_storage_;
   Device<Item>* device_ = nullptr;
   unsigned asked_ = 0;
+  unsigned sent_ = 0;
 };
 
 }  // namespace absenc::kit

@@ -69,6 +69,18 @@ TEST(Amt21, TurnsBelongToTheirSideOfZero) {
   }
 }
 
+TEST(Amt21, ScanFindsItsAddressAmongSilence) {
+  Bench bench(unit, "address=0x58");
+  const author::testing::Told found = bench.run("scan");
+  EXPECT_EQ(found.error, Error::none);
+  EXPECT_EQ(found.numbers.at("encoder_address"), 0x58);
+}
+
+TEST(Amt21, ReservedRequestIsUnexpected) {
+  for (const std::uint8_t reserved : std::to_array<std::uint8_t>({0x57, 0x03, 0xFF})) {
+    EXPECT_EQ(Protocol::decode_request({}, std::array{reserved}).error(), Error::unexpected_reply);
+  }
+}
 TEST(Amt21, NothingIsNoRequest) { EXPECT_EQ(Protocol::decode_request({}, {}).error(), Error::wrong_length); }
 
 }  // namespace

@@ -78,7 +78,9 @@ struct Protocol {
     return bytes;
   }
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
-    if (bytes.empty() || bytes.size() != request_size(format, bytes)) return Error::wrong_length;
+    if (bytes.empty()) return Error::wrong_length;
+    if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // reserved
+    if (bytes.size() != request_size(format, bytes)) return Error::wrong_length;
     const Request request{static_cast<Ask>(bytes.size() == 1 ? bytes[0] & 3 : bytes[1]),
                           static_cast<std::uint8_t>(bytes[0] & 0xFC)};
     const bool known = bytes.size() == 1 || request.ask == Ask::zero || request.ask == Ask::reset;

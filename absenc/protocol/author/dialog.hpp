@@ -25,7 +25,7 @@ namespace absenc::author {
 ///     static Manner manner(const Format&, const Request&);
 ///     static ByteBuffer<N> encode(const Format&, const Request&);
 ///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine
-///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of no bytes: Error::timeout
+///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of one byte at least
 ///     static bool is_whole(const Format&, Error);                    // see Engine
 ///     static Reading reading(const Format&, const Request&, const Reply&);
 ///     static Time latched(const Format&, Time sent_at);              // when the encoder takes the position; where the

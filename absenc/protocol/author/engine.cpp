@@ -171,9 +171,12 @@ void Engine::look() {
 }
 
 void Engine::conclude() {
-  if (disturbed_ && size_ == 0) return conclude_with(Error::bad_framing);
+  if (size_ == 0) {
+    if (disturbed_) return conclude_with(Error::bad_framing);
+    return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
+  }
   // Bytes that are not this reply's.
-  if (size_ != 0 && (disturbed_ || noisy_)) return conclude_with(Error::wrong_length);
+  if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }
 

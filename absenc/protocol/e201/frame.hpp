@@ -201,10 +201,9 @@ struct Protocol {
   }
   /// What has its CR where it belongs is whole, whatever it says.
   static constexpr bool is_whole(const Format&, Error error) { return error != Error::wrong_length; }
-  /// Errors: timeout; those of decode_samples and decode_position, or of decode_line; unsupported (no document says
+  /// Errors: those of decode_samples and decode_position, or of decode_line; unsupported (no document says
   /// what this one answers).
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
-    if (bytes.empty()) return Error::timeout;
     if (letter::is_in(letter::answered_by_a_line, request.letter)) return decode_line(request.letter, bytes);
     if (request.letter != letter::samples) return Error::unsupported;
     const Result<std::uint64_t> samples = decode_samples(bytes);

@@ -35,7 +35,6 @@ TEST(E201Frame, FailuresAreToldApart) {
            {"c000000000000003\r", Error::bad_framing},     // CDS, and truncated
            {"c0014328ff310000\r", Error::none},            // behind the CRC
            {"c0014328fe300000\r", Error::bad_checksum},
-           {"", Error::timeout},
        })) {
     EXPECT_EQ(name(decode('4', reply).error()), name(error)) << reply;
   }

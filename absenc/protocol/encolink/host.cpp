@@ -23,7 +23,6 @@ std::size_t Frames::expected(const Format& format, const Request& request, Bytes
 }
 
 Result<Position> Frames::decode(const Format& format, const Request& request, Bytes reply) {
-  if (reply.empty()) return Error::timeout;
   const bool flat = std::all_of(reply.begin(), reply.end(), [&](std::uint8_t byte) { return byte == reply[0]; });
   if (format.interface == Interface::spi && flat && (reply[0] == 0x00 || reply[0] == 0xFF)) return Error::line_stuck;
   if (request.ask == Ask::identify) return Position{};

@@ -298,7 +298,7 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Profile& profile, const Request& request, Bytes bytes) {
   Result<Reply> result;
-  const Error error = bytes.empty() ? Error::timeout : error_of(check_reply(profile, request, bytes, *result));
+  const Error error = error_of(check_reply(profile, request, bytes, *result));
   if (error != Error::none) result = error;
   return result;
 }

@@ -318,7 +318,6 @@ namespace detail {
 namespace detail {
 
 constexpr Error check_frame(const Request& request, Bytes bytes) {
-  if (bytes.empty()) return Error::timeout;
   const bool rejection = begins_rejection(request.id, bytes);
   if (bytes.size() != reply_length(rejection ? DataId::everything : request.id)) return Error::wrong_length;
   if (checksum(bytes) != 0) return Error::bad_checksum;

@@ -264,7 +264,6 @@ struct Protocol {
   }
   static constexpr bool is_whole(const Format&, Error) { return false; }
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
-    if (bytes.empty()) return Error::timeout;
     return decode_reply(format, request, bytes);
   }
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {

@@ -228,7 +228,6 @@ struct Protocol {
     return encode_position(format, position);
   }
   static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
-    if (bytes.empty()) return Error::timeout;
     if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;  // nothing answers it
     return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : anybody);
   }
