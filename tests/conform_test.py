@@ -134,7 +134,7 @@ class ConformHost(EncoderCase):
         answer = json.loads(out)
         verdicts = {one["id"]: one["verdict"] for one in answer["clauses"]}
         # One that reads positions sends no reset, and leaves the memory alone.
-        read = {"asks", "silence", "damage", "turn"}
+        read = {"asks", "silence", "damage", "turn", "refusal"}
         self.assertEqual(verdicts, {name: "kept" if name in read else "untested" for name in verdicts}, err)
         self.assertEqual((judge.returncode, answer["ok"]), (0, True))
 
