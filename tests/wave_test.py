@@ -147,6 +147,17 @@ class Wave(Case):
                 self.assertEqual(told["exchanges"], len(rows) - 3)
                 self.assertEqual(told["positions"], 0)
 
+    def test_requests_that_nobody_answers_are_read_at_the_rate_of_the_document(self):
+        for unit, requests in (("e201", {"76", "34"}), ("amt21", {"54"}), ("tformat", {"1a"}), ("esl", {"0875"})):
+            with self.subTest(unit):
+                path = self.file(unit + "_silent.vcd")
+                self.wave(f"{unit}?fault=request_corrupt=1&seed=1", path, "--count", "12")
+                result = absenc("decode", unit, path, "--json")
+                rows = [json.loads(line) for line in result.stdout.splitlines()]
+                self.assertGreater(len(rows), 10)
+                self.assertLessEqual({row.get("request") for row in rows}, requests)
+                self.assertIn("timeout", {row.get("error") for row in rows})
+
     def edges(self, *arguments):
         """The times of each wire's changes, and the levels at first."""
         path = self.file("edges.vcd")

@@ -12,17 +12,26 @@ namespace {
 
 using capture::Tick;
 
-// Those that a checksum or the like has proved, and those with characters that are none.
+// Those that a checksum or the like has proved, requests that nobody answered, and those with characters that are none.
 struct Frames final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     if (annotation.remark == capture::Remark::damaged) ++damaged;
+    if (annotation.remark == capture::Remark::unanswered && annotation.error == Error::timeout) ++unanswered;
     if (annotation.error != Error::none || annotation.remark == capture::Remark::cut) return;
     if (annotation.kind == capture::Annotation::Kind::request) return;
     ++good;
   }
   std::uint64_t good = 0;
+  std::uint64_t unanswered = 0;
   std::uint64_t damaged = 0;
 };
+
+// Whether the rate that the document states reads a host whom nobody answers, where the other rate reads next to
+// nothing: the few changes of its requests fit many rates.
+bool reads_silence(const Frames& at_own, const Frames& at_other) {
+  return at_own.damaged == 0 && at_own.unanswered > at_other.unanswered &&
+         at_other.good <= std::min(at_other.damaged, at_own.unanswered);
+}
 
 /// Good replies with their requests, and an end when there are enough of them.
 struct Sample final : capture::AnnotationSink {
@@ -74,12 +83,14 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   Frames at_best = frames_at(best);
   const auto try_at = [&](const Speed& speed, std::uint64_t handicap) {
     const Frames frames = frames_at(speed);
-    if (frames.good < std::max<std::uint64_t>(1, at_best.good + handicap)) return;
+    const bool is_own = speed.baud == line_.rate && speed.parity == line_.parity;
+    const bool is_better = frames.good >= std::max<std::uint64_t>(1, at_best.good + handicap);
+    if (!is_better && !(is_own && reads_silence(frames, at_best))) return;
     best = speed;
     at_best = frames;
   };
   if (rate_is_open) try_at({static_cast<double>(line_.rate), best.parity}, 0);
-  if (choices_.how.parity || (at_best.damaged == 0 && at_best.good != 0)) return best;
+  if (choices_.how.parity || (at_best.damaged == 0 && at_best.good + at_best.unanswered != 0)) return best;
   for (const Parity parity : {Parity::none, Parity::odd, Parity::even}) {
     if (parity == line_.parity) continue;
     if (rate_is_open) try_at({static_cast<double>(line_.rate), parity}, 1);
