@@ -27,7 +27,7 @@ ReadingColumns::ReadingColumns(const Unit& unit, const Options& options) : unit_
       {"singleturn_bits", "", Type::uint64, "", {.is_detail = true}},
       {"singleturn_valid", "", Type::boolean, ""},
       {"singleturn_valid_bits", "", Type::uint64, "", {.is_detail = true}},
-      {"multiturn", "revolutions", Type::uint64, "revolutions as the encoder counts them"},
+      {"multiturn", "revolutions", Type::int64, "revolutions as the encoder counts them"},
       {"multiturn_bits", "", Type::uint64, "", {.is_detail = true}},
       {"multiturn_valid", "", Type::boolean, ""},
   };
@@ -60,7 +60,7 @@ void ReadingColumns::fill(const Reading& reading, std::span<Value> values) const
   put(has_position, value_of(validity));
   put(has_position, std::uint64_t{reading.singleturn_valid_bits});
   const bool has_turns = reading.multiturn_bits != 0;
-  put(has_turns, reading.multiturn);
+  put(has_turns, reading.turns());
   put(has_turns, std::uint64_t{reading.multiturn_bits});
   put(has_turns, value_of(reading.multiturn_validity()));
 

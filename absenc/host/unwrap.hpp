@@ -63,7 +63,7 @@ class Unwrapper {
 
   [[nodiscard]] static constexpr std::uint64_t absolute(const Reading& reading) {
     if (turn_bits(reading) == 0) return reading.singleturn;
-    return reading.multiturn << reading.singleturn_bits | reading.singleturn;
+    return static_cast<std::uint64_t>(reading.turns()) << reading.singleturn_bits | reading.singleturn;
   }
 
   [[nodiscard]] constexpr bool have_turns(const Reading& reading) const {

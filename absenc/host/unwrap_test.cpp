@@ -44,6 +44,25 @@ TEST(Unwrapper, GoesOnPastTheEndOfTheTurnCounter) {
   EXPECT_EQ(unwrapper.position(), 15 * 1024 + 1023);
 }
 
+TEST(Unwrapper, GoesOnThroughZeroOfTurnsWithASign) {
+  const auto signed_turns = [](std::int64_t turns, std::uint64_t counts, Time at) {
+    Reading reading = multiturn(static_cast<std::uint64_t>(turns) & 15, counts, at);
+    reading.multiturn_signed = true;
+    return reading;
+  };
+  Unwrapper unwrapper;
+  unwrapper.add(signed_turns(-3, 1000, 0ms));
+  EXPECT_EQ(unwrapper.position(), -3 * 1024 + 1000);
+  unwrapper.add(signed_turns(1, 8, 1ms));
+  EXPECT_EQ(unwrapper.position(), 1 * 1024 + 8);
+  unwrapper.add(signed_turns(-1, 1023, 2ms));
+  EXPECT_EQ(unwrapper.position(), -1);
+  // And past its last turn.
+  unwrapper.add(signed_turns(-7, 0, 3ms));
+  unwrapper.add(signed_turns(7, 0, 4ms));
+  EXPECT_EQ(unwrapper.position(), -9 * 1024);
+}
+
 TEST(Unwrapper, TakesTheTurnOnlyWhereTheTurnsDoNotHold) {
   Unwrapper unwrapper;
   unwrapper.add(multiturn(5, 1000, 0ms));

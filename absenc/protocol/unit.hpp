@@ -210,7 +210,8 @@ struct Any {
 struct Resolution {
   unsigned singleturn_bits = 0;
   unsigned multiturn_bits = 0;
-  double unit_um = 0;  // linear encoders: micrometres a count; 0: a rotation
+  double unit_um = 0;             // linear encoders: micrometres a count; 0: a rotation
+  bool multiturn_signed = false;  // turns are counted below zero
 };
 
 /// Wires beside the data on which a host's pulses ask for something.

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <concepts>
 #include <iterator>
 
 #include "absenc/client/reading.hpp"
@@ -26,7 +27,8 @@ void append(std::string& text, const std::optional<double>& value) {
   }
 }
 
-void append(std::string& text, const std::optional<std::uint64_t>& value) {
+template <std::integral Number>
+void append(std::string& text, const std::optional<Number>& value) {
   text += value ? fmt::format_int(*value).c_str() : "null";
 }
 

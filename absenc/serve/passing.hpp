@@ -16,7 +16,7 @@ struct Passing {
   std::optional<double> place{};  // past the end of a turn: degrees, of linear encoders mm
   std::optional<double> speed{};  // rpm, of linear encoders mm/s
   std::optional<std::uint64_t> counts{};
-  std::optional<std::uint64_t> turns{};
+  std::optional<std::int64_t> turns{};
 };
 
 /// Bounded: whoever fetches too seldom loses the oldest, which are counted. Empty until somebody fetches.

@@ -55,7 +55,7 @@ void set_place(Json& json, const Reading& reading, bool live) {
   const Validity singleturn = reading.ready ? reading.singleturn_validity() : Validity::invalid;
   json.set("singleturn_valid", live ? to_json(value_of(singleturn)) : Json());
   const bool has_turns = live && reading.multiturn_bits != 0 && reading.multiturn_valid;
-  json.set("turns", has_turns ? Json(reading.multiturn) : Json());
+  json.set("turns", has_turns ? Json(reading.turns()) : Json());
   json.set("multiturn_valid", live ? to_json(value_of(reading.multiturn_validity())) : Json());
 }
 

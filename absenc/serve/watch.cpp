@@ -328,7 +328,7 @@ void Watch::pass_on(const Sample& sample) {
   if (sample.position_valid) passing.place = place_of(sample);
   if (sample.speed_valid) passing.speed = sample.speed;
   if (reading.ready && reading.singleturn_valid()) passing.counts = reading.singleturn;
-  if (reading.multiturn_bits != 0 && reading.multiturn_valid) passing.turns = reading.multiturn;
+  if (reading.multiturn_bits != 0 && reading.multiturn_valid) passing.turns = reading.turns();
   for (Outbox& outbox : outboxes_) {
     if (outbox.wanted()) outbox.put(passing);
   }

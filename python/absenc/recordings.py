@@ -53,7 +53,7 @@ _SIGNED = _Kind("i8", 0, int)
 _UNSIGNED = _Kind("u8", 0, int)
 _BOOLEAN = _Kind("?", False, {"true": True, "false": False}.__getitem__)
 _TEXT = _Kind("O", "", str)
-_WHOLE = {"position": _SIGNED, "singleturn": _UNSIGNED, "multiturn": _UNSIGNED, "missed": _UNSIGNED}
+_WHOLE = {"position": _SIGNED, "singleturn": _UNSIGNED, "multiturn": _SIGNED, "missed": _UNSIGNED}
 _UNITS = {"_mm_s": "mm/s", "_rpm": "rpm", "_deg": "deg", "_mm": "mm", "_um": "um", "_s": "s"}
 _UNITS_BY_NAME = {"position": "counts", "singleturn": "counts", "multiturn": "revolutions"}
 

@@ -34,9 +34,9 @@ struct PyReading {
     if (!holds()) return {};
     return reading.singleturn;
   }
-  [[nodiscard]] std::optional<std::uint64_t> multiturn() const {
+  [[nodiscard]] std::optional<std::int64_t> multiturn() const {
     if (!reading.ready || reading.multiturn_bits == 0 || !reading.multiturn_valid) return {};
-    return reading.multiturn;
+    return reading.turns();
   }
   [[nodiscard]] py::object alarms() const { return names_or_none(client::alarms_of(*unit, reading)); }
   [[nodiscard]] py::object status() const { return names_or_none(client::status_of(*unit, reading)); }

@@ -44,6 +44,9 @@ void run_commands(const Unit& unit, const Configuration& way, Findings& findings
       if (result.seen.reading) {
         findings.require(sim::is_at(*result.seen.reading, world.place()),
                          [&] { return what() + "another position than the shaft's"; });
+        const std::vector<std::int64_t> turns = result.seen.numbers(Role::turns);
+        findings.require(turns.size() != 1 || turns[0] == result.seen.reading->turns(),
+                         [&] { return what() + "shows other turns than its reading"; });
       } else {
         findings.require(command.verb != Verb::read, [&] { return what() + "has no reading"; });
       }

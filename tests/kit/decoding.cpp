@@ -101,14 +101,12 @@ class Decoding {
 
   void reading_shows(const Seen& seen) {
     const Reading& reading = *seen.reading;
-    const auto is = [&](Role role, std::uint64_t counts, unsigned bits) {
-      const std::vector<std::int64_t> numbers = seen.numbers(role);
-      return numbers.size() == 1 && (static_cast<std::uint64_t>(numbers[0]) & low_mask(bits)) == counts;
+    const auto is = [&](Role role, std::int64_t number) {
+      return seen.numbers(role) == std::vector<std::int64_t>{number};
     };
-    require(reading.singleturn_bits == 0 || is(Role::position, reading.singleturn, 64),
+    require(reading.singleturn_bits == 0 || is(Role::position, static_cast<std::int64_t>(reading.singleturn)),
             [] { return "has a reading of another position"; });
-    // Turns may have a sign.
-    require(reading.multiturn_bits == 0 || is(Role::turns, reading.multiturn, reading.multiturn_bits),
+    require(reading.multiturn_bits == 0 || is(Role::turns, reading.turns()),
             [] { return "has a reading of other turns"; });
   }
 

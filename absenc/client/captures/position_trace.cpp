@@ -20,7 +20,10 @@ void PositionTrace::halve() {
 
 double PositionTrace::value(std::uint64_t counts) const {
   if (unit_um_ > 0) return micrometres(counts, unit_um_) / 1000;
-  return turns_ ? std::ldexp(static_cast<double>(counts), -static_cast<int>(bits_)) : degrees(counts, bits_);
+  if (!turns_) return degrees(counts, bits_);
+  const double all =
+      signed_ ? static_cast<double>(static_cast<std::int64_t>(counts - offset())) : static_cast<double>(counts);
+  return std::ldexp(all, -static_cast<int>(bits_));
 }
 
 std::string_view PositionTrace::unit() const { return unit_um_ > 0 ? "mm" : turns_ ? "turns" : "deg"; }

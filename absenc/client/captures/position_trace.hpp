@@ -24,6 +24,7 @@ class PositionTrace {
       first_ = tick;
       bits_ = reading.singleturn_bits;
       unit_um_ = reading.unit_um;
+      signed_ = reading.multiturn_signed;
       turns_ = reading.multiturn_valid && reading.multiturn_bits + bits_ <= 64;
     }
     if (turns_ && !reading.multiturn_valid) return;
@@ -31,7 +32,8 @@ class PositionTrace {
     const std::uint64_t since = tick - std::min(tick, first_);
     while (since >> shift_ >= columns) halve();
     Column& column = columns_[static_cast<std::size_t>(since >> shift_)];
-    const std::uint64_t counts = reading.singleturn | (turns_ ? reading.multiturn << bits_ : 0);
+    const auto turns = static_cast<std::uint64_t>(turns_ ? reading.turns() : 0);
+    const std::uint64_t counts = (reading.singleturn | turns << bits_) + offset();
     column.least = std::min(column.least, counts);
     column.most = std::max(column.most, counts);
   }
@@ -51,6 +53,8 @@ class PositionTrace {
   };
 
   void halve();
+  // Added, so that turns below zero are less than those above.
+  [[nodiscard]] std::uint64_t offset() const { return turns_ && signed_ ? std::uint64_t{1} << 63 : 0; }
   [[nodiscard]] double value(std::uint64_t counts) const;
   [[nodiscard]] std::string_view unit() const;
 
@@ -59,6 +63,7 @@ class PositionTrace {
   std::uint64_t first_ = 0;
   std::uint64_t count_ = 0;
   unsigned bits_ = 1;
+  bool signed_ = false;
   bool turns_ = false;  // as the first one: with turns, those without leave a gap
   double unit_um_ = 0;
 };

@@ -33,6 +33,18 @@ TEST(PositionTrace, NothingIsNoPlot) {
   EXPECT_EQ(trace.plot(), "");
 }
 
+TEST(PositionTrace, TurnsBelowZeroAreBelowThoseAbove) {
+  PositionTrace trace;
+  for (std::int64_t turn = -4; turn <= 4; ++turn) {
+    Reading reading = position(0, static_cast<std::uint64_t>(turn) & 0xFFFF, true);
+    reading.multiturn_signed = true;
+    trace.add(static_cast<std::uint64_t>(turn + 4), reading);
+  }
+  const std::string plot = trace.plot();
+  EXPECT_NE(line_of(plot, 0).find(" 4.000 turns |"), std::string::npos) << plot;
+  EXPECT_NE(line_of(plot, 9).find("-4.000 turns |*"), std::string::npos) << plot;
+}
+
 // However long it gets, all of it is in the plot.
 TEST(PositionTrace, ARampFillsTheDiagonal) {
   PositionTrace trace;

@@ -282,13 +282,13 @@ void Changes::test_reset(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   std::string lost;
   if (before.alarms != 0) lost = "an alarm";
-  if (turns && before.multiturn != 0) lost = fmt::format("a count of {} turns", before.multiturn);
+  if (turns && before.multiturn != 0) lost = fmt::format("a count of {} turns", before.turns());
   if (!may_lose(lost, result)) return;
   const Command& command = *find_command(unit_, clause.verb);
   const Ran ran = line_.run(command, complete_arguments(command, {}));
   const Reading after = read();
   std::string seen = fmt::format("position {}, turns {}, alarms {:x} before; {}, {}, {:x} after", before.singleturn,
-                                 before.multiturn, before.alarms, after.singleturn, after.multiturn, after.alarms);
+                                 before.turns(), before.alarms, after.singleturn, after.turns(), after.alarms);
   // That other alarms remain, which this cannot clear, is said as an error too.
   const bool obeyed = ran.error == Error::none || (ran.error == Error::cross_check_failed && after.alarms != 0);
   const bool cleared = (after.alarms & demanded) == 0 && (!turns || after.multiturn == 0);
@@ -303,7 +303,7 @@ void Changes::test_reset(const Clause& clause, ClauseResult& result) {
 void Changes::test_restart(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const bool turns = before.multiturn_bits != 0 && before.multiturn != 0;
-  if (!may_lose(turns ? fmt::format("a count of {} turns", before.multiturn) : "", result)) return;
+  if (!may_lose(turns ? fmt::format("a count of {} turns", before.turns()) : "", result)) return;
   static_cast<void>(send(*find_command(unit_, clause.command), {}));
   const Ran at_once = line_.run(*find_command(unit_, Verb::read), {});
   line_.rest(std::chrono::milliseconds(clause.value) + settling);

@@ -15,19 +15,23 @@ namespace absenc::client {
 
 namespace {
 
-std::uint64_t checked(std::string_view name, std::optional<std::int64_t> value, unsigned bits) {
+std::uint64_t checked(std::string_view name, std::optional<std::int64_t> value, unsigned bits, bool has_sign) {
   if (!value) return 0;
   if (bits == 0) throw UsageError(fmt::format("{} cannot be set: this encoder has no such position", name));
-  const std::uint64_t maximum = low_mask(bits);
-  if (*value >= 0 && static_cast<std::uint64_t>(*value) <= maximum) return static_cast<std::uint64_t>(*value);
-  throw UsageError(fmt::format("{} is {}, but must be from 0 to {}: it has {} bits", name, *value, maximum, bits));
+  const std::uint64_t low = low_mask(bits) & static_cast<std::uint64_t>(*value);
+  // Below zero either as the encoder shows it, or as the bits that are on the line.
+  if (low == static_cast<std::uint64_t>(*value) || (has_sign && with_sign(low, bits) == *value)) return low;
+  const std::int64_t minimum = has_sign ? with_sign(std::uint64_t{1} << (bits - 1), bits) : 0;
+  throw UsageError(fmt::format("{} is {}, but must be from {} to {}: it has {} bits{}", name, *value, minimum,
+                               low_mask(has_sign ? bits - 1 : bits), bits, has_sign ? ", the highest its sign" : ""));
 }
 
 // The shaft's position (core/shaft.hpp) at which the encoder shows what the user wants.
 std::int64_t start_position(const Unit& unit, const Options& options, const DeviceSettings& settings) {
   const Resolution resolution = unit.resolution(options);
-  const std::uint64_t counts = checked("singleturn", settings.singleturn, resolution.singleturn_bits);
-  const std::uint64_t turns = checked("multiturn", settings.multiturn, resolution.multiturn_bits);
+  const std::uint64_t counts = checked("singleturn", settings.singleturn, resolution.singleturn_bits, false);
+  const std::uint64_t turns =
+      checked("multiturn", settings.multiturn, resolution.multiturn_bits, resolution.multiturn_signed);
   const unsigned bits = resolution.singleturn_bits;
   const std::uint64_t fraction = bits <= 32 ? counts << (32 - bits) : counts >> (bits - 32);
   return static_cast<std::int64_t>(turns << 32 | fraction);

@@ -111,7 +111,7 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
   } else if (setting.name == "singleturn") {
     uri.device.singleturn = number_of(setting, 0, INT64_MAX);
   } else if (setting.name == "multiturn") {
-    uri.device.multiturn = number_of(setting, 0, INT64_MAX);
+    uri.device.multiturn = number_of(setting, INT64_MIN, INT64_MAX);
   } else if (setting.name == "condition") {
     uri.device.conditions.push_back(value);
   } else if (setting.name == "alarm") {

@@ -39,8 +39,10 @@ Procedure read_both(Dialog& dialog, Found& found) {
     before = now;
     if (passed_zero) continue;
     found.turns = counted.value;
-    found.reading.multiturn = turns_reading(counted.value, turns_bits).multiturn;
-    found.reading.multiturn_bits = turns_bits;
+    const Reading turns = Protocol::reading(format, request<Ask::turns>(format), counted);
+    found.reading.multiturn = turns.multiturn;
+    found.reading.multiturn_bits = turns.multiturn_bits;
+    found.reading.multiturn_signed = turns.multiturn_signed;
     found.reading.multiturn_valid = true;
     co_return done;
   }

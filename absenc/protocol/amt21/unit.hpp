@@ -28,7 +28,7 @@ struct Format {
   bool drops_low_bits = false;  // of an encoder of 14 bits read as one of 12
 
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
-  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits}; }
+  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
 /// What is added to the address; of zero and reset, which add 2, the byte behind it.
@@ -115,7 +115,7 @@ struct Protocol {
     return Reply{value >> padding};
   }
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
-    if (request.ask == Ask::turns) return author::turns_reading(reply.value, turns_bits);
+    if (request.ask == Ask::turns) return author::turns_reading(reply.value, {0, turns_bits, 0, true});
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }

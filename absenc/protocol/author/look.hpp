@@ -16,10 +16,11 @@ namespace absenc::author {
   reading.singleturn_bits = reading.singleturn_valid_bits = bits;
   return reading;
 }
-[[nodiscard]] constexpr Reading turns_reading(std::int64_t turns, unsigned bits) {
+[[nodiscard]] constexpr Reading turns_reading(std::int64_t turns, Resolution resolution) {
   Reading reading;
-  reading.multiturn = static_cast<std::uint64_t>(turns) & low_mask(bits);
-  reading.multiturn_bits = bits;
+  reading.multiturn = static_cast<std::uint64_t>(turns) & low_mask(resolution.multiturn_bits);
+  reading.multiturn_bits = resolution.multiturn_bits;
+  reading.multiturn_signed = resolution.multiturn_signed;
   reading.multiturn_valid = true;
   return reading;
 }

@@ -65,7 +65,7 @@ std::string turns_text(const Snapshot& snapshot) {
   const Reading& reading = snapshot.last.reading;
   if (!is_live(snapshot) || reading.multiturn_bits == 0) return "-";
   if (!reading.multiturn_valid) return reading.multiturn_known ? "INVALID" : "unknown";
-  return short_text(static_cast<double>(reading.multiturn), 0, 7);
+  return short_text(static_cast<double>(reading.turns()), 0, 7);
 }
 
 std::string speed_text(const Snapshot& snapshot) {

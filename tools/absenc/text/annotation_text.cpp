@@ -142,7 +142,7 @@ std::string AnnotationPrinter::json(const Annotation& annotation) const {
     const double position = linear ? micrometres(reading.singleturn, reading.unit_um) / 1000
                                    : degrees(reading.singleturn, reading.singleturn_bits);
     json.set(linear ? "position_mm" : "angle_deg", valid ? Json(position) : Json());
-    if (reading.multiturn_bits != 0) json.set("turns", reading.multiturn_valid ? Json(reading.multiturn) : Json());
+    if (reading.multiturn_bits != 0) json.set("turns", reading.multiturn_valid ? Json(reading.turns()) : Json());
   }
   if (annotation.contents.reading != nullptr) set_state(json, unit_, *annotation.contents.reading);
   if (annotation.error != Error::none) json.set("error", text_of(annotation.error).name);

@@ -66,9 +66,9 @@ std::string position_text(const Reading& reading, Doubt doubt) {
 }
 
 std::string turns_text(const Reading& reading, Doubt doubt) {
-  if (!reading.multiturn_known) return fmt::format("turns {} ({})", unknown_word(doubt), reading.multiturn);
-  if (!reading.multiturn_valid) return fmt::format("turns INVALID ({})", reading.multiturn);
-  return fmt::format("{:>{}} turns", reading.multiturn, digits(reading.multiturn_bits));
+  if (!reading.multiturn_known) return fmt::format("turns {} ({})", unknown_word(doubt), reading.turns());
+  if (!reading.multiturn_valid) return fmt::format("turns INVALID ({})", reading.turns());
+  return fmt::format("{:>{}} turns", reading.turns(), digits(reading.multiturn_bits));
 }
 
 // The alarms, and the status where they do not say all; of two channels both.

@@ -325,7 +325,7 @@ constexpr std::array<Example, 7> emulate_examples{{
 DeviceSettings device_settings(const Invocation& invocation) {
   DeviceSettings settings;
   if (invocation.has("--singleturn")) settings.singleturn = invocation.number("--singleturn", 0, 0, INT64_MAX);
-  if (invocation.has("--multiturn")) settings.multiturn = invocation.number("--multiturn", 0, 0, INT64_MAX);
+  if (invocation.has("--multiturn")) settings.multiturn = invocation.number("--multiturn", 0, INT64_MIN, INT64_MAX);
   settings.motion = invocation.text("--motion", "still");
   for (const std::string& condition : invocation.texts("--condition")) settings.conditions.push_back(condition);
   for (const std::string& alarm : invocation.texts("--alarm")) settings.alarms.push_back(alarm);

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""amt21: turns have a sign wherever they are shown, and a scan finds the encoder."""
+import csv
+import io
+import unittest
+
+from command_support import Case, absenc, json_lines
+
+BACKWARDS = "sim:amt21?model=AMT21xD&multiturn=-3"
+
+
+class Turns(Case):
+    def test_read_shows_what_turns_shows(self):
+        for address in (BACKWARDS, "sim:amt21?model=AMT21xD&multiturn=16381"):
+            with self.subTest(address):
+                self.assertRegex(absenc("read", address).stdout, r"\D-3 turns")
+                reading, = json_lines(absenc("read", address, "--json").stdout)
+                self.assertEqual((reading["multiturn"], reading["multiturn_valid"]), (-3, True))
+                row, = csv.DictReader(io.StringIO(absenc("read", address, "--csv").stdout))
+                self.assertEqual(row["multiturn"], "-3")
+                self.assertIn("-3 revolutions", absenc("run", address, "turns").stdout)
+
+    def test_captures(self):
+        file = self.file("wave.vcd")
+        absenc("wave", BACKWARDS.removeprefix("sim:"), file, "--command", "turns")
+        row, = json_lines(absenc("decode", "amt21", file, "--json", "--option", "multiturn_bits=14").stdout)
+        self.assertEqual(row["fields"]["multiturn"], -3)
+
+    def test_recordings(self):
+        file = self.file("turns.csv")
+        absenc("record", BACKWARDS, "--output", file, "--count", "2")
+        with open(file, encoding="utf-8") as lines:
+            rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+        self.assertEqual([row["multiturn"] for row in rows], ["-3", "-3"])
+        self.assertEqual(int(rows[0]["position"]), -3 * 16384 + int(rows[0]["singleturn"]))
+
+    def test_what_cannot_be_is_refused(self):
+        for turns in (-8193, 16384):
+            refused = absenc("read", f"sim:amt21?model=AMT21xD&multiturn={turns}")
+            self.assertEqual(refused.returncode, 2)
+            self.assertIn("must be from -8192 to 8191", refused.stderr)
+        refused = absenc("read", "sim:tformat?multiturn=-1")
+        self.assertIn("must be from 0 to 65535", refused.stderr)
+
+
+class Scan(Case):
+    def test_scan_finds_the_encoder(self):
+        for address in ("sim:amt21", "sim:amt21?rate=9600&address=0x10"):
+            (found,) = json_lines(absenc("scan", address, "--json").stdout)[0]["encoders"]
+            self.assertEqual(found["encoder_address"], 0x10 if "0x10" in address else 0x54)
+
+    def test_reserved_request_is_unexpected(self):
+        refused = absenc("decode", "amt21", "--request", "57")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("unexpected_reply", refused.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
