@@ -40,7 +40,8 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
     const FrameEnd end = one.unit.frame_end(one.options, Direction::reply, bytes);
     return end.kind == FrameEnd::Kind::complete && end.size == bytes.size() && decodes(one, request, {.bytes = bytes});
   };
-  Bytes raw = attempt.raw;
+  const Bytes raw = attempt.raw;
+  if (is_frame(raw)) return false;  // all of it is one: no byte is beside it
   const Bytes sent = request.bytes;
   if (!sent.empty() && raw.size() > sent.size() && std::equal(sent.begin(), sent.end(), raw.begin()) &&
       is_frame(raw.subspan(sent.size()))) {

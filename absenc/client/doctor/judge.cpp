@@ -98,7 +98,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   // On a CAN bus encoders send unasked: what comes behind a request that was not answered is no late answer to it.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
   // A single one may be this computer, which was busy. The verdict counts it all the same.
-  const bool often = one.good == 0 || seen.late * 10 >= tried;
+  const bool often = seen.late * 10 >= tried;
   if (!often && seen.late < 2) return;
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? Ailment::reply_late : Ailment::sometimes_late,
@@ -212,8 +212,11 @@ std::string share(std::size_t some, std::size_t all) {
   return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
 }
 
-// What position and turns of these readings were invalid without an alarm that says why.
-void judge_validity(const std::vector<const Reading*>& readings, bool is_explained, std::vector<Finding>& findings) {
+// What position and turns of these readings were invalid without an alarm that says why. `is_damage`: so few of them
+// are damage that the checksum did not see.
+template <class IsDamage>
+void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
+                    std::vector<Finding>& findings) {
   std::size_t position = 0;
   std::size_t turns = 0;
   std::size_t usable_bits = 0;
@@ -224,7 +227,7 @@ void judge_validity(const std::vector<const Reading*>& readings, bool is_explain
     }
     turns += reading->multiturn_validity() == Validity::invalid ? 1 : 0;
   }
-  if (is_explained || (position == 0 && turns == 0)) return;
+  if (std::max(position, turns) == 0 || is_damage(std::max(position, turns))) return;
   const std::string upper = usable_bits != 0 ? fmt::format(", but for its upper {} bits", usable_bits) : "";
   findings.push_back(finding(Ailment::position_invalid,
                              {fmt::format("{}", std::max(position, turns)), fmt::format("{}", readings.size()),
@@ -256,11 +259,11 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
     return (before.invalid > 0) > (after.invalid > 0);  // what makes the position invalid is mended first
   });
-  // Where replies are damaged, a few that the checksum passes have flags that nobody raised.
-  if (one.good < one.seen.readings.size()) {
-    std::erase_if(flags, [&](const RaisedFlag& rare) { return rare.readings * 20 < ready.size(); });
-    for (RaisedFlag& flag : flags) flag.invalid = flag.invalid * 20 < ready.size() ? 0 : flag.invalid;
-  }
+  // Of damaged replies a checksum of 6 bits passes one in 64, by chance a few more: nobody may have raised their flags.
+  const std::size_t failed = one.seen.readings.size() - one.good;
+  const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
+  std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
+  for (RaisedFlag& flag : flags) flag.invalid = is_damage(flag.invalid) ? 0 : flag.invalid;
   bool is_explained = false;
   for (const RaisedFlag& raised : flags) {
     const std::string_view action =
@@ -277,7 +280,7 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
     if (raised.invalid > 0) findings.back().severity = Severity::fault;
     is_explained = is_explained || raised.invalid > 0;
   }
-  judge_validity(ready, is_explained, findings);
+  if (!is_explained) judge_validity(ready, is_damage, findings);
 }
 
 namespace {

@@ -40,6 +40,9 @@ std::vector<std::string> modes_of(const Unit& unit) {
   return modes;
 }
 
+/// A position of which no byte is 0: of such a frame what is left of it may be a good one.
+constexpr std::string_view at_no_zero = "singleturn=1383&";
+
 /// A virtual encoder whose faults and state can be asked when the examination is over.
 struct Watched {
   std::shared_ptr<VirtualDevice> device;
@@ -156,13 +159,13 @@ const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradic
 /// And of each fault, by its kind. Damage shows as what the frames make of it.
 const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   using enum sim::FaultKind;
-  static const Ids damage{"extra_bytes",    "damaged_bits",  "damaged_bursts", "sometimes_damaged",
-                          "always_damaged", "bytes_missing", "extra_bytes",    "position_jumps",
-                          "position_noise", "stuck_bits",    "can_errors"};
+  static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
+                          "position_jumps", "position_noise", "stuck_bits",        "can_errors"};
   static const std::map<sim::FaultKind, Ids> others{
       // Where the next request is answered before the late reply comes, nothing shows that one came.
       {delay, {"reply_late", "sometimes_late", "sometimes_silent"}},
       {echo, {"wrong_echo", "two_answer", "extra_bytes"}},
+      // On a bus random bytes may be two encoders that speak at the same time.
       {garbage,
        {"same_address", "extra_bytes", "bytes_missing", "sometimes_damaged", "damaged_bits", "damaged_bursts",
         "always_damaged", "position_jumps", "position_noise", "stuck_bits"}},
@@ -170,8 +173,8 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
       {repeat, {"two_answer", "extra_bytes"}},
       // A request that is taken for another has a reply that does not fit; which way was damaged cannot be seen then.
       {request_corrupt,
-       {"extra_bytes", "requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
-        "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory"}},
+       {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
+        "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory", "position_jumps"}},
   };
   // Where the host is the clock, something is always clocked in: whatever the encoder does wrong is damage, or a level
   // that never changes.
@@ -310,13 +313,13 @@ TEST_P(Matrix, DamageIsNeverGoodAndNamedAsWhatItIs) {
       for (const double rate : {0.01, 0.1, 1.0}) {
         SCOPED_TRACE(fmt::format("{}?{} {}={}", unit().id, mode, sim::fault_names[kind], rate));
         const EncoderAddress address =
-            address_of(unit(), mode, fmt::format("fault={}={}", sim::fault_names[kind], rate));
+            address_of(unit(), mode, fmt::format("{}fault={}={}", at_no_zero, sim::fault_names[kind], rate));
         const Watched one = examined(address);
         const Examination& examination = one.examination;
         const bool all_good = examination.good == examination.tried;
         // A fault that changes nothing for the host is none: a delay within its limit.
         if (one.injected() == 0 || (all_good && examination.findings.empty())) continue;
-        EXPECT_TRUE(!examination.healthy() || examination.good + 1 == examination.tried) << sentences(examination);
+        EXPECT_FALSE(examination.healthy()) << sentences(examination);
         EXPECT_EQ(differences(ids_of(examination), causes_of(unit(), static_cast<sim::FaultKind>(kind))), "")
             << sentences(examination);
       }
@@ -344,7 +347,7 @@ std::string fault_table() {
       std::vector<std::string> ids;
       for (const double rate : {0.01, 0.1, 1.0}) {
         const std::string id =
-            first_of(examined(address_of(*unit, "", fmt::format("fault={}={}", name, rate))).examination);
+            first_of(examined(address_of(*unit, "", fmt::format("{}fault={}={}", at_no_zero, name, rate))).examination);
         if (ids.empty() || ids.back() != id) ids.push_back(id);
       }
       table += fmt::format(" {} |", fmt::join(ids, ", "));
