@@ -12,9 +12,9 @@
 
 namespace absenc {
 
-/// What is looked at.
+/// Kind of a clause.
 enum class Demand : std::uint8_t {
-  // Of readings, whose requests any host sends
+  // About readings, whose requests any host sends
   answered,  // each request, pulse or transfer gets a reply
   streamed,  // frames come by themselves
   in_time,   // the reply begins within the time that the unit waits for it: documents give typical times, no limits
@@ -22,10 +22,10 @@ enum class Demand : std::uint8_t {
   checked,   // their checksum is right
   as_drawn,  // fixed bits, echoes, ranges, and what must agree
   does,      // `command` ends well each time, with all that it compares
-  // Of requests that no host sends
+  // About requests that no host sends
   foreign_silent,  // a request to another address is not answered
   reacts,          // to `ask` the encoder does as `reaction` says
-  // Of changes, which are put back
+  // About changes, which are put back
   byte_written,  // what is written to the byte at `page` and `address` is read again
   byte_alone,    // and the bytes beside it stay as they are
   page_alone,    // and so does the byte of page `other` at the same address
@@ -35,7 +35,7 @@ enum class Demand : std::uint8_t {
   zeroed,        // the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
   mirrored,      // of the directions 0 and 1 of `setting`, which nothing reads, one mirrors the position
   paced,         // after `command` with `value` so many frames a second come by themselves; `stop` ends them
-  // Of what nothing can bring back
+  // About values that nothing brings back
   zero,     // after the zero command the position is 0, which it was not
   reset,    // after `verb` what it resets is reset, and was not
   restarts  // after the command `command` it is silent at first, and has the same position behind `value` ms
@@ -51,7 +51,7 @@ template <class... Some>
 [[nodiscard]] constexpr Errors any_of(Some... errors) {
   return ((Errors{1} << static_cast<unsigned>(errors)) | ...);
 }
-/// Of replies that are not as the document draws them.
+/// Errors of replies that are not as the document draws them.
 inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpected_reply, Error::out_of_range,
                                              Error::sequence_mismatch, Error::cross_check_failed, Error::line_stuck);
 
@@ -70,7 +70,7 @@ enum class Reaction : std::uint8_t {
   refusal_or_silent,  // the document says both
 };
 
-/// What the document demands of an encoder. It is kept only by a run that saw what it is about: the requests that it
+/// A demand of the document on an encoder. It is kept only by a run that saw what it is about: the requests that it
 /// names were sent, good replies came, a wrong bit in one of these would have been seen, a value was another before.
 /// The engine (client/conform) counts that, by the demand alone.
 struct Clause {
@@ -106,7 +106,7 @@ enum class HostDemand : std::uint8_t {
   row             // nor does it this one, of requests in a row: looked at while replies are good, as a host may give up
 };
 
-/// What a host sends without a look at what comes back: how a test makes a host that breaks a clause.
+/// A step of a host that does not look at replies: how a test makes a host that breaks a clause.
 struct HostStep {
   Time pause{};             // behind what was sent before
   std::string_view what{};  // a command, of which only its own request is sent, or what stands on the wire: "1a 1a"

@@ -268,7 +268,7 @@ class Campaign {
   }
 
   // Whether the reading says that a part of the conversation was lost: it reports fewer alarms than on a good line.
-  // What it reports is right, and the position is the shaft's.
+  // Its position is the shaft's, and each flag that it does report is right.
   [[nodiscard]] static bool is_part_of(const Reading& seen, const Reading& truth) {
     const std::uint32_t reported = seen.alarms_reported;
     if (reported == truth.alarms_reported || (reported & ~truth.alarms_reported) != 0) return false;

@@ -143,7 +143,7 @@ class States {
     return mask;
   }
 
-  // What a reply shows as a field, its reading reports.
+  // A reading reports the flags that its reply shows as fields.
   void carries(const Seen& seen) {
     if (!seen.reading) return;
     const auto agrees = [&](const Flags& state) {

@@ -130,7 +130,7 @@ void Changes::test_bytes_beside(const Clause& clause, ClauseResult& result) {
   std::string seen = fmt::format("{} of {} others are as before, when 0x{:02X} was written and 0x{:02X} is read", same,
                                  others.size(), written, now);
   if (same != std::ssize(others)) return conclude(result, false, std::move(seen));
-  // What was not written could not reach them.
+  // A byte that was not written could not reach them.
   result.evidence = seen;
   if (now == written) conclude(result, true, std::move(seen));
 }
@@ -366,7 +366,7 @@ void Changes::put_back() {
   }
 }
 
-// Whoever asks once more to end meanwhile has to wait: the encoder would be left changed.
+// Another wish to end has to wait until all is put back: the encoder would stay changed.
 bool Changes::put_back(const Saved& one) {
   for (unsigned i = 0; i < tries; ++i) {
     try {

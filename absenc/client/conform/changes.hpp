@@ -34,7 +34,7 @@ struct Sent {
   capture::HeardFrame reply{};
 };
 
-/// What a reply of the memory says.
+/// A reply of the memory, with its busy bit.
 struct BusyReply {
   bool busy = false;
   std::int64_t value = 0;
@@ -54,8 +54,8 @@ struct Heard {
   }
 };
 
-/// What it needs of the line, whatever that carries. All throw what the port throws; os::Interrupted once for each time
-/// that somebody asks to end.
+/// The line as Changes needs it, whatever that carries. All throw what the port throws; os::Interrupted once for each
+/// time that somebody asks to end.
 struct ChangesLine {
   std::function<Ran(const Command&, Arguments)> run;
   std::function<Sent(const std::vector<std::uint8_t>& request)> send;  // as Unit::encode makes it
@@ -81,7 +81,7 @@ class Changes {
   [[nodiscard]] const std::vector<std::string>& left() const { return left_; }
 
  private:
-  /// What was found as `value`, how that is looked at, and how it is written.
+  /// A value that was found, how to look at it, and how to write it.
   struct Saved {
     std::function<std::int64_t()> look{};
     std::function<void(std::int64_t)> write{};

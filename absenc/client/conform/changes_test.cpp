@@ -47,7 +47,7 @@ class Disobedient final : public Machine<Item> {
       : line_(machine_of<Item>(device)), device_(device_of<Item>(device)) {}
 
   void feed(const Event<Item>& event) override {
-    // What a clock asks for has no bytes.
+    // A request by clock has no bytes.
     if (event.kind == Kind::received || event.kind == Kind::selected) {
       ++requests;
       const bool deaf = requests >= deaf_from && requests < deaf_until;
@@ -131,8 +131,8 @@ struct Bench {
     port = std::make_unique<EndingPort<Item>>(*line);
   }
   [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
-  /// What the encoder tells of what the clauses set and of its position: its memory may also count how often it was
-  /// written.
+  /// Returns the settings that clauses change, and the position, as the encoder reports them. Its memory is no measure:
+  /// it may count how often it was written.
   [[nodiscard]] std::string settings() const {
     // Conform may have been ended at another rate, or just after a restart. Who opens the port anew sets the rate.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
@@ -274,7 +274,7 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // What is set may be in no memory.
+  // A setting may stand in no memory.
   const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
@@ -324,9 +324,9 @@ void check_ends(const EncoderAddress& address) {
   ASSERT_EQ(held.verdict(), Verdict::kept) << held.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
-  // What only counts how often it was written is not put back.
+  // A counter of writes is not put back.
   const bool counts = whole.memory() != before;
-  // Of long ones each step has one of the three ends.
+  // In long runs each step has one of the three ends.
   const unsigned kinds = steps < 1000 ? 3 : 1;
   const unsigned stride = 10 / test_cases(10);
   for (unsigned i = 0; i < steps * kinds; i += stride) {
@@ -387,7 +387,7 @@ INSTANTIATE_TEST_SUITE_P(Units, ChangingClauses, ::testing::ValuesIn([] {
                          }()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// What cannot be put back is said, with what puts it back.
+// A change that cannot be put back is named, with the command that does it.
 TEST(Conformance, SaysHowToPutBackWhatALostLineLeftChanged) {
   const EncoderAddress address = parse_address("sim:tformat");
   const Bench<std::uint8_t> whole(address);
@@ -413,7 +413,7 @@ TEST(Conformance, SaysHowToPutBackWhatALostLineLeftChanged) {
   EXPECT_GT(changed, 4U);
 }
 
-// What nothing could bring back is given up only when that is asked for; a counter that is 0 already shows nothing.
+// A run loses values that nothing brings back only when it is asked to; a counter that is 0 already shows nothing.
 TEST(Conformance, ResetsOnlyWhatMayBeLost) {
   const auto found = [](std::string_view text, bool resets) {
     const Bench<std::uint8_t> bench(parse_address(text));

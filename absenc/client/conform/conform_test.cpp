@@ -53,8 +53,8 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
   }
 }
 
-/// What it says for one request; or to all from the third on, as a host may ask again by itself; or from the eighth on,
-/// as some are spent to find the echo where nothing is asked.
+/// Changes its reply to one request; or to all from the third on, as a host may ask again by itself; or from the eighth
+/// on, as some are spent to find the echo where nothing is asked.
 template <class Item>
 void add_said(Changes<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
   all.push_back({.change = change});
@@ -152,7 +152,7 @@ Changes<Item> of_special(const Clause& clause) {
     };
   }});
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    // Of the right length alone.
+    // Right in its length alone.
     all.push_back({.change = [hears_good](M& m) {
       hears_good(m);
       m.of_special = true;
@@ -257,7 +257,7 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
   return all;
 }
 
-// What rides on what is broken is broken too: registers on channel 2, and both on the identity.
+// A clause that rides on a broken one is broken too: registers on channel 2, and both on the identity.
 bool is_alone(const Unit& unit, const Clause& clause, const std::vector<std::string>& broken) {
   return std::all_of(broken.begin(), broken.end(), [&](const std::string& id) {
     const auto other = std::ranges::find(clauses_of(unit), id, &Clause::id);
@@ -307,7 +307,7 @@ TEST_P(Clauses, EachIsBrokenByTwoMutantsOneAlone) {
   }
 }
 
-// What these options leave out is not kept: a clause that is kept is one that something could break.
+// A clause that these options leave out is not kept: something can break each clause that is kept.
 template <class Item>
 void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
   const Unit& unit = *address.unit;

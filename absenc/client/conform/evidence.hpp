@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a verdict stands on: how often the thing was seen that a clause is about.
+// The evidence of a verdict: how often the run saw the thing that a clause is about.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 /// Whether all bits of a clocked word are alike: a line that nobody drives shows the same.
 [[nodiscard]] bool is_flat(const capture::HeardFrame& reply);
 
-/// What readings with one set of options brought.
+/// Readings with one set of options, and their replies.
 struct Readings {
   std::vector<Attempted> all{};
   std::uint64_t requests = 0;   // requests, pulses and transfers that were sent
@@ -46,10 +46,10 @@ struct Readings {
 [[nodiscard]] std::size_t changes_noticed(const Unit& unit, const Options& options, const capture::HeardExchange& good,
                                           Errors errors);
 
-/// What the unit makes of a reply.
+/// Returns the error of this reply to this request; none if it is good.
 [[nodiscard]] Error error_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// What the unit makes of the reply as one to the request of this command; "": to its own.
+/// Returns the error of the reply as one to the request of this command; "": to its own request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
                                 const capture::HeardExchange& exchange);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a host is put to, and what it is judged by, whoever plays the encoder.
+// The trial of a host: faults in phases, and the verdict on each clause.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ class HostTrial {
 
   HostTrial(const Unit& unit, std::size_t answers) : unit_(unit), answers_(answers) {}
 
-  /// What was counted up to now.
+  /// Counts up to now.
   struct Seen {
     std::uint64_t answered = 0;  // requests that the encoder answered, also where a fault kept the reply from the host
     std::uint64_t missing = 0;   // of these replies, by the fault `silence`
@@ -45,7 +45,7 @@ class HostTrial {
   [[nodiscard]] bool is_calm() const;
   void judge_one(const HostClause& clause, ClauseResult& result) const;
   void judge_requests(ClauseResult& result) const;
-  /// Of the fault of `phase` there were `count`.
+  /// `phase` had its fault `count` times.
   void judge_going_on(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const;
   void judge_rule(const HostClause& clause, ClauseResult& result) const;
   void conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const;

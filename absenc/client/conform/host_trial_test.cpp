@@ -68,7 +68,7 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
   return all;
 }
 
-/// What our own host does not, though a host may.
+/// Adds steps that our own host does not send, though a host may.
 Flaws polite(const Unit& unit) {
   Flaws flaws;
   for (const HostClause& clause : host_clauses_of(unit)) {
@@ -99,7 +99,7 @@ EncoderAddress address_of_unit(const Unit& unit, std::string_view motion) {
 }
 
 bool is_mistake_of(std::span<const std::string> broken, std::string_view clause) {
-  // Who sends what is no request does not send requests as drawn either.
+  // A host that sends something else does not send requests as drawn either.
   return std::find(broken.begin(), broken.end(), clause) != broken.end() &&
          std::all_of(broken.begin(), broken.end(), [&](const std::string& id) { return id == clause || id == "asks"; });
 }
@@ -231,7 +231,7 @@ TEST_P(HostClauses, WhatAHostNeverDidIsUntested) {
   EXPECT_EQ(read.verdict(), Verdict::kept) << read.report();
   for (const ClauseResult& one : read.clauses) {
     const HostClause& clause = *std::ranges::find(host_clauses_of(*GetParam()), one.id, &HostClause::id);
-    // Of one that only reads positions and memory: what only a script does.
+    // This host only reads positions and memory; the rest only a script does.
     if (!clause.breaks[0].empty() && clause.options.empty() && one.verdict == Verdict::kept) {
       EXPECT_NE(one.evidence.find("looked at "), std::string::npos) << one.evidence;
       EXPECT_EQ(one.evidence.find("looked at 0"), std::string::npos) << one.evidence;

@@ -108,7 +108,7 @@ class Stranger final : public Machine<Item> {
   bool sending_ = false;
 };
 
-/// What an encoder says, asked in its own words: nothing, where it cannot be read.
+/// Returns a good reply of this encoder; empty where it cannot be read.
 template <class Item>
 std::vector<Item> said_by(const EncoderAddress& address) {
   VirtualDevice device(*address.unit, address.options, address.device);
@@ -122,7 +122,7 @@ std::vector<Item> said_by(const EncoderAddress& address) {
   return {said.begin(), said.end()};
 }
 
-/// Of an encoder with another number on the same line.
+/// Returns a good reply of an encoder with another number on the same line.
 template <class Item>
 std::vector<Item> said_by_neighbour(const EncoderAddress& address) {
   EncoderAddress other = address;

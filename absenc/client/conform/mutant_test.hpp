@@ -87,7 +87,7 @@ class Mutant final : public Machine<Item> {
   bool is_special = false;                                   // the last request was that
 
  private:
-  // Of a damaged request nothing is known.
+  // Nothing is known about a damaged request.
   void note_special(const std::vector<Item>& request) {
     is_special = false;
     if (!request.empty() && request == good) return;
@@ -106,7 +106,7 @@ class Mutant final : public Machine<Item> {
   std::vector<std::vector<Item>> specials_;
 };
 
-/// What is wrong with an encoder, and the conditions that make it so.
+/// A defect of an encoder, and the conditions that cause it.
 template <class Item>
 struct Change {
   std::function<void(Mutant<Item>&)> change{};

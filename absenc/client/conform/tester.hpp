@@ -52,7 +52,7 @@ class Tester {
   /// Whether the choice `over` ended it.
   [[nodiscard]] bool ended() const { return ended_; }
 
-  /// What tests that change the encoder need of the line.
+  /// Returns the line as tests need it that change the encoder.
   [[nodiscard]] ChangesLine line() {
     return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments, 3); },
             .send = [this](const std::vector<std::uint8_t>& request) { return send(request); },
@@ -126,7 +126,7 @@ class Tester {
     AnswerSink sink;
   };
 
-  // What one request owes is nothing to the next. What comes when the host has asked again is late, not missing.
+  // Each request counts by itself. A reply that comes when the host has asked again is late, not missing.
   Attempted once(const Options& options, Time listen_for = listening) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
@@ -136,7 +136,7 @@ class Tester {
                                    one.detail));
     }
     if (one.error == Error::none || !is_asked() || is_streamed(options)) return one;
-    // What a host makes of silence is no matter of what came.
+    // Silence is a timeout, whatever error the host makes of it.
     if (!one.answered) one.error = Error::timeout;
     runner_.listen(listen_for);
     runner_.keep_exchange(one);

@@ -26,7 +26,7 @@
 
 namespace absenc::client {
 
-/// What is wrong with a host.
+/// Defects of a host.
 struct Flaws {
   bool is_silent = false;
   unsigned stops_at_silence = 0;  // when it has asked so often without a reply; 0: it goes on
@@ -251,7 +251,7 @@ class Host {
     trial.look(seen());
   }
 
-  // What the encoder is told by itself: what it does then is nobody's to wait for.
+  // Sends each step by itself, without waiting for what the encoder does then.
   void send_all() {
     listen(std::chrono::milliseconds(50));
     for (const HostStep& one : flaws_.sends) {

@@ -47,7 +47,7 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
       is_frame(raw.subspan(sent.size()))) {
     return true;
   }
-  // Of two frames both are good; with more than half of a frame beside it, one follows on another that was damaged.
+  // Both of two frames are good; with more than half of a frame beside it, one follows on another that was damaged.
   for (std::size_t size = 2; size < raw.size(); ++size) {
     const bool is_long = size * 3 >= raw.size() * 2;
     if (is_long ? is_frame(raw.first(size)) || is_frame(raw.last(size))

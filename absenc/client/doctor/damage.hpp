@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is left of a good frame in replies that were damaged.
+// The remains of good frames in damaged replies.
 #pragma once
 
 #include <algorithm>

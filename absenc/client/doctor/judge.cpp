@@ -212,7 +212,7 @@ std::string share(std::size_t some, std::size_t all) {
   return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
 }
 
-// What position and turns of these readings were invalid without an alarm that says why. `is_damage`: so few of them
+// Judges positions and turns that are invalid without an alarm that says why. `is_damage`: so few of them
 // are damage that the checksum did not see.
 template <class IsDamage>
 void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
@@ -259,7 +259,8 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
     return (before.invalid > 0) > (after.invalid > 0);  // what makes the position invalid is mended first
   });
-  // Of damaged replies a checksum of 6 bits passes one in 64, by chance a few more: nobody may have raised their flags.
+  // A checksum of 6 bits passes one of 64 damaged replies, by chance a few more: the encoder may not have raised these
+  // flags.
   const std::size_t failed = one.seen.readings.size() - one.good;
   const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
   std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });

@@ -28,7 +28,7 @@ using Ids = std::set<std::string_view>;
 
 constexpr std::size_t readings = 200;
 
-/// What a unit may be set to that changes how it is read: its usual options, each model, each value of each option
+/// Settings of a unit that change how it is read: its usual options, each model, each value of each option
 /// that has names or is a yes or no.
 std::vector<std::string> modes_of(const Unit& unit) {
   std::vector<std::string> modes{""};
@@ -139,7 +139,7 @@ Read reading_of(const EncoderAddress& address) {
   return link.bytes != nullptr ? reading_on(address, *link.bytes) : reading_on(address, *link.frames);
 }
 
-/// What of it tells an ailment: a status without an action is none.
+/// Returns the bits that name a defect: a status without an action is none.
 std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
   std::uint64_t bits = reading.alarms;
   unsigned at = 0;
@@ -153,7 +153,7 @@ std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
   return bits;
 }
 
-/// What doctor may say of a state that the encoder reports by itself.
+/// Findings that may name a state which the encoder reports by itself.
 const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradictory", "counter_stands", "refused"};
 
 /// And of each fault, by its kind. Damage shows as what the frames make of it.
