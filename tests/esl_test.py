@@ -552,7 +552,7 @@ class TwoChannels(EslCase):
                 self.assertEqual((last["ch1_alarms"], last["ch2_alarms"]), ("none", "singleturn_error"))
                 self.assertEqual(len(lines[0].split(",")), len(lines[-1].split(",")))
             else:
-                self.assertEqual(json.loads(lines[-1])["ch2_alarms"], ["singleturn_error"])
+                self.assertEqual(json.loads(lines[-2])["ch2_alarms"], ["singleturn_error"])
 
     def test_monitor(self):
         encoder = self.fake(alarms_2=0x20)

@@ -94,7 +94,8 @@ class Recording(Case):
 
     def test_json_lines(self):
         with open(self.record("log.jsonl"), encoding="utf-8") as file:
-            header, *rows = [json.loads(line) for line in file]
+            header, *rows, end = [json.loads(line) for line in file]
+        self.assertEqual(end, {"absenc_end": 1, "rows": len(rows)})
         self.assertIn("speed_mm_s", header["units"])
         self.assertNotIn("angle_deg", header["units"])
         self.assertNotIn("speed_rpm", rows[0])

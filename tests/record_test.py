@@ -50,6 +50,9 @@ def rows_so_far(path):
 def read_json_lines(path):
     with open(path, encoding="utf-8") as file:
         first, *rest = [json.loads(line) for line in file.read().splitlines()]
+    if rest and "absenc_end" in rest[-1]:
+        if rest.pop() != {"absenc_end": 1, "rows": len(rest)}:
+            raise AssertionError("the end counts other rows")
     return first, rest
 
 

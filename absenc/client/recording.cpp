@@ -99,7 +99,7 @@ bool Recording::run(const std::function<void(const Sample&)>& heard) {
   if (!has_all) pace.leave_out(end);  // the end may have come while a reading was taken
   tell_missed();
   write_gap();
-  file_->sync();
+  file_->finish();
   return sample.kind == Sample::Kind::reading;
 }
 
@@ -129,7 +129,7 @@ void Recording::refuse_parts_of_another_recording() const {
 
 void Recording::open_part() {
   if (file_) {
-    file_->sync();
+    file_->finish();
     finished_bytes_ += file_->size();
     finished_ += file_->counts();
   }

@@ -37,7 +37,8 @@ TEST(ClientRecording, HasALineForEachReading) {
   EXPECT_EQ(lines[0], "# absenc record 1");
   EXPECT_EQ(lines[1], "# encoder: motor");
   EXPECT_EQ(std::count_if(lines.begin(), lines.end(), [](const std::string& line) { return line[0] != '#'; }), 21);
-  EXPECT_THAT(lines.back(), HasSubstr(",90,32768,"));
+  EXPECT_THAT(lines[lines.size() - 2], HasSubstr(",90,32768,"));
+  EXPECT_EQ(lines.back(), "# end: 20 rows");
 }
 
 TEST(ClientRecording, EndsByCancelWhileItWaits) {
@@ -46,7 +47,7 @@ TEST(ClientRecording, EndsByCancelWhileItWaits) {
   std::thread other;
   recording.run([&](const Sample&) { other = std::thread([&] { encoder.cancel(); }); });  // within 1000 s
   other.join();
-  EXPECT_EQ(lines_of(recording.names()).size(), 2U);
+  EXPECT_EQ(lines_of(recording.names()).size(), 3U);
   std::filesystem::remove(recording.names());
 }
 

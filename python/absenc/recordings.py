@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Union
@@ -18,6 +20,7 @@ from .protocols import Protocol, protocol
 
 FLAG_WORDS = "names, separated by spaces"  # how a header begins what it says of flags
 ALL_CLEAR = "none"  # of flags in CSV; an empty cell: they are not reported
+NOT_ENDED = "18446744073709551615"  # in the attribute `rows` of HDF5
 
 #: What a file tells of one row, by column; None: not told, or it does not hold.
 Cells = Mapping[str, Any]
@@ -31,11 +34,19 @@ class Recording(Table):
     `event` is "" of a reading and "restarted" of one whose `position` starts again; "lost" and "back" are of the port,
     "gap" has in `missed` how many readings were due and not taken, all others are errors that came in place of a
     reading. `header` has what the file begins with: "encoder", "protocol", "model", "options", "started" ... Flags are
-    numbers: `Protocol.flag_names` names them; 0: all are reported clear, masked: not all are reported."""
+    numbers: `Protocol.flag_names` names them; 0: all are reported clear, masked: not all are reported.
 
-    def __init__(self, rows: Masked, columns: dict[str, Column], header: dict[str, str]) -> None:
+    `is_whole`: the file says that it ended in order, and has as many rows as it says. It is False of a recording that is
+    still written, of one whose process was killed or whose disk was full, of a file that was cut, and of one that an
+    absenc before 0.5 wrote. `damage` says what was left out: "" mostly, or that the last line was cut."""
+
+    def __init__(
+        self, rows: Masked, columns: dict[str, Column], header: dict[str, str], is_whole: bool = False, damage: str = ""
+    ) -> None:
         super().__init__(rows, columns)
         self.header = header
+        self.is_whole = is_whole
+        self.damage = damage
 
     def good(self) -> npt.NDArray[np.bool_]:
         """Which rows are readings."""
@@ -76,50 +87,83 @@ def _unit_of(name: str) -> str:
     return _UNITS_BY_NAME.get(name, _UNITS.get(ending, ""))
 
 
-def _recording(
-    header: dict[str, str], meanings: Mapping[str, str], names: Iterable[str], lines: Sequence[Cells]
-) -> Recording:
-    unit = protocol[header["protocol"]]
-    kinds = {name: _kind(unit, name, meanings.get(name, "")) for name in names}
-    columns = {name: Column(name, _unit_of(name), kind.dtype, meanings.get(name, "")) for name, kind in kinds.items()}
-    rows = np.empty(len(lines), [(name, kind.dtype) for name, kind in kinds.items()])
-    missing = np.zeros(len(lines), [(name, "?") for name in kinds])
+class _Parsed(NamedTuple):
+    """What a file of text tells, before its cells are values."""
+
+    header: dict[str, str]
+    meanings: Mapping[str, str]
+    names: Sequence[str]
+    rows: Sequence[Cells]
+    ends_after: Union[int, None]  # so many rows, as the last line says; None: there is no such line
+
+
+def _recording(parsed: _Parsed, damage: str) -> Recording:
+    unit = protocol[parsed.header["protocol"]]
+    kinds = {name: _kind(unit, name, parsed.meanings.get(name, "")) for name in parsed.names}
+    columns = {
+        name: Column(name, _unit_of(name), kind.dtype, parsed.meanings.get(name, "")) for name, kind in kinds.items()
+    }
+    count = len(parsed.rows)
+    rows = np.empty(count, [(name, kind.dtype) for name, kind in kinds.items()])
+    missing = np.zeros(count, [(name, "?") for name in kinds])
     for name, kind in kinds.items():
-        told = [line.get(name) for line in lines]
+        told = [row.get(name) for row in parsed.rows]
         rows[name] = [
             kind.empty if value is None else kind.of_text(value) if isinstance(value, str) else value for value in told
         ]
         if kind is not _TEXT:
             missing[name] = [value is None for value in told]
-    return Recording(np.ma.MaskedArray(rows, mask=missing), columns, header)  # type: ignore[no-untyped-call]
+    if parsed.ends_after not in (None, count):
+        raise ValueError(f"it ended after {parsed.ends_after} rows, and {count} are there")
+    is_whole = parsed.ends_after is not None and not damage
+    masked: Masked = np.ma.MaskedArray(rows, mask=missing)  # type: ignore[no-untyped-call]
+    return Recording(masked, columns, parsed.header, is_whole, damage)
 
 
-def _load_csv(text: str) -> Recording:
-    lines = text.splitlines()
+def _parse_csv(lines: list[str]) -> _Parsed:
+    end = re.fullmatch("# end: ([0-9]+) rows", lines[-1])
+    if end:
+        lines = lines[:-1]
     head = [line[2:] for line in lines if line.startswith("# ")]
     notes = dict(line.split(": ", 1) for line in head if ": " in line)
-    table = csv.DictReader(line for line in lines if not line.startswith("#"))
-    names = list(table.fieldnames or [])
+    names, *table = csv.reader(line for line in lines if not line.startswith("#"))
+    for number, cells in enumerate(table, len(lines) - len(table) + 1):
+        if len(cells) != len(names):
+            raise ValueError(f"line {number} has {len(cells)} cells for {len(names)} columns")
     header = {name: value for name, value in notes.items() if name not in names}
-    cells = [{name: value or None for name, value in row.items()} for row in table]
-    return _recording(header, notes, names, cells)
+    rows = [{name: value or None for name, value in zip(names, cells)} for cells in table]
+    return _Parsed(header, notes, names, rows, int(end[1]) if end else None)
 
 
-def _load_json_lines(text: str) -> Recording:
-    head, *lines = [json.loads(line) for line in text.splitlines()]
+def _parse_json_lines(lines: list[str]) -> _Parsed:
+    head, *rows = [json.loads(line) for line in lines]
+    ends_after = int(rows.pop()["rows"]) if rows and "absenc_end" in rows[-1] else None
     meanings: dict[str, str] = head.pop("units")
     names: list[str] = []
     for name in meanings:
         names.append(name)
         if name in ("singleturn", "multiturn"):  # these alone say beside them whether they hold
             names.append(name + "_valid")
-    for line in lines:
-        for name, value in line.items():
+    for row in rows:
+        for name, value in row.items():
             if isinstance(value, list):
-                line[name] = " ".join(value)
+                row[name] = " ".join(value)
     header = {name: f"{value:g}" if isinstance(value, float) else str(value) for name, value in head.items()}
     del header["absenc_record"]
-    return _recording(header, meanings, names, lines)
+    return _Parsed(header, meanings, names, rows, ends_after)
+
+
+def _open_hdf5(h5py: Any, path: Path) -> Any:
+    try:
+        return h5py.File(path, "r")
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        if not os.access(path, os.R_OK):
+            raise
+        if path.stat().st_size == 0:
+            raise Failure(f"{path} is empty: its recording ended before it began") from error
+        raise Failure(f"{path} cannot be opened as HDF5, it is damaged or something else: {error}") from error
 
 
 def _load_hdf5(path: Path) -> Recording:
@@ -127,13 +171,15 @@ def _load_hdf5(path: Path) -> Recording:
         import h5py  # type: ignore[import]
     except ImportError as error:
         raise Failure("recordings in HDF5 need h5py: Debian's package is python3-h5py") from error
-    with h5py.File(path, "r") as file:
+    with _open_hdf5(h5py, path) as file:
         attributes = {
-            name: value.decode() if isinstance(value, bytes) else f"{value:g}" for name, value in file.attrs.items()
+            name: value.decode() if isinstance(value, bytes) else f"{value:g}" if value.dtype.kind == "f" else str(value)
+            for name, value in file.attrs.items()
         }
         if attributes.pop("absenc_record", "") != "1":
             raise Failure(f"{path} is HDF5, but no recording of absenc")
         names = attributes.pop("columns").split(",")
+        ended = attributes.pop("rows", NOT_ENDED)
         count = len(file["time_s"])  # written after all others: of a killed recording they may have more
         dtypes = {
             name: "O" if type.kind == "S" else "?" if type == np.int8 else f"{type.kind}{type.itemsize}"
@@ -152,23 +198,39 @@ def _load_hdf5(path: Path) -> Recording:
                 rows[name] = np.where(missing[name], np.nan if data.dtype.kind == "f" else 0, data)
             unit, meaning = (about.get(key, b"").decode() for key in ("unit", "meaning"))
             columns[name] = Column(name, unit, dtypes[name], meaning)
-    return Recording(np.ma.MaskedArray(rows, mask=missing), columns, attributes)  # type: ignore[no-untyped-call]
+    if ended not in (NOT_ENDED, str(count)):
+        raise Failure(f"{path} is damaged: it ended after {ended} rows, and {count} are there")
+    masked: Masked = np.ma.MaskedArray(rows, mask=missing)  # type: ignore[no-untyped-call]
+    return Recording(masked, columns, attributes, ended != NOT_ENDED)
 
 
 def load(file: Union[str, os.PathLike[str]]) -> Recording:
     """A recording of `absenc record`, whose name ends in .csv, in .jsonl or .ndjson for JSON lines, or in .h5 or .hdf5.
     Columns have the same names and types whichever it is. Details that only JSON lines have (`message`, `sent` ...) are
-    left out; and times have microseconds in CSV. Raises UsageError; Failure when the file is no recording; OSError."""
+    left out; and times have microseconds in CSV.
+
+    A last line without its end may be the beginning of other numbers: it is left out, with a warning and in
+    `Recording.damage`. `Recording.is_whole` says whether anything can be missing.
+
+    Raises UsageError; Failure, which names the file, when it is no recording or damaged elsewhere; OSError."""
     path = Path(file)
     if path.suffix in (".h5", ".hdf5"):
-        return _load_hdf5(path)
-    loaders = {".csv": _load_csv, ".jsonl": _load_json_lines, ".ndjson": _load_json_lines}
-    if path.suffix not in loaders:
-        raise UsageError(f"{path} is no recording by its name: it must end in {', '.join(loaders)}, .h5 or .hdf5")
-    text = path.read_text(encoding="utf-8")
-    if not text.startswith(("# absenc record 1\n", '{"absenc_record":1,')):
+        try:
+            return _load_hdf5(path)
+        except (ValueError, KeyError, TypeError, RuntimeError) as error:
+            raise Failure(f"{path} is damaged: {error!r}") from error
+    parsers = {".csv": _parse_csv, ".jsonl": _parse_json_lines, ".ndjson": _parse_json_lines}
+    if path.suffix not in parsers:
+        raise UsageError(f"{path} is no recording by its name: it must end in {', '.join(parsers)}, .h5 or .hdf5")
+    content = path.read_bytes()
+    if not content.startswith((b"# absenc record 1\n", b'{"absenc_record":1,')):
         raise Failure(f"{path} does not begin as a recording does")
+    whole, _, cut = content.rpartition(b"\n")
+    damage = f"the last line has no end ({len(cut)} bytes) and is left out" if cut else ""
     try:
-        return loaders[path.suffix](text)
-    except (ValueError, KeyError, TypeError) as error:
+        recording = _recording(parsers[path.suffix](whole.decode().split("\n")), damage)
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError, csv.Error) as error:
         raise Failure(f"{path} is damaged: {error!r}") from error
+    if damage:
+        warnings.warn(f"{path}: {damage}", stacklevel=2)
+    return recording

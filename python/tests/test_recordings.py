@@ -5,6 +5,7 @@ import json
 import os
 import signal
 import subprocess
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import absenc
@@ -33,7 +34,7 @@ def both(tmp_path, json_lines):
     path = tmp_path / "run.csv"
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write("\n".join(line for line in header if line.startswith("#")) + f"\n{names}\n")
-        for line in json_lines.read_text().splitlines()[1:]:
+        for line in json_lines.read_text().splitlines()[1:-1]:
             row = json.loads(line)
             cells = [row.get(name) for name in names.split(",")]
             csv.writer(file, lineterminator="\n").writerow(
@@ -98,8 +99,50 @@ def test_files_that_are_no_recordings(tmp_path):
         absenc.load(other)
     damaged = record(tmp_path / "run.csv", "sim:tformat", 1)
     damaged.write_text(damaged.read_text() + "0.1,x\n")
-    with pytest.raises(absenc.Failure, match="damaged"):
+    with pytest.raises(absenc.Failure, match="run.csv is damaged"):
         absenc.load(damaged)
+    for name in ("empty.h5", "text.h5"):
+        (tmp_path / name).write_text("" if name == "empty.h5" else "no HDF5\n" * 200)
+        with pytest.raises(absenc.Failure, match=name):
+            absenc.load(tmp_path / name)
+
+
+def rows_of(recording):
+    return [tuple(row) for row in recording.rows.filled().tolist()]
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
+def test_a_recording_that_is_cut_at_any_byte_has_only_rows_that_were_written(tmp_path, name):
+    path = record(tmp_path / name, "sim:tformat?motion=rpm=60&fault=corrupt=0.1&seed=4", 8)
+    content = path.read_bytes()
+    whole = absenc.load(path)
+    assert whole.is_whole and not whole.damage
+    rows = rows_of(whole)
+    cut_path = tmp_path / ("cut" + path.suffix)
+    step = 499 if name == "run.h5" else 1
+    for size in range(0, len(content), step):
+        cut_path.write_bytes(content[:size])
+        try:
+            with warnings.catch_warnings(record=True) as warned:
+                warnings.simplefilter("always")
+                cut = absenc.load(cut_path)
+        except absenc.Failure as error:
+            assert cut_path.name in str(error), size
+            continue
+        assert not cut.is_whole, size
+        assert rows_of(cut) == rows[:len(cut)], size
+        if name != "run.h5":
+            assert bool(cut.damage) == (content[size - 1:size] != b"\n") == bool(warned), size
+            assert len(cut) == content[:size].count(b"\n") - content.count(b"\n") + len(rows) + 1, size
+
+
+def test_a_line_that_is_missing_in_the_middle_is_damage(tmp_path):
+    for name in ("run.csv", "run.jsonl"):
+        path = record(tmp_path / name, "sim:tformat", 8)
+        lines = path.read_text().splitlines(keepends=True)
+        path.write_text("".join(lines[:-4] + lines[-3:]))
+        with pytest.raises(absenc.Failure, match=f"{name} is damaged.*8 rows, and 7"):
+            absenc.load(path)
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])

@@ -66,6 +66,14 @@ class Hdf5Record final : public RecordFile {
     file_.sync();
   }
 
+  void finish() override {
+    {
+      const std::lock_guard lock(mutex_);
+      ending_ = true;
+    }
+    sync();
+  }
+
   void require_there() const override {
     const std::lock_guard lock(mutex_);
     if (failure_) std::rethrow_exception(failure_);
@@ -101,6 +109,7 @@ class Hdf5Record final : public RecordFile {
   void commit() {
     Hdf5Rows rows = rows_of_now();
     table_.commit(rows);
+    if (is_last_) table_.finish();
     const std::lock_guard lock(mutex_);
     committed_ += taken_;
     size_ = file_.size();
@@ -114,6 +123,7 @@ class Hdf5Record final : public RecordFile {
     rows_.clear();
     taken_ = std::exchange(counts_, {});
     serving_ = asked_;
+    is_last_ = ending_;
     return rows;
   }
 
@@ -130,6 +140,8 @@ class Hdf5Record final : public RecordFile {
   std::uint64_t asked_ = 0;
   std::uint64_t serving_ = 0;
   std::uint64_t served_ = 0;
+  bool ending_ = false;
+  bool is_last_ = false;  // of the rows that are being written
   std::exception_ptr failure_;
   std::jthread thread_;  // the last: it uses all others
 };

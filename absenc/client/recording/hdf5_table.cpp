@@ -138,6 +138,8 @@ void put_attribute(hid_t object, const std::string& name, std::uint64_t number) 
   put_attribute(object, name, H5T_STD_U64LE, &number);
 }
 
+constexpr const char* rows_name = "rows";
+
 }  // namespace
 
 Hdf5Rows::Hdf5Rows(std::span<const Column> columns) {
@@ -177,6 +179,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
   for (const auto& [name, value] : attributes) {
     std::visit([&, &key = name](const auto& one) { put_attribute(file_, key, one); }, value);
   }
+  put_attribute(file_, rows_name, hdf5_not_ended);
   std::string names;
   for (const Column& column : columns) {
     if (column.look.is_detail) continue;
@@ -231,6 +234,16 @@ void Hdf5Table::commit(const Hdf5Rows& rows) {
   require(H5Fflush(file_, H5F_SCOPE_GLOBAL));
   store_.commit();
   rows_ = after;
+}
+
+void Hdf5Table::finish() {
+  const std::lock_guard lock(library());
+  {
+    const Handle attribute(H5Aopen(file_, rows_name, H5P_DEFAULT), H5Aclose);
+    require(H5Awrite(attribute, H5T_NATIVE_UINT64, &rows_));
+  }
+  require(H5Fflush(file_, H5F_SCOPE_GLOBAL));
+  store_.commit();
 }
 
 }  // namespace absenc::client

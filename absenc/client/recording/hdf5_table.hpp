@@ -34,6 +34,9 @@ class Hdf5Rows {
 
 using Hdf5Attributes = std::vector<std::pair<std::string, std::variant<std::string, double, std::uint64_t>>>;
 
+/// In the attribute `rows` of a file that is still written, or whose writer was killed.
+constexpr std::uint64_t hdf5_not_ended = UINT64_MAX;
+
 class Hdf5Table {
  public:
   /// `attributes`: of the file, which has `columns` too, their names. Columns have `unit`, `meaning`, and
@@ -45,6 +48,8 @@ class Hdf5Table {
 
   /// Afterwards they are in the file. Throws as the constructor: then those of before are.
   void commit(const Hdf5Rows& rows);
+  /// Sets the attribute `rows` of the file, which is `hdf5_not_ended` until then. Throws as `commit`.
+  void finish();
 
  private:
   void make(const Column& column);

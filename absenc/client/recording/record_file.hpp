@@ -35,6 +35,9 @@ class RecordFile {
   virtual void append(const Row& row, const RecordCounts& counts) = 0;
   /// Waits until all is in the file and on the disk.
   virtual void sync() = 0;
+  /// Says in the file how many rows it has, so that a reader knows that none is missing, and syncs. Nothing is appended
+  /// afterwards.
+  virtual void finish() = 0;
   virtual void require_there() const = 0;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
   /// Of what is in the file.

@@ -45,6 +45,12 @@ class TextRecord final : public RecordFile {
   void append(const Row& row, const RecordCounts& counts) override {
     file_.append((is_csv_ ? to_csv(row) : to_json(row).line()) + '\n');
     counts_ += counts;
+    ++rows_;
+  }
+  void finish() override {
+    file_.append(is_csv_ ? fmt::format("# end: {} rows\n", rows_)
+                         : Json::object().set("absenc_end", 1).set("rows", rows_).line() + '\n');
+    sync();
   }
   void sync() override { file_.sync(); }
   void require_there() const override { file_.require_there(); }
@@ -55,6 +61,7 @@ class TextRecord final : public RecordFile {
   os::LineFile file_;
   bool is_csv_;
   RecordCounts counts_;
+  std::uint64_t rows_ = 0;
 };
 
 }  // namespace
