@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import tempfile
 import unittest
 
 from command_support import ABSENC, Case, absenc, json_lines
@@ -301,6 +302,39 @@ class Usage(Case):
         self.assert_failed(closed, "standard output cannot be written")
         full = subprocess.run(["sh", "-c", '"$0" list >/dev/full', ABSENC], capture_output=True, text=True, check=False)
         self.assert_failed(full, "standard output cannot be written", "No space left")
+
+    def test_a_file_that_reaches_its_limit_is_a_full_disk(self):
+        """`ulimit -f`: four blocks of 1024 bytes, or 512 in some shells."""
+        def limited(*arguments, output=None):
+            with open(output or os.devnull, "w", encoding="utf-8") as file:
+                return subprocess.run(["sh", "-c", 'ulimit -f 4; exec "$0" "$@"', ABSENC, *arguments], stdout=file,
+                                      stderr=subprocess.PIPE, text=True, check=False)
+
+        with tempfile.TemporaryDirectory() as folder:
+            output = os.path.join(folder, "read.csv")
+            done = limited("read", "sim:tformat", "--csv", "--count", "1000", "--rate", "0", output=output)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn("standard output cannot be written: File too large", done.stderr)
+            with open(output, encoding="utf-8") as file:
+                text = file.read()
+            self.assertTrue(text.endswith("\n"), text[-80:])
+            self.assertEqual({len(line.split(",")) for line in text.splitlines()}, {len(text.splitlines()[0].split(","))})
+            for name in ("log.csv", "log.jsonl", "log.h5"):
+                recorded = os.path.join(folder, name)
+                done = limited("record", "sim:tformat", "--output", recorded, "--count", "1000", "--rate", "0")
+                self.assertEqual(done.returncode, 1, (name, done.stderr))
+                self.assertIn("File too large", done.stderr)
+                if name == "log.h5":
+                    self.assertEqual(os.path.exists(recorded), False)
+                else:
+                    with open(recorded, encoding="utf-8") as file:
+                        self.assertTrue(file.read().endswith("\n"))
+            dump = os.path.join(folder, "motor.dump")
+            done = limited("memory", "dump", "sim:tformat", "--output", dump)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn("File too large", done.stderr)
+            self.assertFalse(os.path.exists(dump))
+            self.assertEqual(sorted(os.listdir(folder)), ["log.csv", "log.jsonl", "read.csv"])
 
     def test_messages_that_cannot_be_written(self):
         for where in ("2>/dev/full", "2>&-"):

@@ -20,11 +20,34 @@ namespace absenc::os {
 
 void protect_standard_streams() {
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
     // The lowest free number is this one.
     if (::open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR) < 0) throw system_failure("/dev/null", errno);
   }
+}
+
+int write_standard_output(std::string_view bytes) {
+  off_t done = 0;
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) {
+      const int error = errno;
+      struct stat file {};
+      const bool is_file = ::fstat(STDOUT_FILENO, &file) == 0 && S_ISREG(file.st_mode);
+      // Unless another program has written behind it.
+      if (done > 0 && is_file && file.st_size == ::lseek(STDOUT_FILENO, 0, SEEK_CUR)) {
+        [[maybe_unused]] const int ignored = ::ftruncate(STDOUT_FILENO, file.st_size - done);
+        ::lseek(STDOUT_FILENO, -done, SEEK_CUR);
+      }
+      return error;
+    }
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+    done += written;
+  }
+  return 0;
 }
 
 bool is_terminal(int descriptor) { return ::isatty(descriptor) == 1; }

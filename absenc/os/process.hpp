@@ -11,10 +11,15 @@
 
 namespace absenc::os {
 
-/// From here on a closed pipe is an error of writing, no longer the end of the process, and a standard stream that was
+/// From here on a closed pipe and a file that reached its limit (`ulimit -f`) are errors of writing, no longer the end
+/// of the process, and a standard stream that was
 /// closed cannot become a port: that gets the lowest free number, and with standard output closed the readings would
 /// go to the encoder. Writing to a standard output that was closed fails. Throws Failure.
 void protect_standard_streams();
+
+/// Hands `bytes` to the system; when they do not all fit into a file, none of them stays. Returns 0, or the error of
+/// the system.
+[[nodiscard]] int write_standard_output(std::string_view bytes);
 
 [[nodiscard]] bool is_terminal(int descriptor);
 

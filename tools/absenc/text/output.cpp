@@ -14,13 +14,10 @@
 namespace absenc::tool {
 
 void print_line(std::string_view text) {
-  errno = 0;
-  if (text.ends_with('\n')) text.remove_suffix(1);
-  std::fwrite(text.data(), 1, text.size(), stdout);
-  std::fputc('\n', stdout);
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
-  if (errno == EPIPE) throw OutputClosed{};
-  throw Failure(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
+  const int error = os::write_standard_output(text.ends_with('\n') ? std::string(text) : fmt::format("{}\n", text));
+  if (error == 0) return;
+  if (error == EPIPE) throw OutputClosed{};
+  throw Failure(fmt::format("standard output cannot be written: {}", std::strerror(error)));
 }
 
 // That a message finds no reader is no reason to end otherwise: fmt::print would throw.
