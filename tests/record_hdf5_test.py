@@ -49,6 +49,22 @@ class Hdf5(RecordCase):
         self.assertLess(numpy.ptp(turns - columns["time_s"][good]), 1e-4)
         self.assertTrue((columns["position"][~good] == numpy.iinfo("i8").min).all())
 
+    def test_a_file_that_is_there_can_be_opened(self):
+        """Killed in the moment in which its name appears."""
+        for i in range(20):
+            path = self.output(f"{i}.h5")
+            process = subprocess.Popen([ABSENC, "record", "sim:tformat", "--output", path], stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.DEVNULL)
+            try:
+                deadline = time.monotonic() + PATIENCE
+                while not os.path.exists(path):
+                    self.assertLess(time.monotonic(), deadline)
+            finally:
+                process.kill()
+                process.wait()
+            self.read(path)
+        self.assertEqual(len(os.listdir(self.directory)), 20)
+
     def test_one_column_a_dataset(self):
         result = absenc("record", "sim:tformat?motion=rpm=60&alarm=over_heat", "--output", self.output(), "--count", "70")
         self.assertEqual(result.returncode, 0, result.stderr)

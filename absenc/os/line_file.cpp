@@ -7,6 +7,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <utility>
 
 #include "absenc/os/error.hpp"
 
@@ -30,19 +33,60 @@ Failure::Kind kind_of(int error) {
   }
 }
 
-}  // namespace
-
-OwnFile::OwnFile(const std::string& path)
-    : path_(path), file_(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666)) {
-  if (file_) return;
-  const int error = errno;
+[[noreturn]] void refuse(const std::string& path, int error) {
   if (error == EEXIST)
     throw Failure(Failure::Kind::in_use,
                   "there is already a file " + path + ", which stays as it is: choose another name");
   throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
 }
 
+// Returns 0, or the error of the system, EEXIST when there is a file `to` already.
+int rename_to_new(const std::string& from, const std::string& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return errno;
+  if (::link(from.c_str(), to.c_str()) < 0) return errno;
+  ::unlink(from.c_str());
+  return 0;
+}
+
+}  // namespace
+
+OwnFile::OwnFile(const std::string& path, Appears appears) : path_(path), appeared_(appears == Appears::at_once) {
+  if (appeared_) {
+    file_ = Descriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (!file_) refuse(path, errno);
+    return;
+  }
+  struct stat there {};
+  if (::lstat(path.c_str(), &there) == 0) refuse(path, EEXIST);
+  const std::string folder = std::filesystem::path(path).parent_path();
+  file_ = Descriptor(::open(folder.empty() ? "." : folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666));
+  if (file_) return;
+  if (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL) refuse(path, errno);
+  beside_ = path + "." + std::to_string(::getpid());
+  file_ = Descriptor(::open(beside_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (!file_) refuse(std::exchange(beside_, {}), errno);
+}
+
+OwnFile::~OwnFile() {
+  if (!beside_.empty()) ::unlink(beside_.c_str());
+}
+
+void BlockFile::appear() {
+  int error = 0;
+  if (!beside_.empty()) {
+    error = rename_to_new(beside_, path_);
+  } else if (::linkat(AT_FDCWD, ("/proc/self/fd/" + std::to_string(file_.get())).c_str(), AT_FDCWD, path_.c_str(),
+                      AT_SYMLINK_FOLLOW) < 0) {
+    error = errno;
+  }
+  if (error != 0) refuse(path_, error);
+  beside_.clear();
+  appeared_ = true;
+}
+
 void OwnFile::require_there() const {
+  if (!appeared_) return;
   struct stat ours {};
   struct stat there {};
   if (::fstat(file_.get(), &ours) < 0) throw system_failure("looking at " + path_, errno);

@@ -14,9 +14,6 @@ namespace absenc::os {
 
 class OwnFile {
  public:
-  /// Makes the file. Throws Failure: `in_use` when there is one already, `no_permission`, `not_found`, `system`.
-  explicit OwnFile(const std::string& path);
-
   /// Waits for the disk. Throws Failure, as `require_there` too.
   void sync();
   /// Throws Failure, `lost`, when the file is no longer what its path leads to, or was cut: what is written then is
@@ -27,7 +24,11 @@ class OwnFile {
   [[nodiscard]] std::uint64_t size() const { return size_; }
 
  protected:
-  ~OwnFile() = default;
+  enum class Appears : std::uint8_t { at_once, later };
+
+  /// Makes the file. Throws Failure: `in_use` when there is one already, `no_permission`, `not_found`, `system`.
+  OwnFile(const std::string& path, Appears appears);
+  ~OwnFile();
   OwnFile(const OwnFile&) = delete;
   OwnFile& operator=(const OwnFile&) = delete;
 
@@ -38,11 +39,13 @@ class OwnFile {
   std::string path_;
   Descriptor file_;
   std::uint64_t size_ = 0;
+  bool appeared_ = false;
+  std::string beside_;  // its name until it appears, where the file system has no files without a name
 };
 
 class LineFile final : public OwnFile {
  public:
-  using OwnFile::OwnFile;
+  explicit LineFile(const std::string& path) : OwnFile(path, Appears::at_once) {}
   /// Hands `lines` to the system at once, which costs a few us. When they do not all fit, none of them stays. Throws
   /// Failure, as `require_there` too.
   void append(std::string_view lines);
@@ -50,7 +53,10 @@ class LineFile final : public OwnFile {
 
 class BlockFile final : public OwnFile {
  public:
-  using OwnFile::OwnFile;
+  explicit BlockFile(const std::string& path) : OwnFile(path, Appears::later) {}
+  /// Gives the file its name: until then nobody sees it, and it is gone when the process ends. Throws Failure, `in_use`
+  /// too when another has taken the name meanwhile.
+  void appear();
   /// Anywhere; what lies between the end and `at` is zero. Throws Failure, as `require_there` too.
   void write(std::uint64_t at, Bytes bytes);
   /// Makes it at least so long. Throws Failure.

@@ -79,6 +79,36 @@ TEST(LineFile, TakesBackWhatDoesNotFit) {
   EXPECT_EQ(content(file.path()), "whole line\nagain\n");
 }
 
+TEST(BlockFile, HasNoNameUntilItAppears) {
+  const Directory directory;
+  const fs::path path = directory.path / "log.h5";
+  { BlockFile file(path); }
+  EXPECT_TRUE(fs::is_empty(directory.path));
+  BlockFile file(path);
+  constexpr std::uint8_t bytes[] = {'o', 'n', 'e'};
+  file.write(0, bytes);
+  EXPECT_FALSE(fs::exists(path));
+  file.appear();
+  EXPECT_EQ(content(path), "one");
+  EXPECT_THROW(BlockFile{path}, Failure);
+  fs::remove(path);
+  EXPECT_THROW(file.require_there(), Failure);
+}
+
+TEST(BlockFile, LeavesAFileThatTookItsNameMeanwhile) {
+  const Directory directory;
+  const fs::path path = directory.path / "log.h5";
+  BlockFile file(path);
+  std::ofstream(path) << "precious";
+  try {
+    file.appear();
+    FAIL();
+  } catch (const Failure& failure) {
+    EXPECT_EQ(failure.kind(), Failure::Kind::in_use);
+  }
+  EXPECT_EQ(content(path), "precious");
+}
+
 TEST(LineFile, IsLostWhenItsPathLeadsElsewhere) {
   const Directory directory;
   const auto sentence = [&](const std::string& name, auto&& change) -> std::string {

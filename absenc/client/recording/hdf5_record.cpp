@@ -31,6 +31,12 @@ Hdf5Attributes attributes_of(const RecordHeader& header) {
           {"part", header.part}};
 }
 
+// A file with its columns, which can be opened.
+std::uint64_t appear(os::BlockFile& file) {
+  file.appear();
+  return file.size();
+}
+
 class Hdf5Record final : public RecordFile {
  public:
   Hdf5Record(const std::string& path, std::span<const Column> columns, const RecordHeader& header)
@@ -40,7 +46,7 @@ class Hdf5Record final : public RecordFile {
                 .read = [this](std::uint64_t at, MutableBytes bytes) { file_.read(at, bytes); }},
                columns, attributes_of(header)),
         rows_(columns),
-        size_(file_.size()),
+        size_(appear(file_)),
         thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
   ~Hdf5Record() override {

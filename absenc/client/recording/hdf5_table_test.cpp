@@ -86,6 +86,7 @@ TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   Bench bench("prefix");
   Hdf5Table table(bench.disk(), columns, {{"encoder", std::string("elbow")}, {"rate_hz", 100.0}});
   for (const Write& one : std::exchange(bench.writes, {})) bench.apply(one);
+  bench.file.appear();
   constexpr std::int64_t batch = 7'001;
   std::int64_t committed = 0;
   std::size_t states = 0;
@@ -125,6 +126,7 @@ TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
                              },
                          .read = [&](std::uint64_t at, MutableBytes bytes) { bench.file.read(at, bytes); }};
     Hdf5Table table(disk, columns, {});
+    bench.file.appear();
     table.commit(rows_from(0, 900));
     left = failing;
     bool failed = false;
