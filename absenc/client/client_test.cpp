@@ -184,6 +184,54 @@ TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   EXPECT_GT(elsewhere, 1u);
 }
 
+// As the examples do it: main catches std::exceptions.
+TEST(ClientEncoder, CancelIsAStandardExceptionAndTheEncoderCanBeUsedAgain) {
+  Encoder encoder = open("sim:tformat?singleturn=7");
+  encoder.cancel();
+  EXPECT_THAT(thrown_by<std::exception>([&] { static_cast<void>(encoder.read()); }), HasSubstr("cancelled"));
+  EXPECT_THAT(thrown_by<std::exception>([] { throw os::Interrupted{}; }), HasSubstr("interrupted"));
+  encoder.resume();
+  EXPECT_EQ(encoder.read().singleturn, 7u);
+}
+
+TEST(ClientEncoder, EndsAtItsDeadline) {
+  Encoder encoder = open("sim:tformat?singleturn=7&fault=drop=1");
+  const Time begin = os::now();
+  EXPECT_THROW(static_cast<void>(encoder.read(begin)), DeadlinePassed);
+  encoder = open("sim:tformat?singleturn=7");
+  EXPECT_EQ(encoder.read(os::now() + std::chrono::minutes(10)).singleturn, 7u);
+  EXPECT_EQ(encoder.read().singleturn, 7u);
+  unsigned samples = 0;  // one in 1000 s
+  const Time end = os::now() + std::chrono::milliseconds(50);
+  for (const Sample& sample : encoder.samples({.rate_hz = 1e-3, .deadline = end})) {
+    EXPECT_EQ(sample.position_state(), PositionState::good);
+    ++samples;
+  }
+  EXPECT_EQ(samples, 1u);
+  EXPECT_GE(os::now(), end);
+}
+
+TEST(ClientSample, SaysInOneWayWhetherItsPositionCanBeUsed) {
+  Sample sample{.kind = Sample::Kind::reading};
+  sample.reading.singleturn_bits = sample.reading.singleturn_valid_bits = 17;
+  EXPECT_EQ(sample.position_state(), PositionState::good);
+  sample.reading.singleturn_valid_bits = 0;
+  EXPECT_EQ(sample.position_state(), PositionState::invalid);
+  sample.reading.singleturn_known = false;
+  EXPECT_EQ(sample.position_state(), PositionState::unknown);
+  sample.doubtful = true;
+  EXPECT_EQ(sample.position_state(), PositionState::unconfirmed);
+  sample.reading.ready = false;
+  EXPECT_EQ(sample.position_state(), PositionState::starting);
+  sample.kind = Sample::Kind::lost;
+  EXPECT_EQ(sample.position_state(), PositionState::none);
+  for (unsigned state = 0; state <= static_cast<unsigned>(PositionState::none); ++state) {
+    for (unsigned other = 0; other < state; ++other) {
+      EXPECT_NE(text_of(static_cast<PositionState>(state)), text_of(static_cast<PositionState>(other)));
+    }
+  }
+}
+
 TEST(ClientSamples, AreRowsOfNamedValues) {
   Encoder encoder = open("sim:esl?singleturn=1000&fault=corrupt=0.3");
   SampleRows rows(encoder.unit(), encoder.options(), Time{}, SampleRows::With::motion);

@@ -11,6 +11,7 @@
 #include "absenc/client/reading.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/end_at.hpp"
 #include "absenc/client/way/pace.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"
@@ -77,6 +78,7 @@ Encoder open(std::string_view text, std::span<const std::string> settings) {
 }
 
 void Encoder::cancel() { cancelled_->store(true); }
+void Encoder::resume() { cancelled_->store(false); }
 
 const Unit& Encoder::unit() const { return connection_->unit(); }
 const Options& Encoder::options() const { return connection_->uri().options; }
@@ -84,7 +86,18 @@ const std::vector<std::string>& Encoder::notes() const { return connection_->not
 const host::Counters& Encoder::counters() const { return connection_->counters(); }
 const host::Latencies& Encoder::latencies() const { return connection_->latencies(); }
 
-Reading Encoder::read() {
+Reading Encoder::read(Time deadline) {
+  if (deadline == never) return read_now();
+  const EndAt end(*this, deadline);
+  try {
+    return read_now();
+  } catch (const Cancelled&) {
+    if (*cancelled_ || os::now() < deadline) throw;
+    throw DeadlinePassed{};
+  }
+}
+
+Reading Encoder::read_now() {
   if (!connection_->connected()) connect();
   Sample sample = next();
   if (sample.kind == Sample::Kind::failed) throw EncoderFailure(std::move(sample.trouble));
@@ -121,7 +134,10 @@ void Encoder::wait_until(Time time) const {
 Samples Encoder::samples(const SampleChoices& choices) { return {*this, choices}; }
 
 Samples::Samples(Encoder& encoder, const SampleChoices& choices)
-    : encoder_(&encoder), count_(choices.count), pace_(std::make_unique<Pace>(choices.rate_hz)) {
+    : encoder_(&encoder),
+      count_(choices.count),
+      deadline_(choices.deadline),
+      pace_(std::make_unique<Pace>(choices.rate_hz)) {
   encoder.period_ = pace_->period();
 }
 Samples::Samples(Samples&&) noexcept = default;
@@ -136,10 +152,16 @@ Samples::Iterator Samples::begin() {
 void Samples::advance() {
   ended_ = count_ != 0 && taken_ == count_;
   if (ended_) return;
-  try {
+  const auto take = [this] {
     if (taken_ != 0) encoder_->wait_until(pace_->next());
     sample_ = encoder_->next();
     ++taken_;
+  };
+  try {
+    if (deadline_ == never) return take();
+    if (os::now() >= deadline_) throw DeadlinePassed{};
+    const EndAt end(*encoder_, deadline_);
+    take();
   } catch (const Cancelled&) {
     ended_ = true;
   }
@@ -245,6 +267,41 @@ void Encoder::note_restart(Sample& sample, bool jumped) {
       "from the encoder's own{}",
       to_text(sample.reading.latched - unwrapped_at_), limit,
       rotates ? ". If the shaft is slower, say so with max_rpm=RPM" : ". If it is slower, say so with max_mm_s=MM/S");
+}
+
+PositionState Sample::position_state() const {
+  if (kind != Kind::reading) return PositionState::none;
+  if (!reading.ready) return PositionState::starting;
+  if (doubtful) return PositionState::unconfirmed;
+  switch (reading.singleturn_validity()) {
+    case Validity::valid:
+      return PositionState::good;
+    case Validity::invalid:
+      return PositionState::invalid;
+    case Validity::unknown:
+      return PositionState::unknown;
+    case Validity::absent:
+      break;
+  }
+  return PositionState::none;
+}
+
+std::string_view text_of(PositionState state) {
+  switch (state) {
+    case PositionState::good:
+      return "the position is good: a second one agreed, and nothing that was reported is against it";
+    case PositionState::unconfirmed:
+      return "no second position agreed with this one: do not use it, read again";
+    case PositionState::starting:
+      return "the encoder is starting: read again";
+    case PositionState::invalid:
+      return "an alarm or a state that the encoder reports says that the position does not hold: look at its alarms";
+    case PositionState::unknown:
+      return "whether the position holds was not reported: read the alarms";
+    case PositionState::none:
+      break;
+  }
+  return "there is no position";
 }
 
 std::string_view event_name(const Sample& sample) {

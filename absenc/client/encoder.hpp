@@ -25,6 +25,18 @@
 
 namespace absenc::client {
 
+/// Whether the position of a sample can be used; `text_of` has a sentence for each.
+enum class PositionState : std::uint8_t {
+  good,
+  unconfirmed,  // `Sample::doubtful`
+  starting,     // not `Reading::ready`
+  invalid,      // `Validity::invalid`
+  unknown,      // `Validity::unknown`
+  none,         // the sample is no reading, or has no position
+};
+
+[[nodiscard]] std::string_view text_of(PositionState state);
+
 /// What one attempt to read has brought. Times are those of os::now.
 struct Sample {
   enum class Kind : std::uint8_t {
@@ -49,6 +61,10 @@ struct Sample {
   Trouble trouble{};      // failed
   std::string message{};  // lost, absent, back, restarted
 
+  /// Whether `reading.singleturn` can be used. Of turns `reading.multiturn_validity()` says it, of the position that
+  /// goes on past the counter's end `position_valid`.
+  [[nodiscard]] PositionState position_state() const;
+
   /// Why there is no reading, or what happened; "" of a reading that goes on.
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
@@ -61,6 +77,7 @@ struct EncoderAddress;
 struct SampleChoices {
   double rate_hz = 0;       // readings a second; 0: as fast as can be
   std::uint64_t count = 0;  // 0: without end
+  Time deadline = never;    // of os::now; the loop ends there, whatever it waits for
 };
 
 class Samples;
@@ -79,8 +96,9 @@ class Encoder {
   void connect();
 
   /// The position, with all alarms that the encoder can tell. A position that no second one confirmed is not valid. A
-  /// port that was lost is opened again. Throws EncoderFailure, os::Failure, Cancelled.
-  [[nodiscard]] Reading read();
+  /// port that was lost is opened again. Throws EncoderFailure, os::Failure, Cancelled; DeadlinePassed when there is
+  /// none at `deadline` (of os::now), up to 20 ms and what one exchange takes later.
+  [[nodiscard]] Reading read(Time deadline = never);
   /// A reading for its alarms: where the unit has a command that reads all of them by name, by that one.
   [[nodiscard]] Reading read_alarms();
   /// For a loop over samples that goes on when the port is lost and comes back. Ends after `count`, or by `cancel`.
@@ -104,6 +122,8 @@ class Encoder {
 
   /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
   void cancel();
+  /// Ends what `cancel` began: the encoder can be used again.
+  void resume();
 
   /// Waiting, also for the time of the next sample, ends with Cancelled also from the moment on in which `over` is
   /// true. Empty: never. Returns what was so before.
@@ -145,6 +165,7 @@ class Encoder {
   /// Throws Cancelled, os::Interrupted.
   void wait_until(Time time) const;
   Sample search();
+  Reading read_now();
   Sample take(Reading reading);
   void note_restart(Sample& sample, bool jumped);
 
@@ -189,6 +210,7 @@ class Samples {
  private:
   Encoder* encoder_;
   std::uint64_t count_;
+  Time deadline_;
   std::unique_ptr<Pace> pace_;
   Sample sample_{};
   std::uint64_t taken_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the client library throws beside os::Failure, of a port, and os::Interrupted.
+// What the client library throws beside os::Failure, of a port, and os::Interrupted. All are std::exceptions.
 #pragma once
 
 #include <stdexcept>
@@ -18,7 +18,12 @@ struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Another thread asked for it, or its time is over.
+/// Another thread asked for it.
 using Cancelled = os::Ended;
+
+/// The deadline of the caller has come.
+struct DeadlinePassed : Cancelled {
+  [[nodiscard]] const char* what() const noexcept override { return "the deadline passed before there was a reading"; }
+};
 
 }  // namespace absenc::client

@@ -16,6 +16,7 @@
 #include "absenc/client/recording/record_file.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
+#include "absenc/client/way/end_at.hpp"
 #include "absenc/client/way/pace.hpp"
 #include "absenc/os/signals.hpp"
 
@@ -31,21 +32,6 @@ std::string date_and_time() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(std::chrono::system_clock::to_time_t(now)),
                      milliseconds);
 }
-
-// Lets what waits for an encoder end at a time too.
-class EndAt {
- public:
-  EndAt(Encoder& encoder, Time end) : encoder_(encoder), before_(encoder.end_when({})) {
-    encoder.end_when([end, this] { return os::now() >= end || (before_ && before_()); });
-  }
-  EndAt(const EndAt&) = delete;
-  EndAt& operator=(const EndAt&) = delete;
-  ~EndAt() { encoder_.end_when(std::move(before_)); }
-
- private:
-  Encoder& encoder_;
-  std::function<bool()> before_;
-};
 
 }  // namespace
 

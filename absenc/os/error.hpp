@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -40,10 +41,18 @@ class Failure : public std::runtime_error {
   return {Failure::Kind::system, what + " failed: " + std::generic_category().message(error)};
 }
 
-/// Thrown out of every wait of this folder after SIGINT or SIGTERM (os/signals.hpp).
-struct Interrupted {};
+// Both are std::exceptions, so that a program whose `main` catches those ends in order. Code that catches all
+// std::exceptions and goes on catches these two first.
 
-/// Thrown by a port when the time given to `StreamPort::set_end` has come.
-struct Ended {};
+/// Thrown out of every wait of this folder after SIGINT or SIGTERM (os/signals.hpp).
+struct Interrupted : std::exception {
+  [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
+};
+
+/// Thrown by a port when the time given to `StreamPort::set_end` has come, and out of every wait when an EndQuestion
+/// says so.
+struct Ended : std::exception {
+  [[nodiscard]] const char* what() const noexcept override { return "cancelled"; }
+};
 
 }  // namespace absenc::os
