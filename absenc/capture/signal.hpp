@@ -56,7 +56,11 @@ struct Burst {
   std::vector<std::uint8_t> in;   // what the encoder sent, packed MSB first, the last byte left-aligned
   std::vector<std::uint8_t> out;  // SPI: what the host sent
   bool cut = false;               // its beginning or its end was not seen: bits may be missing there
-  bool low_after = false;         // without chip select: the clock rests at its low level in the pause behind it
+  // Without chip select:
+  bool low_before = false;   // the clock rested at its low level before it
+  bool low_after = false;    // and rests there behind it
+  bool has_last = false;     // what stood on the line behind the last change of the clock is known
+  bool last = false;         // that level of `in`: a host that gives n clocks for n bits takes its last bit there
 };
 
 struct CanRecord {

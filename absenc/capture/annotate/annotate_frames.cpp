@@ -9,16 +9,16 @@ namespace absenc::capture {
 // ---- Bursts
 
 // Without the clocks that show the idle line before the first bit, and the edge with which a clock that was held low
-// rises again.
-Frame BurstAnnotator::word_of(const Burst& burst) {
-  const bool rises = std::exchange(after_low_, burst.low_after) && judge_.unit().control_bit != nullptr;
+// rises again; with the bit that stood on the line behind the last clock, if it is wanted.
+Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
+  const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
-  if (idle == 0 || burst.bits <= idle) return {.bytes = burst.in, .bits = burst.bits};
-  const std::size_t bits = burst.bits - idle;
+  if (!with_last && (idle == 0 || burst.bits <= idle)) return {.bytes = burst.in, .bits = burst.bits};
+  const std::size_t bits = burst.bits - std::min(idle, burst.bits) + (with_last ? 1 : 0);
   shifted_.assign((bits + 7) / 8, 0);
   for (std::size_t i = 0; i < bits; ++i) {
     const std::size_t from = i + idle;
-    const unsigned bit = burst.in[from / 8] >> (7 - from % 8) & 1u;
+    const unsigned bit = from < burst.bits ? burst.in[from / 8] >> (7 - from % 8) & 1u : burst.last ? 1u : 0u;
     shifted_[i / 8] = static_cast<std::uint8_t>(shifted_[i / 8] | bit << (7 - i % 8));
   }
   return {.bytes = shifted_, .bits = bits};
@@ -43,18 +43,41 @@ void BurstAnnotator::put(const Burst& burst) {
   if (ends_control) sink_.put(control_.annotation(judge_));
 }
 
+// Decodes a word; what is decoded goes to `word`, without the encoder's bit of control communication, which is
+// returned.
+Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
+  word = word_of(burst, with_last);
+  const std::optional<std::size_t> place = judge_.control_bit(word);
+  answered = place && (word.bytes[*place / 8] >> (7 - *place % 8) & 1) != 0;
+  if (answered && control_.may_answer()) {
+    silenced_.assign(word.bytes.begin(), word.bytes.end());
+    silenced_[*place / 8] = static_cast<std::uint8_t>(silenced_[*place / 8] & ~(0x80u >> *place % 8));
+    word.bytes = silenced_;
+  }
+  return judge_.decode({}, word);
+}
+
 // Whether a control frame ends with this word.
 bool BurstAnnotator::decode_word(const Burst& burst, Annotation& annotation) {
-  annotation.reply = word_of(burst);
-  const std::optional<std::size_t> place = judge_.control_bit(annotation.reply);
-  const bool answered = place && (annotation.reply.bytes[*place / 8] >> (7 - *place % 8) & 1) != 0;
-  if (answered && control_.may_answer()) {
-    silenced_.assign(annotation.reply.bytes.begin(), annotation.reply.bytes.end());
-    silenced_[*place / 8] = static_cast<std::uint8_t>(silenced_[*place / 8] & ~(0x80u >> *place % 8));
-    annotation.reply.bytes = silenced_;
+  bool answered = false;
+  annotation.error = decode_as(burst, false, annotation.reply, answered);
+  // A host that gives a clock for each bit and no more takes the last bit behind it.
+  if (annotation.error != Error::none && burst.has_last && !burst.cut) {
+    const bool good = decode_as(burst, true, annotation.reply, answered) == Error::none;
+    annotation.error = good ? Error::none : decode_as(burst, false, annotation.reply, answered);
   }
-  annotation.error = judge_.decode({}, annotation.reply);
   return judge_.unit().control_bit != nullptr && control_.put(burst, answered, annotation.error);
+}
+
+void BurstAnnotator::finish() {
+  if (!control_.finish()) return;
+  Annotation annotation = control_.annotation(judge_);
+  if (annotation.error != Error::none) {
+    annotation.error = Error::none;
+    annotation.remark = Remark::cut;
+    annotation.contents = {};
+  }
+  sink_.put(annotation);
 }
 
 void ControlFrames::Bits::add(bool bit) {

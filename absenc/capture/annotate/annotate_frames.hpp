@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
@@ -23,6 +24,8 @@ class ControlFrames {
   [[nodiscard]] bool may_answer() const { return open_; }
   /// The next word, and what was wrong with it. True: it is the last of a control frame.
   bool put(const Burst& burst, bool answered, Error error);
+  /// The capture ends. True: a control frame goes on.
+  bool finish() { return std::exchange(open_, false); }
   /// The one that has ended, decoded; valid until the next word, and until `judge` decodes the next.
   [[nodiscard]] Annotation annotation(Judge& judge) const;
 
@@ -50,18 +53,20 @@ class BurstAnnotator {
   BurstAnnotator(const Unit& unit, const Options& options, AnnotationSink& sink) : judge_(unit, options), sink_(sink) {}
 
   void put(const Burst& burst);
+  /// The capture ends here, and with it a control frame that goes on.
+  void finish();
 
  private:
   void decode_exchange(const Burst& burst, Annotation& annotation);
+  Error decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered);
   bool decode_word(const Burst& burst, Annotation& annotation);
-  [[nodiscard]] Frame word_of(const Burst& burst);
+  [[nodiscard]] Frame word_of(const Burst& burst, bool with_last);
 
   Judge judge_;
   AnnotationSink& sink_;
   std::vector<std::uint8_t> shifted_;   // without the clocks that show the idle line
   std::vector<std::uint8_t> silenced_;  // without the encoder's bit of control communication
   ControlFrames control_;
-  bool after_low_ = false;  // the clock was held low before the next burst
 };
 
 /// CAN frames of any number of nodes, who answer in any order or speak unasked.

@@ -88,7 +88,7 @@ class Truth {
   }
   void add(const Burst& burst, const Unit& unit) {
     std::size_t idle = unit.link == LinkKind::clocked ? unit.line.idle_clocks : 0;
-    if (std::exchange(after_low_, burst.low_after) && unit.control_bit != nullptr) ++idle;
+    if (burst.low_before && unit.control_bit != nullptr) ++idle;
     Wire bits((burst.bits - idle + 7) / 8);
     for (std::size_t i = idle; i < burst.bits; ++i) {
       const unsigned bit = burst.in[i / 8] >> (7 - i % 8) & 1u;
@@ -133,7 +133,6 @@ class Truth {
 
  private:
   ControlFrames control_;
-  bool after_low_ = false;
   std::size_t stream_size_ = 0;  // of the last good frame that nobody asked for
   std::optional<Reading> reading(Error error) {
     return error == Error::none && judge_.contents().reading != nullptr ? std::optional(*judge_.contents().reading)

@@ -126,7 +126,8 @@ class Talker {
 
   void hear(const sim::Line<std::uint8_t>::Transfer& transfer) {
     std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
-    if (transfer.held_low != never) {  // the edge with which the clock rises again takes a bit of the idle line
+    const bool held_low = transfer.held_low != never;
+    if (held_low) {  // the edge with which the clock rises again takes a bit of the idle line
       ++idle;
       if (!talk_.bursts.empty()) talk_.bursts.back().low_after = true;
     }
@@ -134,7 +135,8 @@ class Talker {
                 .end = static_cast<Tick>(transfer.end.count()),
                 .bits = transfer.bits + idle,
                 .in = std::vector<std::uint8_t>((transfer.bits + idle + 7) / 8),
-                .out = {}};
+                .out = {},
+                .low_before = held_low};
     if (unit_.link == LinkKind::spi) burst.out.assign(transfer.out.begin(), transfer.out.end());
     for (std::size_t i = 0; i < burst.bits; ++i) {
       const bool bit = i < idle || (transfer.in[(i - idle) / 8] >> (7 - (i - idle) % 8) & 1) != 0;

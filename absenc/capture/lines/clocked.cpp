@@ -19,15 +19,27 @@ void put_bit(std::vector<std::uint8_t>& bytes, std::size_t bit, bool level) {
 
 }  // namespace
 
-std::optional<Tick> find_pause(const Changes& clock) {
+std::optional<ClockRests> find_rests(const Changes& clock) {
+  constexpr std::size_t most_lengths = 12;
   std::vector<Tick> periods;
-  for (std::size_t i = 2; i < clock.at.size() && periods.size() < most_periods; ++i) {
-    periods.push_back(clock.at[i] - clock.at[i - 2]);
+  std::vector<Tick> rests;
+  for (std::size_t i = 1; i < clock.at.size() && periods.size() < most_periods; ++i) {
+    rests.push_back(clock.at[i] - clock.at[i - 1]);
+    if (i > 1) periods.push_back(clock.at[i] - clock.at[i - 2]);
   }
   if (periods.empty()) return std::nullopt;
   const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
   std::nth_element(periods.begin(), middle, periods.end());
-  return 3 * *middle;
+  ClockRests found{.half_period = std::max<Tick>(*middle / 2, 1), .pauses = {3 * *middle}};
+  std::sort(rests.begin(), rests.end());
+  for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
+    const Tick shorter = rests[i - 1];
+    const Tick longer = rests[i];
+    // A seventh apart, and by more than two changes that were sampled can seem to be.
+    if (longer <= found.half_period || longer - shorter <= std::max<Tick>(2, shorter / 7)) continue;
+    found.pauses.push_back(std::min(shorter + (longer - shorter) / 2, 2 * shorter));
+  }
+  return found;
 }
 
 void ClockedDecoder::Wire::begin(const Changes* changes, Tick first, bool known) {
@@ -84,10 +96,11 @@ bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
     targets->met = target != nullptr && target->begin == at && !target->cut;
     if (targets->met) return true;
   }
-  open_ = true;
+  open_ = lone_ = true;
   burst_ = {};
   burst_.begin = at;
   burst_.cut = cut;
+  burst_.low_before = !format_.has_select && !clock_.level;
   return false;
 }
 
@@ -96,7 +109,8 @@ void ClockedDecoder::close(Tick at, bool cut, std::vector<Burst>& bursts) {
   burst_.end = at;
   burst_.cut = burst_.cut || cut;
   burst_.low_after = !format_.has_select && !clock_.level;
-  if (burst_.bits > 0) bursts.push_back(std::move(burst_));
+  const bool is_word = burst_.bits > 0 && (format_.has_select || !lone_);
+  if (is_word) bursts.push_back(std::move(burst_));
   burst_ = {};
 }
 
@@ -104,20 +118,33 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   if (burst_.bits == most_bits) {
     close(at, true, bursts);
     open(at, true, nullptr);
+    lone_ = false;
   }
   if (has_in_) put_bit(burst_.in, burst_.bits, in_.before(at));
   if (has_out_) put_bit(burst_.out, burst_.bits, out_.before(at));
   ++burst_.bits;
 }
 
+// The bit behind the last change. A part may have ended before it stood there.
+void ClockedDecoder::look_behind() {
+  if (format_.settle == 0 || burst_.has_last || !has_in_) return;
+  burst_.last = in_.before(last_ + format_.settle);
+  burst_.has_last = true;
+}
+
 bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>& bursts) {
   if (!format_.has_select) {
     if (at - last_ > format_.pause) {
       seen_pause_ = true;
-      if (open_) close(last_, false, bursts);
+      if (open_) {
+        look_behind();
+        close(last_, false, bursts);
+      }
     }
     if (!open_ && open(at, !seen_pause_, targets)) return true;
   }
+  lone_ = open_ && at == burst_.begin;
+  burst_.has_last = false;
   clock_.step();
   last_ = at;
   if (open_ && clock_.level == format_.rising) take(at, bursts);
@@ -141,6 +168,7 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
     if (clock == no_change && select == no_change) break;
     if (clock <= select ? clock_changes(clock, targets, bursts) : select_changes(select, targets, bursts)) return true;
   }
+  if (!format_.has_select && open_ && part.end - last_ > format_.settle) look_behind();
   // What the data did behind the last clock counts for the next part.
   in_.before(no_change);
   out_.before(no_change);

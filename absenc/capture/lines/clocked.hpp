@@ -16,10 +16,18 @@ struct ClockedFormat {
   bool has_select = false;   // words end with chip select; its clocks may pause
   bool select_high = false;  // chip select is active high
   Tick pause = 0;            // without chip select: a clock that rests for longer ends a word
+  Tick settle = 0;           // then: so long behind the last change its bit stands on the line; 0: not looked at
 };
 
-/// The clock's pause that ends a word, from its first changes: three times the usual period. Nothing: too few changes.
-std::optional<Tick> find_pause(const Changes& clock);
+/// What the first changes of a clock say of its pauses.
+struct ClockRests {
+  Tick half_period = 0;
+  std::vector<Tick> pauses;  // a clock that rests for longer ends a word: first three periods, then one between each
+                             // two lengths of its rests that differ clearly, the shortest first
+};
+
+/// Nothing: too few changes.
+std::optional<ClockRests> find_rests(const Changes& clock);
 
 /// A part of the capture. `in`, `out` and `select` may be missing.
 struct ClockedPart {
@@ -31,7 +39,8 @@ struct ClockedPart {
   Tick end = 0;
 };
 
-/// Decodes part after part. A burst whose beginning or end was not seen is marked as cut.
+/// Decodes part after part. A burst whose beginning or end was not seen is marked as cut. A lone change of the clock
+/// between two pauses is none: a host that held the clock low lets it rise again.
 class ClockedDecoder {
  public:
   static constexpr std::size_t most_bits = 65536;  // of a burst; a longer one is cut
@@ -75,6 +84,7 @@ class ClockedDecoder {
   bool open(Tick at, bool cut, Targets* targets);
   void close(Tick at, bool cut, std::vector<Burst>& bursts);
   void take(Tick at, std::vector<Burst>& bursts);
+  void look_behind();
 
   ClockedFormat format_;
   bool begun_ = false;
@@ -87,6 +97,7 @@ class ClockedDecoder {
   Tick last_ = 0;  // change of the clock, or where the capture began
   bool seen_pause_ = false;
   bool open_ = false;
+  bool lone_ = false;  // the clock has changed once in this burst
   Burst burst_;
 };
 

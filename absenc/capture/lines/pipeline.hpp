@@ -42,6 +42,12 @@ struct AsyncOutcome {
 /// not grow with the file. Throws what the reader throws.
 AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsigned threads, const Sink& sink);
 
+/// The beginning of a capture, as it reads when a clock that rests for longer than `pause` ends a word.
+struct PauseReading {
+  Tick pause = 0;
+  std::vector<Burst> bursts{};
+};
+
 struct ClockedLine {
   unsigned clock = 0;
   std::optional<unsigned> in{};      // what the encoder sends
@@ -49,7 +55,9 @@ struct ClockedLine {
   std::optional<unsigned> select{};  // SPI: chip select
   bool rising = false;               // the change of the clock that takes a bit
   bool select_high = false;          // chip select is active high
-  Tick pause = 0;  // without chip select: a clock that rests for longer ends a word; 0: three of its periods
+  Tick pause = 0;                    // without chip select: a clock that rests for longer ends a word; 0: `choose`
+  /// Which of the pauses that the beginning of the capture allows: the index of one. Null: three periods of the clock.
+  std::function<std::size_t(std::span<const PauseReading>)> choose{};
 };
 
 struct ClockedOutcome {

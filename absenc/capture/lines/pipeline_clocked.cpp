@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <utility>
 
 #include "absenc/capture/lines/blocks.hpp"
@@ -107,8 +108,30 @@ std::string no_clock(const std::string& name) {
   return name + " never changes its level, so there is no clock: is it the right channel, and was it connected?";
 }
 
-// "": `pause` is known.
-std::string look_for_pause(LevelReader& reader, const ClockedLine& line, std::vector<Levels>& parts, Tick& pause) {
+// The first changes of each wire, up to the change of the clock at `last`.
+std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, const Wires& wires,
+                                const ClockedFormat& format) {
+  std::vector<Burst> bursts;
+  ClockedDecoder decoder(format);
+  Tick end = 0;
+  for (const Levels& levels : parts) {
+    if (levels.first > last) break;
+    if (end != 0 && levels.first != end) decoder.finish(bursts);
+    Levels begin{.first = levels.first, .end = std::min(levels.end, last + 1), .changes = {}};
+    for (const Changes& one : levels.changes) {
+      Changes clipped{.before = one.before, .at = {}};
+      clipped.at.assign(one.at.begin(), std::upper_bound(one.at.begin(), one.at.end(), last));
+      begin.changes.push_back(std::move(clipped));
+    }
+    decoder.decode(wires.part(begin), bursts);
+    end = levels.end;
+  }
+  return bursts;
+}
+
+// "": `format` has its times.
+std::string look_for_pause(LevelReader& reader, const Wires& wires, const ClockedLine& line, std::vector<Levels>& parts,
+                           ClockedFormat& format) {
   Changes clock;
   bool begun = false;
   std::size_t others = 0;
@@ -119,14 +142,25 @@ std::string look_for_pause(LevelReader& reader, const ClockedLine& line, std::ve
     for (std::size_t i = 1; i < levels.changes.size(); ++i) others += levels.changes[i].at.size();
     return clock.at.size() > enough_clocks || others > most_data;
   });
-  if (const auto found = find_pause(clock)) {
-    pause = *found;
-    return {};
+  const std::optional<ClockRests> rests = find_rests(clock);
+  if (!rests) {
+    const std::string name = reader.name(line.clock);
+    if (clock.at.empty() && others <= most_data) return no_clock(name);
+    return name + " changes its level only " + std::to_string(clock.at.size()) + " times, its data " +
+           std::to_string(others) + " times, so there is no word: is it the right channel?";
   }
-  const std::string name = reader.name(line.clock);
-  if (clock.at.empty() && others <= most_data) return no_clock(name);
-  return name + " changes its level only " + std::to_string(clock.at.size()) + " times, its data " +
-         std::to_string(others) + " times, so there is no word: is it the right channel?";
+  format.settle = rests->half_period;
+  format.pause = rests->pauses.front();
+  if (!line.choose || rests->pauses.size() == 1) return {};
+  const Tick last = clock.at[std::min(clock.at.size(), enough_clocks) - 1];
+  std::vector<PauseReading> readings;
+  for (const Tick pause : rests->pauses) {
+    ClockedFormat with = format;
+    with.pause = pause;
+    readings.push_back({pause, bursts_until(last, parts, wires, with)});
+  }
+  format.pause = rests->pauses[line.choose(readings)];
+  return {};
 }
 
 }  // namespace
@@ -141,11 +175,13 @@ ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned 
   if (!outcome.problem.empty()) return outcome;
 
   std::vector<Levels> parts;
+  ClockedFormat format{line.rising, line.select.has_value(), line.select_high, line.pause};
   if (!line.select && line.pause == 0) {
-    outcome.problem = look_for_pause(reader, line, parts, outcome.pause);
+    outcome.problem = look_for_pause(reader, wires, line, parts, format);
     if (!outcome.problem.empty()) return outcome;
   }
-  ClockedDecoding decoding(wires, {line.rising, line.select.has_value(), line.select_high, outcome.pause}, sink);
+  outcome.pause = format.pause;
+  ClockedDecoding decoding(wires, format, sink);
   bool wanted = true;
   for (const Levels& levels : std::exchange(parts, {})) wanted = wanted && decoding.decode(levels);
   if (wanted) wanted = BlockRun<ClockedDecoding>(reader, decoding, threads).run();

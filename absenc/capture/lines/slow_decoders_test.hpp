@@ -119,18 +119,25 @@ struct SlowClocked {
   std::vector<Burst> found{};
   Burst burst{};
   bool open = false;
+  unsigned edges = 0;
 
   void end(Tick at, bool cut) {
     burst.end = at;
     burst.cut = burst.cut || cut;
-
-    if (open && burst.bits > 0) found.push_back(burst);
+    burst.low_after = !format.has_select && levels[0][at] == 0;
+    const bool is_lone = !format.has_select && edges == 1;
+    if (format.settle != 0 && at + format.settle <= levels[1].size()) {
+      burst.last = levels[1][at + format.settle - 1] != 0;
+    }
+    if (open && burst.bits > 0 && !is_lone) found.push_back(burst);
     open = false;
   }
   void begin(Tick at, bool cut) {
     burst = {};
     burst.begin = at;
     burst.cut = cut;
+    burst.low_before = !format.has_select && at > 0 && levels[0][at - 1] == 0;
+    edges = 0;
     open = true;
   }
   void bit(std::size_t i) {
@@ -153,6 +160,7 @@ struct SlowClocked {
       }
       if (levels[0][i] != levels[0][i - 1]) {
         if (!format.has_select && !open) begin(i, !paused);
+        ++edges;
         if (open && (levels[0][i] != 0) == format.rising) bit(i);
         last = i;
       }

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a capture itself tells of its line and of its encoder, found by reading its beginning.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 #include <utility>
 
+#include "absenc/capture/annotate/annotate_frames.hpp"
 #include "absenc/client/captures/run.hpp"
+#include "absenc/client/captures/words.hpp"
 
 namespace absenc::client {
 
@@ -96,6 +100,58 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
     if (rate_is_open) try_at({static_cast<double>(line_.rate), parity}, 1);
     try_at({choices_.how.baud, parity}, 1);
   }
+  return best;
+}
+
+// The rests of a clock have several lengths: pauses between words, and between the bytes of a host that gives eight
+// clocks at a time. Only one way to cut makes frames of all of them.
+std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
+                                     std::vector<std::string>& notes) const {
+  struct Words final : capture::AnnotationSink {
+    void put(const capture::Annotation& annotation) override {
+      if (annotation.remark == capture::Remark::cut) return;
+      const bool is_good = annotation.error == Error::none;
+      ++(is_good ? good : bad);
+      const auto flip = [&](std::size_t bit) {
+        return unit.is_checked == nullptr || unit.is_checked(options, annotation.request, annotation.reply, bit);
+      };
+      const std::size_t last = std::max<std::size_t>(annotation.reply.bits, 1) - 1;
+      is_proved = is_proved || (is_good && flip(last));
+    }
+    const Unit& unit;
+    const Options& options;
+    std::uint64_t good = 0;
+    std::uint64_t bad = 0;
+    bool is_proved = false;  // by a checksum
+
+    Words(const Unit& unit_of, const Options& with) : unit(unit_of), options(with) {}
+  };
+  std::size_t best = 0;
+  std::uint64_t most = 0;
+  std::vector<std::size_t> faultless;
+  bool is_proved = false;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    Words words(unit_, options_);
+    capture::BurstAnnotator annotator(unit_, options_, words);
+    for (const capture::Burst& burst : readings[i].bursts) annotator.put(burst);
+    is_proved = is_proved || words.is_proved;
+    if (words.bad == 0 && words.good > 1) faultless.push_back(i);
+    // That fewer are bad is no reason: a longer pause hides a silent word in the next.
+    if (i > 0 && words.good <= most) continue;
+    best = i;
+    most = words.good;
+  }
+  const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
+  const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
+  if (other == faultless.end() || is_proved) return best;
+  const auto length = [clock = TickClock(ticks_per_second())](Tick ticks) {
+    return clock.has_time() ? fmt::format("{:g} us", clock.seconds(ticks) * 1e6) : fmt::format("{} ticks", ticks);
+  };
+  notes.push_back(fmt::format(
+      "a word is taken to end where the clock rests for more than {}, which makes {} words of the beginning; {} would "
+      "make {}, and nothing in a word without a check says which is right",
+      length(readings[best].pause), readings[best].bursts.size(), length(readings[*other].pause),
+      readings[*other].bursts.size()));
   return best;
 }
 

@@ -229,13 +229,14 @@ CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const s
 CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.how.channels);
   const bool spi = unit_.link == LinkKind::spi;
-  const capture::ClockedLine line{.clock = *wires.wires[0],
-                                  .in = wires.wires[1],
-                                  .out = spi ? wires.wires[2] : std::nullopt,
-                                  .select = spi ? wires.wires[3] : std::nullopt,
-                                  .rising = line_.spi_mode == 0 || line_.spi_mode == 3};
+  capture::ClockedLine line{.clock = *wires.wires[0],
+                            .in = wires.wires[1],
+                            .out = spi ? wires.wires[2] : std::nullopt,
+                            .select = spi ? wires.wires[3] : std::nullopt,
+                            .rising = line_.spi_mode == 0 || line_.spi_mode == 3};
   CaptureOutcome outcome;
   Guard guard;
+  line.choose = [&](std::span<const capture::PauseReading> readings) { return likely_pause(readings, outcome.notes); };
   capture::BurstAnnotator annotator(unit_, options_, sink);
   const auto take = [&](const Part& part) {
     return guard([&] {
@@ -246,6 +247,7 @@ CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::
   };
   const capture::ClockedOutcome decoded = capture::decode_clocked(*reader_, line, threads(), take);
   guard.rethrow();
+  annotator.finish();
   outcome.problem = decoded.problem;
   return outcome;
 }

@@ -13,6 +13,7 @@
 
 #include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/capture/annotate/annotation.hpp"
+#include "absenc/capture/lines/pipeline.hpp"
 #include "absenc/capture/signal.hpp"
 #include "absenc/client/decode.hpp"
 #include "absenc/protocol/unit.hpp"
@@ -70,6 +71,9 @@ class CaptureRun {
   /// At most so many characters.
   CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                               capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
+  /// Of the pauses that can end a word, that which reads the beginning of the capture best.
+  [[nodiscard]] std::size_t likely_pause(std::span<const capture::PauseReading> readings,
+                                         std::vector<std::string>& notes) const;
   CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
   CaptureOutcome run_bursts(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
   CaptureOutcome run_bytes(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
