@@ -178,7 +178,7 @@ class LateReplyTest(unittest.TestCase):
     def test_over_tcp(self):
         for encoder in ("tformat", "e201"):
             with self.subTest(encoder):
-                address = self.tcp_way(encoder, lambda n: 0.25)
+                address = self.tcp_way(encoder, lambda n: 0.6)  # a network is given 250 ms, E201 50 ms more
                 done = absenc("read", address, "--count", "5", "--rate", "10", "--json")
                 rows = [json.loads(line) for line in done.stdout.splitlines()]
                 self.check(encoder, self.over_tcp, rows)
