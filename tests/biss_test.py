@@ -295,5 +295,15 @@ class ChangedRegisters(Case):
         self.assertEqual((answer["fields"]["acknowledged"], answer["fields"]["executed"]), ("0", True), answer)
 
 
+
+class Requests(Case):
+    def test_a_control_request_is_encoded_and_decoded(self):
+        for unit in ("biss", "biss-safety", "biss-chain"):
+            cdm = absenc("encode", unit, "memory-write", "5", "0x42").stdout.strip()
+            self.assertEqual(set(cdm), {"0", "1", " "})
+            asked = json.loads(absenc("decode", unit, "--request", cdm, "--json").stdout)["fields"]
+            self.assertEqual((asked["operation"], asked["address"], asked["data"]), ("write", 5, "42"))
+
+
 if __name__ == "__main__":
     unittest.main()

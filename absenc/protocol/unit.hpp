@@ -207,6 +207,8 @@ struct Any {
 };
 
 /// Bits of a position; 0: it has no such part.
+inline constexpr std::size_t longest_encoded = 1024;
+
 struct Resolution {
   unsigned singleturn_bits = 0;
   unsigned multiturn_bits = 0;
@@ -251,7 +253,8 @@ struct Unit {
 
   /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
-  /// The request of a command; on CAN links its text, as in vectors. Errors: invalid_argument, buffer_too_small.
+  /// The request of a command, at most `longest_encoded` bytes; on CAN and clocked links its text, as in vectors. Empty
+  /// where a host only clocks. Errors: invalid_argument, buffer_too_small, unsupported.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);

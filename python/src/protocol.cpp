@@ -57,14 +57,14 @@ py::object encode(const std::string& name, const std::string& command_name, cons
   const Unit& unit = client::require_unit(name);
   const Options options = client::require_options(unit, model, settings);
   const Command& command = client::require_command(unit, command_name);
-  std::array<std::uint8_t, 512> bytes{};
+  std::array<std::uint8_t, longest_encoded> bytes{};
   const Result<std::size_t> size =
       unit.encode(options, command, client::complete_arguments(command, given), MutableBytes(bytes));
   if (!size) {
     throw client::UsageError(command_name + " cannot be encoded: " + std::string(text_of(size.error()).description));
   }
   const Bytes encoded = Bytes(bytes).first(*size);
-  if (unit.link == LinkKind::can) return py::str(std::string(encoded.begin(), encoded.end()));
+  if (unit.link == LinkKind::can || unit.link == LinkKind::clocked) return py::str(std::string(encoded.begin(), encoded.end()));
   return to_bytes(encoded);
 }
 

@@ -162,7 +162,7 @@ Values random_arguments(const Command& command, sim::Random& random) {
 }
 
 Result<Wire> encoded(const Unit& unit, const Options& options, const Command& command, Arguments values) {
-  std::array<std::uint8_t, 256> request{};
+  std::array<std::uint8_t, longest_encoded> request{};
   const Result<std::size_t> size = unit.encode(options, command, values, request);
   if (!size) return size.error();
   return Wire(request.begin(), request.begin() + static_cast<std::ptrdiff_t>(*size));

@@ -43,7 +43,7 @@ HeardFrame request_of(const Unit& unit, const Options& options, const Command& c
     arguments.push_back(one.required ? std::max<std::int64_t>(one.minimum, 1) : one.default_value);
   }
   const auto size = unit.encode(options, command, arguments, bytes);
-  if (!size || *size == 0) return {};
+  if (!size || *size == 0 || unit.link == LinkKind::clocked) return {};  // there the bits are spread over frames
   const Bytes request = Bytes(bytes).first(*size);
   if (unit.link != LinkKind::can) return {.bytes = {request.begin(), request.end()}};
   const std::string text(request.begin(), request.end());

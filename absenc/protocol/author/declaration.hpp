@@ -57,6 +57,9 @@ struct Declaration {
   /// Checks a frame and puts its fields. Null: by the protocol and the report.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
 
+  /// Clocked links: writes the bits that the host says for a command, as text of 0 and 1. Null: it only clocks.
+  Result<std::size_t> (*encode)(const Format&, const Command&, Arguments, MutableBytes out) = nullptr;
+
   // ---- As in Unit (protocol/unit.hpp)
 
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;  // null: by the sizes of requests and replies

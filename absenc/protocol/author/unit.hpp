@@ -109,7 +109,9 @@ struct Descriptor {
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
     if (!are_good(command, arguments)) return Error::invalid_argument;
-    if constexpr (Clocked<P>) {
+    if constexpr (declared.encode != nullptr) {
+      return declared.encode(declared.format(values), command, arguments, out);
+    } else if constexpr (Clocked<P>) {
       return std::size_t{0};
     } else {
       return encode_bytes(declared.format(values), find(command), arguments, out);

@@ -201,6 +201,7 @@ constexpr Declaration<ProtocolOf<ChainFormat>, VirtualEncoderOf<ChainFormat>> ch
     .resolution = chain_resolution,
     .is_usable = is_chain_possible,
     .decode = decode_frame<chain_report, is_chain_possible, ChainFormat>,
+    .encode = encode_control<ChainFormat>,
     .is_checked = is_chain_checked,
     .control_bit = control_bit,
     .alarms = &all_chain_fields[word_field_alarms],

@@ -27,6 +27,21 @@ inline constexpr std::array<Argument, 1> select_arguments{{{"bank", "that addres
 inline constexpr std::array<Argument, 2> command_arguments{
     {{"slaves", "bit n is slave n; 0: all, who do not answer", 0, 255}, {"command", "its number", 0, 3}}};
 
+/// Registers that have a name, and a command that reads them.
+struct NamedRegister {
+  std::string_view name;
+  unsigned address;
+  std::string_view meaning;
+};
+inline constexpr std::array<NamedRegister, 6> named_registers{{
+    {"bank", registers::bank_select, "which bank addresses 0 to 63 mean"},
+    {"eds-bank", registers::eds_bank, "the bank of its electronic data sheet; 0: none"},
+    {"profile", registers::profile, "the profile that it keeps to"},
+    {"serial-number", registers::serial_number, "its serial number"},
+    {"device-id", registers::device_id, "which device it is"},
+    {"manufacturer", registers::manufacturer, "who made it"},
+}};
+
 template <class F>
 constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
@@ -60,9 +75,10 @@ inline constexpr author::Finding<F, Found> registers_found{.put = put_registers<
 template <const auto& report, class F>
 [[nodiscard]] constexpr auto commands_of(bool (*is_readable)(const F&)) {
   constexpr auto request = no_request<F>;
-  const auto setting = [is_readable](auto address, std::string_view name, std::string_view meaning) {
-    return author::command<report, registers_found<F>, read_setting<F>, request, decltype(address)::value>(
-               {name, Verb::config_get, 0, meaning})
+  const auto setting = [is_readable]<std::size_t index>(std::integral_constant<std::size_t, index>) {
+    constexpr NamedRegister one = named_registers[index];
+    return author::command<report, registers_found<F>, read_setting<F>, request, one.address>(
+               {one.name, Verb::config_get, 0, one.meaning})
         .only_if(is_readable);
   };
   return std::array{
@@ -79,16 +95,15 @@ template <const auto& report, class F>
           {"memory-write", Verb::memory_write, 0, "write a register; the bank stays selected", write_arguments, true,
            false})
           .only_if(is_readable),
-      setting(std::integral_constant<unsigned, registers::bank_select>{}, "bank", "which bank addresses 0 to 63 mean"),
+      setting(std::integral_constant<std::size_t, 0>{}),
       author::command<report, registers_found<F>, write_bank<F>, request>(
           {"set-bank", Verb::config_set, 0, "select a bank", select_arguments, true, false, "bank"})
           .only_if(is_readable),
-      setting(std::integral_constant<unsigned, registers::eds_bank>{}, "eds-bank",
-              "the bank of its electronic data sheet; 0: none"),
-      setting(std::integral_constant<unsigned, registers::profile>{}, "profile", "the profile that it keeps to"),
-      setting(std::integral_constant<unsigned, registers::serial_number>{}, "serial-number", "its serial number"),
-      setting(std::integral_constant<unsigned, registers::device_id>{}, "device-id", "which device it is"),
-      setting(std::integral_constant<unsigned, registers::manufacturer>{}, "manufacturer", "who made it"),
+      setting(std::integral_constant<std::size_t, 1>{}),
+      setting(std::integral_constant<std::size_t, 2>{}),
+      setting(std::integral_constant<std::size_t, 3>{}),
+      setting(std::integral_constant<std::size_t, 4>{}),
+      setting(std::integral_constant<std::size_t, 5>{}),
       author::command<report, registers_found<F>, send_command<F>, request>(
           {"control-command", Verb::run, 0, "a command of control communication", command_arguments, true, false})
           .only_if(is_readable),
@@ -127,6 +142,41 @@ template <class F>
 }
 
 // ---- What the units of BiSS declare alike
+
+/// The CDM bits of a command's control frame, of those with several the one that does its work.
+template <class F>
+Result<std::size_t> encode_control(const F& format, const Command& command, Arguments arguments, MutableBytes out) {
+  ControlMaster master;
+  const auto value = [&](std::size_t i) { return static_cast<unsigned>(arguments[i]); };
+  const auto byte = [&](std::size_t i) { return std::array{static_cast<std::uint8_t>(arguments[i])}; };
+  switch (command.verb) {
+    case Verb::memory_read:
+      if (value(0) + value(2) > registers::end) return Error::invalid_argument;
+      master.read(format.slave, value(0), value(2));
+      break;
+    case Verb::memory_write:
+      master.write(format.slave, value(0), byte(1));
+      break;
+    case Verb::config_set:
+      master.write(format.slave, registers::bank_select, byte(0));
+      break;
+    case Verb::config_get:
+      for (const NamedRegister& one : named_registers) {
+        if (one.name == command.name) master.read(format.slave, one.address, registers::size_of(one.address));
+      }
+      break;
+    case Verb::run:
+      master.command(static_cast<std::uint8_t>(arguments[0]), value(1));
+      break;
+    default:
+      return std::size_t{0};
+  }
+  BitBuffer<1024> bits;
+  append_cdm(master, control_slaves, bits);
+  if (bits.size() > out.size()) return Error::buffer_too_small;
+  for (std::size_t i = 0; i < bits.size(); ++i) out[i] = bits.view()[i] ? '1' : '0';
+  return bits.size();
+}
 
 template <class F>
 constexpr LineSettings line_of(const F&) {

@@ -61,6 +61,18 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
   }
 }
 
+// What the host writes, by CDM alone. While an encoder is not ready the host repeats its start bit.
+Error take_written(const ControlBits& cdm, ControlFrame& frame) {
+  for (unsigned at = direction_at + 3;; at += byte_bits + 2) {
+    while (!frame.data.empty() && cdm.has(at + byte_bits) && cdm[at] && !is_good_byte(cdm.load(at, byte_bits))) ++at;
+    if (!cdm.has(at + byte_bits - 1)) return Error::truncated;
+    const std::uint16_t sent = cdm.load(at, byte_bits);
+    if (!is_good_byte(sent)) return Error::bad_checksum;
+    if (!frame.data.push_back(static_cast<std::uint8_t>(sent >> 4))) return Error::wrong_length;
+    if (!cdm[at + byte_bits + 1]) return Error::none;
+  }
+}
+
 Error take_register(const ControlBits& cdm, const ControlBits& cds, ControlFrame& frame) {
   const bool write = frame.request.operation == Operation::write;
   if (!cds.has(direction_at + 2)) return Error::truncated;
@@ -109,7 +121,10 @@ Result<ControlFrame> decode_control(BitView cdm, BitView cds) {
   ControlFrame frame;
   Error error = take_request(asked, frame);
   if (error != Error::none) return error;
-  if (cds.size == 0) return frame;
+  if (cds.size == 0) {
+    if (frame.request.operation == Operation::write) error = take_written(asked, frame);
+    return error == Error::none ? Result(frame) : error;
+  }
   const ControlBits answered{cds, start};
   put_locks(frame, answered);
   error = frame.request.is_command() ? take_command(asked, answered, frame) : take_register(asked, answered, frame);
@@ -422,6 +437,30 @@ bool ControlSlaves::command(bool cdm, ControlTarget& target) {
   const unsigned slave = at - direction_at;
   const bool mine = slave < std::min(count_, control_slaves) && (request_.slaves >> slave & 1) != 0;
   return mine && target.obeys(slave, request_.command);
+}
+
+namespace {
+
+struct Willing final : ControlTarget {
+  [[nodiscard]] bool allows(unsigned, unsigned, bool) const override { return true; }
+  [[nodiscard]] std::uint8_t read(unsigned, unsigned) override { return 0; }
+  void write(unsigned, unsigned, std::uint8_t) override {}
+  [[nodiscard]] bool is_ready() const override { return true; }
+  [[nodiscard]] bool obeys(unsigned, unsigned) const override { return true; }
+  void execute(std::uint8_t, unsigned) override {}
+};
+
+}  // namespace
+
+void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out) {
+  Willing target;
+  ControlSlaves answering(slaves);
+  const auto add = [&](bool cdm) {
+    answering.take(cdm, target);
+    out.append(cdm ? 1 : 0, 1);
+  };
+  while (!master.is_over()) add(master.next(answering.cds()));
+  for (unsigned i = 0; i < control_pause; ++i) add(false);
 }
 
 }  // namespace absenc::biss

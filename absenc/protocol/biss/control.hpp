@@ -79,9 +79,11 @@ struct ControlFrame {
 };
 
 /// Of the bits of CDM and CDS, one each for every frame; without those of CDS what is asked. What is before the start
-/// bit are zeros, or nothing. Errors: wrong_length (no bits), bad_framing (no start bit, or not enough zeros before it,
-/// or neither a read nor a write), truncated, bad_checksum (of the header or a byte), timeout (nobody has this ID, or
-/// it does not answer), unexpected_reply (what is written comes back otherwise), request_rejected.
+/// bit are zeros, or nothing. What is written is taken from CDM alone where there are no bits of CDS; a start bit that
+/// was repeated is then told from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, or not
+/// enough zeros before it, or neither a read nor a write), truncated, bad_checksum (of the header or a byte), timeout
+/// (nobody has this ID, or it does not answer), unexpected_reply (what is written comes back otherwise),
+/// request_rejected.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
 /// The host's side of one control frame. It owns no line: each frame of the encoder brings a CDS, and asks for a CDM.
@@ -137,6 +139,10 @@ class ControlMaster {
   bool answered_ = false;  // the first of the two bits of direction
   Error error_ = Error::none;
 };
+
+/// Appends what the host says for what `master` has begun: a bit of CDM for each frame, from the zeros before the start
+/// bit to those behind, as encoders that do all of it at once would be told. `slaves` of them have an ID.
+void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out);
 
 /// What the encoders do with what is asked of them: `slave` is one of theirs.
 struct ControlTarget {

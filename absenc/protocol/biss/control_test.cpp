@@ -40,6 +40,53 @@ TEST(BissControl, ARegisterThatIsRead) {
   EXPECT_TRUE(frame->next_address_accepted);
 }
 
+std::string cdm_of(const ControlMaster& master) {
+  BitBuffer<1024> bits;
+  append_cdm(master, control_slaves, bits);
+  std::string text;
+  for (std::size_t i = 0; i < bits.size(); ++i) text += bits.view()[i] ? '1' : '0';
+  return text;
+}
+
+// Those of the protocol description, and of TI's table; behind them only zeros.
+TEST(BissControl, RequestsAreTheBitsThatAreDrawn) {
+  const auto expect = [](const ControlMaster& master, std::string_view drawn) {
+    const std::string cdm = cdm_of(master);
+    const std::size_t end = drawn.rfind('1') + 1;
+    EXPECT_EQ(cdm.substr(0, end), drawn.substr(0, end));
+    EXPECT_EQ(cdm.find('1', end), std::string::npos);
+    EXPECT_GE(cdm.size(), end + control_pause);
+  };
+  ControlMaster master;
+  master.read(0, 0x44, 1);
+  expect(master, read_44);
+  master.read(0, 0x44, 3);
+  expect(master, "00000000000000110001000100110110100000000000001000000000000010000000000000000");
+  master.write(0, 0x48, std::array<std::uint8_t, 1>{0x55});
+  expect(master, "0000000000000011000100100010100110101010100100000");
+  master.write(0, 0x48, std::array<std::uint8_t, 2>{1, 2});
+  expect(master, "000000000000001100010010001010011000000011100010000001010010000");
+  master.command(1, 3);
+  expect(master, "0000000000000010100000001101111000000010");
+  master.command(0, 0);
+  expect(master, "0000000000000010000000000011111100");
+}
+
+TEST(BissControl, WhatIsWrittenIsTakenFromCdmAlone) {
+  const auto written = [](std::string_view cdm) {
+    std::vector<unsigned> bytes;
+    for (const std::uint8_t byte : decoded(cdm, "")->data.view()) bytes.push_back(byte);
+    return bytes;
+  };
+  EXPECT_EQ(written("0000000000000011000100100010100110101010100100000"), (std::vector<unsigned>{0x55}));
+  // The second start bit is said three times: the encoder was late.
+  EXPECT_EQ(written("00000000000000110001001000101001100000001110001110000001010010000"),
+            (std::vector<unsigned>{1, 2}));
+  EXPECT_TRUE(written(read_44).empty());
+  EXPECT_EQ(decoded("0000000000000011000100100010100110101010", "").error(), Error::truncated);
+  EXPECT_EQ(decoded("0000000000000011000100100010100110101011100100000", "").error(), Error::bad_checksum);
+}
+
 TEST(BissControl, NoBitOfAnAnswerFlipsUnnoticed) {
   // Lock bits of others, and what is behind P, mean nothing here.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {

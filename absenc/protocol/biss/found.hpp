@@ -150,9 +150,9 @@ constexpr void tell(Found& found, RegisterOrder order, unsigned address, Bytes b
   }
   found.slave_id = request.slave;
   found.address = request.address;
+  found.bytes = frame.data;
+  found.has_data = answered || !frame.data.empty();
   if (answered) {
-    found.bytes = frame.data;
-    found.has_data = true;
     for (const std::uint16_t delay : frame.start_delay.view()) found.start_delay.add(delay);
     found.next_address_accepted = frame.next_address_accepted;
   }

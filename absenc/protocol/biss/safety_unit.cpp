@@ -193,6 +193,7 @@ constexpr Declaration<ProtocolOf<SafetyFormat>, VirtualEncoderOf<SafetyFormat>> 
     .resolution = safety_resolution,
     .is_usable = is_safety_possible,
     .decode = decode_frame<safety_report, is_safety_possible, SafetyFormat>,
+    .encode = encode_control<SafetyFormat>,
     .is_checked = is_safety_checked,
     .control_bit = control_bit,
     .alarms = &safety_fields[field_alarms],

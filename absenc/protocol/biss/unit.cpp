@@ -105,6 +105,7 @@ constexpr Declaration<Protocol, VirtualEncoderOf<Format>> declaration{
     .resolution = resolution_by,
     .is_usable = is_possible,
     .decode = decode_frame<report, is_possible, Format>,
+    .encode = encode_control<Format>,
     .is_checked = is_checked,
     .bits = bits_in,
     .control_bit = control_bit,

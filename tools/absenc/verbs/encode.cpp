@@ -22,14 +22,15 @@ int run_encode(const Invocation& invocation) {
   const Command& command = require_command(unit, invocation.text("command"));
   const std::vector<std::int64_t> arguments = require_arguments(command, invocation.texts("arguments"));
 
-  std::array<std::uint8_t, 512> bytes;
+  std::array<std::uint8_t, longest_encoded> bytes;
   const Result<std::size_t> size = unit.encode(options, command, arguments, bytes);
   if (!size) {
     throw UsageError(fmt::format("{} cannot be encoded: {}. Try: {}", command.name, text_of(size.error()).description,
                                  text_of(size.error()).advice));
   }
   const Bytes encoded = Bytes(bytes).first(*size);
-  const WireFrame frame = unit.link == LinkKind::can
+  const bool is_text = unit.link == LinkKind::can || (unit.link == LinkKind::clocked && !encoded.empty());
+  const WireFrame frame = is_text
                               ? parse_wire_text(unit.link, command.name, std::string(encoded.begin(), encoded.end()))
                               : WireFrame{.bytes = {encoded.begin(), encoded.end()}, .bits = 0, .can = {}};
   const std::string request = to_wire_text(unit.link, frame.frame());
@@ -50,9 +51,10 @@ constexpr std::array<Parameter, 6> encode_parameters{{
     parameter::json,
 }};
 
-constexpr std::array<Example, 2> encode_examples{{
+constexpr std::array<Example, 3> encode_examples{{
     {"absenc encode tformat position", "1A: the request that asks for everything"},
     {"absenc encode tformat memory-write 5 0x42", "32 05 42 75: the request that writes 42 to address 5"},
+    {"absenc encode biss memory-write 5 0x42", "the bits of CDM, one behind each frame"},
 }};
 
 }  // namespace
