@@ -8,7 +8,7 @@ import unittest
 import urllib.parse
 
 from command_support import PATIENCE
-from serve_support import ServeCase, wait_until
+from serve_support import ServeCase, of, wait_until
 
 
 class Abuse(ServeCase):
@@ -58,7 +58,7 @@ class Abuse(ServeCase):
             self.assertNotIn(b" 200 ", connection.recv(100))
 
     def test_large_bodies(self):
-        status, _ = self.served.ask("/api/command", "POST", {"Content-Length": "1000000000"})
+        status, _ = self.served.ask(of("sim:tformat?motion=rpm=60", "command"), "POST", {"Content-Length": "1000000000"})
         self.assertEqual(status, 413)
 
     def test_many_connections(self):
@@ -81,19 +81,19 @@ class Abuse(ServeCase):
         self.assert_well()
 
     def test_many_who_want_the_same_encoder(self):
-        name = urllib.parse.quote("sim:tformat?motion=rpm=60", safe="").encode()
-        asked = [b"POST /api/doctor", b"GET /api/memory", b"GET /api/settings"] * 20
+        asked = [f"{method} {of('sim:tformat?motion=rpm=60', part)}".encode()
+                 for method, part in (("POST", "doctor"), ("GET", "memory"), ("GET", "settings"))] * 20
         clients = [self.connect() for _ in asked]
         for client, what in zip(clients, asked):
-            client.sendall(what + b"?encoder=" + name + b" HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n")
+            client.sendall(what + b" HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n")
         statuses = [client.recv(15)[9:12] for client in clients]
         self.assertLessEqual(set(statuses), {b"200", b"409"})
         self.assertIn(b"200", statuses)
         self.assertIn(b"409", statuses)
 
     def test_random_bytes(self):
-        for path in ("/", "/metrics", "/api/encoders", "/api/encoder", "/api/stream", "/api/history", "/api/events",
-                     "/api/settings", "/api/memory"):
+        for path in ("/", "/metrics", "/api/encoders", "/api/encoders/", "/api/stream", "/api/events",
+                     *(of("sim:tformat?motion=rpm=60", part) for part in ("", "history", "events", "memory"))):
             for _ in range(5):
                 with contextlib.closing(socket.create_connection(("127.0.0.1", self.served.port))) as connection:
                     with contextlib.suppress(OSError):
@@ -108,7 +108,7 @@ class Abuse(ServeCase):
     def test_a_slow_reader_delays_nobody(self):
         slow = self.connect()
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-        slow.sendall(b"GET /api/stream?trace=" + urllib.parse.quote("sim:tformat?motion=rpm=60", safe="").encode() +
+        slow.sendall(b"GET " + of("sim:tformat?motion=rpm=60", "stream").encode() +
                      b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
         slow.recv(1)
         stream = self.stream(self.served)

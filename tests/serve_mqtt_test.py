@@ -16,7 +16,7 @@ import jsonschema
 
 from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
 from mqtt_support import Broker, Receiver, free_port, now, numbers, twice
-from serve_support import BUSY, ServeCase, wait_until
+from serve_support import BUSY, ServeCase, of, wait_until
 
 SOURCE = pathlib.Path(os.environ.get("ABSENC_SOURCE_DIR", pathlib.Path(__file__).resolve().parent.parent))
 SCHEMA = json.loads((SOURCE / "docs/mqtt-schema.json").read_text(encoding="utf-8"))
@@ -419,11 +419,11 @@ class Settings(MqttCase):
         path = self.file("absenc.toml", self.FILE.format(broker.url, "a", self.spool()))
         server = self.without_history(ABSENC_CONFIG=path)
         wait_until(lambda: any(topic == "plant/a/elbow/readings" for topic, _, _ in receiver.messages), "a")
-        before = server.json("/api/encoder", name="elbow")["readings"]
+        before = server.json(of("elbow"))["readings"]
         self.file("absenc.toml", self.FILE.format(broker.url, "b", self.spool()))
         server.process.send_signal(signal.SIGHUP)
         wait_until(lambda: any(topic == "plant/b/elbow/readings" for topic, _, _ in receiver.messages), "b")
-        self.assertGreater(server.json("/api/encoder", name="elbow")["readings"], before)
+        self.assertGreater(server.json(of("elbow"))["readings"], before)
         times = [one[0] for payload in receiver.all("readings") for one in payload["readings"]]
         self.assertLess(max(later - earlier for earlier, later in zip(times, times[1:])), 1_000_000 * BUSY)
         self.file("absenc.toml", self.FILE.format("ftp://x", "b", self.spool()))

@@ -24,12 +24,17 @@ def wait_until(true, what):
     return value
 
 
+def of(encoder, part=""):
+    """The path of an encoder, or of a part of it: "history", "doctor"..."""
+    return "/api/encoders/" + urllib.parse.quote(encoder, safe="") + (part and f"/{part}")
+
+
 class Stream:
     """An open stream of server-sent events."""
 
     def __init__(self, server, trace=""):
         self.connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
-        self.connection.request("GET", "/api/stream?" + urllib.parse.urlencode({"trace": trace}))
+        self.connection.request("GET", of(trace, "stream") if trace else "/api/stream")
         self.answer = self.connection.getresponse()
 
     def next(self):
@@ -98,7 +103,7 @@ class Server:
         return self.json("/api/encoders")["encoders"][index]
 
     def command(self, encoder, command, headers, **values):
-        status, body = self.ask("/api/command", "POST", headers, encoder=encoder, command=command, **values)
+        status, body = self.ask(of(encoder, "command"), "POST", headers, command=command, **values)
         return status, json.loads(body)
 
 

@@ -11,11 +11,12 @@ import subprocess
 import threading
 import time
 import unittest
+import urllib.parse
 
 import jsonschema
 
 from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
-from serve_support import BUSY, TOKEN, ServeCase, Server, SilentLine, wait_until
+from serve_support import BUSY, TOKEN, ServeCase, Server, SilentLine, of, wait_until
 
 
 class Values(ServeCase):
@@ -77,7 +78,7 @@ class Values(ServeCase):
     def test_latencies(self):
         name = "sim:tformat"
         server = self.without_history(name)
-        latency = wait_until(lambda: (told := server.json("/api/encoder", name=name)["latency_us"])["p50"] and told,
+        latency = wait_until(lambda: (told := server.json(of(name))["latency_us"])["p50"] and told,
                              "it was read")
         buckets = latency["buckets"]
         self.assertEqual([one["at_most"] for one in buckets[:4] + buckets[-2:]], [10, 20, 50, 100, 1e6, None])
@@ -100,7 +101,7 @@ class Values(ServeCase):
         server = self.without_history(name)
 
         def has_bad():
-            details = server.json("/api/encoder", name=name)
+            details = server.json(of(name))
             return details["bad_exchanges"] and details["fields"] and details
         details = wait_until(has_bad, "an exchange has failed")
         self.assertTrue(details["errors"])
@@ -109,12 +110,90 @@ class Values(ServeCase):
         changing = [command["name"] for command in details["commands"] if command["changes_encoder"]]
         self.assertIn("zero", changing)
         self.assertNotIn("position", changing)
-        self.assertEqual(server.ask("/api/encoder", name="none")[0], 400)
+        self.assertEqual(server.ask(of("none"))[0], 404)
+
+    def test_an_unknown_encoder_is_404_with_the_nearest_name(self):
+        server = self.server("sim:tformat", "sim:esl", "--history", self.file("history"), "--token-file", self.tokens())
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        for part, method in (("", "GET"), ("history", "GET"), ("history.csv", "GET"), ("events", "GET"),
+                             ("settings", "GET"), ("memory", "GET"), ("stream", "GET"), ("doctor", "POST"),
+                             ("command", "POST")):
+            with self.subTest(part=part):
+                status, body = server.ask(of("sim:tfornat", part), method, good)
+                self.assertEqual((status, json.loads(body)["error"]),
+                                 (404, 'there is no encoder "sim:tfornat" here; did you mean sim:tformat?'))
+        status, body = server.ask(of("sim:tformat", "histori"))
+        self.assertEqual((status, json.loads(body)["error"]),
+                         (404, 'an encoder has no "histori"; did you mean history?'))
+
+    def test_an_old_path_is_404_with_the_new_one(self):
+        server = self.without_history("sim:tformat", "--token-file", self.tokens())
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        for part, method in (("history", "GET"), ("history.csv", "GET"), ("settings", "GET"), ("memory", "GET"),
+                             ("doctor", "POST"), ("command", "POST"), ("events", "GET")):
+            with self.subTest(part=part):
+                status, body = server.ask(f"/api/{part}", method, good, encoder="sim:tformat")
+                self.assertEqual((status, json.loads(body)["error"]), (404, f"this is at /api/encoders/NAME/{part} now"))
+        status, body = server.ask("/api/encoder", name="sim:tformat")
+        self.assertEqual((status, json.loads(body)["error"]), (404, "this is at /api/encoders/NAME now"))
+        status, body = server.ask("/api/stream", trace="sim:tformat")
+        self.assertEqual((status, json.loads(body)["error"]), (404, "this is at /api/encoders/NAME/stream now"))
+
+    def test_a_name_with_slashes_and_a_question_mark(self):
+        name = "tformat:" + self.file("nothing") + "?latency=300"
+        server = self.without_history(name)
+        self.assertEqual(server.json(of(name))["encoder"], name)
+        self.assertEqual(server.ask(of(name, "settings"))[0], 502)
+
+    def test_units_and_ends(self):
+        server = self.without_history("sim:tformat", "sim:biss?model=linear-26-1um")
+        turned, slid = (wait_until(lambda: server.encoder(i)["state"] == "live" and server.encoder(i), "it is live")
+                        for i in range(2))
+        self.assertEqual([turned[name] for name in ("position_unit", "speed_unit", "counts_in_all", "length_mm", "has_turns")],
+                         ["deg", "rpm", 131072, None, True])
+        self.assertEqual([slid[name] for name in ("position_unit", "speed_unit", "counts_in_all", "length_mm", "has_turns")],
+                         ["mm", "mm/s", 2**26, 67108.864, False])
+
+    def test_the_last_minute(self):
+        server = self.without_history("sim:tformat?motion=rpm=60")
+
+        def seconds():
+            return server.json("/api/minute")["encoders"][0]["seconds"]
+        rows = wait_until(lambda: len(seconds()) >= 3 and seconds(), "three seconds are over")
+        self.assertEqual([row[0] - rows[0][0] for row in rows], list(range(len(rows))))
+        self.assertAlmostEqual(rows[2][2], 60, delta=1)
+        self.assertAlmostEqual(rows[2][1] - rows[1][1], 360, delta=60)
+
+    def test_a_lost_encoder_has_a_last_reading(self):
+        emulator = Emulator(self.directory, "--singleturn", "1000")
+        self.addCleanup(emulator.end)
+        server = self.without_history(f"tformat:{emulator.path}")
+        live = wait_until(lambda: server.encoder()["state"] == "live" and server.encoder(), "it is live")
+        self.assertIsNone(live["last_reading"])
+        emulator.kill()
+        before = time.time() * 1000
+        lost = wait_until(lambda: server.encoder()["state"] == "lost" and server.encoder(), "it is lost")
+        self.assertIsNone(lost["counts"])
+        self.assertIsNone(lost["continued_position"])
+        self.assertEqual(lost["last_reading"]["counts"], 1000)
+        self.assertLess(abs(lost["last_reading"]["at_ms"] - before), 5000)
+
+    def test_whose_token_it_is(self):
+        server = self.without_history("sim:tformat")
+        self.assertEqual(server.json("/api/token"), {"tokens": False, "name": None})
+        server = self.without_history("sim:tformat", "--token-file", self.tokens())
+        self.assertEqual(server.json("/api/token"), {"tokens": True, "name": None})
+        status, body = server.ask("/api/token", headers={"Authorization": f"Bearer {TOKEN}"})
+        self.assertEqual((status, json.loads(body)), (200, {"tokens": True, "name": "anna"}))
+        for path, method in (("/api/token", "GET"), (of("sim:tformat", "command"), "POST")):
+            status, body = server.ask(path, method, headers={"Authorization": "Bearer another-secret-than-that"})
+            self.assertEqual(status, 401)
+            self.assertIn("token is wrong", json.loads(body)["error"])
 
     def test_what_describes_it(self):
         server = self.without_history("sim:tformat")
         paths = set(server.json("/openapi.json")["paths"])
-        self.assertLessEqual({"/api/command", "/api/settings", "/api/memory", "/api/doctor"}, paths)
+        self.assertLessEqual({"/api/encoders/{encoder}/" + part for part in ("command", "settings", "memory", "doctor")}, paths)
         self.assertTrue(server.json("/healthz")["ok"])
         page = server.ask("/")
         self.assertEqual(page[0], 200)
@@ -131,9 +210,7 @@ class Described(ServeCase):
     """openapi.json against what is answered."""
     NAME = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.1&seed=1"
     # What a route must be asked with.
-    VALUES = {"/api/encoder": {"name": NAME}, "/api/history": {"encoder": NAME}, "/api/history.csv": {"encoder": NAME},
-              "/api/command": {"encoder": NAME, "command": "position"}, "/api/settings": {"encoder": NAME},
-              "/api/memory": {"encoder": NAME}, "/api/doctor": {"encoder": NAME}}
+    VALUES = {"/api/encoders/{encoder}/command": {"command": "position"}}
 
     def schema(self, schema, components):
         """As jsonschema takes it: OpenAPI 3.0 has a word of its own for null."""
@@ -148,19 +225,23 @@ class Described(ServeCase):
 
     def test_every_route(self):
         server = self.server(self.NAME, "--history", self.file("history"), "--token-file", self.tokens())
-        wait_until(lambda: server.json("/api/history", encoder=self.NAME)["rows"], "it has a second")
+        wait_until(lambda: server.json(of(self.NAME, "history"))["rows"], "it has a second")
         wait_until(lambda: server.json("/api/events")["events"], "something has happened")
-        wait_until(lambda: server.json("/api/encoder", name=self.NAME)["bad_exchanges"], "an exchange has failed")
+        wait_until(lambda: server.json(of(self.NAME))["bad_exchanges"], "an exchange has failed")
         described = server.json("/openapi.json")
         for path, methods in described["paths"].items():
             for method, told in methods.items():
                 with self.subTest(route=f"{method} {path}"):
                     (kind, content), = told["responses"]["200"]["content"].items()
                     values = self.VALUES.get(path, {})
-                    needed = [one.get("name") or one["$ref"].rsplit("/", 1)[1] for one in told.get("parameters", [])
-                              if one.get("required") or one.get("$ref", "").endswith("/encoder")]
+                    parameters = [described["components"]["parameters"][one["$ref"].rsplit("/", 1)[1]] if "$ref" in one
+                                  else one for one in told.get("parameters", [])]
+                    needed = [one["name"] for one in parameters if one.get("required") and one["in"] == "query"]
+                    in_path = [one["name"] for one in parameters if one["in"] == "path"]
                     self.assertEqual(set(needed), set(values))
-                    self.check(server, method.upper(), path, values, kind,
+                    self.assertEqual(in_path, re.findall(r"\{(\w+)\}", path))
+                    asked = path.replace("{encoder}", urllib.parse.quote(self.NAME, safe=""))
+                    self.check(server, method.upper(), asked, values, kind,
                                self.schema(content["schema"], described["components"]["schemas"]))
 
     def check(self, server, method, path, values, kind, schema):
@@ -229,7 +310,7 @@ class Reload(ServeCase):
         server = self.without_history(ABSENC_CONFIG=path)
 
         def readings(name):
-            return server.json("/api/encoder", name=name)["readings"]
+            return server.json(of(name))["readings"]
 
         def turns(index):
             return server.encoder(index)["turns"]
@@ -288,7 +369,7 @@ class WhoMayWhat(ServeCase):
             with self.subTest(headers=headers):
                 status, body = self.command(server, headers)
                 self.assertEqual(status, expected, body)
-        self.assertEqual(server.ask("/api/command", headers=good, encoder=self.name, command="zero")[0], 404)
+        self.assertEqual(server.ask(of(self.name, "command"), headers=good, command="zero")[0], 405)
         self.assertEqual(self.counts(server), 1000)
         origin = {"Origin": f"http://127.0.0.1:{server.port}", "Sec-Fetch-Site": "same-origin"}
         status, body = self.command(server, {**good, **origin})
@@ -296,7 +377,7 @@ class WhoMayWhat(ServeCase):
         wait_until(lambda: self.counts(server) == 0, "it is at zero")
 
         def commands():
-            return [event for event in server.json("/api/events", encoder=self.name)["events"]
+            return [event for event in server.json(of(self.name, "events"))["events"]
                     if event["kind"] == "command"]
         events = wait_until(commands, "the history has it")
         self.assertEqual(len(events), 1)
@@ -310,9 +391,8 @@ class WhoMayWhat(ServeCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command(self.name, "memory-read", good, argument=["5"])
         self.assertEqual(status, 200, body)
-        for encoder, command, argument in (("nobody", "zero", []), (self.name, "zerro", []),
-                                           (self.name, "memory-read", ["x"]), (self.name, "memory-read", ["5", "6", "7", "8", "9"])):
-            status, body = server.command(encoder, command, good, argument=argument)
+        for command, argument in (("zerro", []), ("memory-read", ["x"]), ("memory-read", ["5", "6", "7", "8", "9"])):
+            status, body = server.command(self.name, command, good, argument=argument)
             self.assertEqual(status, 400, body)
             self.assertTrue(body["error"])
 
@@ -351,7 +431,7 @@ class Inside(ServeCase):
     """Settings, memory, doctor: what is asked of an encoder between two readings, or instead of them."""
 
     def post(self, server, encoder, headers=None):
-        status, body = server.ask("/api/doctor", "POST", headers, encoder=encoder)
+        status, body = server.ask(of(encoder, "doctor"), "POST", headers)
         return status, json.loads(body)
 
     def emulator(self, *arguments, **settings):
@@ -369,12 +449,12 @@ class Inside(ServeCase):
             wanted = json.loads(absenc("config", "get", f"sim:{unit}", "--json").stdout)["settings"]
             told = json.loads(absenc("info", f"sim:{unit}", "--json").stdout)["answers"]
             with self.subTest(unit):
-                found = server.json("/api/settings", encoder=f"sim:{unit}")
+                found = server.json(of(f"sim:{unit}", "settings"))
                 self.assertEqual((found["settings"], found["failed"]), (wanted, {}))
                 self.assertTrue(found["identity"])
                 for name, fields in found["identity"].items():
                     self.assertEqual(list(fields), list(told[name]["fields"]))
-                readable = server.json("/api/encoder", name=f"sim:{unit}")["readable"]
+                readable = server.json(of(f"sim:{unit}"))["readable"]
                 self.assertEqual(readable["settings"], [*found["identity"], *wanted])
                 self.assertLessEqual({row["setting"] for row in found["rows"]}, set(readable["settings"]))
 
@@ -383,7 +463,7 @@ class Inside(ServeCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command("sim:tformat", "set-overheat-threshold", good, argument=["77"])
         self.assertEqual(status, 200, body)
-        found = server.json("/api/settings", encoder="sim:tformat")
+        found = server.json(of("sim:tformat", "settings"))
         row = next(row for row in found["rows"] if row["field"] == "overheat_threshold_c")
         self.assertEqual(row["value"], "77 degC")
         self.assertEqual([row["value"] for row in found["rows"] if row["field"] == "status"], ["none"])
@@ -398,14 +478,14 @@ class Inside(ServeCase):
         for address, value, page in ((5, 0x5A, 0), (126, 0xC3, 2)):
             status, body = server.command(name, "memory-write", good, argument=[address, value, page])
             self.assertEqual(status, 200, body)
-        before = server.json("/api/encoder", name=name)["readings"]
-        found = server.json("/api/memory", encoder=name)
-        self.assertGreater(server.json("/api/encoder", name=name)["readings"], before)
+        before = server.json(of(name))["readings"]
+        found = server.json(of(name, "memory"))
+        self.assertGreater(server.json(of(name))["readings"], before)
         self.assertEqual(found["bytes"], 6 * 127)
         pages = {part["page"]: bytes.fromhex(part["data"]) for part in found["memory"]}
         self.assertEqual((pages[0][5], pages[2][126]), (0x5A, 0xC3))
         self.assertEqual({part["address"] for part in found["memory"]}, {0})
-        one = server.json("/api/memory", encoder=name, page=2)
+        one = server.json(of(name, "memory"), page=2)
         self.assertEqual([(part["page"], bytes.fromhex(part["data"])) for part in one["memory"]], [(2, pages[2])])
         end(server.process)
         for page, content in pages.items():
@@ -414,28 +494,28 @@ class Inside(ServeCase):
 
     def test_registers(self):
         server = self.without_history("sim:encolink")
-        found = server.json("/api/memory", encoder="sim:encolink")
+        found = server.json(of("sim:encolink", "memory"))
         told = json.loads(absenc("memory", "read", "sim:encolink", "serial_number", "--json").stdout)
         serial = next(one for one in found["registers"] if one["name"] == "serial_number")
         self.assertEqual((serial["fields"], serial["value"]), (told["fields"], told["fields"]["serial_number"]))
-        self.assertEqual(server.json("/api/encoder", name="sim:encolink")["readable"]["registers"],
+        self.assertEqual(server.json(of("sim:encolink"))["readable"]["registers"],
                          len(found["registers"]) + len(found["failed"]))
 
     def test_what_has_none_says_so(self):
         server = self.without_history("sim:ssi", "sim:tformat")
-        for path, values, words in (("/api/settings", {}, "no settings"), ("/api/memory", {}, "cannot be read"),
-                                    ("/api/memory", {"encoder": "sim:tformat", "page": 6}, "no page 6"),
-                                    ("/api/memory", {"encoder": "sim:tformat", "page": "x"}, "page"),
-                                    ("/api/settings", {"encoder": "nobody"}, "nobody")):
-            with self.subTest(values=values):
-                status, body = server.ask(path, **{"encoder": "sim:ssi", **values})
+        for path, values, words in ((of("sim:ssi", "settings"), {}, "no settings"),
+                                    (of("sim:ssi", "memory"), {}, "cannot be read"),
+                                    (of("sim:tformat", "memory"), {"page": 6}, "no page 6"),
+                                    (of("sim:tformat", "memory"), {"page": "x"}, "page")):
+            with self.subTest(path=path, values=values):
+                status, body = server.ask(path, **values)
                 self.assertEqual(status, 400, body)
                 self.assertIn(words, json.loads(body)["error"])
 
     def test_an_encoder_that_is_away(self):
         server = self.without_history("tformat:" + self.file("nothing"))
-        for path in ("/api/settings", "/api/memory"):
-            status, body = server.ask(path, encoder="tformat:" + self.file("nothing"))
+        for part in ("settings", "memory"):
+            status, body = server.ask(of("tformat:" + self.file("nothing"), part))
             self.assertEqual(status, 502, body)
             self.assertIn("was not done", json.loads(body)["error"])
         status, found = self.post(server, "tformat:" + self.file("nothing"))
@@ -455,7 +535,7 @@ class Inside(ServeCase):
         self.assertEqual(stream.state(lambda one: one["state"] == "live")["counts"], 1000)
 
         def commands():
-            return [event for event in server.json("/api/events", encoder=name)["events"]
+            return [event for event in server.json(of(name, "events"))["events"]
                     if event["kind"] == "command"]
         events = wait_until(commands, "the history has it")
         self.assertEqual([(event["text"], event["who"]) for event in events],
@@ -479,7 +559,7 @@ class Inside(ServeCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(server.command("sim:tformat", "memory-write", good, argument=[2, 0x77, 1])[0], 200)
         self.assertTrue(self.post(server, "sim:tformat")[1]["ok"])
-        page = server.json("/api/memory", encoder="sim:tformat", page=1)
+        page = server.json(of("sim:tformat", "memory"), page=1)
         self.assertEqual(bytes.fromhex(page["memory"][0]["data"])[2], 0x77)
 
     def test_others_on_the_line(self):
@@ -516,12 +596,12 @@ class Inside(ServeCase):
         server = self.without_history(name, "sim:tformat")
         self.live(server, 1)
         client, answers = self.begin(server, name)
-        before = server.json("/api/encoder", name="sim:tformat")["readings"]
-        for path, method in (("/api/doctor", "POST"), ("/api/settings", "GET"), ("/api/memory", "GET")):
-            status, body = server.ask(path, method, encoder=name)
+        before = server.json(of("sim:tformat"))["readings"]
+        for part, method in (("doctor", "POST"), ("settings", "GET"), ("memory", "GET")):
+            status, body = server.ask(of(name, part), method)
             self.assertEqual(status, 409, body)
             self.assertIn("examined", json.loads(body)["error"])
-        wait_until(lambda: server.json("/api/encoder", name="sim:tformat")["readings"] > before + 20, "others are read")
+        wait_until(lambda: server.json(of("sim:tformat"))["readings"] > before + 20, "others are read")
         self.assertEqual(server.encoder(1)["state"], "live")
         client.join()
         status, found = answers[0]
@@ -553,28 +633,29 @@ class Inside(ServeCase):
 
     def test_who_may(self):
         server = self.without_history("sim:tformat")
-        asked = (("/api/settings", "GET"), ("/api/memory", "GET"), ("/api/doctor", "POST"))
+        asked = [(of("sim:tformat", part), method)
+                 for part, method in (("settings", "GET"), ("memory", "GET"), ("doctor", "POST"))]
         for path, method in asked:
             for headers in ({"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"},
                             {"Host": "evil.example"}):
-                self.assertEqual(server.ask(path, method, headers, encoder="sim:tformat")[0], 403)
-            self.assertEqual(server.ask(path, method, encoder="sim:tformat")[0], 200)
-        self.assertEqual(server.ask("/api/doctor", encoder="sim:tformat")[0], 404)
+                self.assertEqual(server.ask(path, method, headers)[0], 403)
+            self.assertEqual(server.ask(path, method)[0], 200)
+        self.assertEqual(server.ask(of("sim:tformat", "doctor"))[0], 405)
         server = Server("sim:tformat", "--token-file", self.tokens(), "--history", "none", "--listen", "0.0.0.0:0")
         self.addCleanup(end, server.process)
         good = {"Authorization": f"Bearer {TOKEN}"}
         for path, method in asked:
-            self.assertEqual(server.ask(path, method, encoder="sim:tformat")[0], 401)
-            self.assertEqual(server.ask(path, method, good, encoder="sim:tformat")[0], 200)
+            self.assertEqual(server.ask(path, method)[0], 401)
+            self.assertEqual(server.ask(path, method, good)[0], 200)
             evil = {**good, "Origin": "http://evil.example"}
-            self.assertEqual(server.ask(path, method, evil, encoder="sim:tformat")[0], 403)
+            self.assertEqual(server.ask(path, method, evil)[0], 403)
 
 
 class History(ServeCase):
     NAME = "sim:tformat?motion=rpm=60&alarm=over_heat"
 
     def rows(self, server):
-        return server.json("/api/history", encoder=self.NAME)["rows"]
+        return server.json(of(self.NAME, "history"))["rows"]
 
     def test_it_is_kept_over_kill_9(self):
         path = self.file("history")
@@ -600,13 +681,13 @@ class History(ServeCase):
     def test_csv(self):
         server = self.server(self.NAME, "--history", self.file("history"))
         wait_until(lambda: len(self.rows(server)) >= 2, "it has two seconds")
-        status, text = server.ask("/api/history.csv", encoder=self.NAME)
+        status, text = server.ask(of(self.NAME, "history.csv"))
         lines = text.splitlines()
         self.assertEqual(status, 200)
         self.assertEqual(lines[0].split(",")[:4], ["encoder", "at_s", "readings", "errors"])
         self.assertGreaterEqual(len(lines), 3)
-        self.assertEqual(server.ask("/api/history.csv", encoder=self.NAME, **{"from": 1, "to": 2})[1], lines[0] + "\n")
-        self.assertEqual(server.ask("/api/history", encoder=self.NAME, **{"from": 2, "to": 1})[0], 400)
+        self.assertEqual(server.ask(of(self.NAME, "history.csv"), **{"from": 1, "to": 2})[1], lines[0] + "\n")
+        self.assertEqual(server.ask(of(self.NAME, "history"), **{"from": 2, "to": 1})[0], 400)
 
     def test_many_rows_of_csv(self):
         path = self.file("history")
@@ -617,9 +698,9 @@ class History(ServeCase):
             database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
                                  [(now - 100_000 + i,) for i in range(35_000)])
             database.commit()
-        _, text = server.ask("/api/history.csv", encoder=self.NAME, **{"from": now - 100_000, "to": now - 60_000})
+        _, text = server.ask(of(self.NAME, "history.csv"), **{"from": now - 100_000, "to": now - 60_000})
         self.assertEqual(len(text.splitlines()), 35_001)
-        rows = server.json("/api/history", encoder=self.NAME, rows=100, **{"from": now - 100_000, "to": now - 60_000})
+        rows = server.json(of(self.NAME, "history"), rows=100, **{"from": now - 100_000, "to": now - 60_000})
         self.assertLessEqual(len(rows["rows"]), 101)
 
     def test_what_is_old_goes(self):

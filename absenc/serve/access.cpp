@@ -80,7 +80,8 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
     return error_response(403, "nothing can be changed here: the server was started without --token-file");
   }
   if (!who(request).empty()) return {};
-  Response response = error_response(401, "this needs a token: Authorization: Bearer TOKEN");
+  Response response = error_response(
+      401, request.authorization.empty() ? "this needs a token: Authorization: Bearer TOKEN" : wrong_token);
   response.headers.emplace_back("WWW-Authenticate", "Bearer");
   return response;
 }

@@ -29,6 +29,9 @@ class Access {
   [[nodiscard]] std::optional<Response> refusal(const Request& request, To what) const;
   /// The name of the token that came with it, or "".
   [[nodiscard]] std::string who(const Request& request) const;
+  [[nodiscard]] bool has_tokens() const { return !tokens_.empty(); }
+
+  static constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
  private:
   std::vector<Secret> tokens_;

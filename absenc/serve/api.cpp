@@ -5,9 +5,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "absenc/client/error.hpp"
+#include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/options.hpp"
 #include "absenc/serve/assets.hpp"
@@ -24,6 +26,11 @@ constexpr std::int64_t rows_of_a_page = 10'000;  // of CSV at a time
 
 /// Is refused with 400.
 struct BadRequest : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Is refused with 404.
+struct NotFound : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
@@ -55,10 +62,50 @@ Range range_in(const Request& request) {
   return range;
 }
 
-std::shared_ptr<Watch> encoder_in(const Fleet& fleet, const Request& request, const std::string& parameter) {
-  const std::string name = request.value(parameter);
+constexpr std::string_view encoders_path = "/api/encoders/";
+constexpr std::array<std::string_view, 8> parts_of_encoder{"command",     "doctor", "events",   "history",
+                                                           "history.csv", "memory", "settings", "stream"};
+
+/// A path /api/encoders/NAME/PART. The name may contain slashes; the part is empty for the encoder itself.
+struct Target {
+  std::string_view name;
+  std::string_view part;
+};
+
+Target target_of(std::string_view path) {
+  const std::string_view rest = path.substr(encoders_path.size());
+  const std::size_t slash = rest.rfind('/');
+  if (slash == std::string_view::npos) return {rest, {}};
+  const std::string_view last = rest.substr(slash + 1);
+  if (std::find(parts_of_encoder.begin(), parts_of_encoder.end(), last) == parts_of_encoder.end()) return {rest, {}};
+  return {rest.substr(0, slash), last};
+}
+
+std::shared_ptr<Watch> require_encoder(const Fleet& fleet, std::string_view name) {
   if (std::shared_ptr<Watch> watch = fleet.find(name)) return watch;
-  throw BadRequest(fmt::format("there is no encoder \"{}\" here", name));
+  const std::size_t slash = name.rfind('/');
+  if (slash != std::string_view::npos && fleet.find(name.substr(0, slash)) != nullptr) {
+    const std::string_view part = name.substr(slash + 1);
+    throw NotFound(fmt::format("an encoder has no \"{}\"{}", part, suggestion(part, parts_of_encoder)));
+  }
+  const Fleet::Watches watches = fleet.all();
+  std::vector<std::string_view> names;
+  for (const auto& watch : watches) names.push_back(watch->name());
+  throw NotFound(fmt::format("there is no encoder \"{}\" here{}", name, suggestion(name, names)));
+}
+
+// Says where a path of older versions is now.
+std::string unknown_path(const Request& request) {
+  constexpr std::string_view api = "/api/";
+  const std::string_view path = request.path;
+  if (path.starts_with(api)) {
+    const std::string_view last = path.substr(api.size());
+    if (last == "encoder") return "this is at /api/encoders/NAME now";
+    if (std::find(parts_of_encoder.begin(), parts_of_encoder.end(), last) != parts_of_encoder.end()) {
+      return fmt::format("this is at {}NAME/{} now", encoders_path, last);
+    }
+  }
+  return "there is nothing at this path: /openapi.json describes what there is";
 }
 
 std::vector<std::int64_t> arguments_in(const Request& request, const Command& command) {
@@ -98,6 +145,8 @@ void Api::answer(const Request& request, const Reply& reply) {
     Response response = error_response(405, "only GET and POST are known here");
     response.headers.emplace_back("Allow", "GET, HEAD, POST");
     reply.send(response);
+  } catch (const NotFound& error) {
+    reply.send(error_response(404, error.what()));
   } catch (const BadRequest& error) {
     reply.send(error_response(400, error.what()));
   } catch (const UsageError& error) {
@@ -109,10 +158,13 @@ void Api::get(const Request& request, const Reply& reply) {
   const std::string& path = request.path;
   const Asset* asset = find_asset(path);
   const bool for_anybody = asset != nullptr || path == "/healthz";
-  const bool asks = path == "/api/settings" || path == "/api/memory";
+  const bool is_of_encoder = path.starts_with(encoders_path);
+  const Target target = is_of_encoder ? target_of(path) : Target{};
+  const bool asks = target.part == "settings" || target.part == "memory";
   const Access::To what = for_anybody ? Access::To::anybody : asks ? Access::To::ask : Access::To::look;
   if (const auto refused = access_->refusal(request, what)) return reply.send(*refused);
   if (asset != nullptr) return reply.send({200, std::string(asset->type), std::string(asset->content)});
+  if (is_of_encoder) return get_of(require_encoder(*fleet_, target.name), target.part, request, reply);
   if (path == "/healthz") return reply.send(health());
   if (path == "/metrics") {
     ServerFigures figures{streams_->count(), streams_->dropped(), 0};
@@ -121,23 +173,44 @@ void Api::get(const Request& request, const Reply& reply) {
         {200, "text/plain; version=0.0.4; charset=utf-8", metrics(fleet_->all(), figures) + sending_->metrics()});
   }
   if (path == "/api/encoders") return reply.send(json_response(state_json(*fleet_, chronicler_)));
-  if (path == "/api/encoder") return reply.send(encoder(request));
-  if (path == "/api/stream" && request.method == "GET") return stream(request, reply);
-  if (asks && request.method == "GET") return inside(request, reply);
+  if (path == "/api/minute") return reply.send(json_response(last_minute(fleet_->all())));
+  if (path == "/api/token") return reply.send(token(request));
+  const bool wants_all = request.value("encoder").empty() && request.value("trace").empty();
+  if (path == "/api/stream" && wants_all && request.method == "GET") return stream("", reply);
+  if (path == "/api/events" && wants_all) return past("", true, request, reply);
   if (path == "/api/mqtt") return reply.send(json_response(sending_->json()));
-  if (path == "/api/history" || path == "/api/events") return past(request, reply);
-  if (path == "/api/history.csv") return past_as_csv(request, reply);
-  reply.send(error_response(404, "there is nothing of this name: /openapi.json tells what there is"));
+  throw NotFound(unknown_path(request));
+}
+
+void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, const Request& request,
+                 const Reply& reply) {
+  if (part.empty()) return reply.send(json_response(details(*watch)));
+  if (part == "history" || part == "events") return past(watch->name(), part == "events", request, reply);
+  if (part == "history.csv") return past_as_csv(watch->name(), request, reply);
+  if (part == "command" || part == "doctor" || request.method == "HEAD") {
+    Response response = error_response(
+        405, fmt::format("{} is asked for with {}", part, part == "command" || part == "doctor" ? "POST" : "GET"));
+    response.headers.emplace_back("Allow", part == "command" || part == "doctor" ? "POST" : "GET");
+    return reply.send(response);
+  }
+  if (part == "stream") return stream(watch->name(), reply);
+  const Unit& unit = *watch->address().unit;
+  if (part == "settings") return give(*watch, settings_order(unit), request, reply);
+  give(*watch, memory_order(unit, number_in(request, "page", -1, 0, UINT16_MAX)), request, reply);
 }
 
 void Api::post(const Request& request, const Reply& reply) {
-  const bool is_doctor = request.path == "/api/doctor";
-  if (const auto refused = access_->refusal(request, is_doctor ? Access::To::ask : Access::To::change)) {
-    return reply.send(*refused);
-  }
-  if (is_doctor) return doctor(request, reply);
-  if (request.path == "/api/command") return command(request, reply);
-  reply.send(error_response(404, "there is nothing of this name: /openapi.json tells what there is"));
+  const bool is_of_encoder = request.path.starts_with(encoders_path);
+  const Target target = is_of_encoder ? target_of(request.path) : Target{};
+  const Access::To what = target.part == "doctor" ? Access::To::ask : Access::To::change;
+  if (const auto refused = access_->refusal(request, what)) return reply.send(*refused);
+  if (!is_of_encoder) throw NotFound(unknown_path(request));
+  const std::shared_ptr<Watch> watch = require_encoder(*fleet_, target.name);
+  if (target.part == "doctor") return doctor(*watch, request, reply);
+  if (target.part == "command") return command(*watch, request, reply);
+  Response response = error_response(405, "only command and doctor are asked for with POST");
+  response.headers.emplace_back("Allow", "GET, HEAD");
+  reply.send(response);
 }
 
 // That it answers is its health; what is wrong with encoders is for /metrics.
@@ -156,21 +229,22 @@ Response Api::health() const {
                            .set("history_lost", history.lost));
 }
 
-Response Api::encoder(const Request& request) const {
-  return json_response(details(*encoder_in(*fleet_, request, "name")));
+// Whether there are tokens, and whose this one is.
+Response Api::token(const Request& request) const {
+  const std::string who = access_->who(request);
+  if (who.empty() && !request.authorization.empty()) return error_response(401, Access::wrong_token);
+  return json_response(
+      Json::object().set("tokens", access_->has_tokens()).set("name", who.empty() ? Json() : Json(who)));
 }
 
-void Api::stream(const Request& request, const Reply& reply) {
-  const std::string trace = request.value("trace");
-  if (!trace.empty()) static_cast<void>(encoder_in(*fleet_, request, "trace"));
+void Api::stream(const std::string& trace, const Reply& reply) {
   const std::shared_ptr<Stream> stream = streams_->open(trace);
   if (stream == nullptr) return reply.send(error_response(503, "too many streams are open"));
   reply.send(stream);
 }
 
-void Api::command(const Request& request, const Reply& reply) {
-  const std::shared_ptr<Watch> watch = encoder_in(*fleet_, request, "encoder");
-  const Command& wanted = require_command(*watch->address().unit, request.value("command"));
+void Api::command(Watch& watch, const Request& request, const Reply& reply) {
+  const Command& wanted = require_command(*watch.address().unit, request.value("command"));
   if (wanted.verb == Verb::scan) throw BadRequest("a scan is for a line without encoders that are being read");
   Order order;
   order.command = &wanted;
@@ -179,26 +253,17 @@ void Api::command(const Request& request, const Reply& reply) {
     Json json = Json::object().set("ok", done.good).set("text", done.text).set("fields", done.json);
     reply.send({done.good ? 200U : 502U, "application/json", json.line() + "\n"});
   };
-  give(*watch, std::move(order), request, reply);
-}
-
-// Settings or memory.
-void Api::inside(const Request& request, const Reply& reply) {
-  const std::shared_ptr<Watch> watch = encoder_in(*fleet_, request, "encoder");
-  const Unit& unit = *watch->address().unit;
-  if (request.path == "/api/settings") return give(*watch, settings_order(unit), request, reply);
-  give(*watch, memory_order(unit, number_in(request, "page", -1, 0, UINT16_MAX)), request, reply);
+  give(watch, std::move(order), request, reply);
 }
 
 // It opens the port anew, with other settings too: others on the line would lose it.
-void Api::doctor(const Request& request, const Reply& reply) {
-  const std::shared_ptr<Watch> watch = encoder_in(*fleet_, request, "encoder");
-  const std::vector<std::string> others = fleet_->company_of(*watch);
-  if (others.empty()) return give(*watch, examination_order(), request, reply);
+void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
+  const std::vector<std::string> others = fleet_->company_of(watch);
+  if (others.empty()) return give(watch, examination_order(), request, reply);
   reply.send(error_response(
       409, fmt::format("{} shares its line with {}, whose readings would stop too: end this server, then run "
                        "`absenc doctor \"{}\"`",
-                       watch->name(), fmt::join(others, ", "), watch->name())));
+                       watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
 // What answers is JSON of its own, or {"error":"..."}.
@@ -214,12 +279,10 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
   if (!refused.empty()) reply.send(error_response(409, refused));
 }
 
-void Api::past(const Request& request, const Reply& reply) {
+void Api::past(const std::string& encoder, bool events, const Request& request, const Reply& reply) {
   if (reader_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
   const Range range = range_in(request);
   const std::int64_t rows = number_in(request, "rows", 1000, 1, most_rows);
-  const std::string encoder = request.value("encoder");
-  const bool events = request.path == "/api/events";
   const auto job = [reader = reader_, range, rows, encoder, events, reply] {
     try {
       reply.send(
@@ -231,14 +294,14 @@ void Api::past(const Request& request, const Reply& reply) {
   if (!worker_->add(job)) reply.send(error_response(503, "too many others ask for history"));
 }
 
-void Api::past_as_csv(const Request& request, const Reply& reply) {
+void Api::past_as_csv(const std::string& encoder, const Request& request, const Reply& reply) {
   if (reader_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
   struct Rest {
     std::string encoder;
     Range range;
     std::weak_ptr<Stream> stream{};
   };
-  const auto rest = std::make_shared<Rest>(Rest{request.value("encoder"), range_in(request)});
+  const auto rest = std::make_shared<Rest>(Rest{encoder, range_in(request)});
   // A page each time that the client has taken the one before.
   const auto next = [reader = reader_, rest] {
     const std::shared_ptr<Stream> stream = rest->stream.lock();

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "absenc/serve/access.hpp"
 #include "absenc/serve/chronicler.hpp"
@@ -31,14 +32,14 @@ class Api {
   void get(const Request& request, const Reply& reply);
   void post(const Request& request, const Reply& reply);
   [[nodiscard]] Response health() const;
-  [[nodiscard]] Response encoder(const Request& request) const;
-  void stream(const Request& request, const Reply& reply);
-  void command(const Request& request, const Reply& reply);
-  void inside(const Request& request, const Reply& reply);
-  void doctor(const Request& request, const Reply& reply);
+  [[nodiscard]] Response token(const Request& request) const;
+  void get_of(const std::shared_ptr<Watch>& watch, std::string_view part, const Request& request, const Reply& reply);
+  void stream(const std::string& trace, const Reply& reply);
+  void command(Watch& watch, const Request& request, const Reply& reply);
+  void doctor(Watch& watch, const Request& request, const Reply& reply);
   void give(Watch& watch, Order order, const Request& request, const Reply& reply);
-  void past(const Request& request, const Reply& reply);
-  void past_as_csv(const Request& request, const Reply& reply);
+  void past(const std::string& encoder, bool events, const Request& request, const Reply& reply);
+  void past_as_csv(const std::string& encoder, const Request& request, const Reply& reply);
 
   Fleet* fleet_;
   const Access* access_;

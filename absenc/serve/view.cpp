@@ -70,6 +70,22 @@ Json arguments_json(const Command& command) {
   });
 }
 
+// Of the commands of which the page says what will be.
+std::string_view name_of(Verb verb) {
+  switch (verb) {
+    case Verb::clear_alarms:
+      return "clear_alarms";
+    case Verb::zero:
+      return "zero";
+    case Verb::reset_multiturn:
+      return "reset_multiturn";
+    case Verb::config_set:
+      return "config_set";
+    default:
+      return "";
+  }
+}
+
 Json commands_json(const Unit& unit) {
   Json all = Json::array();
   for (const Command& command : unit.commands) {
@@ -77,6 +93,7 @@ Json commands_json(const Unit& unit) {
     all.append(Json::object()
                    .set("name", command.name)
                    .set("meaning", command.meaning)
+                   .set("verb", name_of(command.verb))
                    .set("changes_encoder", command.changes_encoder)
                    .set("arguments", arguments_json(command)));
   }
@@ -121,6 +138,31 @@ Json bad_json(const Details& details) {
   });
 }
 
+// What the encoder can count: positions of a turn or of the scale. Null where only a reply tells.
+void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
+  Resolution known = watch.address().unit->resolution(watch.address().options);
+  const Reading& reading = snapshot.last.reading;
+  if (snapshot.has_reading && reading.singleturn_bits != 0) {
+    known.singleturn_bits = reading.singleturn_bits;
+    known.multiturn_bits = reading.multiturn_bits;
+    known.unit_um = reading.unit_um;
+  }
+  const bool is_known = known.singleturn_bits != 0 && known.singleturn_bits < 63;
+  const std::int64_t counts = is_known ? std::int64_t{1} << known.singleturn_bits : 0;
+  const bool linear = known.unit_um > 0;
+  json.set("counts_in_all", is_known ? Json(counts) : Json());
+  json.set("length_mm", is_known && linear ? Json(static_cast<double>(counts) * known.unit_um / 1000) : Json());
+  json.set("has_turns", known.multiturn_bits != 0);
+}
+
+// The past of an encoder that is not live: never to be shown as the present.
+Json last_reading_json(const Sample& last) {
+  const std::int64_t age_ms = std::chrono::duration_cast<std::chrono::milliseconds>(os::now() - last.at).count();
+  Json json = Json::object().set("at_ms", calendar_ms() - age_ms);
+  set_place(json, last.reading, true);
+  return json;
+}
+
 }  // namespace
 
 bool is_linear(const Watch& watch) { return watch.address().unit->resolution(watch.address().options).unit_um > 0; }
@@ -141,13 +183,17 @@ Json overview(const Watch& watch, const Snapshot& snapshot) {
   const Sample& last = snapshot.last;
   Json json = Json::object().set("encoder", watch.name()).set("address", address_of(watch.address()));
   json.set("protocol", unit.id).set("state", name_of(snapshot.state)).set("age_s", seconds_of(snapshot.age));
-  json.set("linear", is_linear(watch));
+  json.set("protocol_name", unit.name);
+  json.set("linear", is_linear(watch)).set("position_unit", is_linear(watch) ? "mm" : "deg");
+  set_scale(json, watch, snapshot);
   set_place(json, last.reading, live);
+  json.set("continued_position", live && last.position_valid && snapshot.place ? Json(*snapshot.place) : Json());
   json.set("speed", live && last.speed_valid ? Json(last.speed) : Json());
   json.set("speed_unit", is_linear(watch) ? "mm/s" : "rpm");
   json.set("alarms", live ? alarms_json(unit, last.reading) : Json());
   json.set("status", live ? status_json(unit, last.reading) : Json());
   json.set("errors_last_minute", snapshot.errors_last_minute).set("rate_hz", snapshot.rate);
+  json.set("last_reading", !live && snapshot.has_reading ? last_reading_json(last) : Json());
   return json.set("message", live ? Json() : Json(snapshot.message));
 }
 
@@ -155,7 +201,6 @@ Json details(const Watch& watch) {
   const Snapshot snapshot = watch.snapshot();
   const Details more = watch.details();
   Json json = overview(watch, snapshot);
-  json.set("protocol_name", watch.address().unit->name);
   json.set("readings", snapshot.readings).set("losses", snapshot.losses).set("restarts", snapshot.restarts);
   json.set("repeated", snapshot.counters.repeated).set("errors", errors_json(snapshot.counters));
   json.set("latency_us", latency_json(snapshot.latency));
@@ -163,6 +208,17 @@ Json details(const Watch& watch) {
   json.set("bad_exchanges", bad_json(more));
   json.set("readable", readable_json(*watch.address().unit));
   return json.set("commands", commands_json(*watch.address().unit));
+}
+
+Json last_minute(const Fleet::Watches& watches) {
+  const auto mean = [](const Spread& spread) { return spread.count != 0 ? Json(spread.mean()) : Json(); };
+  const Json encoders = Json::list(watches, [&](const auto& watch) {
+    const Json seconds = Json::list(watch->last_minute(), [&](const Second& second) {
+      return Json::array().append(second.at_s).append(mean(second.place)).append(mean(second.speed));
+    });
+    return Json::object().set("encoder", watch->name()).set("seconds", seconds);
+  });
+  return Json::object().set("encoders", encoders);
 }
 
 Json points(const Watch& watch, std::span<const Point> taken) {

@@ -138,6 +138,11 @@ void Watch::stop_passing(Outlet outlet) {
   outboxes_[static_cast<std::size_t>(outlet)].close();
 }
 
+std::vector<Second> Watch::last_minute() const {
+  const std::lock_guard lock(mutex_);
+  return {last_minute_.begin(), last_minute_.end()};
+}
+
 std::vector<Second> Watch::take_seconds() {
   const std::int64_t now_s = calendar_ms() / 1000;
   const std::lock_guard lock(mutex_);
@@ -239,6 +244,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
         const std::lock_guard lock(mutex_);
         known_.has_reading = true;
         known_.last = sample;
+        if (sample.position_valid) known_.place = place_of(sample);
         known_at_ = sample.at;
         ++known_.readings;
       }
@@ -295,7 +301,11 @@ void Watch::count_second(const Sample& sample, std::uint64_t errors) {
   const std::int64_t at_ms = calendar_ms();
   const std::int64_t at_s = at_ms / 1000;
   if (at_s != second_.at_s) {
-    if (second_.at_s != 0) seconds_.push_back(second_);
+    if (second_.at_s != 0) {
+      seconds_.push_back(second_);
+      if (second_.readings != 0) last_minute_.push_back(second_);
+      if (last_minute_.size() > 60) last_minute_.pop_front();
+    }
     if (seconds_.size() > most_seconds) seconds_.pop_front();
     second_ = {};
     second_.at_s = at_s;

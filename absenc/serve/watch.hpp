@@ -60,8 +60,9 @@ struct Snapshot {
   State state = State::opening;
   Time age{};  // of the reading, or of what is known instead
   bool has_reading = false;
-  client::Sample last{};  // only to be shown as the present one while `live`
-  std::string message{};  // why it is not
+  std::optional<double> place{};  // of the last position that held, as in `Point`
+  client::Sample last{};          // only to be shown as the present one while `live`
+  std::string message{};          // why it is not
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
@@ -127,6 +128,8 @@ class Watch {
   void stop_passing(Outlet outlet);
   /// The seconds that are over.
   [[nodiscard]] std::vector<Second> take_seconds();
+  /// The last 60 seconds that are over and in which it was read, the oldest first: of a lost encoder those before.
+  [[nodiscard]] std::vector<Second> last_minute() const;
   /// "", or why it is not taken: another waits, an examination runs, or it has ended.
   [[nodiscard]] std::string_view give(Order order);
 
@@ -171,6 +174,7 @@ class Watch {
   std::array<Outbox, 2> outboxes_;  // by Outlet
   Second second_{};
   std::deque<Second> seconds_;
+  std::deque<Second> last_minute_;
   struct Minute {
     std::array<std::uint64_t, 60> errors{};  // by second
     std::array<std::int64_t, 60> at_s{};

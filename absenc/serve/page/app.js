@@ -1,52 +1,88 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which view is shown, and what the stream of events tells it.
-import {ask, setText} from "./dom.js";
+// Which view is shown, and what the stream of events says to it.
+import {askToken} from "./dialog.js";
+import {setText} from "./dom.js";
 import {One} from "./encoder.js";
-import {Glance} from "./glance.js";
-import {Events, setToken} from "./server.js";
+import {Overview} from "./overview.js";
+import {Events, tokenInfo} from "./server.js";
+import {clock, sentence} from "./words.js";
 
 const main = document.getElementById("main");
+const bar = document.getElementById("bar");
+const time = document.getElementById("clock");
 const connection = document.getElementById("connection");
 const historyTrouble = document.getElementById("history-trouble");
 const announcements = document.getElementById("announcements");
+const tokenButton = document.getElementById("token");
 
 let view;
 let events;
+let shown;  // the encoder whose page it is; null: all
 
-function lose(why) {
-  connection.className = "lost";
-  setText(connection, `The connection to the server is lost: ${why}. What is shown is not live.`);
-  view.lose();
+/** `refused`: the server is there and says why it sends nothing. */
+function lose(why, refused = false) {
+  connection.hidden = false;
+  setText(connection, refused ? sentence(why) : `No connection to the server: ${why}. Nothing on this page is live.`);
+  setText(time, "not live");
+  view.lose(refused ? why : undefined);
+}
+
+// A token that the server wants even to look.
+function explain(why, refused) {
+  lose(why, refused);
+  tokenButton.hidden = false;
 }
 
 function take(event, data) {
   if (event === "state") {
-    connection.className = "";
-    setText(connection, `connected: ${data.encoders.filter((one) => one.state === "live").length} of ${data.encoders.length} live`);
+    if (!connection.hidden) greet();
+    connection.hidden = true;
+    setText(time, clock(data.at_ms).split(", ").at(-1));
     const trouble = data.history?.trouble ?? "";
     historyTrouble.hidden = trouble === "";
-    setText(historyTrouble, trouble === "" ? "" : `The history is not being written: ${trouble}. Lost so far: ${data.history.lost} rows.`);
+    setText(historyTrouble, trouble === "" ? "" : `The history is not being written: ${trouble}. Rows lost so far: ${data.history.lost}.`);
     view.show(data);
   }
   if (event === "happening") setText(announcements, `${data.encoder} ${data.kind}: ${data.text}`);
   view.take(event, data);
 }
 
-function route() {
-  const match = /^#encoder=(.*)$/.exec(location.hash);
-  events?.close();
-  view?.close();
-  view = match ? new One(main, decodeURIComponent(match[1])) : new Glance(main);
-  document.title = match ? `${decodeURIComponent(match[1])} – absenc` : "absenc";
-  events = new Events(view.trace, {onEvent: take, onLost: lose});
+/** {encoder, tab, range, unit} of the address: a link to it can be shared. */
+function place() {
+  const values = new URLSearchParams();
+  for (const part of location.hash.slice(1).split("&")) {
+    const [name, ...rest] = part.split("=");
+    if (name !== "") values.set(name, decodeURIComponent(rest.join("=")));
+  }
+  return values;
 }
 
-document.getElementById("token").addEventListener("click", async () => {
-  const token = await ask("Token", "Of the server's token file; kept until this tab is closed.", "Use it", "token");
-  if (token !== null) setToken(token);
-});
+function route() {
+  const values = place();
+  const encoder = values.get("encoder");
+  if (view !== undefined && encoder !== null && encoder === shown) return view.go(values);
+  events?.close();
+  view?.close();
+  shown = encoder;
+  bar.replaceChildren();
+  view = encoder === null ? new Overview(main, bar) : new One(main, bar, encoder, values);
+  document.title = encoder === null ? "absenc" : `${encoder} – absenc`;
+  events = new Events(view.trace, {onEvent: take, onLost: explain});
+}
+
+async function greet() {
+  try {
+    tokenButton.hidden = !(await tokenInfo()).tokens;
+  } catch {
+    // the stream says that the server is away
+  }
+}
+
+tokenButton.addEventListener("click", askToken);
 addEventListener("hashchange", () => {
+  const before = shown;
   route();
-  main.focus();
+  if (before !== shown) main.focus();
 });
 route();
+greet();

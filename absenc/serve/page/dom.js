@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Elements and texts. Everything that came from elsewhere is put in as text, never as markup.
+// Elements, drawings and tables. Texts of the server are put in as text, never as markup.
 
 /** element("p", {class: "why"}, "text", child) */
 export function element(name, attributes = {}, ...children) {
@@ -12,35 +12,93 @@ export function element(name, attributes = {}, ...children) {
   return made;
 }
 
-/** Only when it is another: so screen readers and selections are left in peace. */
+/** Changes the text only if it is another, so that screen readers and selections are not disturbed. */
 export function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** A dial whose needle `turn` sets, in degrees clockwise from the top; null: no needle. */
+function drawing(name, attributes = {}, ...children) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+/** A name that may be broken behind its separators, and nowhere else. */
+export function breakable(text) {
+  const parts = text.split(/(?<=[?&=:/_,])/);
+  return parts.flatMap((part, i) => (i === 0 ? [part] : [element("wbr"), part]));
+}
+
+/** A sentence in which `this` is a command line. */
+export const rich = (text) => text.split("`").map((part, i) => (i % 2 === 1 ? element("code", {}, part) : part));
+
+/** A dial. `turn` sets its needle in degrees clockwise from the top; null hides it. */
 export function dial() {
-  const svg = document.createElementNS(SVG, "svg");
-  svg.setAttribute("viewBox", "-50 -50 100 100");
-  svg.setAttribute("class", "dial off");
-  svg.setAttribute("aria-hidden", "true");  // the number stands beside it
-  const add = (name, attributes) => {
-    const part = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) part.setAttribute(key, value);
-    svg.append(part);
-    return part;
-  };
-  add("circle", {r: 46});
-  for (let angle = 0; angle < 360; angle += 30) {
-    add("line", {class: "tick", y1: -46, y2: -40, transform: `rotate(${angle})`});
-  }
-  const needle = add("line", {class: "needle", y1: 8, y2: -36});
+  const needle = drawing("line", {class: "needle", y1: 0, y2: -36});
+  const ticks = Array.from({length: 12}, (_, i) => drawing("line", {class: "tick", y1: -46, y2: -40, transform: `rotate(${30 * i})`}));
+  const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},  // the number stands beside it
+                       drawing("circle", {r: 46}), ...ticks, needle, drawing("circle", {class: "hub", r: 5}));
   return {
-    svg,
+    node,
     turn(angle) {
-      svg.classList.toggle("off", angle === null);
+      node.classList.toggle("off", angle === null);
       if (angle !== null) needle.setAttribute("transform", `rotate(${angle})`);
+    },
+  };
+}
+
+/** A scale from 0 to its end. `move` sets its mark as a share from 0 to 1; null hides it. */
+export function scale() {
+  const filled = element("span", {class: "filled"});
+  const mark = element("span", {class: "mark"});
+  const end = element("span");
+  const node = element("div", {class: "scale off", "aria-hidden": "true"}, element("div", {class: "track"}, filled, mark),
+                       element("div", {class: "ends"}, element("span", {}, "0 mm"), end));
+  return {
+    node,
+    move(share, length) {
+      node.classList.toggle("off", share === null);
+      setText(end, length);
+      if (share === null) return;
+      filled.style.width = mark.style.left = `${100 * share}%`;
+    },
+  };
+}
+
+const SPARK_S = 60;
+const SPARK_LOST_S = 15;  // so much of the width is left for the time without readings
+
+/** The line of a minute. */
+export function spark() {
+  const line = drawing("path", {class: "line"});
+  const gap = drawing("rect", {class: "gap", y: 0, height: 100, width: 0});
+  const node = drawing("svg", {viewBox: "0 0 600 100", preserveAspectRatio: "none", class: "spark", "aria-hidden": "true"}, gap, line);
+  return {
+    node,
+    /** `points`: [seconds, value]; `least`: the smallest range that fills the height; `live`: false marks the end. */
+    draw(points, now, least, live) {
+      const last = points.at(-1)?.[0] ?? now;
+      const end = live ? now : Math.min(now, last + SPARK_LOST_S);
+      const shown = points.filter(([at, value]) => value !== null && at >= end - SPARK_S);
+      const values = shown.map(([, value]) => value);
+      const [low, high] = [Math.min(...values), Math.max(...values)];
+      const range = Math.max(high - low, least);
+      const middle = (low + high) / 2;
+      const x = (at) => 600 * (1 - (end - at) / SPARK_S);
+      let before = -Infinity;
+      const path = shown.map(([at, value]) => {
+        const step = `${at - before > 3 ? "M" : "L"}${x(at).toFixed(1)} ${(50 - 88 * (value - middle) / range).toFixed(1)}`;
+        before = at;
+        return step;
+      });
+      line.setAttribute("d", path.join(""));
+      const from = live ? 600 : Math.max(0, x(last));
+      gap.setAttribute("x", from);
+      gap.setAttribute("width", 600 - from);
+      return values.length === 0 ? null : [low, high];
     },
   };
 }
@@ -53,91 +111,29 @@ function narrowTable(head, list, cells, caption) {
                  element("tbody", {}, ...list.map(line)));
 }
 
-/** One that may be wider than the page. */
+/** A table that may be wider than the page. */
 export function table(head, list, cells, caption) {
   return element("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": caption}, narrowTable(head, list, cells, caption));
 }
 
-/** A table of [name, count], with bars beside the counts for those who see them. */
+/** A table of [name, count], with bars beside the counts. */
 export function histogram(head, list, caption) {
   const most = Math.max(1, ...list.map(([, count]) => count));
   const bar = (count) => element("span", {class: "bar", style: `width: ${100 * count / most}%`, "aria-hidden": "true"});
-  const made = narrowTable([...head, ""], list, ([name, count]) => [name, String(count), bar(count)], caption);
+  const made = narrowTable([...head, "share"], list, ([name, count]) => [name, String(count), bar(count)], caption);
   made.className = "histogram";
   return made;
 }
 
-export const NOTHING = "–";
-
-export function duration(seconds) {
-  if (seconds < 1) return `${Math.round(seconds * 1000)} ms`;
-  if (seconds < 120) return `${seconds.toFixed(1)} s`;
-  if (seconds < 7200) return `${Math.round(seconds / 60)} min`;
-  return `${Math.round(seconds / 3600)} h`;
+/** A list of [term, value]. */
+export function terms(list) {
+  return element("dl", {}, ...list.map(([term, value]) => element("div", {}, element("dt", {}, term), element("dd", {}, value))));
 }
 
-export function positionText(one) {
-  if (one.angle_deg !== null) return `${one.angle_deg.toFixed(3)}°`;
-  if (one.position_mm !== null) return `${one.position_mm.toFixed(4)} mm`;
-  if (one.state !== "live") return NOTHING;
-  return one.singleturn_valid === null ? "unknown" : "INVALID";
-}
-
-export function turnsText(one) {
-  if (one.turns !== null) return String(one.turns);
-  return one.multiturn_valid === false ? "INVALID" : NOTHING;
-}
-
-export function speedText(one) {
-  return one.speed === null ? NOTHING : `${one.speed.toFixed(1)} ${one.speed_unit}`;
-}
-
-export function stateText(one) {
-  return one.state === "live" ? "live" : `${one.state}: no reading for ${duration(one.age_s)}`;
-}
-
-export function alarmText(alarm) {
-  const action = alarm.action ? ` What to do: ${alarm.action}.` : "";
-  return `${alarm.channel ? alarm.channel + " " : ""}${alarm.name}: ${alarm.meaning}.${action}`;
-}
-
-/** [class, text] of each line below an encoder: alarms, or that nobody has reported them, and why it is not live. */
-export function wordsOf(one) {
-  const words = (one.alarms ?? []).map((alarm) => ["alarm", alarmText(alarm)]);
-  if (one.state === "live" && one.alarms === null) {
-    if (one.status?.length) words.push(["alarm", `status: ${one.status.join(" ")}`]);
-    words.push(["faint", "alarms not reported"]);
-  }
-  if (one.message) words.push(["why", one.message]);
-  return words;
-}
-
-/** A value of a reply: flags are a list of names, and what does not hold is null. */
-export function fieldText(value, missing = "INVALID") {
-  if (value === null) return missing;
-  return Array.isArray(value) ? value.join(" ") || "none" : String(value);
-}
-
-const dialog = document.getElementById("dialog");
-
-/** True when it was answered with yes; with `field`, what was written, or null. */
-export function ask(title, text, yes, field = null) {
-  document.getElementById("dialog-title").textContent = title;
-  document.getElementById("dialog-text").textContent = text;
-  document.getElementById("dialog-yes").textContent = yes;
-  const label = document.getElementById("dialog-field");
-  const input = label.querySelector("input");
-  label.hidden = field === null;
-  label.querySelector("span").textContent = field ?? "";
-  input.value = "";
-  dialog.returnValue = "no";
-  dialog.showModal();
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => {
-      const agreed = dialog.returnValue === "yes";
-      if (field === null) resolve(agreed);
-      else resolve(agreed ? input.value.trim() : null);
-      input.value = "";
-    }, {once: true});
-  });
+/** Buttons of which one is chosen. `list`: [[value, text], ...]. */
+export function choice(label, list, chosen, onChoice) {
+  const buttons = list.map(([value, text]) => element("button", {
+    type: "button", "aria-pressed": String(value === chosen), "data-value": value,
+    onclick: () => onChoice(value)}, text));
+  return element("div", {class: "choice", role: "group", "aria-label": label}, ...buttons);
 }

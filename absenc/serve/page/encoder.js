@@ -1,35 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything about one encoder: live trace, history, errors, commands.
-/* global Dygraph */
-import {NOTHING, ask, dial, duration, element, fieldText, histogram, positionText, setText, speedText, stateText, table, turnsText, wordsOf} from "./dom.js";
+// One encoder: what it does, what is wrong, what can be done; the rest in tabs.
+import {askCommand} from "./dialog.js";
+import {breakable, choice, dial, element, histogram, rich, scale, setText, table, terms} from "./dom.js";
 import {Examine} from "./examine.js";
-import {download, hasToken, request, setToken} from "./server.js";
+import {figureNode, showParts, showState, stateNode} from "./overview.js";
+import {Trace, isMarked, markText, quantities} from "./plots.js";
+import {download, pathOf, request, tokenInfo} from "./server.js";
+import {SHAPES, belowFigure, clock, condition, duration, fieldText, figure, happened, lastText, microseconds, namedUnit, numberText, plain, sentence, wrongs} from "./words.js";
 
-const SHOWN_MS = 20000;
-const MOST_POINTS = 2000;
+const LIVE_MS = 20000;
+const LOST_SHARE = .15;     // of the trace of a lost encoder: the time without readings
+const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
-const WRITTEN_MS = 1500;  // then what has happened stands in the history
+const WRITTEN_MS = 1500;    // after that an event stands in the history
 const PAST_MS = 10000;
 const MOST_EVENTS = 100;
-
-const ink = () => getComputedStyle(document.body).color;
-
-// Labels with as many decimals as tell one line of the grid from the next.
-function gridLines(...range) {
-  const lines = Dygraph.numericTicks(...range);
-  if (lines.length < 2) return lines;
-  const decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(Math.abs(lines[1].v - lines[0].v)))));
-  return lines.map((line) => ({...line, label: line.v.toFixed(decimals)}));
-}
-
-// One point that is none, until there is something.
-function plot(node, title, options) {
-  const nothing = options.customBars ? [NaN, NaN, NaN] : NaN;
-  return new Dygraph(node, [[new Date(), nothing]], {
-    title, labels: ["time", title], axisLabelColor: ink(), axisLabelWidth: 72, axisLineColor: ink(), gridLineColor: "rgba(128,128,128,.35)", titleHeight: 20,
-    colors: ["#2f7fd0", "#d07a1f"], strokeWidth: 1.5, legend: "never", axes: {y: {ticker: gridLines, axisLabelWidth: 96}}, ...options,
-  });
-}
+const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], "24h": ["24 h", 86400], "7d": ["7 days", 604800], all: ["All", 31 * 86400]};
+const TABS = {history: "History", exchanges: "Exchanges", settings: "Settings", memory: "Memory", doctor: "Doctor"};
+const AWAY = ["opening", "lost", "examined"];
+const SLOW_RPM = 20;
+const SHOWN_COMMANDS = 3;
+const LEAST_MS = 12;      // between two points
 
 function limitText(us) {
   if (us >= 1e6) return `${us / 1e6} s`;
@@ -43,272 +34,472 @@ function latencyRows(buckets) {
     .map(({at_most: limit, count}) => [limit === null ? "longer" : `to ${limitText(limit)}`, count]);
 }
 
-// Where nothing was read there is a gap, up to now: a loss must not lie beyond the end of the plot.
-function pastRows({rows, step_s: step}) {
-  const list = [];
-  const gap = (at) => list.push([new Date(at * 1000), [NaN, NaN, NaN]]);
-  let before = null;
-  for (const [at, least, mean, greatest] of rows.filter((row) => row[2] !== null)) {
-    if (before !== null && at - before > 2 * step) gap(before + step);
-    list.push([new Date(at * 1000), [least, mean, greatest]]);
-    before = at;
-  }
-  if (before !== null) gap(Math.max(before + step, Date.now() / 1000));
-  return list;
-}
-
-// What the plot of the past marks, with its word: an alarm has its name before its meaning.
-const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
-const markText = (event) => (event.kind === "alarm" ? event.text.split(":")[0] : event.kind);
-
-// Words that would stand on others are left out: the table below the plot has them all.
-function drawMarks(canvas, area, graph, marks) {
-  const style = getComputedStyle(document.body);
-  canvas.save();
-  canvas.font = "12px system-ui, sans-serif";
-  const free = [area.x, area.x, area.x];  // where each of three lines of words ends
-  for (const {at_ms: at, kind, ...event} of marks) {
-    const x = Math.round(graph.toDomXCoord(at)) + .5;
-    if (x < area.x || x > area.x + area.w) continue;
-    canvas.fillStyle = canvas.strokeStyle = style.getPropertyValue(kind === "alarm" ? "--bad" : "--warn");
-    canvas.setLineDash(kind === "alarm" ? [] : [4, 3]);
-    canvas.beginPath();
-    canvas.moveTo(x, area.y);
-    canvas.lineTo(x, area.y + area.h);
-    canvas.stroke();
-    const words = markText({kind, ...event});
-    const width = canvas.measureText(words).width;
-    const left = Math.min(x + 3, area.x + area.w - width);
-    const line = free.findIndex((end) => end <= left);
-    if (line < 0) continue;
-    canvas.fillText(words, left, area.y + 12 + 14 * line);
-    free[line] = left + width + 6;
-  }
-  canvas.restore();
-}
-
 export class One {
-  constructor(main, name) {
+  constructor(main, bar, name, values) {
     this.name = name;
     this.trace = name;
-    this.points = [];
-    this.marks = [];
-    this.word = null;  // a new one each time that the server is there again
-    this.build(main);
+    this.points = [];     // [at_ms, position, speed]
+    this.events = [];
+    this.loss = 0;        // counts losses of the server: an answer from before one is dropped
+    this.hasHistory = true;
+    this.values = new Map(values);
+    this.build(main, bar);
+    this.seed();
     this.timer = setInterval(() => this.refresh(), REFRESH_MS);
-    this.loadHistory();
-    this.pastTimer = setInterval(() => this.loadHistory(), PAST_MS);
+    this.pastTimer = setInterval(() => this.loadPast(), PAST_MS);
     const frame = () => {
       if (this.closed) return;
-      this.draw();
+      if (this.changed) this.draw();
       requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
   }
 
-  build(main) {
+  build(main, bar) {
+    bar.replaceChildren(element("a", {href: "#", class: "back"}, "← All encoders"));
     this.dial = dial();
-    this.state = element("p", {class: "state"});
-    this.facts = element("dl");
-    this.words = element("div");
-    this.placePlot = element("div", {class: "plot", role: "img", "aria-label": "position over the last 20 seconds"});
-    this.speedPlot = element("div", {class: "plot", role: "img", "aria-label": "speed over the last 20 seconds"});
-    this.fields = element("dl");
+    this.scale = scale();
+    this.figure = figureNode();
+    this.state = stateNode();
+    this.about = element("p", {class: "faint about"});
+    this.below = element("p", {class: "below"});
+    this.ranges = element("div");
+    this.units = element("div");
+    this.scale.node.hidden = true;  // until it is known to be linear
+    this.plot = element("div", {class: "plot", hidden: true, role: "img", "aria-label": "trace"});
+    this.noTrace = element("p", {class: "faint"});
+    this.wrong = element("div");
+    this.wrongBox = element("section", {class: "box side"}, element("h3", {}, "What is wrong"), this.wrong);
+    this.commands = element("div", {class: "commands"});
+    this.outcome = element("p", {class: "status", role: "status"});
+    this.line = element("div");
+    this.examine = new Examine(this.name);
+    this.doctorButton = element("button", {type: "button", onclick: () => {
+      this.set("tab", "doctor");
+      this.examine.doctor.run();
+    }}, "Examine (doctor)");
+    this.past = element("p", {class: "faint", role: "status"});
+    this.eventTable = element("div");
     this.latencies = element("div");
     this.errors = element("div");
+    this.fields = element("div");
     this.bad = element("div");
-    this.command = element("select", {"aria-label": "command", onchange: () => this.showArguments()});
-    this.arguments = element("div");
-    this.outcome = element("p", {role: "status"});
-    this.hours = element("select", {onchange: () => this.loadHistory()},
-                         ...[1, 6, 24, 168].map((hours) => element("option", {value: hours}, `${hours} h`)));
-    this.pastPlot = element("div", {class: "plot", role: "img", "aria-label": "least, mean and greatest position"});
-    this.past = element("p", {class: "why", role: "status"});
-    this.events = element("div");
-    this.examine = new Examine(this.name);
-    const box = (title, ...children) => element("section", {class: "box"}, element("h2", {}, title), ...children);
-    main.replaceChildren(
-      element("p", {}, element("a", {href: "#"}, "all encoders")),
-      box(this.name, element("div", {class: "card"}, this.dial.svg, element("div", {}, this.state, this.facts)), this.words),
-      box("Live", this.placePlot, this.speedPlot),
-      box("Last reply", this.fields),
-      box("Latencies and errors", element("div", {class: "figures"}, this.latencies, this.errors)),
-      box("Last bad exchanges", this.bad),
-      box("Commands", element("p", {}, this.command, " ", element("button", {type: "button", onclick: () => this.run()}, "Run")),
-          this.arguments, this.outcome),
-      ...this.examine.nodes,
-      box("History", element("p", {}, element("label", {}, "the last ", this.hours), " ",
-                             element("button", {type: "button", onclick: () => this.save()}, "CSV")),
-          this.past, this.pastPlot, this.events));
-    const zoom = {interactionModel: {}};
-    this.placeGraph = plot(this.placePlot, "position", zoom);
-    this.speedGraph = plot(this.speedPlot, "speed", zoom);
-    this.dark = matchMedia("(prefers-color-scheme: dark)");
-    this.recolor = () => {
-      for (const graph of [this.placeGraph, this.speedGraph, this.pastGraph]) graph?.updateOptions({axisLabelColor: ink(), axisLineColor: ink()});
+    this.csv = element("button", {type: "button", onclick: () => this.save()}, "Save as CSV");
+    const part = (title, node) => element("div", {}, element("h4", {}, title), node);
+    this.panels = {
+      history: element("div", {}, element("p", {class: "row"}, this.csv, this.past), this.eventTable),
+      exchanges: element("div", {class: "figures"}, part("Replies by latency", this.latencies), part("Failed attempts", this.errors),
+                         part("Last reply", this.fields), element("div", {class: "wide"}, element("h4", {}, "Last bad exchanges"), this.bad)),
+      settings: this.examine.settings.node, memory: this.examine.memory.node, doctor: this.examine.doctor.node,
     };
-    this.dark.addEventListener("change", this.recolor);
+    this.tabs = {};
+    const tabs = Object.entries(TABS).map(([key, text]) => {
+      Object.entries({id: `panel-${key}`, role: "tabpanel", "aria-labelledby": `tab-${key}`, tabindex: 0}).forEach(([name, value]) => this.panels[key].setAttribute(name, value));
+      this.tabs[key] = element("button", {type: "button", role: "tab", id: `tab-${key}`, "aria-controls": `panel-${key}`, onclick: () => this.set("tab", key)}, text);
+      return this.tabs[key];
+    });
+    const list = element("div", {role: "tablist", class: "tablist", "aria-label": "more about the encoder", onkeydown: (event) => this.step(event)}, ...tabs);
+    main.replaceChildren(element("div", {class: "one"},
+      element("section", {class: "box now-box"},
+        element("div", {class: "head"}, element("h2", {}, ...breakable(this.name)), this.state), this.about,
+        element("div", {class: "now large"}, this.dial.node, element("div", {}, this.figure.node, this.below)),
+        this.scale.node,
+        element("div", {class: "choices"}, this.ranges, this.units), this.plot, this.noTrace),
+      element("div", {class: "beside"}, this.wrongBox,
+        element("section", {class: "box side"}, element("h3", {}, "What can be done"), this.commands, this.outcome),
+        element("section", {class: "box side"}, element("h3", {}, "Line"), this.line)),
+      element("section", {class: "box tabs"}, list, ...Object.values(this.panels))));
+    this.showTab();
+  }
+
+  /** Left and right between the tabs, as in any list of tabs. */
+  step(event) {
+    const move = {ArrowRight: 1, ArrowLeft: -1}[event.key];
+    if (move === undefined) return;
+    const keys = Object.keys(TABS).filter((key) => !this.tabs[key].hidden);
+    const next = keys[(keys.indexOf(this.tab) + move + keys.length) % keys.length];
+    this.set("tab", next);
+    this.tabs[next].focus();
+  }
+
+  /** Into the address, so that it can be shared. */
+  set(name, value) {
+    this.values.set(name, value);
+    const values = [...this.values].map(([key, text]) => `${key}=${encodeURIComponent(text)}`).join("&");
+    history.replaceState(null, "", `#${values}`);
+    this.go(this.values);
+  }
+
+  go(values) {
+    this.values = new Map(values);
+    this.showTab();
+    if (this.one !== undefined) this.showChoices();
+    this.loadPast();
+    this.changed = true;
+  }
+
+  get tab() {
+    const key = this.values.get("tab");
+    return key in TABS && !this.tabs[key].hidden ? key : "history";
+  }
+
+  showTab() {
+    for (const key of Object.keys(TABS)) {
+      this.panels[key].toggleAttribute("hidden", key !== this.tab);
+      this.tabs[key].setAttribute("aria-selected", String(key === this.tab));
+      this.tabs[key].tabIndex = key === this.tab ? 0 : -1;
+    }
+  }
+
+  get range() {
+    const key = this.values.get("range");
+    return key in RANGES && this.hasHistory ? key : "live";
+  }
+
+  /** Range and unit, with the plot of that unit. */
+  showChoices() {
+    const all = quantities(this.one);
+    const possible = Object.entries(all).filter(([, one]) => !one.past || this.range !== "live");
+    const wanted = this.values.get("unit");
+    const unit = possible.some(([key]) => key === wanted) ? wanted : possible[0][0];
+    const key = JSON.stringify([this.range, unit, this.hasHistory, this.one.counts_in_all, this.one.has_turns]);
+    if (key === this.shownChoices) return;
+    this.shownChoices = key;
+    const focused = document.activeElement?.dataset?.value;
+    const ranges = Object.entries(RANGES).map(([value, [text]]) => [value, text]);
+    this.ranges.replaceChildren(this.hasHistory ? choice("range", ranges, this.range, (value) => this.set("range", value)) : element("p", {class: "faint"}, "Live. No history is kept: see --history."));
+    this.units.replaceChildren(choice("unit", possible.map(([value, one]) => [value, one.text]), unit, (value) => this.set("unit", value)));
+    if (focused) this.node(`[data-value="${focused}"]`)?.focus();
+    this.quantity = all[unit];
+    this.graph?.close();
+    this.graph = undefined;
+    this.changed = true;
+  }
+
+  node(selector) {
+    return document.querySelector(`.one ${selector}`);
+  }
+
+  /** The last minute that the server knows, of a lost encoder the one before its loss. */
+  async seed() {
+    try {
+      const {status, body} = await request("api/minute");
+      if (status !== 200 || this.closed) return;
+      const seconds = body.encoders.find((one) => one.encoder === this.name)?.seconds ?? [];
+      // Between the means of seconds a fast encoder has turned further than they can tell.
+      const means = seconds.filter(([, place, speed]) => place !== null && (this.one?.state !== "live" || this.one.linear || Math.abs(speed ?? 0) < SLOW_RPM)).map(([at, place, speed]) => [at * 1000 + 500, place, speed]);
+      const fresh = means.filter(([at]) => !this.points.some(([other]) => Math.abs(other - at) < 1000));
+      this.points = [...fresh, ...this.points].sort((a, b) => a[0] - b[0]);
+      this.changed = true;
+    } catch {
+      // the stream says that the server is away
+    }
   }
 
   show(state) {
     const one = state.encoders.find((other) => other.encoder === this.name);
-    if (one === undefined) return this.lose("it is no longer served");
-    if (this.word === null) {
-      this.word = {};
-      this.refresh();
+    if (one === undefined) return this.lose("this encoder is not served any more");
+    const first = this.one === undefined || !this.known;
+    const changed = this.one?.state !== one.state;
+    this.one = one;
+    this.known = true;
+    this.at_ms = state.at_ms;
+    this.hasHistory = state.history !== null;
+    this.condition = condition(one);
+    showState(this.state, this.condition);
+    const address = one.address === this.name ? "" : ` · ${one.address}`;
+    if (this.about.dataset.shown !== address) {
+      this.about.dataset.shown = address;
+      this.about.replaceChildren(...breakable(one.protocol_name + address));
     }
-    this.dial.svg.toggleAttribute("hidden", one.linear);
+    this.figure.show(one);
+    this.dial.node.toggleAttribute("hidden", one.linear);
     this.dial.turn(one.angle_deg);
-    this.state.className = `state ${one.state}`;
-    setText(this.state, stateText(one));
-    this.live = one.state === "live";
-    for (const node of [this.placePlot, this.speedPlot]) node.classList.toggle("stale", !this.live);
-    this.facts.replaceChildren(...[
-      ["position", positionText(one)], ["turns", turnsText(one)],
-      ["speed", speedText(one)], ["readings a second", this.live ? one.rate_hz.toFixed(1) : NOTHING],
-      ["errors, last minute", String(one.errors_last_minute)], ["address", one.address],
-    ].flatMap(([label, value]) => [element("dt", {}, label), element("dd", {}, value)]));
-    this.words.replaceChildren(...wordsOf(one).map(([kind, text]) => element("p", {class: kind}, text)));
+    const scaled = one.linear && one.length_mm !== null;
+    this.scale.node.toggleAttribute("hidden", !scaled);
+    if (scaled) this.scale.move(one.position_mm === null ? null : one.position_mm / one.length_mm, `${numberText(one.length_mm)} mm`);
+    const counts = one.counts === null ? [] : [`${numberText(one.counts)} ${one.counts_in_all === null ? "counts" : `of ${numberText(one.counts_in_all)} counts`}`];
+    showParts(this.below, [...belowFigure(one, state.at_ms), ...counts]);
+    // A command could not reach it; doctor says why.
+    for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(one.state);
+    this.showWrong();
+    this.showChoices();
     this.examine.show(one);
+    if (first) {
+      this.refresh();
+      this.loadPast();
+    }
+    if (changed || one.state !== "live") this.changed = true;
+  }
+
+  sinceOf(name) {
+    const event = this.events.find((other) => other.kind === "alarm" && other.text.split(/[: ]/)[0] === name);
+    return event === undefined ? "" : `Since ${clock(event.at_ms)}.`;
+  }
+
+  showWrong() {
+    const one = this.one;
+    const list = wrongs(one).map(([kind, strong, text], i) => {
+      const since = one.alarms?.[i] ? this.sinceOf(one.alarms[i].name) : "";
+      return [kind, strong, [since, text].filter((part) => part !== "").join(" ")];
+    });
+    if (one.state !== "live" && one.state !== "examined" && one.last_reading !== null) {
+      list.push(["bad", "No reading", `since ${clock(one.last_reading.at_ms)}${lastText(one.last_reading) && `: then it was at ${lastText(one.last_reading)}`}.`]);
+    }
+    if (one.errors_last_minute > 0) list.push(["warn", `${numberText(one.errors_last_minute)} ${one.errors_last_minute === 1 ? "error" : "errors"}`, "in the last minute: see Exchanges."]);
+    if (list.length === 0) list.push(["good", "Nothing.", "All alarms are reported clear, no reply failed in the last minute."]);
+    const text = JSON.stringify(list);
+    if (text === this.shownWrong) return;
+    this.shownWrong = text;
+    this.wrongBox.className = `box side ${this.condition.kind}`;
+    this.wrong.replaceChildren(...list.map(([kind, strong, words]) => element("p", {class: kind}, element("strong", {}, strong), strong && words ? " " : "", ...rich(words))));
   }
 
   lose(why = "no connection to the server") {
-    this.live = false;
-    this.word = null;
-    this.dial.turn(null);
-    this.state.className = "state unknown";
-    setText(this.state, `not known: ${why}`);
-    this.facts.replaceChildren();
-    for (const node of [this.fields, this.latencies, this.errors, this.bad, this.words]) node.replaceChildren();
-    for (const node of [this.placePlot, this.speedPlot]) node.classList.add("stale");
+    this.loss += 1;
+    this.known = false;
+    if (this.one !== undefined) {
+      const last = this.one.state === "live" ? {...this.one, at_ms: this.at_ms} : this.one.last_reading;
+      this.one = {...this.one, state: "unknown", angle_deg: null, position_mm: null, counts: null, turns: null, speed: null, alarms: null,
+                  status: null, errors_last_minute: null, message: why, last_reading: last};
+      this.condition = condition(this.one);
+      this.figure.show(this.one);
+      this.dial.turn(null);
+      this.scale.move(null, "");
+      showParts(this.below, belowFigure(this.one, Date.now()));
+      this.showWrong();
+    } else {
+      setText(this.noTrace, sentence(why));
+    }
+    showState(this.state, {kind: "bad", word: "not known"});
+    for (const node of [this.fields, this.latencies, this.errors, this.bad, this.line, this.commands]) node.replaceChildren();
+    this.offered = undefined;
     this.examine.lose(why);
+    this.changed = true;
   }
 
   take(event, data) {
     if (event === "happening" && data.encoder === this.name) {
       clearTimeout(this.soon);
-      this.soon = setTimeout(() => this.loadHistory(), WRITTEN_MS);
+      this.soon = setTimeout(() => this.loadPast(), WRITTEN_MS);
     }
     if (event !== "points" || data.encoder !== this.name) return;
-    const points = data.points.length > 8 ? data.points.filter((_, i) => i % Math.ceil(data.points.length / 8) === 0) : data.points;
-    const last = this.points.at(-1);
-    // A gap is drawn as one.
-    if (last !== undefined && points[0][0] - last[0] > 1000) this.points.push([last[0] + 1, null, null]);
-    this.points.push(...points);
+    for (const point of data.points) {
+      if (point[0] - (this.points.at(-1)?.[0] ?? 0) >= LEAST_MS) this.points.push(point);
+    }
+    while (this.points.length > MOST_POINTS) this.points.shift();
     this.changed = true;
   }
 
+  /** Rows of the plot from the points or the history, in the unit that is chosen. */
+  rows() {
+    const {of} = this.quantity;
+    const row = (at, ...values) => [at, ...values.map((value) => value ?? null)];
+    if (this.range === "live") {
+      const list = [];
+      for (const [at, place, speed] of this.points) {
+        if (list.length > 0 && at - list.at(-1)[0] > 2500) list.push([at - 1, null, null, null]);
+        const value = of(place, speed);
+        list.push(row(at, value, value, value));
+      }
+      return list;
+    }
+    const list = [];
+    let before = null;
+    const {rows = [], step_s: step = 1} = this.history ?? {};
+    for (const [at, least, mean, greatest, slow, middle, fast, , errors] of rows) {
+      const values = this.quantity.past ? [0, errors, errors] : [of(least, slow), of(mean, middle), of(greatest, fast)];
+      if (values[1] === null || (!this.quantity.past && mean === null)) continue;
+      if (before !== null && at - before > 2 * step) list.push([(before + step) * 1000, null, null, null]);
+      list.push(row(at * 1000, ...values));
+      before = at;
+    }
+    return list;
+  }
+
   draw() {
-    if (!this.changed) return;
     this.changed = false;
-    const newest = this.points.at(-1)[0];
-    while (this.points.length > MOST_POINTS || this.points[0][0] < newest - SHOWN_MS) this.points.shift();
-    const window = [newest - SHOWN_MS, newest];
-    this.placeGraph.updateOptions({file: this.points.map(([at, place]) => [new Date(at), place]), dateWindow: window});
-    this.speedGraph.updateOptions({file: this.points.map(([at, , speed]) => [new Date(at), speed]), dateWindow: window});
+    if (this.quantity === undefined) return;
+    const rows = this.rows();
+    const newest = rows.at(-1)?.[0];
+    const isLive = this.one.state === "live";
+    const none = newest === undefined || rows.every((row) => row[2] === null);
+    this.plot.toggleAttribute("hidden", none);
+    if (none) {
+      const never = this.one.last_reading === null && !isLive;
+      return setText(this.noTrace, this.range !== "live" ? "The history has nothing of this time." : never ? "There has been no reading since the server started." : "There is nothing to draw yet.");
+    }
+    setText(this.noTrace, "");
+    this.graph ??= new Trace(this.plot, this.quantity);
+    const lostAt = isLive ? null : this.one.last_reading?.at_ms ?? newest;
+    const from = this.range === "live" ? LIVE_MS : RANGES[this.range][1] * 1000;
+    const now = this.at_ms;
+    // A loss must not lie beyond the end of the plot.
+    const to = this.range !== "live" ? now : isLive ? newest : Math.min(now, newest + LOST_SHARE * 60000);
+    const width = this.range === "all" ? Math.max(60000, to - rows[0][0]) : isLive || this.range !== "live" ? from : 60000;
+    const marks = this.range === "live" ? [] : this.events.filter(isMarked).reverse();
+    this.graph.draw(rows.filter((row) => row[0] >= to - width - 1000), [to - width, to], {marks, lostAt});
+    const words = marks.length === 0 ? "" : `; marked: ${[...new Set(marks.map(markText))].join(", ")}`;
+    this.plot.setAttribute("aria-label", `${this.quantity.text}, ${RANGES[this.range][0]}${words}`);
   }
 
   async refresh() {
-    const word = this.word;
-    if (word === null) return;
+    const {loss} = this;
+    if (!this.known) return;
     let answer;
     try {
-      answer = await request("api/encoder", {name: this.name});
+      answer = await request(pathOf(this.name));
     } catch {
-      return;  // the stream tells that the server is away
+      return;  // the stream says that the server is away
     }
-    if (this.closed || this.word !== word || answer.status !== 200) return;  // not what was before a loss
+    if (this.closed || this.loss !== loss || answer.status !== 200) return;
     const one = answer.body;
-    const missing = one.singleturn_valid === false || one.multiturn_valid === false ? "INVALID" : "unknown";
-    const fields = Object.entries(one.fields ?? {}).map(([name, value]) => [name, fieldText(value, missing)]);
     this.examine.describe(one.readable);
-    const latency = one.latency_us;
-    fields.push(["latency", `50 % ${latency.p50.toFixed(0)} µs, 99 % ${latency.p99.toFixed(0)} µs, longest ${latency.max.toFixed(0)} µs`]);
-    fields.push(["readings", `${one.readings}; port lost ${one.losses} times; repeated ${one.repeated}`]);
-    this.fields.replaceChildren(...fields.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
-    const errors = Object.entries(one.errors).sort(([, a], [, b]) => b - a);
-    this.latencies.replaceChildren(histogram(["latency", "replies"], latencyRows(latency.buckets), "replies by latency"));
-    this.errors.replaceChildren(errors.length === 0 ? element("p", {}, "no errors") :
-      histogram(["error", "attempts"], errors, "failed attempts by kind"));
-    this.bad.replaceChildren(one.bad_exchanges.length === 0 ? element("p", {}, "no exchange has failed") : table(
-      ["ago", "what", "sent", "received"],
-      one.bad_exchanges, (bad) => [duration(bad.age_s), `${bad.error}: ${bad.meaning}`, element("code", {}, bad.sent), element("code", {}, bad.received || "nothing")],
+    for (const key of ["settings", "memory"]) this.tabs[key].hidden = !this.examine.has[key];
+    this.showTab();
+    this.showLine(one);
+    this.offer(one);
+    const missing = one.singleturn_valid === false || one.multiturn_valid === false ? "INVALID" : "unknown";
+    this.fields.replaceChildren(one.fields === null ? element("p", {class: "faint"}, "none is new") :
+      terms(Object.entries(one.fields).map(([field, value]) => {
+        const {name, unit} = namedUnit(field);
+        return [name, value === null || unit === "" ? fieldText(value, missing) : `${fieldText(value)} ${unit}`];
+      })));
+    const errors = Object.entries(one.errors).sort(([, a], [, b]) => b - a).map(([name, count]) => [plain(name), count]);
+    const latencies = latencyRows(one.latency_us.buckets);
+    this.latencies.replaceChildren(latencies.length === 0 || one.readings === 0 ? element("p", {class: "faint"}, "no reply yet") : histogram(["latency", "replies"], latencies, "replies by latency"));
+    this.errors.replaceChildren(errors.length === 0 ? element("p", {class: "faint"}, "none") : histogram(["error", "attempts"], errors, "failed attempts by kind"));
+    this.bad.replaceChildren(one.bad_exchanges.length === 0 ? element("p", {class: "faint"}, "none") : table(
+      ["ago", "what", "sent", "received"], one.bad_exchanges,
+      (bad) => [duration(bad.age_s), `${plain(bad.error)}: ${bad.meaning}`, element("code", {}, bad.sent), element("code", {}, bad.received || "nothing")],
       "last bad exchanges"));
-    if (this.commands === undefined) {
-      this.commands = one.commands;
-      this.command.replaceChildren(...one.commands.map((command) => element("option", {value: command.name}, `${command.name}: ${command.meaning}`)));
-      this.showArguments();
-    }
   }
 
-  chosen() {
-    return this.commands?.find((command) => command.name === this.command.value);
+  showLine(one) {
+    const latency = one.latency_us;
+    const live = one.state === "live";
+    this.line.replaceChildren(terms([
+      ["readings", `${live ? numberText(one.rate_hz, one.rate_hz < 10 ? 1 : 0) : 0} /s`],
+      ["reply after", one.readings === 0 ? "no reply yet" : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
+      ["errors, last minute", numberText(one.errors_last_minute)],
+      ["errors of all readings", `${numberText(Object.values(one.errors).reduce((sum, count) => sum + count, 0))} of ${numberText(one.readings)}`],
+      ["requests repeated", numberText(one.repeated)],
+      ["port lost", one.losses === 1 ? "once" : `${numberText(one.losses)} times`],
+    ]));
   }
 
-  showArguments() {
-    this.arguments.replaceChildren(...(this.chosen()?.arguments ?? []).map((argument) => element("p", {}, element("label", {},
-      `${argument.name} (${argument.meaning}; ${argument.minimum} to ${argument.maximum}) `,
-      element("input", {value: argument.default ?? "", inputmode: "numeric"})))));
-  }
-
-  async run() {
-    const command = this.chosen();
-    if (command === undefined) return;
-    if (command.changes_encoder) {
-      if (!await ask(command.name, `This changes the encoder ${this.name}: ${command.meaning}. Go on?`, "Go on")) return;
-      if (!await ask(command.name, `Once more: ${this.name} will be changed now and may not be as it was again. Is the machine safe?`, "Do it")) return;
-    }
-    if (!hasToken()) {
-      const token = await ask("Token", "Commands need a token of the server's token file.", "Use it", "token");
-      if (token === null) return;
-      setToken(token);
-    }
-    const values = {encoder: this.name, command: command.name, argument: [...this.arguments.querySelectorAll("input")].map((input) => input.value).filter((text) => text !== "")};
-    setText(this.outcome, `${command.name} is running`);
+  /** Buttons of the commands; those that changes an encoder first. */
+  async offer(one) {
+    if (this.offered !== undefined) return;
+    this.offered = one.commands;
+    let info;
     try {
-      const {status, body} = await request("api/command", values, "POST");
-      if (status === 401) setToken("");
-      const fields = Object.entries(body.fields ?? {}).map(([name, value]) => `${name} ${fieldText(value)}`).join(", ");
-      setText(this.outcome, body.error ?? (fields ? `${body.text}: ${fields}` : body.text));
-    } catch (error) {
-      setText(this.outcome, `no answer came, read whether it was done: ${error.message}`);
-    }
-  }
-
-  range() {
-    const to = Math.floor(Date.now() / 1000);
-    return {encoder: this.name, from: to - Number(this.hours.value) * 3600, to};
-  }
-
-  async loadHistory() {
-    if (this.loading) return;
-    this.loading = true;
-    try {
-      const past = await request("api/history", {...this.range(), rows: 1500});
-      if (this.closed) return;
-      setText(this.past, past.body.error ?? "");
-      if (past.status !== 200) return;
-      const list = pastRows(past.body);
-      const events = (await request("api/events", {...this.range(), rows: MOST_EVENTS})).body.events;
-      if (this.closed) return;
-      this.marks = events.filter((event) => MARKED.includes(event.kind)).reverse();
-      this.pastPlot.setAttribute("aria-label", `least, mean and greatest position; marked: ${[...new Set(this.marks.map(markText))].join(", ") || "nothing"}`);
-      this.pastGraph ??= plot(this.pastPlot, "position: least, mean, greatest", {
-        customBars: true, underlayCallback: (canvas, area, graph) => drawMarks(canvas, area, graph, this.marks)});
-      this.pastGraph.updateOptions(list.length === 0 ? {} : {file: list});
-      this.events.replaceChildren(events.length === 0 ? element("p", {}, "nothing has happened") : table(
-        ["when", "what", "", "who"],
-        events, (event) => [new Date(event.at_ms).toLocaleString(), event.kind, event.text, event.who], "events"));
+      info = await tokenInfo();
     } catch {
-      // the stream tells that the server is away
+      this.offered = undefined;
+      return;
+    }
+    if (!info.tokens) {
+      this.commands.replaceChildren(this.doctorButton, element("p", {class: "faint"}, "Nothing can be changed here: the server has no tokens. To change encoders, start it with ",
+        element("code", {}, "--token-file FILE"), ", a file of lines NAME TOKEN."));
+      return;
+    }
+    const first = ["clear_alarms", "zero", "reset_multiturn", "config_set"];
+    const rank = (command) => (first.indexOf(command.verb) + 1 || 9) + (command.changes_encoder ? 0 : 10);
+    const sorted = [...one.commands].sort((a, b) => rank(a) - rank(b));
+    const button = (command) => {
+      const title = plain(command.name).replace(/^./, (letter) => letter.toUpperCase());
+      return element("button", {type: "button", title: command.meaning, "data-command": command.name, onclick: () => this.run({...command, title})}, `${title}…`);
+    };
+    const changing = sorted.filter((command) => command.changes_encoder);
+    const shown = changing.slice(0, SHOWN_COMMANDS);
+    const rest = sorted.filter((command) => !shown.includes(command));
+    this.commands.replaceChildren(...shown.map(button), this.doctorButton,
+      ...(rest.length === 0 ? [] : [element("details", {}, element("summary", {}, "More commands"), ...rest.map(button))]),
+      element("p", {class: "faint"}, "What a command changes is shown before, and stands in the history with the name of your token."));
+  }
+
+  /** What is so now, in the words of the page. */
+  nowText() {
+    const {text, unit} = figure(this.one);
+    const alarms = (this.one.alarms ?? []).map((alarm) => plain(alarm.name)).join(", ");
+    const parts = [`${text}${unit === "mm" ? " mm" : unit}`, ...(this.one.turns === null ? [] : [`${numberText(this.one.turns)} turns`]),
+                   alarms ? `alarms: ${alarms}` : this.one.alarms === null ? "alarms not reported" : "no alarms"];
+    return parts.join(", ");
+  }
+
+  async run(command) {
+    const then = (values) => {
+      if (command.verb === "zero") return this.one.linear ? "0.0000 mm" : "0.000°";
+      if (command.verb === "reset_multiturn") return "0 turns";
+      if (command.verb === "clear_alarms") return "alarms are clear whose cause is gone";
+      const written = command.arguments.map((argument, i) => `${plain(argument.name)} ${values[i] || "?"}`).join(", ");
+      return written || command.meaning;
+    };
+    let values;
+    try {
+      values = await askCommand(this.name, command, this.nowText(), then);
+    } catch (error) {
+      return setText(this.outcome, `${command.title} was not done: ${error.message}`);
+    }
+    if (values === null) return;
+    setText(this.outcome, `${command.title} is running.`);
+    this.outcome.className = "status";
+    try {
+      const {status, body} = await request(pathOf(this.name, "command"), {command: command.name, argument: values}, "POST");
+      const fields = Object.entries(body.fields ?? {}).map(([name, value]) => `${plain(name)} ${fieldText(value)}`).join(", ");
+      setText(this.outcome, sentence(body.error ?? (fields ? `${body.text}: ${fields}` : body.text)));
+      this.outcome.className = `status ${status === 200 ? "good" : "bad"}`;
+    } catch (error) {
+      setText(this.outcome, `No answer came; read whether it was done: ${error.message}`);
+    }
+  }
+
+  span() {
+    const to = Math.floor(Date.now() / 1000);
+    return {from: to - (RANGES[this.range][1] || 3600), to};
+  }
+
+  async loadPast() {
+    if (this.closed || this.loading || this.one === undefined) return;
+    this.csv.hidden = !this.hasHistory;
+    if (!this.hasHistory) return setText(this.past, "No history is kept: start the server without --history none.");
+    this.loading = true;
+    const {range} = this;
+    try {
+      const events = await request(pathOf(this.name, "events"), {...this.span(), rows: MOST_EVENTS});
+      if (this.closed) return;
+      if (events.status !== 200) return setText(this.past, sentence(events.body.error));
+      setText(this.past, `Events of the last ${range === "live" ? "hour" : RANGES[range][0]}.`);
+      this.events = events.body.events;
+      this.showEvents();
+      if (range !== "live") {
+        const past = await request(pathOf(this.name, "history"), {...this.span(), rows: 1500});
+        if (past.status === 200) this.history = past.body;
+      }
+      this.changed = true;
+    } catch {
+      // the stream says that the server is away
     } finally {
       this.loading = false;
     }
+    if (!this.closed && range !== this.range) this.loadPast();
+  }
+
+  showEvents() {
+    const text = JSON.stringify(this.events);
+    if (text === this.shownEvents) return;
+    this.shownEvents = text;
+    this.eventTable.replaceChildren(this.events.length === 0 ? element("p", {class: "faint"}, "Nothing happened in this time.") : table(
+      ["when", "what", "details", "who"], this.events, (event) => {
+        const [kind, words] = happened(event.kind);
+        return [element("span", {class: "nowrap"}, clock(event.at_ms)), element("span", {class: `nowrap ${kind}`}, `${SHAPES[kind]} ${words}`), element("span", {}, ...rich(event.text.replace(/^\w+(?=:)/, plain))), event.who];
+      }, "events"));
   }
 
   async save() {
     try {
-      await download("api/history.csv", this.range(), `${this.name.replace(/[^\w-]/g, "_")}.csv`);
+      await download(pathOf(this.name, "history.csv"), this.span(), `${this.name.replace(/[^\w-]/g, "_")}.csv`);
     } catch (error) {
       setText(this.past, error.message);
     }
@@ -319,7 +510,6 @@ export class One {
     clearInterval(this.timer);
     clearInterval(this.pastTimer);
     clearTimeout(this.soon);
-    this.dark.removeEventListener("change", this.recolor);
-    for (const graph of [this.placeGraph, this.speedGraph, this.pastGraph]) graph?.destroy();
+    this.graph?.close();
   }
 }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is asked of one encoder on a button: an examination, its settings, its memory. Each answer says of when it is.
-import {element, setText, table} from "./dom.js";
-import {request} from "./server.js";
+// Examination, settings and memory: each is asked of the encoder when its button is pressed, and says of when it is.
+import {element, setText, table, terms} from "./dom.js";
+import {pathOf, request} from "./server.js";
+import {namedUnit, plain, sentence} from "./words.js";
 
 const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
 const GONE = new Set(["opening", "lost", "ended"]);  // another encoder may be there when the port comes back
 const THERE = new Set(["live", "examined"]);
 
 const hex = (number, digits) => number.toString(16).toUpperCase().padStart(digits, "0");
-const clock = () => new Date().toLocaleTimeString();
+const clock = () => new Date().toLocaleTimeString("en-GB");
 
 /** "00 5A", and what of it can be shown as characters. */
 function dumpLines(part) {
@@ -28,16 +29,13 @@ function failures(failed) {
   return Object.entries(failed ?? {}).map(([name, why]) => element("p", {class: "why"}, `${name}: ${why}`));
 }
 
-/** A box with a button, a line that says what became of it, and what came. */
+/** A panel with a button, a line of status, and the answer. */
 class Asked {
   constructor(title, text, ...before) {
     this.button = element("button", {type: "button", onclick: () => this.run()}, text);
     this.status = element("p", {class: "status", role: "status"});
     this.result = element("div");
-    const id = `asked-${title.toLowerCase()}`;
-    this.button.setAttribute("aria-describedby", id);
-    this.node = element("section", {class: "box"}, element("h2", {id}, title), element("p", {}, ...before, this.button),
-                        this.status, this.result);
+    this.node = element("div", {"aria-label": title}, element("p", {class: "row"}, ...before, this.button), this.status, this.result);
   }
 
   async ask(doing, path, values, method) {
@@ -82,8 +80,8 @@ class Asked {
 
 class Doctor extends Asked {
   constructor(name) {
-    super("Doctor", "Examine", element("span", {}, "What is wrong with it, or with the way to it? It is not read meanwhile, some seconds. Nothing is written to it. "));
-    this.run = () => this.ask("the examination begins", "api/doctor", {encoder: name}, "POST");
+    super("Doctor", "Examine", element("span", {}, "Looks for what is wrong with the encoder or its line. It takes some seconds without readings, and writes nothing. "));
+    this.run = () => this.ask("the examination begins", pathOf(name, "doctor"), {}, "POST");
   }
 
   progress(one) {
@@ -93,16 +91,15 @@ class Doctor extends Asked {
   take(found) {
     this.tell(`At ${clock()}: ${found.verdict}`, found.ok);
     this.result.replaceChildren(...found.findings.map((one) => element("div", {class: `finding ${one.severity}`},
-      element("h3", {}, `${one.severity}: ${one.id}`),
-      element("dl", {}, element("dt", {}, "seen"), element("dd", {}, one.evidence), element("dt", {}, "likely"), element("dd", {}, one.cause),
-              element("dt", {}, "try"), element("dd", {}, one.action)))));
+      element("h4", {}, `${plain(one.severity)}: ${plain(one.id)}`),
+      terms([["seen", sentence(one.evidence)], ["likely", sentence(one.cause)], ["try", sentence(one.action)]]))));
   }
 }
 
 class Settings extends Asked {
   constructor(name) {
-    super("Settings", "Read", "What it says of itself, and what it is set to. ");
-    this.run = () => this.ask("the settings are being read", "api/settings", {encoder: name});
+    super("Settings", "Read the settings", "What the encoder says of itself, and what it is set to. ");
+    this.run = () => this.ask("the settings are being read", pathOf(name, "settings"), {});
   }
 
   take(found) {
@@ -110,8 +107,8 @@ class Settings extends Asked {
     const names = [...new Set(found.rows.map((row) => row.setting))];
     this.result.replaceChildren(...names.flatMap((name) => {
       const own = found.rows.filter((row) => row.setting === name);
-      return [element("h3", {}, name), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${own[0].range}`),
-              table(["field", "value", "meaning"], own, (row) => [row.field, element("strong", {}, row.value ?? "INVALID"), row.meaning], name)];
+      return [element("h4", {}, plain(name)), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${own[0].range}`),
+              table(["field", "value", "meaning"], own, (row) => [namedUnit(row.field).name, element("strong", {}, row.value ?? "INVALID"), row.meaning], name)];
     }), ...failures(found.failed));
   }
 }
@@ -119,9 +116,9 @@ class Settings extends Asked {
 class Memory extends Asked {
   constructor(name) {
     const part = element("select", {});
-    super("Memory", "Read", element("label", {}, "which ", part), " ");
+    super("Memory", "Read the memory", element("label", {}, "Part ", part), " ");
     this.part = part;
-    this.run = () => this.ask("the memory is being read", "api/memory", part.value === "" ? {encoder: name} : {encoder: name, page: part.value});
+    this.run = () => this.ask("the memory is being read", pathOf(name, "memory"), part.value === "" ? {} : {page: part.value});
   }
 
   describe(areas, registers) {
@@ -137,7 +134,7 @@ class Memory extends Asked {
     this.tell(`${registers ? `${registers.length} registers` : `${found.bytes} bytes`} read at ${clock()}`);
     const body = registers
       ? table(["register", "address", "value"], registers, (one) => [one.name, "0x" + hex(one.address, 2), one.value], "registers")
-      : table(["page", "address", "bytes", ""], found.memory.flatMap(dumpLines), (line) => line, "memory");
+      : table(["page", "address", "bytes", "characters"], found.memory.flatMap(dumpLines), (line) => line, "memory");
     body.classList.add("dump");
     this.result.replaceChildren(body, ...failures(found.failed));
   }
@@ -148,16 +145,14 @@ export class Examine {
     this.doctor = new Doctor(name);
     this.settings = new Settings(name);
     this.memory = new Memory(name);
-    this.nodes = [this.doctor, this.settings, this.memory].map((one) => one.node);
-    for (const one of [this.settings, this.memory]) one.node.hidden = true;  // until it is known that there are some
+    this.has = {settings: false, memory: false};  // until the server has said that there are some
   }
 
-  /** What of the encoder can be read. */
+  /** Takes what of the encoder can be read. */
   describe(readable) {
     if (this.described) return;
     this.described = true;
-    this.settings.node.hidden = readable.settings.length === 0;
-    this.memory.node.hidden = readable.memory.length === 0 && readable.registers === 0;
+    this.has = {settings: readable.settings.length > 0, memory: readable.memory.length > 0 || readable.registers > 0};
     this.memory.describe(readable.memory, readable.registers);
   }
 

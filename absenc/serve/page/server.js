@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way to the server: requests with the token, and the stream of events, which tells at once when it is lost.
+// Requests to the server with the token, and its stream of events, which says at once when it is lost.
 
 let token = sessionStorage.getItem("token") ?? "";
 
-export function setToken(text) {
+function setToken(text) {
   token = text;
   sessionStorage.setItem("token", text);
 }
-export const hasToken = () => token !== "";
+export const forgetToken = () => setToken("");
 
 const headers = () => (token === "" ? {} : {Authorization: `Bearer ${token}`});
+
+/** The path of an encoder, or of a part of it. */
+export const pathOf = (name, part = "") => `api/encoders/${encodeURIComponent(name)}${part && `/${part}`}`;
 
 /** JSON, also of an answer that is an error: {status, body}. */
 export async function request(path, values = {}, method = "GET") {
@@ -19,6 +22,30 @@ export async function request(path, values = {}, method = "GET") {
   }
   const answer = await fetch(`${path}?${query}`, {method, headers: headers(), cache: "no-store"});
   return {status: answer.status, body: await answer.json()};
+}
+
+/** {tokens, name}: whether the server has tokens, and whose this one is. A token that is wrong is forgotten. */
+export async function tokenInfo() {
+  const {status, body} = await request("api/token");
+  if (status === 200) return body;
+  forgetToken();
+  return {tokens: true, name: null};
+}
+
+/** "" when the token is good and kept, else what is wrong with it. */
+export async function tryToken(text) {
+  if (text === "") return "Commands need a token.";
+  const before = token;
+  setToken(text);
+  try {
+    const {status, body} = await request("api/token");
+    if (status === 200) return "";
+    setToken(before);
+    return body.error;
+  } catch (error) {
+    setToken(before);
+    return `no answer came: ${error.message}`;
+  }
 }
 
 /** For a file: a link cannot carry the token. */
@@ -69,7 +96,7 @@ export class Events {
         await this.read();
         if (!this.closed) this.onLost("the server has ended the connection");
       } catch (error) {
-        if (!this.closed && !this.abort.signal.aborted) this.onLost(error.message);
+        if (!this.closed && !this.abort.signal.aborted) this.onLost(error.message, error.refused);
       }
       clearTimeout(this.timer);
       await new Promise((resolve) => setTimeout(resolve, PAUSE));
@@ -77,9 +104,9 @@ export class Events {
   }
 
   async read() {
-    const path = this.trace === "" ? "api/stream" : `api/stream?trace=${encodeURIComponent(this.trace)}`;
+    const path = this.trace === "" ? "api/stream" : pathOf(this.trace, "stream");
     const answer = await fetch(path, {headers: headers(), signal: this.abort.signal, cache: "no-store"});
-    if (!answer.ok) throw new Error((await answer.json()).error);
+    if (!answer.ok) throw Object.assign(new Error((await answer.json()).error), {refused: true});
     const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
     for (let text = ""; ;) {
       const {value, done} = await reader.read();

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Questions: the token, and whether an encoder is to be changed.
+import {element, terms} from "./dom.js";
+import {forgetToken, tokenInfo, tryToken} from "./server.js";
+
+const dialog = document.getElementById("dialog");
+const title = document.getElementById("dialog-title");
+const body = document.getElementById("dialog-body");
+const wrong = document.getElementById("dialog-wrong");
+const yes = document.getElementById("dialog-yes");
+const no = document.getElementById("dialog-no");
+
+/** Shows `nodes`; `agree` answers "" when all is well, else what is wrong. Resolves to whether it was agreed. */
+function ask(words, button, nodes, agree) {
+  title.textContent = words;
+  body.replaceChildren(...nodes);
+  wrong.textContent = "";
+  yes.textContent = button;
+  yes.disabled = false;
+  return new Promise((resolve) => {
+    let agreed = false;
+    no.onclick = () => dialog.close();
+    dialog.querySelector("form").onsubmit = async (event) => {
+      event.preventDefault();
+      yes.disabled = true;
+      wrong.textContent = "";
+      const trouble = await agree();
+      yes.disabled = false;
+      wrong.textContent = trouble;
+      if (trouble !== "") return;
+      agreed = true;
+      dialog.close();
+    };
+    dialog.addEventListener("close", () => {
+      body.replaceChildren();
+      resolve(agreed);
+    }, {once: true});
+    dialog.showModal();
+  });
+}
+
+const tokenField = () => element("input", {type: "password", autocomplete: "off", id: "dialog-token"});
+const tokenLabel = (input) => element("label", {class: "field"}, "Your token, from the server's token file. It is forgotten when this tab is closed.", input);
+
+/** The button of the bar. */
+export async function askToken() {
+  const {name} = await tokenInfo();
+  if (name !== null) {
+    if (await ask("Token", "Forget it", [element("p", {}, "Commands of this tab are named ", element("strong", {}, name), " in the history.")], async () => "")) forgetToken();
+    return;
+  }
+  const input = tokenField();
+  await ask("Token", "Use it", [tokenLabel(input)], () => tryToken(input.value.trim()));
+}
+
+/**
+ * Whether `command` is to be run. `now`: what is so now; `then(values)`: what will be. Returns the arguments, or null.
+ */
+export async function askCommand(name, command, now, then) {
+  const {name: who} = await tokenInfo();
+  const fields = command.arguments.map((argument) => element("input", {
+    value: argument.default ?? "", inputmode: "numeric", required: argument.default === null, pattern: "-?(0[xX][0-9a-fA-F]+|[0-9]+)"}));
+  const labels = fields.map((input, i) => {
+    const {name: word, meaning, minimum, maximum} = command.arguments[i];
+    return element("label", {class: "field"}, `${word}: ${meaning} (${minimum} to ${maximum})`, input);
+  });
+  const values = () => fields.map((input) => input.value.trim());
+  const after = element("span");
+  const showAfter = () => after.replaceChildren(then(values()));
+  for (const input of fields) input.addEventListener("input", showAfter);
+  showAfter();
+  const token = tokenField();
+  const safe = element("input", {type: "checkbox", required: true, id: "dialog-safe"});
+  const nodes = [element("p", {}, command.meaning.charAt(0).toUpperCase() + command.meaning.slice(1) + "."), ...labels];
+  if (command.changes_encoder) {
+    nodes.push(terms([["now", now], ["then", after], ["named in the history", who ?? "the name of the token below"]]));
+  }
+  if (who === null) nodes.push(tokenLabel(token));
+  if (command.changes_encoder) nodes.push(element("label", {class: "check"}, safe, ` Nothing moves or starts when ${name} is changed.`));
+  const agreed = await ask(`${command.title}: ${name}`, command.title, nodes, async () => (who === null ? tryToken(token.value.trim()) : ""));
+  if (!agreed) return null;
+  const written = values();
+  while (written.length > 0 && written.at(-1) === "") written.pop();
+  return written;
+}

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+// All encoders: a card for each, the ill first, and the bar above them.
+import {breakable, dial, element, rich, scale, setText, spark} from "./dom.js";
+import {request} from "./server.js";
+import {GROUPS, GROUP_WORDS, SHAPES, belowFigure, condition, figure, numberText, wrongs} from "./words.js";
+
+const MANY = 30;           // beyond it cards are small
+const FEW = 3;
+const ORDER_MS = 2000;     // cards change places no faster
+const MINUTE_S = 60;
+const MOST_WORDS = 2;
+
+/** The large figure with its unit; also used on the page of one. */
+export function figureNode() {
+  const digits = element("span", {class: "digits"});
+  const widest = element("span", {class: "widest", "aria-hidden": "true"});  // keeps the place of the widest value so far
+  const unit = element("span", {class: "unit"});
+  const node = element("p", {class: "figure"}, element("span", {class: "number"}, widest, digits), unit);
+  return {
+    node,
+    show(one) {
+      const {text, unit: name, width} = figure(one);
+      setText(digits, text);
+      setText(unit, name);
+      node.style.setProperty("--digits", width);
+      node.style.setProperty("--beside", one.linear ? "0rem" : "var(--dial)");
+      const ghost = name === "" ? "" : text.replace(/\d/g, "0");
+      if (ghost.length > widest.textContent.length) widest.textContent = ghost;
+      node.classList.toggle("word", name === "");
+    },
+  };
+}
+
+/** Which of position and speed says more of the last minute: a position that turns on and on says nothing. */
+export function sparkColumn(points, linear) {
+  if (linear) return 1;
+  const places = points.map((row) => row[1]).filter((place) => place !== null);
+  const turning = places.length > 1 && Math.max(...places) - Math.min(...places) > 720;
+  return turning ? 2 : 1;
+}
+
+/** Shows the parts, each on one line. */
+export function showParts(node, parts) {
+  if (node.textContent === parts.join("")) return;
+  node.replaceChildren(...parts.map((part) => element("span", {class: /INVALID/.test(part) ? "bad" : ""}, part)));
+}
+
+export function showState(node, {kind, word}) {
+  node.className = `state ${kind}`;
+  setText(node.firstChild, SHAPES[kind]);
+  setText(node.lastChild, word);
+}
+export const stateNode = () => element("p", {class: "state"}, element("span", {"aria-hidden": "true"}), " ", element("span"));
+
+class Card {
+  constructor(name) {
+    this.name = name;
+    this.points = [];
+    this.dial = dial();
+    this.scale = scale();
+    this.figure = figureNode();
+    this.state = stateNode();
+    this.kindName = element("p", {class: "faint kind"});
+    this.below = element("p", {class: "below"});
+    this.words = element("div", {class: "words"});
+    this.spark = spark();
+    this.caption = element("span");
+    this.range = element("span");
+    this.trace = element("div", {class: "trace"}, element("p", {class: "caption faint"}, this.caption, this.range), this.spark.node);
+    this.rate = element("span");
+    this.errors = element("span");
+    const link = element("a", {href: `#encoder=${encodeURIComponent(name)}`}, ...breakable(name));
+    this.node = element("li", {class: "card"},
+      element("div", {class: "head"}, element("h2", {}, link), this.state), this.kindName,
+      element("div", {class: "now"}, element("div", {}, this.figure.node, this.below), this.dial.node),
+      this.scale.node, this.words, this.trace, element("p", {class: "foot faint"}, this.rate, this.errors));
+  }
+
+  show(one, at_ms) {
+    this.one = one;
+    this.condition = condition(one);
+    this.node.className = `card ${this.condition.kind}`;
+    this.node.dataset.state = one.state;
+    showState(this.state, this.condition);
+    setText(this.kindName, one.protocol_name);
+    this.figure.show(one);
+    this.dial.node.toggleAttribute("hidden", one.linear);
+    this.dial.turn(one.angle_deg);
+    this.scale.node.toggleAttribute("hidden", !one.linear || one.length_mm === null);
+    if (one.linear && one.length_mm !== null) {
+      this.scale.move(one.position_mm === null ? null : one.position_mm / one.length_mm, `${numberText(one.length_mm)} mm`);
+    }
+    showParts(this.below, belowFigure(one, at_ms));
+    this.showWords(wrongs(one));
+    const live = one.state === "live";
+    setText(this.rate, live ? `${numberText(one.rate_hz, one.rate_hz < 10 ? 1 : 0)} readings/s` : "0 readings/s");
+    setText(this.errors, one.errors_last_minute === null ? "" : `${numberText(one.errors_last_minute)} ${one.errors_last_minute === 1 ? "error" : "errors"}/min`);
+    this.errors.className = one.errors_last_minute > 0 ? "warn" : "";
+    const second = Math.floor(at_ms / 1000);
+    if (second === this.second) return;
+    this.second = second;
+    if (live && one.continued_position !== null) this.points.push([second, one.continued_position, one.speed]);
+    while (this.points.length > MINUTE_S + 5) this.points.shift();
+    this.drawTrace(second, live);
+  }
+
+  showWords(list) {
+    const shown = list.slice(0, MOST_WORDS);
+    if (list.length > shown.length) shown.push(["bad", `And ${list.length - shown.length} more.`, ""]);
+    const text = JSON.stringify(shown);
+    if (text === this.shownWords) return;
+    this.shownWords = text;
+    // Of a long reason its first sentence; all of it stands on the page of the encoder.
+    const first = (words) => /^.*?[.!?](?= [A-Z]|$)/.exec(words)?.[0] ?? words;
+    this.words.replaceChildren(...shown.map(([kind, strong, words]) => element("p", {class: kind}, element("strong", {}, strong), element("span", {class: "more"}, strong && words ? " " : "", ...rich(strong ? words : first(words))))));
+  }
+
+  seed(seconds) {
+    const first = this.points[0]?.[0] ?? Infinity;
+    this.points.unshift(...seconds.filter(([at]) => at < first));
+    this.second = 0;
+  }
+
+  drawTrace(now, live) {
+    const column = sparkColumn(this.points, this.one.linear);
+    // Of an encoder without turns, so that the step from 360 to 0 degrees is none.
+    let turns = 0;
+    const unwrapped = this.points.map((row, i) => {
+      const step = i > 0 ? row[1] - this.points[i - 1][1] : 0;
+      if (column === 1 && !this.one.linear && Math.abs(step) > 180) turns -= Math.round(step / 360);
+      return [row[0], row[column] === null ? null : row[column] + (column === 1 ? 360 * turns : 0)];
+    });
+    const unit = column === 2 ? this.one.speed_unit : this.one.linear ? "mm" : "°";
+    const least = column === 2 ? 1 : this.one.linear ? .1 : .5;
+    const range = this.spark.draw(unwrapped, now, least, live);
+    this.trace.toggleAttribute("hidden", range === null);
+    if (range === null) return;
+    setText(this.caption, `${column === 2 ? "speed" : "position"}, ${live ? "last minute" : "before"}`);
+    const suffix = unit === "°" ? unit : ` ${unit}`;
+    const decimals = unit === "°" || unit === "mm" ? 2 : 1;
+    const offset = unit === "°" ? 360 * Math.floor(range[0] / 360) : 0;
+    const [low, high] = range.map((value) => numberText(value - offset, decimals));
+    setText(this.range, low === high ? low + suffix : `${low} to ${high}${suffix}`);
+  }
+}
+
+export class Overview {
+  constructor(main, bar) {
+    this.cards = new Map();
+    this.list = element("ul", {class: "cards", "aria-label": "encoders"});
+    this.none = element("div", {class: "none", hidden: true}, element("h2", {}, "No encoder is served"),
+      element("p", {}, "Name encoders behind ", element("code", {}, "absenc serve"), ", or write them into absenc.toml and send the server SIGHUP. Without hardware, try:"),
+      element("p", {}, element("code", {}, "absenc serve \"sim:tformat?motion=rpm=60\" sim:esl")));
+    this.noMatch = element("p", {class: "none", hidden: true}, "No encoder matches. ", element("button", {type: "button", onclick: () => this.clearFilter()}, "Show all"));
+    main.replaceChildren(this.none, this.noMatch, this.list);
+    this.pills = element("div", {class: "pills", role: "group", "aria-label": "show only"});
+    this.filter = element("input", {type: "search", placeholder: "Filter", "aria-label": "filter by name", oninput: () => this.arrange(true)});
+    this.order = element("select", {"aria-label": "order", onchange: () => this.arrange(true)},
+      element("option", {value: "ill"}, "Ill first"), element("option", {value: "name"}, "By name"), element("option", {value: "given"}, "As configured"));
+    this.tools = element("div", {class: "tools"}, this.filter, this.order);
+    bar.replaceChildren(this.pills, this.tools);
+    this.group = null;
+    this.arranged = 0;
+    this.seed();
+  }
+
+  trace = "";
+
+  async seed() {
+    try {
+      const {status, body} = await request("api/minute");
+      if (status === 200) this.minutes = new Map(body.encoders.map((one) => [one.encoder, one.seconds]));
+    } catch {
+      // the stream says that the server is away
+    }
+    for (const card of this.cards.values()) this.seedCard(card);
+  }
+
+  seedCard(card) {
+    const seconds = this.minutes?.get(card.name);
+    if (seconds === undefined) return;
+    this.minutes.delete(card.name);
+    card.seed(seconds);
+  }
+
+  show(state) {
+    this.given = state.encoders.map((one) => one.encoder);
+    const changed = this.given.join("\n") !== [...this.cards.keys()].join("\n");
+    if (changed) {
+      this.cards = new Map(this.given.map((name) => [name, this.cards.get(name) ?? new Card(name)]));
+      for (const card of this.cards.values()) this.seedCard(card);
+    }
+    for (const one of state.encoders) this.cards.get(one.encoder).show(one, state.at_ms);
+    this.none.toggleAttribute("hidden", this.given.length > 0);
+    this.list.classList.toggle("many", this.given.length > MANY);
+    this.list.classList.toggle("few", this.given.length <= FEW);
+    this.tools.toggleAttribute("hidden", this.given.length <= FEW);
+    this.showPills();
+    this.arrange(changed);
+  }
+
+  showPills() {
+    const counts = Object.fromEntries(GROUPS.map((group) => [group, []]));
+    for (const card of this.cards.values()) counts[card.condition.group].push(card);
+    const key = GROUPS.map((group) => counts[group].length).join() + this.group;
+    if (key === this.shownPills) return;
+    this.shownPills = key;
+    const total = this.cards.size;
+    const pills = GROUPS.filter((group) => counts[group].length > 0).map((group) => {
+      const {kind} = counts[group][0].condition;
+      const count = counts[group].length;
+      const words = group === "good" && count === total ? (total === 1 ? "good" : `all ${total} good`) : GROUP_WORDS[group](count);
+      return element("button", {type: "button", class: `pill ${kind}`, "data-group": group, "aria-pressed": String(this.group === group),
+                                onclick: () => this.choose(group)}, element("span", {"aria-hidden": "true"}, SHAPES[kind] + " "), words);
+    });
+    const focused = this.pills.contains(document.activeElement) ? document.activeElement.dataset.group : null;
+    this.pills.replaceChildren(...pills);
+    if (focused) this.pills.querySelector(`[data-group=${focused}]`)?.focus();
+  }
+
+  choose(group) {
+    this.group = this.group === group ? null : group;
+    this.showPills();
+    this.arrange(true);
+  }
+
+  clearFilter() {
+    this.filter.value = "";
+    this.choose(this.group);
+  }
+
+  arrange(now) {
+    if (!now && performance.now() - this.arranged < ORDER_MS) return;
+    this.arranged = performance.now();
+    const rank = (card) => GROUPS.indexOf(card.condition.group);
+    const cards = [...this.cards.values()];
+    if (this.order.value === "ill") cards.sort((a, b) => rank(a) - rank(b));
+    if (this.order.value === "name") cards.sort((a, b) => a.name.localeCompare(b.name, "en", {numeric: true}));
+    const written = this.filter.value.trim().toLowerCase();
+    const matches = (card) => (this.group === null || card.condition.group === this.group) &&
+      `${card.name} ${card.one.protocol_name}`.toLowerCase().includes(written);
+    const shown = cards.filter(matches);
+    this.noMatch.toggleAttribute("hidden", shown.length > 0 || cards.length === 0);
+    const nodes = shown.map((card) => card.node);
+    if (nodes.length === this.list.childElementCount && nodes.every((node, i) => node === this.list.children[i])) return;
+    const focused = document.activeElement;
+    this.list.replaceChildren(...nodes);
+    if (this.list.contains(focused)) focused.focus({preventScroll: true});
+  }
+
+  /** Nothing is known any more: no value is shown as the present one. */
+  lose() {
+    for (const card of this.cards.values()) {
+      const last = card.one.state === "live" ? {...card.one, at_ms: Date.now() - card.one.age_s * 1000} : card.one.last_reading;
+      card.show({...card.one, state: "unknown", angle_deg: null, position_mm: null, turns: null, speed: null, alarms: null, status: null,
+                 errors_last_minute: null, message: null, last_reading: last}, Date.now());
+    }
+    this.showPills();
+  }
+
+  take() {}
+  close() {}
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// How values and conditions read.
+
+export const NOTHING = "—";
+const MINUS = "−";
+const THIN = " ";  // narrow, and no line is broken there
+
+/** "−1 204.55" */
+export function numberText(value, decimals = 0) {
+  const [whole, part] = Math.abs(value).toFixed(decimals).split(".");
+  const grouped = whole.replace(/\B(?=(\d{3})+$)/g, THIN);
+  const negative = value < 0 && Number(value.toFixed(decimals)) !== 0;
+  return `${negative ? MINUS : ""}${grouped}${part === undefined ? "" : "." + part}`;
+}
+
+export function duration(seconds) {
+  if (seconds < 1) return `${Math.round(seconds * 1000)} ms`;
+  if (seconds < 120) return `${Math.floor(seconds)} s`;
+  if (seconds < 7200) return `${Math.floor(seconds / 60)} min`;
+  if (seconds < 172800) return `${Math.floor(seconds / 3600)} h`;
+  return `${Math.floor(seconds / 86400)} days`;
+}
+
+export const microseconds = (us) => (us >= 1e6 ? `${numberText(us / 1e6, 2)} s` : us >= 1e3 ? `${numberText(us / 1e3, 2)} ms` : `${numberText(us, 1)} µs`);
+
+/** The time of day, with the date if it is not today's. */
+export function clock(at_ms) {
+  const at = new Date(at_ms);
+  const time = at.toLocaleTimeString("en-GB");
+  if (at.toDateString() === new Date().toDateString()) return time;
+  return `${at.toLocaleDateString("en-GB", {day: "numeric", month: "short", year: "numeric"})}, ${time}`;
+}
+
+/** "battery_alarm" as "battery alarm" */
+export const plain = (name) => name.replace(/[_-]/g, " ");
+const UNITS = {c: "°C", mv: "mV", v: "V", us: "µs", ms: "ms", s: "s", hz: "Hz", deg: "°", mm: "mm"};
+/** {name, unit} of "temperature_c" */
+export function namedUnit(field) {
+  const found = /^(.+)_([a-z]+)$/.exec(field);
+  return found && found[2] in UNITS ? {name: plain(found[1]), unit: UNITS[found[2]]} : {name: plain(field), unit: ""};
+}
+export const sentence = (text) => {
+  const whole = text.charAt(0).toUpperCase() + text.slice(1);
+  return /[.!?]$/.test(whole) ? whole : whole + ".";
+};
+
+/** The large figure: {text, unit, width}; `width` is that of the greatest value in digits, so that nothing moves. */
+export function figure(one) {
+  const whole = one.length_mm === null ? 6 : numberText(one.length_mm).length;
+  const width = one.linear ? whole + 5 : 7;
+  if (one.angle_deg !== null) return {text: one.angle_deg.toFixed(3), unit: "°", width};
+  if (one.position_mm !== null) return {text: numberText(one.position_mm, 4), unit: "mm", width};
+  if (one.state !== "live") return {text: NOTHING, unit: "", width};
+  return {text: one.singleturn_valid === null ? "unknown" : "INVALID", unit: "", width};
+}
+
+export function lastText(last) {
+  if (last.angle_deg !== null) return `${last.angle_deg.toFixed(3)}°`;
+  return last.position_mm !== null ? `${numberText(last.position_mm, 4)} mm` : "";
+}
+
+/** What stands below the large figure, in parts that are not broken. */
+export function belowFigure(one, now) {
+  if (one.state !== "live") {
+    if (one.last_reading === null) return ["no reading yet"];
+    const last = lastText(one.last_reading);
+    return [last ? `last ${last}` : "last reading", `${duration(Math.max(0, (now - one.last_reading.at_ms) / 1000))} ago`];
+  }
+  const parts = [];
+  if (one.turns !== null) parts.push(`${numberText(one.turns)} ${Math.abs(one.turns) === 1 ? "turn" : "turns"}`);
+  else if (one.has_turns) parts.push(one.multiturn_valid === false ? "turns INVALID" : "turns unknown");
+  else if (!one.linear) parts.push("single-turn");
+  if (one.speed !== null) parts.push(`${numberText(one.speed, 1)} ${one.speed_unit}`);
+  return parts;
+}
+
+const GONE = {lost: "lost", silent: "no reply", failing: "no reply", ended: "stopped", unknown: "not known"};
+export const SHAPES = {bad: "▲", warn: "◆", good: "●", plain: "○"};
+
+/** {group, kind, word}: groups in the order in which they are shown, the ill first. */
+export const GROUPS = ["unknown", "lost", "alarm", "errors", "waiting", "live", "good"];
+export function condition(one) {
+  const age = one.state === "unknown" ? "" : ` ${duration(one.age_s)}`;
+  if (one.state in GONE) return {group: one.state === "unknown" ? "unknown" : "lost", kind: "bad", word: GONE[one.state] + age};
+  if (one.state === "opening") return {group: "waiting", kind: "warn", word: "port not there"};
+  if (one.state === "examined") return {group: "waiting", kind: "warn", word: "examined"};
+  const count = one.alarms?.length ?? 0;
+  if (count > 0) return {group: "alarm", kind: "bad", word: count === 1 ? "alarm" : `${count} alarms`};
+  if (one.singleturn_valid === false || one.multiturn_valid === false) return {group: "alarm", kind: "bad", word: "invalid"};
+  if (one.alarms === null && one.status?.length) return {group: "alarm", kind: "bad", word: "warning"};
+  if (one.errors_last_minute > 0) return {group: "errors", kind: "warn", word: "errors"};
+  return one.alarms === null ? {group: "live", kind: "plain", word: "live"} : {group: "good", kind: "good", word: "good"};
+}
+
+/** The words of the bar: how many of a group. */
+export const GROUP_WORDS = {
+  unknown: (count) => `${count} not known`, lost: (count) => `${count} lost`, alarm: (count) => (count === 1 ? "1 alarm" : `${count} with alarms`), errors: (count) => `${count} with errors`,
+  waiting: (count) => `${count} waiting`, live: (count) => `${count} live, alarms not reported`, good: (count) => `${count} good`,
+};
+
+/** [kind, strong, text] of each line that says what is wrong. */
+export function wrongs(one) {
+  const list = [];
+  for (const alarm of one.alarms ?? []) {
+    list.push(["bad", sentence(plain((alarm.channel ? alarm.channel + " " : "") + alarm.name)), `${sentence(alarm.meaning)}${alarm.action ? " " + sentence(alarm.action) : ""}`]);
+  }
+  if (one.state === "live") {
+    if (one.singleturn_valid === false && one.alarms?.length !== undefined) list.push(["bad", "Position invalid.", "The encoder says that its position does not hold."]);
+    if (one.alarms === null && one.status?.length) list.push(["bad", `Status: ${one.status.map(plain).join(", ")}.`, ""]);
+    if (one.alarms === null) list.push(["faint", "", "Alarms not reported."]);
+  }
+  if (one.message) list.push([one.state === "examined" ? "warn" : "bad", "", sentence(one.message)]);
+  return list;
+}
+
+/** A value of a reply: flags are a list of names, and null where it does not hold. */
+export function fieldText(value, missing = "INVALID") {
+  if (value === null) return missing;
+  return Array.isArray(value) ? value.map(plain).join(", ") || "none" : String(value);
+}
+
+/** What happened, as [kind, words]. */
+const HAPPENED = {
+  alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
+  failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],
+  examined: ["plain", "examined"], command: ["plain", "command"], change: ["plain", "change"],
+};
+export const happened = (kind) => HAPPENED[kind] ?? ["plain", plain(kind)];
