@@ -272,7 +272,7 @@ class ChangedRegisters(Case):
             settings = json.loads(result.stdout)["settings"]
             self.assertEqual({name: fields[name.replace("-", "_")] for name, fields in settings.items()},
                              {"bank": 0, "eds-bank": 3, "profile": 0, "serial-number": slave + 1,
-                              "device-id": b"Absenc".hex(), "manufacturer": b"ve".hex()})
+                              "device-id": b"Absenc".hex(), "manufacturer": "ve"})
             self.assertEqual({fields["slave_id"] for fields in settings.values()}, {slave})
 
     def test_those_that_say_who_it_is_can_only_be_read(self):

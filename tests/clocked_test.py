@@ -143,5 +143,30 @@ class Places(Case):
         self.assertRegex(listed, r"spi_mode=0\.\.3 +spi ")
 
 
+
+class Texts(Case):
+    def test_an_alarm_that_the_word_cannot_carry_is_refused(self):
+        refused = absenc("read", "sim:ssi?alarm=error")
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("the alarm error cannot be shown", refused.stderr)
+        shown = absenc("read", "sim:ssi?alarm=error&error_bit=active_high", "--json")
+        self.assertEqual(json.loads(shown.stdout)["alarms"], ["error"])
+        self.assertEqual(absenc("read", "sim:ssi?alarm=warning&error_bit=active_high").returncode, 2)
+
+    def test_too_many_clocks_are_called_that(self):
+        refused = absenc("decode", "ssi", "--hex", "000111101111000000")
+        self.assertIn("more clocks than the word has bits", refused.stderr)
+        self.assertNotIn("bits that must be zero", refused.stderr)
+
+    def test_ranges_name_their_step(self):
+        refused = absenc("read", "sim:amt21?address=85")
+        self.assertIn("must be 0 to 252 in steps of 4", refused.stderr)
+        self.assertIn("must be 12 to 14 in steps of 2", absenc("read", "sim:amt21?singleturn_bits=13").stderr)
+        self.assertIn("0 to 252 in steps of 4", absenc("list", "amt21").stdout)
+
+    def test_a_maker_is_two_letters(self):
+        self.assertRegex(absenc("run", "sim:biss", "manufacturer").stdout, r"manufacturer +ve ")
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -83,6 +83,12 @@ class CrcFind(Case):
                     self.assertIn(f"biss has the first of these {name}", shown)
         self.assertNotIn("options", self.best("--hex", self.encolink_frames(4)))
 
+    def test_options_give_the_start_value_that_decodes_frames_of_one_length(self):
+        for start in (0x2A, 0x15):
+            words = [self.random.randbytes(3) for _ in range(8)]
+            frames = ["".join(f"{byte:08b}" for byte in word) + f"{crc(word, 6, 3, start, 0x3F):06b}" for word in words]
+            self.assertEqual(self.best("--bits", frames)["options"]["biss"], [f"crc_init={start}"])
+
     def test_bytes_that_never_change_prove_nothing(self):
         frames = [bytes((0x40, 0x42, 0, 0)) + (0xA5A5 + 311 * i).to_bytes(2, "big") for i in range(8)]
         frames = [frame + bytes([functools.reduce(operator.xor, frame)]) for frame in frames]

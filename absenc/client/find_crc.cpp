@@ -120,10 +120,31 @@ CheckFindings find_crc(std::span<const CheckedFrame> frames) {
   return findings;
 }
 
-std::vector<CheckOptions> options_for(const FoundCheck& check, LinkKind link) {
-  const CrcParameters& crc = check.parameters;
+namespace {
+
+// Frames of one length do not tell a start value from what is added at the end: the start value that goes with
+// `xorout` over `covered` bits.
+CrcParameters with_xorout(CrcParameters crc, std::uint32_t xorout, std::size_t covered) {
+  std::uint32_t change = crc.xorout ^ xorout;
+  for (std::size_t i = 0; i < covered; ++i) {
+    const bool fed_back = (change & 1) != 0;
+    change = (fed_back ? change ^ crc.poly : change) >> 1 | (fed_back ? 1u << (crc.width - 1) : 0u);
+  }
+  crc.init = static_cast<decltype(crc.init)>(crc.init ^ change);
+  crc.xorout = static_cast<decltype(crc.xorout)>(xorout);
+  return crc;
+}
+
+}  // namespace
+
+std::vector<CheckOptions> options_for(const FoundCheck& check, std::size_t frame_size, LinkKind link) {
+  CrcParameters crc = check.parameters;
   const auto all_ones = static_cast<std::uint32_t>(low_mask(crc.width));
   const bool is_plain = check.name == "crc" && !crc.refin && !crc.refout && check.trailing == 0 && !check.padded;
+  const bool from_begin = std::find(check.first.begin(), check.first.end(), 0u) != check.first.end();
+  if (check.init_open && from_begin && link == LinkKind::clocked) {
+    crc = with_xorout(crc, all_ones, frame_size - check.check_size);
+  }
   if (!is_plain || (crc.xorout != 0 && crc.xorout != all_ones)) return {};
   const std::array<std::pair<Role, std::int64_t>, 4> wanted{{{Role::check_width, crc.width},
                                                              {Role::check_polynomial, crc.poly},

@@ -244,6 +244,8 @@ struct Unit {
   std::span<const Vector> vectors;
   const FieldInfo* status;  // the flags of Reading::status; null when the unit has none
   const FieldInfo* alarms;  // the flags of Reading::alarms
+  /// The alarms that an encoder with these options can report; null: all.
+  std::uint32_t (*reportable)(const Options& options) = nullptr;
   // Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first in one
   // number: whoever compares alarms sees both, whoever shows them names each.
   const FieldInfo* second_status = nullptr;

@@ -17,6 +17,7 @@
 #include "absenc/client/captures/stage_test.hpp"
 #include "absenc/client/captures/words.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/testing.hpp"
 #include "absenc/protocol/all.hpp"
@@ -90,11 +91,10 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
     const bool is_first = &base == &bases.front();
     const std::string moved = is_first ? base : base + "&motion=rpm=600";
     all.push_back({moved, !is_first});
-    if (unit.alarms != nullptr) {
+    const std::vector<std::string> alarms = reportable_alarms(unit, parse_address(moved).options);
+    if (!alarms.empty()) {
       std::string every = moved;
-      for (const FlagInfo& flag : unit.alarms->flags) {
-        if (!flag.name.empty()) every += "&alarm=" + std::string(flag.name);
-      }
+      for (const std::string& name : alarms) every += "&alarm=" + name;
       all.push_back({every, !is_first});
     }
     if (!is_first) continue;
@@ -105,11 +105,7 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
         all.push_back({moved + "&fault=" + std::string(fault) + "=" + rate + "&seed=" + seed, seed != '1'});
       }
     }
-    if (unit.alarms != nullptr) {
-      for (const FlagInfo& flag : unit.alarms->flags) {
-        if (!flag.name.empty()) all.push_back({moved + "&alarm=" + std::string(flag.name), true});
-      }
-    }
+    for (const std::string& name : alarms) all.push_back({moved + "&alarm=" + name, true});
     for (const Condition& condition : unit.conditions) {
       for (const std::int64_t value : {condition.minimum, condition.maximum}) {
         if (value == condition.normal) continue;

@@ -242,11 +242,8 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
 /// Each alarm, and each condition at both ends of its range, as settings of a virtual encoder.
 std::vector<std::string> states_of(const Unit& unit) {
   std::vector<std::string> states;
-  if (unit.alarms != nullptr) {
-    for (const FlagInfo& flag : unit.alarms->flags) {
-      if (!flag.name.empty()) states.push_back(fmt::format("alarm={}", flag.name));
-    }
-  }
+  const Options options = parse_address("sim:" + std::string(unit.id)).options;
+  for (const std::string& name : reportable_alarms(unit, options)) states.push_back("alarm=" + name);
   for (const Condition& condition : unit.conditions) {
     for (const std::int64_t value : {condition.minimum, condition.maximum}) {
       if (value != condition.normal) states.push_back(fmt::format("condition={}={}", condition.name, value));

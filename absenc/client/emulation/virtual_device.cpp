@@ -76,7 +76,7 @@ VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const Dev
   if (device_.bytes == nullptr && device_.frames == nullptr) {
     throw UsageError(fmt::format("{} has no virtual encoder with these options", unit.id));
   }
-  if (!settings.alarms.empty()) alarms_ = require_alarms(unit, settings.alarms);
+  if (!settings.alarms.empty()) alarms_ = require_alarms(unit, options, settings.alarms);
   for (const Condition& condition : unit.conditions) conditions_.push_back(condition.normal);
   for (const std::string& text : settings.conditions) {
     const OptionText written = split_setting(text);

@@ -211,9 +211,31 @@ std::uint32_t require_alarms(const Unit& unit, std::span<const std::string> name
   return bits;
 }
 
+std::vector<std::string> reportable_alarms(const Unit& unit, const Options& options) {
+  const std::uint64_t bits = unit.reportable != nullptr ? unit.reportable(options) : ~std::uint64_t{0};
+  std::vector<std::string> names;
+  if (unit.alarms == nullptr) return names;
+  for (const std::string_view name : flag_names(*unit.alarms, bits)) names.emplace_back(name);
+  return names;
+}
+
+std::uint32_t require_alarms(const Unit& unit, const Options& options, std::span<const std::string> names) {
+  const std::uint32_t bits = require_alarms(unit, names);
+  const std::vector<std::string> reportable = reportable_alarms(unit, options);
+  for (const std::string& name : names) {
+    if (std::find(reportable.begin(), reportable.end(), name) != reportable.end()) continue;
+    throw UsageError(fmt::format(
+        "the alarm {} cannot be shown: nothing in what {} sends with these options reports it; `absenc list {}` shows "
+        "the options that add it",
+        name, unit.id, unit.id));
+  }
+  return bits;
+}
+
 std::string range_of(const Option& option) {
   if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, " or "));
-  return fmt::format("{} to {}", to_text(option, option.minimum), to_text(option, option.maximum));
+  const std::string ends = fmt::format("{} to {}", to_text(option, option.minimum), to_text(option, option.maximum));
+  return option.step == 1 ? ends : fmt::format("{} in steps of {}", ends, to_text(option, option.step));
 }
 
 double real_value(const Option& option, std::int64_t value) {
@@ -349,12 +371,10 @@ std::string to_text(Time time) {
 
 std::string_view name_of(Role role) {
   static constexpr std::array<std::string_view, 21> names{
-      "",           "position",       "turns",       "of_position",
-      "sequence",   "encoder",        "identity",    "clash",
-      "trouble",    "rate",           "check_width", "check_polynomial",
-      "check_init", "check_inverted", "address",     "page",
-      "count",      "force",          "value",       "data",
-      "written"};
+      "",           "position",       "turns",   "of_position", "sequence",    "encoder",
+      "identity",   "clash",          "trouble", "rate",        "check_width", "check_polynomial",
+      "check_init", "check_inverted", "address", "page",        "count",       "force",
+      "value",      "data",           "written"};
   return names[static_cast<std::size_t>(role)];
 }
 

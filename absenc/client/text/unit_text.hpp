@@ -47,6 +47,11 @@ struct RoleArgument {
 
 /// The bits of the flags with these names. Throws UsageError.
 [[nodiscard]] std::uint32_t require_alarms(const Unit& unit, std::span<const std::string> names);
+/// Names of those that an encoder with these options can report.
+[[nodiscard]] std::vector<std::string> reportable_alarms(const Unit& unit, const Options& options);
+/// The same of an encoder with these options, which must be able to report them.
+[[nodiscard]] std::uint32_t require_alarms(const Unit& unit, const Options& options,
+                                           std::span<const std::string> names);
 
 /// Null when the virtual encoder has no condition of this name.
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);

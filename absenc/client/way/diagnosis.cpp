@@ -82,6 +82,9 @@ std::string meaning(LinkKind link, Subject subject, Error error) {
       return fmt::format("the checksum of the {} is wrong", frame);
     case Error::cross_check_failed:
       return fmt::format("parts of the {} contradict each other", frame);
+    case Error::out_of_range:
+      if (link == LinkKind::clocked) return "the word is outside its range";
+      break;
     case Error::unexpected_reply:
       if (subject == Subject::request) return "this encoder knows no such request";
       break;

@@ -70,6 +70,7 @@ struct Declaration {
   bool (*streams)(const Options&) = nullptr;
   ExtraWires (*extra_wires)(const Options&) = nullptr;
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
+  std::uint32_t (*reportable)(const Options&) = nullptr;
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
   std::size_t follower_storage = 0;

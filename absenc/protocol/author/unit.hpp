@@ -281,6 +281,7 @@ struct Descriptor {
               .vectors = Made::vectors,
               .status = declared.status,
               .alarms = declared.alarms,
+              .reportable = declared.reportable,
               .second_status = declared.second_status,
               .second_alarms = declared.second_alarms,
               .host_storage = Made::host_storage,

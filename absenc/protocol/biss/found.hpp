@@ -32,6 +32,26 @@ class NumberList {
   Buffer<char, 96> text_;  // what has no room is left out
 };
 
+/// The two letters of a maker; bytes that are no letters or digits as "\\x00".
+class MakerName {
+ public:
+  constexpr void append(Bytes bytes) {
+    constexpr std::string_view hex = "0123456789ABCDEF";
+    for (const std::uint8_t byte : bytes) {
+      if (byte > ' ' && byte < 0x7F && byte != '\\') {
+        text_.push_back(static_cast<char>(byte));
+        continue;
+      }
+      for (const char c : {'\\', 'x', hex[byte >> 4], hex[byte & 15]}) text_.push_back(c);
+    }
+  }
+  [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
+  [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
+
+ private:
+  Buffer<char, 8> text_;
+};
+
 struct Found {
   // Of a control frame.
   std::optional<std::uint8_t> slaves{};
@@ -57,13 +77,14 @@ struct Found {
   std::optional<std::uint16_t> profile{};
   std::optional<std::uint64_t> serial_number{};
   ByteBuffer<6> device_id;
-  ByteBuffer<2> manufacturer;
+  MakerName manufacturer;
   Reading reading{};  // none: positions are not what was asked for
 };
 
 namespace shown {
 constexpr std::optional<Bytes> some(Bytes bytes, bool there) { return there ? std::optional(bytes) : std::nullopt; }
-constexpr std::optional<std::string_view> some(const NumberList& list) {
+template <class Text>
+constexpr std::optional<std::string_view> some(const Text& list) {
   return list.empty() ? std::nullopt : std::optional(list.view());
 }
 constexpr std::optional<Bytes> data(const Found& found) { return some(found.bytes, found.has_data); }
@@ -71,9 +92,7 @@ constexpr std::optional<std::string_view> start_delay(const Found& found) { retu
 constexpr std::optional<std::string_view> slave_ids(const Found& found) { return some(found.slave_ids); }
 constexpr std::optional<std::string_view> acknowledged(const Found& found) { return some(found.acknowledged); }
 constexpr std::optional<Bytes> device_id(const Found& found) { return some(found.device_id, !found.device_id.empty()); }
-constexpr std::optional<Bytes> manufacturer(const Found& found) {
-  return some(found.manufacturer, !found.manufacturer.empty());
-}
+constexpr std::optional<std::string_view> manufacturer(const Found& found) { return some(found.manufacturer); }
 }  // namespace shown
 
 inline constexpr auto register_fields = author::fields_of<Found>(

@@ -88,6 +88,8 @@ BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& fi
   return place_in_word(format_by(values).word, field, start + 2);
 }
 
+std::uint32_t reportable_by(const Options& values) { return contents_of(format_by(values).word).reported; }
+
 constexpr Declaration<Protocol, VirtualEncoderOf<Format>> declaration{
     .id = "biss",
     .name = "BiSS-C",
@@ -109,6 +111,7 @@ constexpr Declaration<Protocol, VirtualEncoderOf<Format>> declaration{
     .is_checked = is_checked,
     .bits = bits_in,
     .control_bit = control_bit,
+    .reportable = reportable_by,
     .alarms = &all_fields[word_field_alarms],
     .memory = registers::areas,
 };

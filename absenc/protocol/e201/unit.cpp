@@ -253,6 +253,8 @@ bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
   return first_changed < biss::idle_bits + position.ack_bits + 2 + biss::data_bits(f.biss());
 }
 
+std::uint32_t reportable_by(const Options& values) { return contents_of(format_by(values).word).reported; }
+
 constexpr Declaration<Protocol, VirtualInterface> declaration{
     .id = "e201",
     .name = "RLS E201-9S USB interface",
@@ -273,6 +275,7 @@ constexpr Declaration<Protocol, VirtualInterface> declaration{
     .guess_request = guess_request,
     .reply_size = size_of_reply,
     .is_checked = is_checked,
+    .reportable = reportable_by,
     .alarms = &all_fields[word_field_alarms],
     .timing = {.turnaround_limit = answer_limit},
 };

@@ -97,6 +97,10 @@ constexpr void put_reply(FieldSink& sink, const Format& format, const NoRequest&
 Explanation explain(const Format& format, Error error, Bytes, Bytes) {
   if (error == Error::bad_checksum) return {"the parity of the word is wrong"};
   if (error == Error::out_of_range && format.padded) return {"what fills the word up is not zero"};
+  if (error == Error::out_of_range) {
+    return {"there are more clocks than the word has bits: read as one number they are larger than any position",
+            "give as many bits as the word has, or set extra_clocks"};
+  }
   if (error != Error::cross_check_failed) return {};
   if (format.confirm_rpm != 0) {
     return {"the word read once more is one that the shaft cannot have reached: the line is noisy, or broken"};
@@ -121,6 +125,11 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   return place_in_word(format_by(values).word, field, 0);
 }
 
+std::uint32_t reportable_by(const Options& values) {
+  const Format format = format_by(values);
+  return contents_of(format.word).reported | (format.error_parity ? word_error : 0);
+}
+
 constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .id = "ssi",
     .name = "SSI",
@@ -138,6 +147,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .is_usable = is_possible,
     .is_checked = is_checked,
     .bits = bits_in,
+    .reportable = reportable_by,
     .alarms = &word_fields[word_field_alarms],
 };
 

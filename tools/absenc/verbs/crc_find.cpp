@@ -94,15 +94,15 @@ void show_checks(const CheckFindings& findings, std::size_t most, std::string_vi
 }
 
 // How what decodes words is told of the best of them.
-void show_options(const FoundCheck& check, LinkKind link) {
-  for (const CheckOptions& one : options_for(check, link)) {
+void show_options(const CheckFindings& findings, LinkKind link) {
+  for (const CheckOptions& one : options_for(findings.checks.front(), findings.shortest, link)) {
     const std::string options =
         one.options.empty() ? "as it is" : fmt::format("with --option {}", fmt::join(one.options, " --option "));
     print_line(fmt::format("{} has the first of these {}", one.unit->id, options));
   }
 }
 
-Json check_json(const FoundCheck& check, LinkKind link, std::string_view unit) {
+Json check_json(const FoundCheck& check, std::size_t frame_size, LinkKind link, std::string_view unit) {
   const CrcParameters& crc = check.parameters;
   Json json = Json::object().set("check", check.name).set("width", crc.width);
   if (check.name == crc_name) {
@@ -117,7 +117,8 @@ Json check_json(const FoundCheck& check, LinkKind link, std::string_view unit) {
   json.set("unit", unit).set("covered_from", Json::list(check.first)).set("check_size", check.check_size);
   json.set("behind_check", check.trailing).set("chance", check.chance);
   Json options = Json::object();
-  for (const CheckOptions& one : options_for(check, link)) options.set(one.unit->id, Json::list(one.options));
+  for (const CheckOptions& one : options_for(check, frame_size, link))
+    options.set(one.unit->id, Json::list(one.options));
   if (!options.empty()) json.set("options", options);
   return json.set("frames_to_settle", check.frames_to_settle);
 }
@@ -129,11 +130,12 @@ int run_crc_find(const Invocation& invocation) {
   const LinkKind link = frames.front().bits != 0 ? LinkKind::clocked : LinkKind::half_duplex;
   const std::string_view unit = link == LinkKind::clocked ? "bits" : "bytes";
   if (invocation.has("--json")) {
-    const Json list = Json::list(findings.checks, [&](const auto& check) { return check_json(check, link, unit); });
+    const Json list = Json::list(findings.checks,
+                                 [&](const auto& check) { return check_json(check, findings.shortest, link, unit); });
     print_line(Json::object().set("ok", found).set("frames", frames.size()).set("solutions", list).line());
   } else if (found) {
     show_checks(findings, invocation.has("--all") ? SIZE_MAX : most_shown, unit);
-    show_options(findings.checks.front(), link);
+    show_options(findings, link);
   }
   if (!found && !findings.is_open) {
     print_message(findings.advice);
