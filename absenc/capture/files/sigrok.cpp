@@ -28,6 +28,7 @@ namespace {
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes 4 MiB, PulseView 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
+constexpr std::uint64_t believable = std::uint64_t{1} << 60;  // bytes of a capture
 constexpr const char* copy_again = "copy the file again from where it came";
 
 struct Metadata {
@@ -212,8 +213,43 @@ class SigrokReader final : public Reader {
     }
   }
 
+  // N of all NAME-N, rising.
+  static std::vector<unsigned> numbers_of_pieces(const ZipArchive& archive, const std::string& name) {
+    std::vector<unsigned> numbers;
+    for (const std::string& entry : archive.names()) {
+      if (!entry.starts_with(name + "-")) continue;
+      const unsigned number = to_number(std::string_view(entry).substr(name.size() + 1));
+      if (number != 0 && entry == name + "-" + std::to_string(number)) numbers.push_back(number);
+    }
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+    return numbers;
+  }
+
+  // Pieces that are missing in the middle. sigrok writes all but the last of them equally long, so that the time of
+  // what comes behind is known. Returns how many bytes there are before `next`.
+  std::uint64_t leave_gap(ZipArchive& archive, const std::string& name, const std::string& next,
+                          std::pair<unsigned, unsigned> missing_numbers, std::uint64_t before) {
+    ZipArchive::Entry neighbour;
+    static_cast<void>(archive.find(next, neighbour));
+    if (!pieces_.empty()) {
+      neighbour.size = pieces_.back().entry.size;
+      pieces_.back().tail = 0;
+    }
+    const std::uint64_t count = missing_numbers.second - missing_numbers.first;
+    const std::uint64_t longest = neighbour.size == 0 ? 0 : believable / neighbour.size;
+    const std::uint64_t after = before + std::min(count, longest) * neighbour.size;
+    const std::string first = name + "-" + std::to_string(missing_numbers.first);
+    const std::string last = name + "-" + std::to_string(missing_numbers.second - 1);
+    static_cast<void>(archive.open(neighbour));
+    damages_.add({.offset = archive.offset(),
+                  .tick = before / unit_size_,
+                  .what = (count == 1 ? first + " is missing" : first + " to " + last + " are missing") + ", about " +
+                          std::to_string((after - before) / unit_size_) + " samples; " + copy_again});
+    return after;
+  }
+
   void list_pieces(ZipArchive& archive, const std::string& name) {
-    constexpr std::uint64_t believable = std::uint64_t{1} << 60;
     std::uint64_t bytes = 0;
     const auto add = [&](const std::string& entry_name) {
       Piece piece{.name = entry_name};
@@ -227,7 +263,14 @@ class SigrokReader final : public Reader {
       return true;
     };
     if (!add(name)) {
-      for (std::size_t i = 1; add(name + "-" + std::to_string(i)); ++i) continue;
+      unsigned expected = 1;
+      for (const unsigned number : numbers_of_pieces(archive, name)) {
+        const std::string piece = name + "-" + std::to_string(number);
+        if (number != expected) bytes = leave_gap(archive, name, piece, {expected, number}, bytes);
+        add(piece);
+        bytes = std::min(bytes, believable);
+        expected = number + 1;
+      }
     }
     layout_.ticks = bytes / unit_size_;
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <random>
+#include <tuple>
 
 #include "absenc/capture/files/test_files.hpp"
 
@@ -151,6 +152,27 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
     ASSERT_EQ(contents.samples.size(), 600'000u);
     EXPECT_TRUE(std::equal(samples.begin(), samples.end(), contents.samples.begin()));
     EXPECT_TRUE(std::equal(samples.begin(), samples.end(), contents.samples.begin() + 300'000));
+  }
+}
+
+TEST(Sigrok, AMissingPieceIsADamageAndTheOthersKeepTheirTime) {
+  const FileBytes samples = wave(300'000);
+  for (const auto& [numbers, tick, end, words] :
+       std::initializer_list<std::tuple<std::vector<int>, Tick, Tick, std::string>>{
+           {{1, 2, 4}, 600'000, 1'200'000, "logic-1-3 is missing"},
+           {{1, 5}, 300'000, 1'500'000, "logic-1-2 to logic-1-4 are missing"},
+           {{2, 3}, 0, 900'000, "logic-1-1 is missing"}}) {
+    std::vector<std::pair<std::string, FileBytes>> pieces;
+    for (const int number : numbers) pieces.emplace_back("logic-1-" + std::to_string(number), samples);
+    const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 8, 1), pieces));
+    const Contents contents = read_all(*reader);
+    EXPECT_EQ(contents.end, end) << words;
+    EXPECT_EQ(reader->layout().ticks, end) << words;
+    EXPECT_EQ(contents.samples.size(), numbers.size() * samples.size());
+    ASSERT_EQ(reader->damages().size(), 1u) << words;
+    EXPECT_NE(reader->damages()[0].what.find(words), std::string::npos) << reader->damages()[0].what;
+    EXPECT_EQ(reader->damages()[0].tick, tick);
+    EXPECT_FALSE(reader->damages()[0].note);
   }
 }
 

@@ -153,6 +153,16 @@ bool ZipArchive::find(const std::string& name, Entry& entry) const {
   return true;
 }
 
+std::vector<std::string> ZipArchive::names() const {
+  std::vector<std::string> names;
+  const zip_int64_t count = zip_get_num_entries(state_->archive.get(), 0);
+  for (zip_int64_t i = 0; i < count; ++i) {
+    const char* name = zip_get_name(state_->archive.get(), static_cast<zip_uint64_t>(i), ZIP_FL_ENC_GUESS);
+    if (name != nullptr) names.emplace_back(name);
+  }
+  return names;
+}
+
 bool ZipArchive::expand(const Entry& entry, std::span<std::uint8_t> into) {
   zip_stat_t stat;
   zip_stat_init(&stat);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "absenc/capture/files/source.hpp"
 
@@ -26,6 +27,9 @@ class ZipArchive {
   };
   /// False: there is none of that name.
   [[nodiscard]] bool find(const std::string& name, Entry& entry) const;
+
+  /// All entries, in the order of the archive.
+  [[nodiscard]] std::vector<std::string> names() const;
 
   /// Expands a whole deflated entry into `into`, which has its size, in a quarter of the time that `open` and `read`
   /// take. True only when all of it is there and its checksum is right; else those read it as far as can be, and say
