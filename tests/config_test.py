@@ -2,9 +2,12 @@
 """absenc.toml: encoders by name, where the file is looked for, what overrides what, and what is wrong with a file."""
 import json
 import os
+import resource
+import signal
+import subprocess
 import unittest
 
-from command_support import Case, Emulator, absenc, json_lines
+from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, json_lines
 
 ELBOW = '[encoder.elbow]\nprotocol = "tformat"\n'
 SIM = ELBOW + 'port = "sim"\n'
@@ -143,7 +146,60 @@ class WhereTheFileIs(ConfigCase):
         self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG=self.directory), "cannot be read", "directory")
 
 
+class ManyEncoders(ConfigCase):
+    def many(self, count):
+        self.config("".join(f'[encoder.axis{i}]\nprotocol = "tformat"\nport = "/dev/absent{i}"\n' for i in range(count)))
+
+    def processor_time(self, count):
+        self.many(count)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        self.assert_good(self.absenc("list", "--names"))
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    def test_the_file_is_parsed_once(self):
+        """Ten times the encoders take ten times as long, not a hundred times."""
+        self.assertLess(self.processor_time(2000), 30 * max(self.processor_time(200), 0.01))
+
+    def test_serve_ends_by_a_signal_whatever_it_does(self):
+        self.many(1000)
+        environment = {**os.environ, "HOME": self.home, "XDG_STATE_HOME": self.home}
+        environment.pop("ABSENC_CONFIG", None)
+        process = subprocess.Popen([ABSENC, "serve", "--listen", "127.0.0.1:0", "--history", "none"], cwd=self.work,
+                                   env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        try:
+            self.assertIn("http://", process.stdout.readline())
+            process.send_signal(signal.SIGTERM)
+            self.assertEqual(process.wait(PATIENCE), 0)
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+
+
 class WrongFiles(ConfigCase):
+    def test_a_link_that_leads_nowhere_is_not_passed_over(self):
+        self.write("home/.config/absenc/absenc.toml", SIM)
+        self.assert_good(self.absenc("read", "elbow"))
+        for target in ("nowhere.toml", "absenc.toml"):
+            os.symlink(target, os.path.join(self.work, "absenc.toml"))
+            self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml", "leads to no file")
+            os.unlink(os.path.join(self.work, "absenc.toml"))
+
+    def test_a_fifo_is_refused(self):
+        os.mkfifo(os.path.join(self.work, "absenc.toml"))
+        self.assert_wrong_usage(self.absenc("read", "elbow"), "no regular file")
+
+    def test_an_option_that_is_given_twice(self):
+        for encoder in ("sim:tformat?seed=1&seed=2", "sim:tformat?singleturn=1&singleturn=1",
+                        "sim:tformat?model=TS5700N8500&model=TS5667N120"):
+            self.assert_wrong_usage(self.absenc("read", encoder), "is given twice")
+        self.assert_wrong_usage(self.absenc("info", "sim:tformat?seed=1", "--option", "seed=2"), "is given twice")
+        self.assert_good(self.absenc("read", "sim:tformat?alarm=over_heat&alarm=battery_alarm"))
+
+    def test_a_number_too_small_is_not_zero(self):
+        self.assert_wrong_usage(self.absenc("read", "sim:tformat", "--count", "1", "--rate", "1e-400"), "1e-400", "from 0")
+
     def test_what_is_nested_too_deep_is_told(self):
         deep = 50_000
         for text, place in [(".".join(["a"] * deep) + " = 1\n", "1:34:"),

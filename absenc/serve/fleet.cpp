@@ -5,11 +5,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <unordered_set>
 #include <utility>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/way/named_encoder.hpp"
 #include "absenc/client/way/shared_link.hpp"
+#include "absenc/os/error.hpp"
+#include "absenc/os/signals.hpp"
 
 namespace absenc::serve {
 
@@ -49,26 +52,29 @@ Fleet::~Fleet() {
 
 std::vector<Fleet::Wanted> Fleet::wanted() const {
   std::vector<std::string> names = names_;
-  std::optional<SettingsFile> file;
+  std::optional<NamedEncoders> file;
   if (names.empty() || std::any_of(names.begin(), names.end(), is_named)) {
-    file = require_settings_file("the names of encoders stand in absenc.toml");
+    file = require_names("the names of encoders stand in absenc.toml");
   }
   if (names.empty()) {
-    for (const FileSection& encoder : file->encoders) names.push_back(encoder.name);
-    if (names.empty()) throw UsageError(fmt::format("there is no encoder in {}", file->path));
+    for (const FileSection& encoder : file->file().encoders) names.push_back(encoder.name);
+    if (names.empty()) throw UsageError(fmt::format("there is no encoder in {}", file->file().path));
   }
   std::vector<Wanted> all;
   for (const std::string& name : names) {
+    if (os::interrupted()) throw os::Interrupted{};
     NamedEncoder named;
-    if (is_named(name)) named = require_encoder(*file, name);
+    if (is_named(name)) named = file->require(name);
     const double rate = named.rate_hz > 0 ? named.rate_hz : rate_;
-    all.push_back({name, description_of(named), parse_address(name), rate});
+    all.push_back(
+        {name, description_of(named), is_named(name) ? parse_address(name, *file) : parse_address(name), rate});
   }
   std::vector<EncoderAddress> addresses;
   for (const Wanted& one : all) addresses.push_back(one.address);
   require_different(addresses, names);
-  for (auto one = names.begin(); one != names.end(); ++one) {
-    if (std::find(names.begin(), one, *one) != one) throw UsageError(fmt::format("{} is named twice", *one));
+  std::unordered_set<std::string_view> seen;
+  for (const std::string& name : names) {
+    if (!seen.insert(name).second) throw UsageError(fmt::format("{} is named twice", name));
   }
   return all;
 }
@@ -95,6 +101,7 @@ std::string Fleet::reload() {
   std::vector<std::string> added;
   std::vector<Served> next;
   for (std::size_t i = 0; i < all.size(); ++i) {
+    if (os::interrupted()) throw os::Interrupted{};
     const Wanted& now = all[i];
     const auto same =
         std::find_if(going.begin(), going.end(), [&](const Served& one) { return one.watch->name() == now.name; });

@@ -81,8 +81,10 @@ double Invocation::real(std::string_view name, double fallback, double minimum, 
   if (!has(name)) return fallback;
   const std::string written(text(name));
   char* end = nullptr;
+  errno = 0;
   const double value = std::strtod(written.c_str(), &end);
-  const bool whole = !written.empty() && end == written.c_str() + written.size() && std::isfinite(value);
+  const bool whole = !written.empty() && end == written.c_str() + written.size() && std::isfinite(value) &&
+                     errno != ERANGE;  // 1e-400 is not 0
   if (whole && value >= minimum && value <= maximum) return value;
   throw UsageError(fmt::format("{} is \"{}\", but must be a number from {} to {}", name, written, minimum, maximum));
 }

@@ -282,6 +282,20 @@ bool fits(const EncoderAddress& uri, std::string_view setting) {
   return setting == word_option_name && takes_word(*uri.unit);
 }
 
+void require_once(std::span<const OptionText> settings) {
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const std::string_view name = settings[i].name;
+    const LinkParameter* parameter = find_link_parameter(name);
+    if (parameter != nullptr && parameter->repeatable) continue;
+    const auto before = settings.first(i);
+    const auto* const other =
+        std::find_if(before.data(), before.data() + before.size(), [&](const auto& one) { return one.name == name; });
+    if (other == before.data() + before.size()) continue;
+    throw UsageError(fmt::format("{} is given twice, as \"{}\" and as \"{}\": which is meant?", name, other->value,
+                                 settings[i].value));
+  }
+}
+
 // So that what is wrong can be said of the last of them. A virtual encoder wants all of its options first.
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
@@ -289,10 +303,8 @@ void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   if (uri.place == Place::sim && options_are_set) VirtualDevice(*uri.unit, uri.options, uri.device);
 }
 
-EncoderAddress parse_named(std::string_view name, std::span<const OptionText> written) {
-  const SettingsFile config = require_settings_file(
-      fmt::format("\"{}\" is no PROTOCOL:PORT, so it would have to be a name of absenc.toml", name));
-  NamedEncoder named = require_encoder(config, name);
+EncoderAddress parse_named(std::string_view name, std::span<const OptionText> written, const NamedEncoders& names) {
+  NamedEncoder named = names.require(name);
   EncoderAddress uri = at(named.place, [&] { return parse_place(named.address); });
 
   std::vector<FileSetting> settings = std::move(named.settings);
@@ -341,11 +353,19 @@ EncoderAddress parse_address(std::string_view text, std::span<const std::string>
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
   for (const std::string& setting : more) settings.push_back(split_setting(setting));
-  if (is_name(address)) return parse_named(address, settings);
+  require_once(settings);
+  if (is_name(address)) {
+    return parse_named(address, settings,
+                       require_names(fmt::format("\"{}\" is no PROTOCOL:PORT, so it would have to be "
+                                                 "a name of absenc.toml",
+                                                 address)));
+  }
   EncoderAddress uri = parse_place(address);
   take_settings(uri, settings);
   return uri;
 }
+
+EncoderAddress parse_address(std::string_view name, const NamedEncoders& names) { return parse_named(name, {}, names); }
 
 host::SpeedLimit speed_limit(const EncoderAddress& uri) {
   host::SpeedLimit limit = host::speed_limit(uri.options);

@@ -107,6 +107,10 @@ struct EncoderAddress {
 /// Throws UsageError, which names what is wrong and the nearest name that would be right.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
+class NamedEncoders;
+/// The same of a name of absenc.toml that was read already.
+[[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
+
 /// Without its settings: "tformat:/dev/ttyUSB0"
 [[nodiscard]] std::string address_of(const EncoderAddress& uri);
 

@@ -72,7 +72,9 @@ void check_name(const FileSection& encoder) {
   }
 }
 
-void check_line(const FileSection& encoder, const std::vector<FileSection>& buses) {
+}  // namespace
+
+void NamedEncoders::check_line(const FileSection& encoder) const {
   const FileSetting* bus = encoder.find("bus");
   const FileSetting* port = encoder.find("port");
   if (bus == nullptr && port == nullptr) {
@@ -80,14 +82,14 @@ void check_line(const FileSection& encoder, const std::vector<FileSection>& buse
   }
   if (bus == nullptr) return;
   if (port != nullptr) refuse(bus->place, fmt::format("the encoder {} has a port and a bus: give one", encoder.name));
-  Names names;
-  for (const FileSection& one : buses) names.push_back(one.name);
   const std::string& wanted = bus->values[0];
-  if (std::find(names.begin(), names.end(), wanted) != names.end()) return;
+  if (buses_.contains(wanted)) return;
+  Names names;
+  for (const FileSection& one : file_.buses) names.push_back(one.name);
   refuse(bus->place, fmt::format("there is no bus \"{}\"{}", wanted, suggestion(wanted, names)));
 }
 
-void check_encoder(const FileSection& encoder, const std::vector<FileSection>& buses) {
+void NamedEncoders::check_encoder(const FileSection& encoder) const {
   check_name(encoder);
   Names known{"protocol", "model", "bus", "port", rate_name};
   const FileSetting* protocol = encoder.find("protocol");
@@ -98,8 +100,10 @@ void check_encoder(const FileSection& encoder, const std::vector<FileSection>& b
   add_link_parameters(known);
   check_settings(encoder, known, protocol == nullptr ? "an encoder" : "an encoder of " + protocol->values[0]);
   if (protocol == nullptr) refuse(encoder.place, fmt::format("the encoder {} has no protocol", encoder.name));
-  check_line(encoder, buses);
+  check_line(encoder);
 }
+
+namespace {
 
 // Those of `from` that are not in `over`.
 std::vector<FileSetting> not_overridden(const FileSection& from, const std::vector<FileSetting>& over) {
@@ -124,27 +128,31 @@ double rate_of(const FileSection& encoder) {
   return value;
 }
 
-const FileSection& section_named(const std::vector<FileSection>& sections, std::string_view name) {
-  return *std::find_if(sections.begin(), sections.end(), [&](const auto& section) { return section.name == name; });
-}
-
 }  // namespace
 
-void check(const SettingsFile& config) {
-  check_defaults(config.defaults);
-  for (const FileSection& bus : config.buses) check_bus(bus);
-  for (const FileSection& encoder : config.encoders) check_encoder(encoder, config.buses);
+NamedEncoders::NamedEncoders(SettingsFile file) : file_(std::move(file)) {
+  check_defaults(file_.defaults);
+  for (const FileSection& bus : file_.buses) {
+    check_bus(bus);
+    buses_.emplace(bus.name, &bus);
+  }
+  for (const FileSection& encoder : file_.encoders) {
+    check_encoder(encoder);
+    encoders_.emplace(encoder.name, &encoder);
+    if (const FileSetting* bus = encoder.find("bus")) ++on_bus_[bus->values[0]];
+  }
 }
 
-NamedEncoder require_encoder(const SettingsFile& config, std::string_view name) {
-  Names names;
-  for (const FileSection& encoder : config.encoders) names.push_back(encoder.name);
-  if (std::find(names.begin(), names.end(), name) == names.end()) {
-    throw UsageError(fmt::format("there is no encoder \"{}\" in {}{}", name, config.path, suggestion(name, names)));
+NamedEncoder NamedEncoders::require(std::string_view name) const {
+  const auto found = encoders_.find(name);
+  if (found == encoders_.end()) {
+    Names names;
+    for (const FileSection& encoder : file_.encoders) names.push_back(encoder.name);
+    throw UsageError(fmt::format("there is no encoder \"{}\" in {}{}", name, file_.path, suggestion(name, names)));
   }
-  const FileSection& encoder = section_named(config.encoders, name);
+  const FileSection& encoder = *found->second;
   const FileSetting* bus = encoder.find("bus");
-  const FileSection& line = bus == nullptr ? encoder : section_named(config.buses, bus->values[0]);
+  const FileSection& line = bus == nullptr ? encoder : *buses_.at(bus->values[0]);
   const FileSetting& port = *line.find("port");
 
   const std::string& protocol = encoder.find("protocol")->values[0];
@@ -158,23 +166,16 @@ NamedEncoder require_encoder(const SettingsFile& config, std::string_view name) 
   if (bus != nullptr) {
     for (FileSetting& setting : not_overridden(line, encoder.settings)) named.settings.push_back(std::move(setting));
   }
-  named.has_company =
-      bus != nullptr && std::any_of(config.encoders.begin(), config.encoders.end(), [&](const FileSection& other) {
-        const FileSetting* its = other.find("bus");
-        return other.name != encoder.name && its != nullptr && its->values[0] == bus->values[0];
-      });
-  named.defaults = not_overridden(config.defaults, named.settings);
+  named.has_company = bus != nullptr && on_bus_.at(bus->values[0]) > 1;
+  named.defaults = not_overridden(file_.defaults, named.settings);
   std::erase_if(named.settings, [](const FileSetting& setting) {
     return setting.name == "protocol" || setting.name == "bus" || setting.name == "port" || setting.name == rate_name;
   });
   return named;
 }
 
-SettingsFile require_settings_file(std::string_view purpose) {
-  if (std::optional<SettingsFile> config = load_settings_file()) {
-    check(*config);
-    return *std::move(config);
-  }
+NamedEncoders require_names(std::string_view purpose) {
+  if (std::optional<SettingsFile> config = load_settings_file()) return NamedEncoders(*std::move(config));
   const std::string_view protocol = all_units()[0]->id;
   throw UsageError(
       fmt::format("{}, and there is none: looked for {}. An encoder is named there like this:\n"

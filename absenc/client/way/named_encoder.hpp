@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "absenc/client/error.hpp"
@@ -20,16 +21,36 @@ struct NamedEncoder {
   double rate_hz = 0;                 // how often a service shall read it; 0: the file does not say
 };
 
-/// Throws UsageError, which names the place in the file: settings that do not exist, protocols and buses that do not
-/// exist, whether they are used or not: a misspelt name must not be silent, wherever it stands. Values are left to
-/// whoever uses them, because they may depend on more than the file: the model behind `?`, a file of motion.
-void check(const SettingsFile& config);
+/// A file that was checked, by its names: read once for all of them.
+class NamedEncoders {
+ public:
+  /// Throws UsageError, which names the place in the file: settings that do not exist, protocols and buses that do not
+  /// exist, whether they are used or not: a misspelt name must not be silent, wherever it stands. Values are left to
+  /// whoever uses them, because they may depend on more than the file: the model behind `?`, a file of motion.
+  explicit NamedEncoders(SettingsFile file);
+  NamedEncoders(NamedEncoders&&) noexcept = default;
+  NamedEncoders& operator=(NamedEncoders&&) noexcept = default;
+  NamedEncoders(const NamedEncoders&) = delete;  // the indices point into the file
+  NamedEncoders& operator=(const NamedEncoders&) = delete;
+  ~NamedEncoders() = default;
 
-/// From a file that was checked. Throws UsageError, which names the nearest.
-[[nodiscard]] NamedEncoder require_encoder(const SettingsFile& config, std::string_view name);
+  [[nodiscard]] const SettingsFile& file() const { return file_; }
+  /// Throws UsageError, which names the nearest.
+  [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
-/// absenc.toml, checked; throws UsageError also when there is none: then `purpose` says who needs it.
-[[nodiscard]] SettingsFile require_settings_file(std::string_view purpose);
+ private:
+  using Index = std::unordered_map<std::string_view, const FileSection*>;
+  void check_line(const FileSection& encoder) const;
+  void check_encoder(const FileSection& encoder) const;
+
+  SettingsFile file_;
+  Index buses_;
+  Index encoders_;
+  std::unordered_map<std::string_view, std::size_t> on_bus_;  // how many encoders
+};
+
+/// absenc.toml; throws UsageError also when there is none: then `purpose` says who needs it.
+[[nodiscard]] NamedEncoders require_names(std::string_view purpose);
 
 /// Does the work; a UsageError gets the place put before it.
 template <class Work>

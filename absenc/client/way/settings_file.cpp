@@ -230,8 +230,16 @@ std::vector<std::string> settings_file_paths() {
 std::optional<SettingsFile> load_settings_file() {
   const bool must_exist = !environment(variable).empty();
   for (const std::string& path : settings_file_paths()) {
+    namespace fs = std::filesystem;
     std::error_code ignored;
-    if (std::filesystem::exists(path, ignored)) {
+    if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
+      const fs::file_type type = fs::status(path, ignored).type();
+      if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: a link to itself
+        throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
+      }
+      if (type == fs::file_type::fifo || type == fs::file_type::socket) {  // one might wait for its writer without end
+        throw UsageError(fmt::format("{} is no regular file: write the encoders' names into a file", path));
+      }
       try {
         return parse_settings_file(read_text_file("the file of encoders' names", path), path);
       } catch (const Failure& failure) {

@@ -44,7 +44,7 @@ struct SettingsFile {
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
 /// The first that is there; none: nullopt. Throws UsageError also when the file of ABSENC_CONFIG is not there, or one
-/// that is there cannot be read.
+/// that is there cannot be read, is a link that leads nowhere, or a FIFO: it is never passed over for the next.
 [[nodiscard]] std::optional<SettingsFile> load_settings_file();
 
 }  // namespace absenc::client

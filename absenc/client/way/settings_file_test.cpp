@@ -17,15 +17,12 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-SettingsFile read(std::string_view text) {
-  SettingsFile config = parse_settings_file(text, "file");
-  check(config);
-  return config;
-}
+NamedEncoders names_of(std::string_view text) { return NamedEncoders(parse_settings_file(text, "file")); }
+SettingsFile read(std::string_view text) { return names_of(text).file(); }
 
 std::string refusal(std::string_view text) {
   try {
-    const SettingsFile config = read(text);
+    const NamedEncoders names = names_of(text);
   } catch (const UsageError& error) {
     return error.what();
   }
@@ -137,11 +134,11 @@ TEST(SettingsFile, NamesThatCouldNotBeUsed) {
 }
 
 TEST(NamedEncoder, TheNearestOverrides) {
-  const SettingsFile config = read(
+  const NamedEncoders names = names_of(
       "[defaults]\nlatency = 1\nbaud = 1\necho = \"on\"\n"
       "[bus.arm]\nport = \"tcp:host:4001\"\nlatency = 2\nbaud = 2\n"
       "[encoder.elbow]\nprotocol = \"tformat\"\nbus = \"arm\"\nlatency = 3\n");
-  const NamedEncoder named = require_encoder(config, "elbow");
+  const NamedEncoder named = names.require("elbow");
   EXPECT_EQ(named.address, "tformat:tcp:host:4001");
   EXPECT_EQ(named.place, "file:6:1");
   ASSERT_EQ(named.settings.size(), 2u);
@@ -154,9 +151,9 @@ TEST(NamedEncoder, TheNearestOverrides) {
 }
 
 TEST(NamedEncoder, SimIsAPort) {
-  const SettingsFile config = read("[encoder.elbow]\nprotocol = \"tformat\"\nport = \"sim\"\n");
-  EXPECT_EQ(require_encoder(config, "elbow").address, "sim:tformat");
-  EXPECT_THROW((void)require_encoder(config, "elbwo"), UsageError);
+  const NamedEncoders names = names_of("[encoder.elbow]\nprotocol = \"tformat\"\nport = \"sim\"\n");
+  EXPECT_EQ(names.require("elbow").address, "sim:tformat");
+  EXPECT_THROW((void)names.require("elbwo"), UsageError);
 }
 
 class Environment : public testing::Test {

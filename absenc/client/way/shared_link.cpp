@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <unordered_map>
 #include <vector>
 
 #include "absenc/client/error.hpp"
@@ -21,11 +22,27 @@ fs::path device(const std::string& path) {
   return error ? fs::path(path) : canonical;
 }
 
+// The same for encoders at the same place; "": for no other.
+std::string place_key(const EncoderAddress& one) {
+  const std::string_view place = place_names[static_cast<std::size_t>(one.place)];
+  switch (one.place) {
+    case Place::serial:
+    case Place::slcan:
+      return fmt::format("{}:{}", place, device(one.path).string());
+    case Place::can:
+    case Place::spi:
+      return fmt::format("{}:{}", place, one.path);
+    case Place::tcp:
+      return fmt::format("{}:{}:{}", place, one.host, one.port);
+    case Place::sim:
+      break;
+  }
+  return {};
+}
+
 bool same_place(const EncoderAddress& one, const EncoderAddress& other) {
-  if (one.place != other.place) return false;
-  if (one.place == Place::serial || one.place == Place::slcan) return device(one.path) == device(other.path);
-  if (one.place == Place::can) return one.path == other.path;
-  return one.place == Place::tcp && one.host == other.host && one.port == other.port;
+  return one.place == other.place && one.place != Place::spi && one.place != Place::sim &&
+         place_key(one) == place_key(other);
 }
 
 std::string latency_text(const std::optional<Time>& latency) {
@@ -84,8 +101,11 @@ bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
 
 // Opening is done under the lock, so that encoders which come back at the same time open one port.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names) {
+  std::unordered_map<std::string, std::vector<std::size_t>> at_place;
   for (std::size_t i = 0; i < encoders.size(); ++i) {
-    for (std::size_t other = 0; other < i; ++other) {
+    const std::string key = place_key(encoders[i]);
+    if (key.empty()) continue;
+    for (const std::size_t other : at_place[key]) {
       const EncoderAddress& one = encoders[i];
       const EncoderAddress& before = encoders[other];
       if (one.place == Place::spi && before.place == Place::spi && one.path == before.path) {
@@ -95,6 +115,7 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
       const bool same = one.unit == before.unit && one.options.values == before.options.values;
       if (same) throw UsageError(fmt::format("{} and {} are the same encoder", names[other], names[i]));
     }
+    at_place[key].push_back(i);
   }
 }
 

@@ -319,15 +319,15 @@ Json name_json(std::string_view name, const EncoderAddress& uri) {
 
 // Nothing is shown when one of them is wrong.
 int list_names(bool json) {
-  const SettingsFile config = require_settings_file("the names are those of absenc.toml");
+  const NamedEncoders names = require_names("the names are those of absenc.toml");
   Rows rows{{"NAME", "ENCODER", "MODEL"}};
   std::string lines;
-  for (const FileSection& encoder : config.encoders) {
-    const EncoderAddress uri = parse_address(encoder.name);
+  for (const FileSection& encoder : names.file().encoders) {
+    const EncoderAddress uri = parse_address(encoder.name, names);
     rows.push_back({encoder.name, address_of(uri), std::string(uri.options.model ? uri.options.model->name : "")});
     lines += name_json(encoder.name, uri).line() + '\n';
   }
-  if (!json) print_line(table(rows) + fmt::format("\nThey are written in {}.", config.path));
+  if (!json) print_line(table(rows) + fmt::format("\nThey are written in {}.", names.file().path));
   if (json && !lines.empty()) print_line(lines);
   return exit_good;
 }
