@@ -9,7 +9,7 @@ from typing import Union
 from .errors import UsageError
 
 #: Of an option; several of one name where it may be given more than once.
-Value = Union[str, int, float, bool, Iterable[str]]
+Value = Union[str, int, float, bool, None, Iterable[str]]
 
 #: A number, a text, bytes, the names of flags; None: not told or not reported, or it does not hold.
 Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
@@ -23,9 +23,11 @@ def natural(name: str, value: float, least: int = 0, most: int = 2**32 - 1) -> i
 
 
 def texts(options: Mapping[str, Value]) -> list[str]:
-    """`singleturn=5, alarm=["a", "b"]` as "singleturn=5", "alarm=a", "alarm=b"."""
+    """`singleturn=5, alarm=["a", "b"]` as "singleturn=5", "alarm=a", "alarm=b"; None as nothing."""
     settings = []
     for name, value in options.items():
+        if value is None:  # as if it were not there
+            continue
         if isinstance(value, bool):
             settings.append(f"{name}={str(value).lower()}")
         elif isinstance(value, (str, int, float)):

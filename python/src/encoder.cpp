@@ -117,17 +117,30 @@ class PySamples {
   bool begun_ = false;
 };
 
+std::int64_t whole_number(const Argument& argument, const py::handle& value) {
+  try {
+    return py::cast<std::int64_t>(value);
+  } catch (const py::cast_error&) {  // no number, or more than 64 bits
+    throw client::UsageError(std::string(argument.name) + " is " + std::string(py::repr(value)) +
+                             ", but must be a whole number of up to 64 bits");
+  }
+}
+
 /// Named arguments in the order of the command, those that are left out with their defaults.
 std::vector<std::int64_t> arguments_of(const Command& command, const py::args& args, const py::kwargs& named) {
   std::vector<std::int64_t> values;
-  for (const py::handle value : args) values.push_back(py::cast<std::int64_t>(value));
+  if (args.size() > command.arguments.size()) {
+    throw client::UsageError(std::string(command.name) + " takes " + std::to_string(command.arguments.size()) +
+                             " arguments, not " + std::to_string(args.size()));
+  }
+  for (const py::handle value : args) values.push_back(whole_number(command.arguments[values.size()], value));
   std::size_t used = 0;
   for (std::size_t i = values.size(); i < command.arguments.size() && used < named.size(); ++i) {
     const Argument& argument = command.arguments[i];
     std::string name(argument.name);
     std::replace(name.begin(), name.end(), '-', '_');
     if (named.contains(name.c_str())) {
-      values.push_back(py::cast<std::int64_t>(named[name.c_str()]));
+      values.push_back(whole_number(argument, named[name.c_str()]));
       ++used;
     } else if (argument.required) {
       throw client::UsageError(std::string(command.name) + " needs the argument " + name);
@@ -200,10 +213,15 @@ client::MemoryImage image_of(std::uint32_t page, std::uint32_t address, std::str
 }
 
 py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t count, std::uint32_t page) {
-  const client::MemoryImage image = encoder.use([&](client::Encoder& one) {
-    client::require_memory(one.unit(), client::Access::read);
-    return one.memory().read(image_of(page, address, std::string(count, '\0')));
-  });
+  const Unit& unit = encoder.unit();
+  client::require_memory(unit, client::Access::read);
+  client::MemoryImage wanted;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const client::MemoryAddress at{page, address + i};
+    client::require_open(unit, {{at, 0}}, client::Access::read);  // one by one: `count` may be any number
+    wanted[at] = 0;
+  }
+  const client::MemoryImage image = encoder.use([&](client::Encoder& one) { return one.memory().read(wanted); });
   std::vector<std::uint8_t> bytes;
   for (const auto& [at, value] : image) bytes.push_back(value);
   return to_bytes(bytes);

@@ -1,7 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "python/src/sample.hpp"
 
+#include <type_traits>
+
+#include "absenc/client/error.hpp"
+#include "absenc/client/text/unit_text.hpp"
+
 namespace absenc::python {
+
+namespace {
+
+// Its times are apart: they are no numbers.
+template <class Act>
+void each_part(Reading& reading, const Act& act) {
+  act(reading.singleturn);
+  act(reading.multiturn);
+  act(reading.singleturn_bits);
+  act(reading.multiturn_bits);
+  act(reading.singleturn_valid_bits);
+  act(reading.multiturn_valid);
+  act(reading.singleturn_known);
+  act(reading.multiturn_known);
+  act(reading.multiturn_signed);
+  act(reading.unit_um);
+  act(reading.ready);
+  act(reading.status);
+  act(reading.alarms);
+  act(reading.status_reported);
+  act(reading.alarms_reported);
+}
+
+// What `pickle` keeps: the name of the unit, then the parts.
+py::tuple state_of(const PyReading& one) {
+  py::list state;
+  state.append(std::string(one.unit->id));
+  Reading reading = one.reading;
+  const auto keep = [&](auto value) { state.append(value); };
+  each_part(reading, keep);
+  state.append(reading.latched.count());
+  state.append(reading.received.count());
+  return py::tuple(state);
+}
+
+PyReading reading_of(const py::tuple& state) {
+  PyReading one{&client::require_unit(py::cast<std::string>(state[0])), {}};
+  std::size_t next = 1;
+  const auto take = [&](auto& value) { value = py::cast<std::decay_t<decltype(value)>>(state[next++]); };
+  each_part(one.reading, take);
+  one.reading.latched = Time(py::cast<Time::rep>(state[next++]));
+  one.reading.received = Time(py::cast<Time::rep>(state[next++]));
+  if (next != state.size()) throw client::Failure("this reading was kept by another version of absenc");
+  return one;
+}
+
+}  // namespace
 
 void bind_sample(py::module_& module) {
   py::class_<PyReading>(module, "Reading", "One position as an encoder reported it.")
@@ -33,6 +85,7 @@ void bind_sample(py::module_& module) {
       .def_property_readonly(
           "time_s", [](const PyReading& one) { return seconds(one.reading.latched); },
           "When it was latched, seconds of time.monotonic().")
+      .def(py::pickle(&state_of, &reading_of))
       .def("__repr__", &PyReading::text);
   py::class_<PySample>(module, "Sample", "What one attempt to read has brought.")
       .def_property_readonly(
@@ -62,6 +115,8 @@ void bind_sample(py::module_& module) {
           "text", [](const PySample& one) { return one.sample.text(); },
           "Why there is no reading, or what happened; \"\" of a reading that goes on.")
       .def_property_readonly("error", &PySample::error, "The absenc.errors.EncoderError of a failed attempt, or None.")
+      .def("__copy__", [](const PySample& one) { return one; })
+      .def("__deepcopy__", [](const PySample& one, const py::dict&) { return one; })
       .def("__repr__", &PySample::repr);
 }
 

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+import copy
+import pickle
 import asyncio
 import os
 import select
@@ -58,6 +60,32 @@ def test_names_that_are_wrong_name_the_nearest(absenc_emulate):
     with pytest.raises(absenc.PortError) as raised:
         absenc.open("tformat:/dev/no-such-port")
     assert raised.value.kind == "not_found"
+
+
+def test_numbers_and_options_that_cannot_be():
+    with absenc.open("sim:tformat", model=None) as encoder:
+        for numbers in [(0, 10**9), (0, 2**31), (10**6, 1)]:
+            with pytest.raises(absenc.UsageError):
+                encoder.memory.read(*numbers)  # without memory for as many bytes
+        for argument in (2**80, -(2**80), "five", None, 1.5):
+            with pytest.raises(absenc.UsageError, match="address is .*must be a whole number"):
+                encoder.run("memory-read", argument)
+            with pytest.raises(absenc.UsageError, match="address is .*must be a whole number"):
+                encoder.run("memory-read", address=argument)
+        with pytest.raises(absenc.UsageError, match="arguments"):
+            encoder.run("memory-read", 1, 2, 3, 4, 5)
+
+
+def test_readings_are_copied_and_pickled():
+    for address in ("sim:tformat?singleturn=70000&multiturn=5&alarm=over_heat", "sim:ssi", "sim:esl"):
+        with absenc.open(address) as encoder:
+            reading = encoder.read()
+            sample = next(encoder.samples(count=1))
+        parts = [name for name in dir(reading) if not name.startswith("_")]
+        for other in (copy.copy(reading), copy.deepcopy(reading), pickle.loads(pickle.dumps(reading))):
+            assert {name: getattr(other, name) for name in parts} == {name: getattr(reading, name) for name in parts}
+            assert str(other) == str(reading)
+        assert str(copy.deepcopy(sample)) == str(copy.copy(sample)) == str(sample)
 
 
 def test_memory_is_written_and_read_back(absenc_emulate):
