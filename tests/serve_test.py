@@ -678,6 +678,21 @@ class History(ServeCase):
         kinds = [event["kind"] for event in server.json("/api/events")["events"]]
         self.assertIn("alarm", kinds)
 
+    def test_a_command_is_there_before_its_answer(self):
+        for _ in range(5):
+            path = self.file("history")
+            server = self.server("sim:tformat", "--history", path, "--token-file", self.tokens())
+            answer = server.command("sim:tformat", "zero", {"Authorization": f"Bearer {TOKEN}"})
+            server.process.kill()
+            server.process.wait()
+            self.assertEqual(answer[0], 200, answer)
+            with contextlib.closing(sqlite3.connect(path)) as database:
+                events = database.execute("SELECT text, who FROM happening WHERE kind = 'command'").fetchall()
+            self.assertEqual([(text, who.split()[0]) for text, who in events], [(answer[1]["text"], "anna")])
+            for ending in ("", "-wal", "-shm"):
+                if os.path.exists(path + ending):
+                    os.unlink(path + ending)
+
     def test_csv(self):
         server = self.server(self.NAME, "--history", self.file("history"))
         wait_until(lambda: len(self.rows(server)) >= 2, "it has two seconds")

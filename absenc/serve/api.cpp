@@ -127,12 +127,13 @@ Json state_json(const Fleet& fleet, const Chronicler* chronicler) {
   return Json::object().set("at_ms", calendar_ms()).set("encoders", encoders).set("history", history);
 }
 
-Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Chronicler* chronicler,
-         const std::string& history_path, const Sending& sending)
+Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Happenings& happenings,
+         Chronicler* chronicler, const std::string& history_path, const Sending& sending)
     : fleet_(&fleet),
       access_(&access),
       streams_(&streams),
       worker_(&worker),
+      happenings_(&happenings),
       chronicler_(chronicler),
       sending_(&sending) {
   if (chronicler != nullptr) reader_ = std::make_shared<HistoryReader>(history_path);
@@ -273,6 +274,13 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
   if (!order.done) {
     order.done = [reply](const Done& done) {
       reply.send(done.good ? json_response(done.json) : error_response(502, done.text));
+    };
+  }
+  // The history is the record of who changed what: it has the command before anybody is told that it was done.
+  if (chronicler_ != nullptr && order.kind == Order::Kind::command) {
+    order.done = [chronicler = chronicler_, happenings = happenings_,
+                  answer = std::move(order.done)](const Done& done) {
+      chronicler->when_written(happenings->added(), [answer, done] { answer(done); });
     };
   }
   const std::string_view refused = watch.give(std::move(order));

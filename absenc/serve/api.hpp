@@ -23,8 +23,8 @@ namespace absenc::serve {
 class Api {
  public:
   /// All of them outlive it; `chronicler` null: there is no history.
-  Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Chronicler* chronicler,
-      const std::string& history_path, const Sending& sending);
+  Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Happenings& happenings,
+      Chronicler* chronicler, const std::string& history_path, const Sending& sending);
 
   void answer(const Request& request, const Reply& reply);
 
@@ -45,7 +45,8 @@ class Api {
   const Access* access_;
   Streams* streams_;
   Worker* worker_;
-  const Chronicler* chronicler_;
+  const Happenings* happenings_;
+  Chronicler* chronicler_;
   const Sending* sending_;
   std::shared_ptr<HistoryReader> reader_;  // of the worker's thread; null: there is no history
 };

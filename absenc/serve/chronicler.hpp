@@ -4,9 +4,11 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "absenc/serve/fleet.hpp"
@@ -21,7 +23,11 @@ class Chronicler {
   /// Writes what there still is.
   ~Chronicler();
 
-  void add(const std::vector<Happening>& happenings);
+  /// `added`: how many there have been with them (Happenings::added).
+  void add(const std::vector<Happening>& happenings, std::uint64_t added);
+  /// Calls `then` once the first `added` happenings are in the file, so that kill -9 does not lose them, or could not
+  /// be written; from the thread of the history.
+  void when_written(std::uint64_t added, std::function<void()> then);
 
   struct Health {
     std::string trouble{};  // why nothing can be written; "": nothing is wrong
@@ -32,12 +38,15 @@ class Chronicler {
  private:
   void work(const std::stop_token& stop);
   void write();
+  [[nodiscard]] bool is_awaited() const;
 
   HistoryWriter writer_;
   const Fleet* fleet_;
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;
   std::vector<Happening> happenings_;
+  std::uint64_t added_ = 0;  // with those of `happenings_`
+  std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
   std::jthread thread_;  // last: it uses all of the others
 };

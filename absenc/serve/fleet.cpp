@@ -46,8 +46,12 @@ Fleet::Fleet(std::vector<std::string> names, double rate, Happenings& happenings
   reload();
 }
 
-Fleet::~Fleet() {
-  for (const Served& one : served_) one.watch->request_stop();  // all at once, and then wait for each
+Fleet::~Fleet() { end(); }
+
+void Fleet::end() {
+  const Watches watches = all();
+  for (const auto& watch : watches) watch->request_stop();  // all at once, and then wait for each
+  for (const auto& watch : watches) watch->wait();
 }
 
 std::vector<Fleet::Wanted> Fleet::wanted() const {

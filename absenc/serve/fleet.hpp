@@ -23,6 +23,9 @@ class Fleet {
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
 
+  /// Ends all threads that read, and what they do for others. What they have counted can still be taken.
+  void end();
+
   /// Reads absenc.toml again; those that it describes as before go on undisturbed. Throws UsageError: then all do.
   /// Returns what changed, in words. From one thread.
   std::string reload();

@@ -47,14 +47,22 @@ class Happenings {
   void add(Happening happening) {
     const std::lock_guard lock(mutex_);
     waiting_.push_back(std::move(happening));
+    ++added_;
     if (waiting_.size() <= most) return;
     waiting_.pop_front();
     ++dropped_;
   }
 
-  /// All that came since the last time, the oldest first.
-  [[nodiscard]] std::vector<Happening> take() {
+  /// How many there have been so far.
+  [[nodiscard]] std::uint64_t added() const {
     const std::lock_guard lock(mutex_);
+    return added_;
+  }
+
+  /// All that came since the last time, the oldest first; `added` says how many there have been with them.
+  [[nodiscard]] std::vector<Happening> take(std::uint64_t& added) {
+    const std::lock_guard lock(mutex_);
+    added = added_;
     std::vector<Happening> taken(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
     waiting_.clear();
     if (dropped_ != 0) {
@@ -65,8 +73,9 @@ class Happenings {
   }
 
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::deque<Happening> waiting_;
+  std::uint64_t added_ = 0;
   std::size_t dropped_ = 0;
 };
 

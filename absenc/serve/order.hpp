@@ -34,7 +34,7 @@ struct Order {
   std::vector<std::int64_t> arguments{};
   client::MemoryImage addresses{};
   std::string who{};
-  std::function<void(const Done&)> done{};  // called once, from the thread of the encoder
+  std::function<void(const Done&)> done{};  // called once, from the thread of the encoder, after the event of it
 
   /// "zero", "doctor"
   [[nodiscard]] std::string_view name() const;

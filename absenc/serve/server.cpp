@@ -44,8 +44,8 @@ struct Server::Parts {
         sending(fleet, happenings) {
     sending.change_to(read_outlets(choices.outlets));
     if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet);
-    const Chronicler* history = chronicler ? &*chronicler : nullptr;
-    api.emplace(fleet, access, streams, worker, history, choices.history, sending);
+    Chronicler* history = chronicler ? &*chronicler : nullptr;
+    api.emplace(fleet, access, streams, worker, happenings, history, choices.history, sending);
     http.emplace(std::move(listener),
                  [this](const Request& request, const Reply& reply) { api->answer(request, reply); });
     teller = std::jthread([this](const std::stop_token& stop) { tell(stop); });
@@ -55,6 +55,7 @@ struct Server::Parts {
     teller.request_stop();
     teller.join();
     http.reset();  // before what it asks
+    fleet.end();   // what a command tells at its end goes into the history
     tell_happenings();
     sending.change_to({});
   }
@@ -81,9 +82,10 @@ struct Server::Parts {
   }
 
   void tell_happenings() {
-    const std::vector<Happening> taken = happenings.take();
+    std::uint64_t added = 0;
+    const std::vector<Happening> taken = happenings.take(added);
     if (taken.empty()) return;
-    if (chronicler) chronicler->add(taken);
+    if (chronicler) chronicler->add(taken, added);
     sending.add(taken);
     for (const Happening& one : taken) streams.tell("happening", one.json());
   }
