@@ -50,6 +50,41 @@ class Abuse(ServeCase):
                 return
         self.fail("it is still waited for")
 
+    def raw(self, request):
+        """What comes back until the server closes, or has answered once."""
+        connection = self.connect()
+        connection.sendall(request)
+        answer = b""
+        while b"\r\n\r\n" not in answer and (part := connection.recv(4096)):
+            answer += part
+        return answer, connection
+
+    def test_ambiguous_requests(self):
+        hello = b"POST /api/command HTTP/1.1\r\nHost: localhost\r\n"
+        chunk = b"Transfer-Encoding: chunked\r\n"
+        for request in (hello + b"Content-Length: 5\r\nContent-Length: 6\r\n\r\nhello!",
+                        hello + b"Content-Length: 5\r\n" + chunk + b"\r\n5\r\nhello\r\n0\r\n\r\n",
+                        hello + chunk + b"content-length: 5\r\n\r\n5\r\nhello\r\n0\r\n\r\n",
+                        b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nhost: localhost\r\n\r\n",
+                        b"GET /healthz HTTP/1.1\r\nHost: user@localhost\r\n\r\n"):
+            with self.subTest(request):
+                answer, connection = self.raw(request)
+                self.assertIn(b" 400 ", answer.split(b"\r\n")[0])
+                while connection.recv(4096):  # it closes
+                    pass
+
+    def test_much_is_answered(self):
+        for count in (1, 100, 500):
+            query = "&".join(f"a{i}={i}" for i in range(count))
+            self.assertEqual(self.served.ask(f"/healthz?{query}")[0], 200, count)
+        body = b"".join(b"400\r\n" + b"x" * 1024 + b"\r\n" for _ in range(8)) + b"0\r\n\r\n"
+        answer, _ = self.raw(b"POST /api/command HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n" + body)
+        self.assertIn(b" 413 ", answer.split(b"\r\n")[0])
+
+    def test_names_without_their_case(self):
+        self.assertEqual(self.served.ask("/api/encoders", headers={"Host": f"LocalHost:{self.served.port}"})[0], 200)
+        self.assertEqual(self.served.ask("/api/encoders", headers={"Host": "localhostx"})[0], 403)
+
     def test_large_headers(self):
         connection = self.connect()
         with contextlib.suppress(OSError):

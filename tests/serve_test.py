@@ -396,6 +396,39 @@ class WhoMayWhat(ServeCase):
             self.assertEqual(status, 400, body)
             self.assertTrue(body["error"])
 
+    def test_a_token_ends_when_it_is_removed(self):
+        path = self.tokens()
+        server = self.without_history(self.name, "--token-file", path)
+        good = {"Authorization": f"bearer {TOKEN}"}  # whatever its case
+        self.assertEqual(self.command(server, good)[0], 200)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("berta another-secret-of-hers\n")
+        server.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: self.command(server, good)[0] == 401, "the token is gone")
+        self.assertEqual(self.command(server, {"Authorization": "Bearer another-secret-of-hers"})[0], 200)
+        os.chmod(path, 0o644)
+        server.process.send_signal(signal.SIGHUP)
+        line = b""
+        while b"chmod 600" not in line:
+            line = server.process.stderr.readline()
+            self.assertTrue(line, "it was read, although others may read it")
+        self.assertEqual(self.command(server, {"Authorization": "Bearer another-secret-of-hers"})[0], 200)
+
+    def test_wrong_tokens_are_counted_limited_and_told(self):
+        server = self.server(self.name, "--token-file", self.tokens(), "--history", self.file("history"))
+        wrong = {"Authorization": "Bearer " + "x" * 20}
+        self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
+        self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
+        self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
+
+        def events():
+            return [event for event in server.json("/api/events")["events"] if event["kind"] == "access"]
+        told = wait_until(lambda: len(events()) >= 2 and events(), "both are told")
+        self.assertEqual(len(told), 2)
+        self.assertIn("a wrong token came", told[1]["text"])
+        self.assertIn("10", told[0]["text"])
+        self.assertEqual({event["who"] for event in told}, {"127.0.0.1"})
+
     def test_without_tokens_nothing_changes(self):
         server = self.without_history(self.name)
         status, body = self.command(server, {"Authorization": "Bearer "})

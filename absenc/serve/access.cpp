@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
+#include <utility>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/json.hpp"
+#include "absenc/os/signals.hpp"
 
 namespace absenc::serve {
 
@@ -15,6 +17,16 @@ using namespace client;
 namespace {
 
 constexpr std::size_t least_token = 16;
+constexpr unsigned most_guesses = 10;  // wrong tokens of one address within the time that follows
+constexpr Time time_of_guesses = std::chrono::seconds(60);
+constexpr std::size_t most_addresses = 1000;
+
+// As HTTP compares the names of hosts and of schemes: of ASCII, without the case.
+bool same_word(std::string_view one, std::string_view other) {
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+  return std::equal(one.begin(), one.end(), other.begin(), other.end(),
+                    [&](char a, char b) { return lower(a) == lower(b); });
+}
 
 // How long it takes tells nothing about how much of it is right.
 bool same_secret(std::string_view one, std::string_view other) {
@@ -34,7 +46,7 @@ std::string_view name_in(std::string_view host) {
 // A page of another site can make a browser ask us under that site's own name, for which it has the answer read.
 bool names_loopback(std::string_view host) {
   const std::string_view name = name_in(host);
-  return name == "localhost" || name == "127.0.0.1" || name == "[::1]";
+  return same_word(name, "localhost") || name == "127.0.0.1" || name == "[::1]";
 }
 
 bool from_own_page(const Request& request) {
@@ -49,7 +61,8 @@ Response error_response(unsigned status, std::string_view sentence) {
   return {status, "application/json", Json::object().set("error", sentence).line() + "\n"};
 }
 
-Access::Access(const std::string& token_file, bool on_loopback) : on_loopback_(on_loopback) {
+Access::Access(const std::string& token_file, bool on_loopback, Happenings& happenings)
+    : token_file_(token_file), on_loopback_(on_loopback), happenings_(&happenings) {
   if (token_file.empty()) {
     if (on_loopback) return;
     throw UsageError("whoever can reach this address could read the encoders: give --token-file too");
@@ -57,11 +70,44 @@ Access::Access(const std::string& token_file, bool on_loopback) : on_loopback_(o
   tokens_ = read_secrets("token", token_file, least_token);
 }
 
+void Access::reload() {
+  if (token_file_.empty()) return;
+  std::vector<Secret> tokens = read_secrets("token", token_file_, least_token);
+  const std::lock_guard lock(mutex_);
+  tokens_ = std::move(tokens);
+}
+
+std::uint64_t Access::wrong_tokens() const {
+  const std::lock_guard lock(mutex_);
+  return wrong_tokens_;
+}
+
+// Counts a wrong token. Events are few, however many guesses there are: the first of a minute, and the end of patience.
+bool Access::may_guess_on(const std::string& peer) const {
+  const Time now = os::now();
+  const std::lock_guard lock(mutex_);
+  ++wrong_tokens_;
+  std::erase_if(guesses_, [&](const auto& one) { return now - one.second.since > time_of_guesses; });
+  if (guesses_.size() >= most_addresses && !guesses_.contains(peer)) return false;
+  Guesses& guesses = guesses_.try_emplace(peer, Guesses{now, 0}).first->second;
+  ++guesses.count;
+  if (guesses.count == 1) happenings_->add({calendar_ms(), "", "access", "a wrong token came", peer});
+  if (guesses.count == most_guesses + 1) {
+    happenings_->add(
+        {calendar_ms(), "", "access",
+         fmt::format("more than {} wrong tokens came within a minute: the rest of it refuses them with 429",
+                     most_guesses),
+         peer});
+  }
+  return guesses.count <= most_guesses;
+}
+
 std::string Access::who(const Request& request) const {
   constexpr std::string_view scheme = "Bearer ";
   const std::string_view given = request.authorization;
   std::string name;
-  if (!given.starts_with(scheme)) return name;
+  if (!same_word(given.substr(0, scheme.size()), scheme)) return name;
+  const std::lock_guard lock(mutex_);
   for (const Secret& token : tokens_) {
     if (same_secret(given.substr(scheme.size()), token.secret)) name = token.name;
   }
@@ -76,10 +122,15 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
     return error_response(403, "no other site may change anything here, or have an encoder asked");
   }
   if (what == To::anybody || (what != To::change && on_loopback_)) return {};
-  if (tokens_.empty()) {
+  if (token_file_.empty()) {
     return error_response(403, "nothing can be changed here: the server was started without --token-file");
   }
   if (!who(request).empty()) return {};
+  if (!request.authorization.empty() && !may_guess_on(request.peer)) {
+    Response response = error_response(429, "too many wrong tokens came from this address: try again in a minute");
+    response.headers.emplace_back("Retry-After", "60");
+    return response;
+  }
   Response response = error_response(
       401, request.authorization.empty() ? "this needs a token: Authorization: Bearer TOKEN" : wrong_token);
   response.headers.emplace_back("WWW-Authenticate", "Bearer");

@@ -2,11 +2,16 @@
 // Who may what. On loopback everybody of this computer may look; elsewhere, and to change an encoder, it takes a token.
 #pragma once
 
+#include <cstdint>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "absenc/core/time.hpp"
+#include "absenc/serve/happening.hpp"
 #include "absenc/serve/http.hpp"
 #include "absenc/serve/secret_file.hpp"
 
@@ -22,20 +27,38 @@ class Access {
   };
 
   /// `token_file`: lines of a name and a token; "": there is none, which is for loopback only. Throws Failure: when it
-  /// cannot be read, others may read it, or a token is shorter than 16 characters; UsageError.
-  Access(const std::string& token_file, bool on_loopback);
+  /// cannot be read, others may read it, or a token is shorter than 16 characters; UsageError. `happenings` outlives
+  /// it.
+  Access(const std::string& token_file, bool on_loopback, Happenings& happenings);
+
+  /// Reads the file again: tokens that are no longer in it end at once. Throws Failure as the constructor; then those
+  /// of before count.
+  void reload();
 
   /// Why this is refused; nothing: it is not.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, To what) const;
   /// The name of the token that came with it, or "".
   [[nodiscard]] std::string who(const Request& request) const;
-  [[nodiscard]] bool has_tokens() const { return !tokens_.empty(); }
+  [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
 
   static constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
+  /// How many requests came with a wrong token.
+  [[nodiscard]] std::uint64_t wrong_tokens() const;
 
  private:
-  std::vector<Secret> tokens_;
+  struct Guesses {
+    Time since{};
+    unsigned count = 0;
+  };
+  [[nodiscard]] bool may_guess_on(const std::string& peer) const;
+
+  std::string token_file_;
   bool on_loopback_;
+  Happenings* happenings_;
+  mutable std::mutex mutex_;  // guards what follows
+  std::vector<Secret> tokens_;
+  mutable std::map<std::string, Guesses> guesses_;  // by address
+  mutable std::uint64_t wrong_tokens_ = 0;
 };
 
 /// {"error":"..."}

@@ -168,7 +168,7 @@ void Api::get(const Request& request, const Reply& reply) {
   if (is_of_encoder) return get_of(require_encoder(*fleet_, target.name), target.part, request, reply);
   if (path == "/healthz") return reply.send(health());
   if (path == "/metrics") {
-    ServerFigures figures{streams_->count(), streams_->dropped(), 0};
+    ServerFigures figures{streams_->count(), streams_->dropped(), 0, access_->wrong_tokens()};
     if (chronicler_ != nullptr) figures.history_lost = chronicler_->health().lost;
     return reply.send(
         {200, "text/plain; version=0.0.4; charset=utf-8", metrics(fleet_->all(), figures) + sending_->metrics()});

@@ -5,10 +5,13 @@
 #include <microhttpd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdlib>
 #include <cstring>
 #include <optional>
+#include <string_view>
 #include <unordered_map>
+#include <utility>
 
 #include "absenc/client/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -20,8 +23,9 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr unsigned most_connections = 512;
-constexpr std::size_t memory_for_each = 32 * 1024;  // headers and what waits to be written; more is refused with 431
+constexpr std::size_t memory_for_each = 64 * 1024;  // headers and what waits to be written; more is refused with 431
 constexpr std::uint64_t most_body = 4096;           // nothing here takes one
+constexpr std::uint64_t most_read = 1 << 20;        // of a body of unknown length, until it is answered at its end
 constexpr unsigned idle_seconds = 15;
 constexpr Time request_time = 10s;  // in which it must have come; a byte now and then is not enough
 constexpr std::size_t block = 16 * 1024;
@@ -29,6 +33,34 @@ constexpr std::size_t block = 16 * 1024;
 std::string header_of(MHD_Connection* connection, const char* name) {
   const char* value = ::MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
   return value == nullptr ? std::string() : value;
+}
+
+std::size_t headers_named(MHD_Connection* connection, std::string_view name) {
+  std::pair<std::string_view, std::size_t> wanted{name, 0};
+  const auto count = [](void* found, MHD_ValueKind, const char* header, const char*) {
+    auto& [own_name, number] = *static_cast<std::pair<std::string_view, std::size_t>*>(found);
+    const std::string_view other = header;
+    const bool same = std::equal(own_name.begin(), own_name.end(), other.begin(), other.end(), [](char a, char b) {
+      return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
+    });
+    if (same) ++number;
+    return MHD_YES;
+  };
+  ::MHD_get_connection_values(connection, MHD_HEADER_KIND, count, &wanted);
+  return wanted.second;
+}
+
+// RFC 9112 3.2 and 6.3: a proxy before us may read such a request otherwise, and take a part of it for another one.
+// Returns what is wrong, or "".
+std::string_view ambiguity(MHD_Connection* connection) {
+  const std::size_t lengths = headers_named(connection, "Content-Length");
+  if (lengths > 1) return "two Content-Length";
+  if (lengths != 0 && headers_named(connection, "Transfer-Encoding") != 0) {
+    return "Content-Length and Transfer-Encoding";
+  }
+  if (headers_named(connection, "Host") > 1) return "two Host";
+  if (header_of(connection, "Host").find('@') != std::string::npos) return "a user in Host";
+  return {};
 }
 
 MHD_Result add_argument(void* query, MHD_ValueKind, const char* name, const char* value) {
@@ -286,14 +318,21 @@ struct HttpServer::Daemon {
     auto& daemon = *static_cast<Daemon*>(self);
     if (*context == nullptr) {
       *context = new std::shared_ptr<Exchange>(std::make_shared<Exchange>());
+      if (const std::string_view wrong = ambiguity(connection); !wrong.empty()) {
+        return queue(connection, {MHD_HTTP_BAD_REQUEST,
+                                  "text/plain",
+                                  "the request is ambiguous: " + std::string(wrong) + "\n",
+                                  {{"Connection", "close"}}});
+      }
       const bool announced = std::strtoull(header_of(connection, "Content-Length").c_str(), nullptr, 10) > most_body;
       return announced ? queue(connection, too_large()) : MHD_YES;
     }
     const auto& exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
     if (*size != 0) {
       exchange->body += std::exchange(*size, 0);
-      return exchange->body > most_body ? MHD_NO : MHD_YES;
+      return exchange->body > most_read ? MHD_NO : MHD_YES;
     }
+    if (exchange->body > most_body) return queue(connection, too_large());
     if (!std::exchange(exchange->called, true)) daemon.call(connection, path, method, exchange);
     return daemon.respond(connection, *exchange);
   }

@@ -114,6 +114,8 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   page.line("absenc_stream_dropped_total", "", figures.stream_drops);
   page.metric("absenc_history_lost_total", "counter", "rows of history that could not be written");
   page.line("absenc_history_lost_total", "", figures.history_lost);
+  page.metric("absenc_wrong_tokens_total", "counter", "requests that came with a wrong token");
+  page.line("absenc_wrong_tokens_total", "", figures.wrong_tokens);
   return page.text;
 }
 

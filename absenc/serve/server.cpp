@@ -39,7 +39,7 @@ struct Server::Parts {
   explicit Parts(const Choices& choices)
       : listener(os::listen_at(choices.host, choices.port)),
         url(url_of(choices.host, listener.port)),
-        access(choices.token_file, listener.on_loopback),
+        access(choices.token_file, listener.on_loopback, happenings),
         fleet(choices.encoders, choices.rate, happenings),
         sending(fleet, happenings) {
     sending.change_to(read_outlets(choices.outlets));
@@ -131,6 +131,11 @@ std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {
   const Outlets outlets = read_outlets(outlets_);  // before anything is changed
+  try {
+    parts_->access.reload();
+  } catch (const client::Failure& failure) {
+    throw client::UsageError(failure.what());
+  }
   std::string changed = parts_->fleet.reload();
   changed += parts_->sending.change_to(outlets);
   parts_->happenings.add({calendar_ms(), "", "change", "absenc.toml was read again: " + changed});

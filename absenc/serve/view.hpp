@@ -40,6 +40,7 @@ struct ServerFigures {
   std::size_t streams = 0;
   std::uint64_t stream_drops = 0;  // messages that slow readers lost
   std::uint64_t history_lost = 0;  // rows that could not be written
+  std::uint64_t wrong_tokens = 0;  // requests
 };
 
 /// The text format of Prometheus.

@@ -59,7 +59,8 @@ void reload(serve::Server& server) {
   try {
     print_message("absenc.toml was read again: " + server.reload());
   } catch (const UsageError& error) {
-    print_message(fmt::format("everything goes on as it was, because absenc.toml is wrong: {}", error.what()));
+    print_message(fmt::format("everything goes on as it was, because absenc.toml or the file of tokens is wrong: {}",
+                              error.what()));
   } catch (const Failure& failure) {
     print_message(fmt::format("absenc.toml was read again, but not all of it can be sent: {}", failure.what()));
   } catch (const os::Failure& failure) {
