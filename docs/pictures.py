@@ -96,7 +96,7 @@ def monitor(browser, folder, columns, rows):
     try:
         subprocess.run([*tmux, "set", "-g", "status", "off"], check=True)
         time.sleep(MINUTE / 2)
-        text = subprocess.run([*tmux, "capture-pane", "-p", "-e"], check=True, capture_output=True, text=True).stdout
+        text = subprocess.run([*tmux, "capture-pane", "-p", "-e", "-N"], check=True, capture_output=True, text=True).stdout
     finally:
         subprocess.run([*tmux, "kill-server"], check=False)
     lines = "\n".join((text.rstrip("\n").split("\n") + [""] * rows)[:rows])

@@ -164,6 +164,15 @@ class Values(ServeCase):
         self.assertAlmostEqual(rows[2][2], 60, delta=1)
         self.assertAlmostEqual(rows[2][1] - rows[1][1], 360, delta=60)
 
+    def test_the_last_minute_has_positions_where_the_encoder_was(self):
+        """Within 40 degrees of zero: a mean of 1 and 359 degrees would be far from there."""
+        server = self.without_history("sim:raa38-can?motion=sine=40,1")
+
+        def places():
+            return [row[1] for row in server.json("/api/minute")["encoders"][0]["seconds"]]
+        shown = wait_until(lambda: len(places()) >= 3 and places(), "three seconds are over")
+        self.assertEqual([place for place in shown if 41 < place % 360 < 319], [])
+
     def test_a_lost_encoder_has_a_last_reading(self):
         emulator = Emulator(self.directory, "--singleturn", "1000")
         self.addCleanup(emulator.end)

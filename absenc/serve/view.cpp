@@ -214,7 +214,10 @@ Json last_minute(const Fleet::Watches& watches) {
   const auto mean = [](const Spread& spread) { return spread.count != 0 ? Json(spread.mean()) : Json(); };
   const Json encoders = Json::list(watches, [&](const auto& watch) {
     const Json seconds = Json::list(watch->last_minute(), [&](const Second& second) {
-      return Json::array().append(second.at_s).append(mean(second.place)).append(mean(second.speed));
+      return Json::array()
+          .append(second.at_s)
+          .append(second.last_place ? Json(*second.last_place) : Json())
+          .append(mean(second.speed));
     });
     return Json::object().set("encoder", watch->name()).set("seconds", seconds);
   });

@@ -31,8 +31,8 @@ namespace absenc::serve {
 /// {"encoder":name,"points":[[at_ms,position,speed],...]}; a speed that is not known is null.
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
-/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: means of the last 60 seconds in which
-/// it was read, null where its position or speed did not hold.
+/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of the last
+/// 60 seconds in which it was read, null where its position or speed did not hold.
 [[nodiscard]] client::Json last_minute(const Fleet::Watches& watches);
 
 /// Of the server, beside the encoders.

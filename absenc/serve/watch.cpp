@@ -320,6 +320,7 @@ void Watch::count_second(const Sample& sample, std::uint64_t errors) {
   if (!sample.position_valid) return;
   Point point{at_ms, place_of(sample), {}};
   second_.place.add(point.place);
+  second_.last_place = point.place;
   if (sample.speed_valid) {
     point.speed = sample.speed;
     second_.speed.add(sample.speed);

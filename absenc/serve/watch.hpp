@@ -101,6 +101,7 @@ struct Second {
   std::uint64_t errors = 0;
   Spread place{};
   Spread speed{};
+  std::optional<double> last_place{};  // a mean says nothing where a turn begins anew
 };
 
 class Watch {

@@ -186,9 +186,9 @@ export class One {
       const {status, body} = await request("api/minute");
       if (status !== 200 || this.closed) return;
       const seconds = body.encoders.find((one) => one.encoder === this.name)?.seconds ?? [];
-      // Between the means of seconds a fast encoder has turned further than they can tell.
-      const means = seconds.filter(([, place, speed]) => place !== null && (this.one?.state !== "live" || this.one.linear || Math.abs(speed ?? 0) < SLOW_RPM)).map(([at, place, speed]) => [at * 1000 + 500, place, speed]);
-      const fresh = means.filter(([at]) => !this.points.some(([other]) => Math.abs(other - at) < 1000));
+      // From second to second a fast encoder has turned further than they can tell.
+      const samples = seconds.filter(([, place, speed]) => place !== null && (this.one?.state !== "live" || this.one.linear || Math.abs(speed ?? 0) < SLOW_RPM)).map(([at, place, speed]) => [at * 1000 + 999, place, speed]);
+      const fresh = samples.filter(([at]) => !this.points.some(([other]) => Math.abs(other - at) < 1000));
       this.points = [...fresh, ...this.points].sort((a, b) => a[0] - b[0]);
       this.changed = true;
     } catch {

@@ -20,9 +20,9 @@ export function quantities(one) {
   const turn = one.counts_in_all ?? 0;
   const within = (place) => place - 360 * Math.floor(place / 360);
   return {
-    degrees: {text: "degrees", unit: "°", of: (place) => place, turn: 360, within, least: .1, narrow: true},
+    degrees: {text: "degrees", unit: "°", of: (place) => place, turn: 360, within, wraps: !one.has_turns, least: .1, narrow: true},
     ...(one.has_turns ? {turns: {text: "turns", unit: "", of: (place) => place / 360, least: .01}} : {}),
-    ...(turn > 0 ? {counts: {text: "counts", unit: "", of: (place) => place / 360 * turn, turn, within: (value) => value - turn * Math.floor(value / turn), least: 10}} : {}),
+    ...(turn > 0 ? {counts: {text: "counts", unit: "", of: (place) => place / 360 * turn, turn, wraps: !one.has_turns, within: (value) => value - turn * Math.floor(value / turn), least: 10}} : {}),
     rpm: {text: "rpm", unit: " rpm", of: (place, speed) => speed, least: 1, narrow: false},
     errors: {text: "errors", unit: "", past: true, least: 4},
   };
@@ -118,7 +118,7 @@ export class Trace {
     let before = null;
     // A turn is drawn from its start wherever a row lies within one.
     const fits = within && rows.every((row, i) => row[2] === null ||
-      (row[3] - row[1] < turn / 2 && (i === 0 || rows[i - 1][2] === null || Math.abs(row[2] - rows[i - 1][2]) < turn / 2)));
+      (row[3] - row[1] < turn / 2 && (i === 0 || rows[i - 1][2] === null || this.quantity.wraps || Math.abs(row[2] - rows[i - 1][2]) < turn / 2)));
     for (const [at, ...values] of rows) {
       if (values[1] === null) {
         list.push([new Date(at), NONE]);
