@@ -31,7 +31,7 @@ def page(browser, folder):
     emulator = Emulator(folder, "--motion", "rpm=20")
     path, tokens = os.path.join(folder, "absenc.toml"), os.path.join(folder, "tokens")
     with open(path, "w", encoding="utf-8") as file:
-        file.write(config({"press-2": ("tformat", ""), **KINDS}, {"press-2": emulator.path}))
+        file.write(config({"press-2": ("tformat", "latency=300"), **KINDS}, {"press-2": emulator.path}))
     with open(tokens, "w", encoding="utf-8") as file:
         file.write("anna a-token-for-the-pictures\n")
     os.chmod(tokens, 0o600)

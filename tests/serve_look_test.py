@@ -151,7 +151,7 @@ class Look(ServeCase):
     def test_all_kinds_one_lost_one_with_alarms(self):
         emulator = Emulator(self.directory, "--motion", "rpm=20")
         self.addCleanup(emulator.end)
-        server = self.served({"press-2": ("tformat", ""), **KINDS}, ports={"press-2": emulator.path})
+        server = self.served({"press-2": ("tformat", "latency=300"), **KINDS}, ports={"press-2": emulator.path})
         wait_until(lambda: server.encoder()["state"] == "live" and len(server.json("/api/minute")["encoders"][0]["seconds"]) > 2, "it was read")
         emulator.kill()
         wait_until(lambda: server.encoder()["state"] == "lost", "it is lost")

@@ -44,7 +44,6 @@ export class One {
     this.hasHistory = true;
     this.values = new Map(values);
     this.build(main, bar);
-    this.seed();
     this.timer = setInterval(() => this.refresh(), REFRESH_MS);
     this.pastTimer = setInterval(() => this.loadPast(), PAST_MS);
     const frame = () => {
@@ -187,7 +186,8 @@ export class One {
       if (status !== 200 || this.closed) return;
       const seconds = body.encoders.find((one) => one.encoder === this.name)?.seconds ?? [];
       // From second to second a fast encoder has turned further than they can tell.
-      const samples = seconds.filter(([, place, speed]) => place !== null && (this.one?.state !== "live" || this.one.linear || Math.abs(speed ?? 0) < SLOW_RPM)).map(([at, place, speed]) => [at * 1000 + 999, place, speed]);
+      const samples = seconds.filter(([, place, speed]) => place !== null && (this.one.state !== "live" || this.one.linear || Math.abs(speed ?? 0) < SLOW_RPM))
+        .map(([at, place, speed]) => [Math.min(at * 1000 + 999, this.one.last_reading?.at_ms ?? Infinity), place, speed]);
       const fresh = samples.filter(([at]) => !this.points.some(([other]) => Math.abs(other - at) < 1000));
       this.points = [...fresh, ...this.points].sort((a, b) => a[0] - b[0]);
       this.changed = true;
@@ -226,6 +226,7 @@ export class One {
     this.showChoices();
     this.examine.show(one);
     if (first) {
+      this.seed();
       this.refresh();
       this.loadPast();
     }

@@ -34,7 +34,7 @@ function gridLines(quantity) {
     if (quantity.turn === 360 && high - low > 300) {
       const lines = [];
       for (let at = 90 * Math.ceil(low / 90); at <= high; at += 90 * Math.max(1, Math.ceil((high - low) / 900))) lines.push({v: at, label: `${at}°`});
-      return lines;
+      return high - low < 400 ? lines : lines.filter((line) => line.v - low > .05 * (high - low));
     }
     // A label at the lower end would stand on those of the time.
     const lines = Dygraph.numericTicks(low, high, pixels, options, graph, values).filter((line) => line.v - low > .05 * (high - low));
