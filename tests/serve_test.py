@@ -429,6 +429,8 @@ class WhoMayWhat(ServeCase):
         self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
         self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
         self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
+        self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)  # nothing tells more about a token
+        self.assertIn("absenc_wrong_tokens_total{} 14\n", server.ask("/metrics")[1])
 
         def events():
             return [event for event in server.json("/api/events")["events"] if event["kind"] == "access"]

@@ -20,6 +20,7 @@ constexpr std::size_t least_token = 16;
 constexpr unsigned most_guesses = 10;  // wrong tokens of one address within the time that follows
 constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
+constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
 // As HTTP compares the names of hosts and of schemes: of ASCII, without the case.
 bool same_word(std::string_view one, std::string_view other) {
@@ -126,6 +127,10 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
     return error_response(403, "nothing can be changed here: the server was started without --token-file");
   }
   if (!who(request).empty()) return {};
+  return refuse_token(request);
+}
+
+Response Access::refuse_token(const Request& request) const {
   if (!request.authorization.empty() && !may_guess_on(request.peer)) {
     Response response = error_response(429, "too many wrong tokens came from this address: try again in a minute");
     response.headers.emplace_back("Retry-After", "60");

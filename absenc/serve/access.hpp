@@ -39,9 +39,9 @@ class Access {
   [[nodiscard]] std::optional<Response> refusal(const Request& request, To what) const;
   /// The name of the token that came with it, or "".
   [[nodiscard]] std::string who(const Request& request) const;
+  /// What answers a request whose token is missing or wrong; a wrong one is counted.
+  [[nodiscard]] Response refuse_token(const Request& request) const;
   [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
-
-  static constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
   /// How many requests came with a wrong token.
   [[nodiscard]] std::uint64_t wrong_tokens() const;
 

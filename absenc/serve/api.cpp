@@ -233,7 +233,7 @@ Response Api::health() const {
 // Whether there are tokens, and whose this one is.
 Response Api::token(const Request& request) const {
   const std::string who = access_->who(request);
-  if (who.empty() && !request.authorization.empty()) return error_response(401, Access::wrong_token);
+  if (who.empty() && !request.authorization.empty()) return access_->refuse_token(request);
   return json_response(
       Json::object().set("tokens", access_->has_tokens()).set("name", who.empty() ? Json() : Json(who)));
 }
