@@ -279,5 +279,14 @@ class Decode(Case):
         self.assertEqual(widest["fields"]["position"], 2**64 - 1)
 
 
+
+class Commands(Case):
+    def test_decode_names_the_commands_of_scripts(self):
+        for command in (">", "1", "B26"):
+            shown = absenc("decode", "e201", "--request", command.encode().hex(), "--json")
+            self.assertEqual(json.loads(shown.stdout)["fields"]["command"], command)
+        self.assert_failed(absenc("decode", "e201", "--request", b"M9".hex()), "unsupported")
+
+
 if __name__ == "__main__":
     unittest.main()

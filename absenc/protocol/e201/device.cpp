@@ -23,6 +23,13 @@ void append_number(ByteBuffer<64>& reply, std::uint64_t number) {
   append_text(reply, {digits.data() + first, digits.size() - first});
 }
 
+// As many digits as the width needs.
+void append_hexadecimal(ByteBuffer<64>& reply, std::uint64_t number, unsigned width) {
+  for (unsigned digit = (width + 3) / 4; digit-- > 0;) {
+    reply.push_back(static_cast<std::uint8_t>("0123456789ABCDEF"[number >> (4 * digit) & 0xF]));
+  }
+}
+
 }  // namespace
 
 VirtualInterface::VirtualInterface(const Format& format, const Shaft& shaft)
@@ -38,13 +45,15 @@ void VirtualInterface::stopped(Time) {
 }
 
 // Whether `M` needs its CR is not known, and a CR behind any other command does no harm.
-std::size_t VirtualInterface::request_size(Bytes begin) const { return begin[0] == letter::set_clock ? 2 : 1; }
+std::size_t VirtualInterface::request_size(Bytes begin) const {
+  return begin[0] == letter::set_clock ? 2 : begin[0] == letter::set_width ? 3 : 1;
+}
 
 author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBuffer<64>& reply) {
   if (trimmed(bytes).empty()) return Answer::for_others;
   const Result<Request> request = Protocol::decode_request(format_, bytes);
-  if (request.error() == Error::out_of_range) return Answer::none;
-  const std::string_view rule = bytes[0] == letter::set_clock ? "a command without its number" : "an unknown command";
+  const bool has_no_number = request.error() == Error::wrong_length;
+  const std::string_view rule = has_no_number ? "a command without its number" : "an unknown command";
   if (!expect(request.has_value(), rule, at)) return Answer::for_others;
   if (change(*request, at)) return Answer::none;
   switch (request->letter) {
@@ -69,7 +78,10 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
     case letter::width:
       append_number(reply, width_);
       break;
-    default: {  // the position, with a sign where there is a zero
+    case letter::hexadecimal:
+      append_hexadecimal(reply, (counts(at) - zero_) & low_mask(width_), width_);
+      break;
+    default: {  // the position, of a stream the first, with a sign where there is a zero
       const std::uint64_t number = counts(at) - zero_;
       const bool negative = zero_ != 0 && static_cast<std::int64_t>(number) < 0;
       append_text(reply, negative ? "-" : "");
@@ -95,6 +107,9 @@ bool VirtualInterface::change(const Request& request, Time at) {
       return true;
     case letter::set_clock:
       clock_ = request.clock;
+      return true;
+    case letter::set_width:
+      width_ = request.width;
       return true;
     default:
       return request.letter == letter::stream_off;  // nobody has begun one

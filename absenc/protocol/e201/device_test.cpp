@@ -31,9 +31,14 @@ TEST(E201Device, AnswersEveryCommand) {
   expect("m", "4\r");
   expect("M8\r", "");
   expect("m", "8\r");
-  expect("M9m", "8\r");  // no such clock
   expect("b", "35\r");
   expect("?", "1048581\r");
+  expect(">", "000100005\r");
+  expect("1", "1048581\r");  // the first of a stream
+  expect("B20\r", "");
+  expect("b", "20\r");
+  expect(">", "00005\r");
+  expect("B35\r", "");
   expect("z", "");
   bench.shaft.start.position -= count;
   expect("?", "-1\r");
@@ -50,14 +55,15 @@ TEST(E201Device, AnswersEveryCommand) {
   expect("n", "");
   EXPECT_EQ(bench.raw("4").substr(0, 1), "c");
   EXPECT_EQ(bench.device.violation_count(), 0u);
-  EXPECT_EQ(bench.device.answer_count(), 23u);
+  EXPECT_EQ(bench.device.answer_count(), 27u);
   EXPECT_TRUE(bench.device.memory().empty());
 }
 
 TEST(E201Device, TellsWhatItDoesNotKnow) {
   Bench bench;
-  for (const char* text : {"x", "MM", "\r\n"}) EXPECT_EQ(bench.raw(text), "");
-  ASSERT_EQ(bench.device.violation_count(), 2u);
+  for (const char* text : {"x", "MM", "\r\n", "M9\r"}) EXPECT_EQ(bench.raw(text), "");
+  ASSERT_EQ(bench.device.violation_count(), 3u);
+  EXPECT_EQ(bench.device.violations()[2].rule, "an unknown command");
   EXPECT_EQ(bench.device.violations()[0].rule, "an unknown command");
   EXPECT_EQ(bench.device.violations()[1].rule, "a command without its number");
 }

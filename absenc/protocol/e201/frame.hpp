@@ -30,12 +30,15 @@ inline constexpr std::uint8_t supply_off = 'f';
 inline constexpr std::uint8_t decimal = '?';
 inline constexpr std::uint8_t zero = 'z';
 inline constexpr std::uint8_t clear_zero = 'a';
+inline constexpr std::uint8_t hexadecimal = '>';
+inline constexpr std::uint8_t stream_on = '1';
 inline constexpr std::uint8_t stream_off = '0';
 inline constexpr std::uint8_t set_clock = 'M';
 inline constexpr std::uint8_t clock = 'm';
 inline constexpr std::uint8_t width = 'b';
-inline constexpr std::string_view all = "4vse?mbnfza0M";
-inline constexpr std::string_view answered_by_a_line = "vse?mb";
+inline constexpr std::uint8_t set_width = 'B';
+inline constexpr std::string_view all = "4vse?>mbnfza01MB";
+inline constexpr std::string_view answered_by_a_line = "vse?>mb";
 
 [[nodiscard]] constexpr bool is_in(std::string_view letters, std::uint8_t one) {
   return index_of(letters, static_cast<char>(one)) < letters.size();
@@ -118,13 +121,16 @@ struct Position {
 struct Request {
   std::uint8_t letter = letter::samples;
   unsigned clock = 0;  // set_clock: 1 to 8
+  unsigned width = 0;  // set_width: 1 to 64
 };
 
 struct Reply {
   std::uint64_t samples = 0;
-  std::int64_t number = 0;  // ? m b
+  std::int64_t number = 0;  // ? > m b
   Text text{};              // of a line, without what is around it
 };
+
+inline constexpr unsigned widest = 64;  // of a position in bits
 
 /// Errors: wrong_length (not 16 characters and CR), bad_framing (not hexadecimal).
 [[nodiscard]] constexpr Result<std::uint64_t> decode_samples(Bytes reply) {
@@ -148,6 +154,7 @@ struct Reply {
   }
   Result<std::int64_t> number = std::int64_t{0};
   if (asked == letter::decimal) number = decode_number(text);
+  if (asked == letter::hexadecimal) number = decode_hexadecimal(text);
   if (asked == letter::clock) number = find_clock(text);
   if (asked == letter::width) number = find_number(text);
   if (!number) return number.error();
@@ -170,30 +177,40 @@ struct Protocol {
     if (request.letter == letter::samples || letter::is_in(letter::answered_by_a_line, request.letter)) return {};
     return {.any_reply = true, .answer_limit = silent_limit};
   }
-  /// Nothing of a clock that there is not.
-  static constexpr ByteBuffer<3> encode(const Format&, const Request& request) {
-    ByteBuffer<3> text;
+  /// Nothing of a clock or a width that there is not.
+  static constexpr ByteBuffer<4> encode(const Format&, const Request& request) {
+    ByteBuffer<4> text;
     const bool is_clock = request.letter == letter::set_clock;
+    const bool is_width = request.letter == letter::set_width;
     if (is_clock && (request.clock < 1 || request.clock > clocks_khz.size())) return text;
+    if (is_width && (request.width < 1 || request.width > widest)) return text;
     text.push_back(request.letter);
+    if (is_width) text.push_back(static_cast<std::uint8_t>('0' + request.width / 10));
+    if (is_width) text.push_back(static_cast<std::uint8_t>('0' + request.width % 10));
     if (is_clock) text.push_back(static_cast<std::uint8_t>('0' + request.clock));
-    if (is_clock) text.push_back(end_of_line);
+    if (is_clock || is_width) text.push_back(end_of_line);
     return text;
   }
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (!letter::is_in(letter::all, begin[0])) return 0;
-    return begin[0] == letter::set_clock ? 3 : 1;
+    return begin[0] == letter::set_clock ? 3 : begin[0] == letter::set_width ? 4 : 1;
   }
-  /// With its CR or without. Errors: unsupported (no such letter), wrong_length, out_of_range (no such clock).
+  /// With its CR or without. Errors: unsupported (no such letter, clock or width), wrong_length.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
     const Bytes text = trimmed(bytes);
     if (text.empty()) return Error::wrong_length;
     if (!letter::is_in(letter::all, text[0])) return Error::unsupported;
     const bool is_clock = text[0] == letter::set_clock;
-    if (text.size() != (is_clock ? 2 : 1) || (is_clock && !is_digit(text[1]))) return Error::wrong_length;
-    const auto clock = static_cast<unsigned>(is_clock ? text[1] - '0' : 0);
-    if (is_clock && (clock < 1 || clock > clocks_khz.size())) return Error::out_of_range;
-    return Request{text[0], clock};
+    const std::size_t digits = is_clock ? 1 : text[0] == letter::set_width ? 2 : 0;
+    if (text.size() != 1 + digits) return Error::wrong_length;
+    unsigned number = 0;
+    for (const std::uint8_t c : text.subspan(1)) {
+      if (!is_digit(c)) return Error::wrong_length;
+      number = 10 * number + static_cast<unsigned>(c - '0');
+    }
+    const std::size_t most = is_clock ? clocks_khz.size() : widest;
+    if (digits != 0 && (number < 1 || number > most)) return Error::unsupported;
+    return Request{text[0], is_clock ? number : 0, is_clock ? 0 : number};
   }
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     if (request.letter == letter::samples) return samples_length;

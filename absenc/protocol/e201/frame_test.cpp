@@ -82,7 +82,7 @@ TEST(E201Frame, AnSsiWordFollowsTheFirstSample) {
 TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
   for (const auto& [request, text] : std::to_array<std::pair<Request, std::string_view>>(
            {{{'4'}, "4"}, {{'M', 1}, "M1\r"}, {{'M', 8}, "M8\r"}, {{'M', 0}, ""}, {{'M', 9}, ""}, {{'b'}, "b"}})) {
-    const ByteBuffer<3> encoded = Protocol::encode({}, request);
+    const ByteBuffer<4> encoded = Protocol::encode({}, request);
     EXPECT_EQ(std::string(encoded.view().begin(), encoded.view().end()), text);
     if (text.empty()) continue;
     EXPECT_EQ(Protocol::request_size({}, bytes(text)), text.size());
@@ -99,10 +99,19 @@ TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
                                                                      {"M\r", "wrong_length"},
                                                                      {"M44", "wrong_length"},
                                                                      {"Mx", "wrong_length"},
-                                                                     {"M0", "out_of_range"},
-                                                                     {"M9", "out_of_range"}})) {
+                                                                     {"M0", "unsupported"},
+                                                                     {"M9", "unsupported"},
+                                                                     {"B7", "wrong_length"},
+                                                                     {"B65", "unsupported"},
+                                                                     {"B00", "unsupported"}})) {
     EXPECT_EQ(name(Protocol::decode_request({}, bytes(text)).error()), error) << text;
   }
+  EXPECT_EQ(Protocol::decode_request({}, bytes("B26\r")).value().width, 26u);
+  for (const char* text : {">", "1"}) EXPECT_TRUE(Protocol::decode_request({}, bytes(text))) << text;
+  EXPECT_EQ(decode_line(letter::hexadecimal, bytes("000100001\r")).value().number, 0x100001);
+  EXPECT_EQ(find_milli(bytes("5,02V 0,033A"), 'V'), 5020u);
+  EXPECT_EQ(find_milli(bytes("5,02V 0,033A"), 'A'), 33u);
+  EXPECT_EQ(find_milli(bytes("5V, 33mA"), 'A'), 33u);
   EXPECT_EQ(Protocol::request_size({}, bytes("q")), 0u);
 }
 

@@ -42,7 +42,7 @@ struct Found {
     if (asked == letter::supply) supply = reply.text;
     if (asked == letter::clock) clock = reply.number;
     if (asked == letter::width) width = reply.number;
-    if (asked == letter::decimal) counts = reply.number;
+    if (asked == letter::decimal || asked == letter::hexadecimal) counts = reply.number;
   }
   /// The middle of the longest run of clocks at which all frames were good; 0: there is none.
   [[nodiscard]] unsigned recommended() const;

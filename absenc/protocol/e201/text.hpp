@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "absenc/core/bytes.hpp"
+#include "absenc/core/hex.hpp"
 #include "absenc/core/result.hpp"
 
 namespace absenc::e201 {
@@ -114,7 +115,9 @@ struct Version {
 [[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, std::uint8_t symbol) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     std::uint64_t milli = std::uint64_t{detail::number_at(text, at)} * 1000;
-    if (at < text.size() && text[at] == '.') {
+    const bool has_point = at < text.size() && text[at] == '.';
+    const bool has_comma = at + 1 < text.size() && text[at] == ',' && is_digit(text[at + 1]);  // of another locale
+    if (has_point || has_comma) {
       unsigned weight = 100;
       for (++at; at < text.size() && is_digit(text[at]); ++at, weight /= 10) {
         milli += weight * static_cast<unsigned>(text[at] - '0');
@@ -127,6 +130,18 @@ struct Version {
     if (after < text.size() && text[after] == symbol) return static_cast<unsigned>(milli);
   }
   return std::nullopt;
+}
+
+/// What `>` gives. Error: bad_framing.
+[[nodiscard]] constexpr Result<std::int64_t> decode_hexadecimal(Bytes text) {
+  if (text.empty() || text.size() > 16) return Error::bad_framing;
+  std::uint64_t number = 0;
+  for (const std::uint8_t c : text) {
+    const int digit = hex_digit(static_cast<char>(c));
+    if (digit < 0) return Error::bad_framing;
+    number = number << 4 | static_cast<std::uint64_t>(digit);
+  }
+  return static_cast<std::int64_t>(number);
 }
 
 }  // namespace absenc::e201
