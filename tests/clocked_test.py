@@ -80,11 +80,11 @@ class Virtual(Case):
 
     def test_trouble_shows_what_the_clocks_brought(self):
         result = absenc("read", "sim:biss?singleturn_bits=19&fault=silence=1")
-        self.assert_failed(result, "line_stuck", "41 clocks to the virtual encoder; received 1111 1111 1111 1111 ",
+        self.assert_failed(result, "line_stuck", "121 clocks to the virtual encoder; received 1111 1111 1111 1111 ",
                            "check the wiring")
         line, = json_lines(absenc("read", "sim:biss?singleturn_bits=19&fault=silence=1", "--json").stdout)
         self.assertEqual((line["ok"], line["error"], line["sent"]), (False, "line_stuck", ""))
-        self.assertEqual(line["received"].replace(" ", ""), "1" * 41)
+        self.assertEqual(line["received"].replace(" ", ""), "1" * 121)
 
 
 class Places(Case):
@@ -163,6 +163,11 @@ class Texts(Case):
         self.assertIn("must be 0 to 252 in steps of 4", refused.stderr)
         self.assertIn("must be 12 to 14 in steps of 2", absenc("read", "sim:amt21?singleturn_bits=13").stderr)
         self.assertIn("0 to 252 in steps of 4", absenc("list", "amt21").stdout)
+
+    def test_a_long_line_is_read_without_being_told(self):
+        for slow in ("line_delay_ns=39500", "ma_khz=10000&latency_us=1&line_delay_ns=5050"):
+            reading, = json_lines(absenc("read", f"sim:biss?singleturn=275087&{slow}", "--json").stdout)
+            self.assertEqual((reading["singleturn"], reading["singleturn_valid"]), (275087, True))
 
     def test_a_maker_is_two_letters(self):
         self.assertRegex(absenc("run", "sim:biss", "manufacturer").stdout, r"manufacturer +ve ")

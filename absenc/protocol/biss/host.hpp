@@ -109,6 +109,12 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
     const Error error = this->take(samples);
     if constexpr (finds) {
       if (start_.is_due(error)) return this->clock(start_pulses);
+      // A line that only idles may be one whose delay is longer than was thought: it is looked at once for as long as
+      // any line takes.
+      if (error == Error::line_stuck && samples[0] && !looked_further_) {
+        looked_further_ = true;
+        return this->clock(P::all_clocks(this->format()));
+      }
       const unsigned head = this->last().delay_bits + this->last().ack_bits;
       const bool expected = tries_ == 0 && head <= ack_bits(this->format().latency, this->format().period());
       const bool late = error == Error::none ? !expected && !late_.is_again(head) : needs_more(error, samples);
@@ -126,6 +132,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   }
 
   bool second_ = false;
+  bool looked_further_ = false;
   std::uint8_t tries_ = 0;
   [[no_unique_address]] std::conditional_t<finds, LateFrames, author::Later> late_{};
   [[no_unique_address]] std::conditional_t<finds, StartSequence, author::NoRequest> start_{};

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "absenc/protocol/biss/bench_test.hpp"
@@ -230,7 +231,23 @@ TEST(BissHost, GivesTheStartSequenceWhereNothingComes) {
   clocks.clear();
   FindPosition<Format> nobody(format);
   EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
-  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame}));  // once
+  const std::size_t longest = ProtocolOf<Format>::all_clocks(format);                  // the line may be a long one
+  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));  // each once
+}
+
+TEST(BissHost, LooksFurtherBeforeALineIsStuck) {
+  for (const auto& [khz, latency, delay] :
+       std::to_array<std::tuple<std::uint16_t, Time, Time>>({{1000, 10us, 39'500ns}, {10'000, 1us, 5'050ns}})) {
+    Format format = turns_19;
+    format.ma_khz = khz;
+    format.latency = latency;
+    format.line_delay = delay;
+    Bench bench(line_settings, format);
+    bench.shaft.state.position = 0x1234'5678;
+    FindPosition<Format> found(format);
+    ASSERT_EQ(bench.run(found).error(), Error::none) << khz << " kHz, " << delay.count() << " ns";
+    EXPECT_EQ(found.reading()->singleturn, 0x1234'5678u >> 13);
+  }
 }
 
 TEST(BissHost, SaysWhatToDo) {
