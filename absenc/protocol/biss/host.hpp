@@ -111,7 +111,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
       if (start_.is_due(error)) return this->clock(start_pulses);
       // A line that only idles may be one whose delay is longer than was thought: it is looked at once for as long as
       // any line takes.
-      if (error == Error::line_stuck && samples[0] && !looked_further_) {
+      if (error == Error::line_stuck && samples[0] && !second_ && !looked_further_) {
         looked_further_ = true;
         return this->clock(P::all_clocks(this->format()));
       }
