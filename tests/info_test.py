@@ -7,11 +7,11 @@ from command_support import Case, Emulator, absenc, json_lines
 
 
 class EncoderCase(Case):
-    def encoder(self, *arguments, more=""):
+    def encoder(self, *arguments, latency=300, more=""):
         """The address of an emulator, with patience for a machine that is busy with other tests."""
         emulator = Emulator(self.directory, *arguments)
         self.addCleanup(emulator.end)
-        return f"tformat:{emulator.path}?latency=300{more}"
+        return f"tformat:{emulator.path}?latency={latency}{more}"
 
 
 def questions():
@@ -68,7 +68,7 @@ class Info(EncoderCase):
         self.assertIn("none with these options", absenc("info", "sim:tformat?singleturn_bits=20").stdout)
 
     def test_silence(self):
-        address = self.encoder("--fault", "silence=1", more="&latency=1")
+        address = self.encoder("--fault", "silence=1", latency=1)
         result = absenc("info", address)
         self.assert_failed(result, "timeout: the encoder did not answer", "Try: ")
         self.assertEqual(result.stderr.count("timeout"), 1)
@@ -149,7 +149,7 @@ class Alarms(EncoderCase):
                 self.assertEqual(json.loads(result.stdout)["alarms"], [flag])
 
     def test_silence(self):
-        address = self.encoder("--fault", "silence=1", more="&latency=1")
+        address = self.encoder("--fault", "silence=1", latency=1)
         result = absenc("alarms", address)
         self.assert_failed(result, "timeout: the encoder did not answer", "sent 1A to ", "Try: ")
         self.assertEqual(result.stdout, "")

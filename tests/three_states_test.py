@@ -170,7 +170,7 @@ class Live(Case):
             self.assert_good(absenc("record", "sim:ssi", "--output", path, "--count", "3", "--rate", "50"))
             with open(path, encoding="utf-8") as file:
                 lines = [line for line in file if not line.startswith("#")]
-            rows = list(csv.DictReader(lines)) if ending == "csv" else [json.loads(line) for line in lines[1:]]
+            rows = list(csv.DictReader(lines)) if ending == "csv" else json_lines("".join(lines[1:-1]))
             self.assertEqual({row["alarms"] for row in rows if row.get("event", "") == ""}, {value})
 
     def test_monitor(self):

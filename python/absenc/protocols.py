@@ -68,7 +68,7 @@ class Protocol:
         return _absenc.decode_frame(self.id, _plain(reply), _plain(request), model, texts(options))
 
     def encode(self, command: str, *values: int, model: str = "", **options: Value) -> Union[bytes, str]:
-        """The request of a command: bytes, on CAN text."""
+        """The request of a command: bytes, on CAN text, on clocked links the bits that the host says."""
         return _absenc.encode_request(self.id, command, list(values), model, texts(options))
 
     def flag_names(self, field: str, bits: int) -> list[str]:

@@ -138,6 +138,7 @@ constexpr Declaration<Toy, Encoder> whole{
     .reply_size = [](const Format&, Bytes) -> std::size_t { return 9; },
     .answer_to_bad = [](const Format&, Bytes, Error, Bytes) { return Error::request_rejected; },
     .decode = nullptr,
+    .encode = [](const Format&, const Command&, Arguments, MutableBytes) -> Result<std::size_t> { return 11; },
     .frame_end = end_of_frame,
     .is_answered = is_answered,
     .is_checked = is_checked,
@@ -146,6 +147,7 @@ constexpr Declaration<Toy, Encoder> whole{
     .streams = streams,
     .extra_wires = wires,
     .control_bit = control_bit,
+    .reportable = [](const Options&) -> std::uint32_t { return 13; },
     .remembered = remembered,
     .follower = follower,
     .follower_storage = 5,
@@ -188,6 +190,15 @@ TEST(Declaration, LeavesOutWhatTheUnitDoesNotHave) {
   EXPECT_EQ(unit.over_spi, nullptr);
   EXPECT_TRUE(unit.memory.empty() && unit.registers.empty() && unit.conditions.empty());
   EXPECT_EQ(unit.models[0].values[0].value, 16);
+}
+
+TEST(Declaration, TakesRequestsAndReportableAlarmsFromTheUnit) {
+  std::array<std::uint8_t, 4> out{};
+  const auto size = whole_unit.encode(options_with(8), whole_unit.commands[0], {}, out);
+  ASSERT_TRUE(size.has_value());
+  EXPECT_EQ(*size, 11u);
+  EXPECT_EQ(whole_unit.reportable(options_with(8)), 13u);
+  EXPECT_EQ(unit.reportable, nullptr);
 }
 
 TEST(Declaration, ProtocolAndFormatTellWhatIsLeftOut) {

@@ -52,8 +52,9 @@ std::size_t VirtualInterface::request_size(Bytes begin) const {
 author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBuffer<64>& reply) {
   if (trimmed(bytes).empty()) return Answer::for_others;
   const Result<Request> request = Protocol::decode_request(format_, bytes);
-  const bool has_no_number = request.error() == Error::wrong_length;
-  const std::string_view rule = has_no_number ? "a command without its number" : "an unknown command";
+  const bool is_about_number =
+      request_size(bytes) > 1 && (request.has_value() || request.error() == Error::wrong_length);
+  const std::string_view rule = is_about_number ? "a command without its number" : "an unknown command";
   if (!expect(request.has_value(), rule, at)) return Answer::for_others;
   if (change(*request, at)) return Answer::none;
   switch (request->letter) {

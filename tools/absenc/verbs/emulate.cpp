@@ -343,9 +343,14 @@ DeviceSettings device_settings(const Invocation& invocation) {
 
 EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                const DeviceSettings& settings) {
+  // Settings of its own take the place of those of the first encoder.
   std::string base = fmt::format("sim:{}?", unit.id);
-  if (invocation.has("--model")) base += fmt::format("model={}&", invocation.text("--model"));
-  for (const std::string& option : invocation.texts("--option")) base += option + '&';
+  const auto add = [&](const std::string& setting) {
+    const std::string assigned = setting.substr(0, setting.find('=')) + '=';
+    if (fmt::format("&{}", further).find(fmt::format("&{}", assigned)) == std::string::npos) base += setting + '&';
+  };
+  if (invocation.has("--model")) add(fmt::format("model={}", invocation.text("--model")));
+  for (const std::string& option : invocation.texts("--option")) add(option);
   EncoderAddress uri = parse_address(base + further);
   uri.device.delay = settings.delay;
   uri.device.faults_may_come = settings.faults_may_come;
