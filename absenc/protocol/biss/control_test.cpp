@@ -74,9 +74,9 @@ TEST(BissControl, RequestsAreTheBitsThatAreDrawn) {
 
 TEST(BissControl, WhatIsWrittenIsTakenFromCdmAlone) {
   const auto written = [](std::string_view cdm) {
-    std::vector<unsigned> bytes;
-    for (const std::uint8_t byte : decoded(cdm, "")->data.view()) bytes.push_back(byte);
-    return bytes;
+    const Result<ControlFrame> frame = decoded(cdm, "");
+    const Bytes data = frame->data.view();
+    return std::vector<unsigned>(data.begin(), data.end());
   };
   EXPECT_EQ(written("0000000000000011000100100010100110101010100100000"), (std::vector<unsigned>{0x55}));
   // The second start bit is said three times: the encoder was late.
