@@ -4,16 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <filesystem>
-#include <fstream>
-#include <set>
 #include <thread>
 
-#include "absenc/client/decode.hpp"
 #include "absenc/client/emulate.hpp"
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/find_crc.hpp"
-#include "absenc/client/identify.hpp"
 #include "absenc/client/sample_rows.hpp"
 #include "absenc/client/test_support.hpp"
 #include "absenc/client/way/connection.hpp"
@@ -24,25 +19,7 @@ namespace absenc::client {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using Kind = Sample::Kind;
-
-/// A file of this test alone.
-class TestFile {
- public:
-  explicit TestFile(const std::string& text) { std::ofstream(path_) << text; }
-  ~TestFile() { std::filesystem::remove(path_); }
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_ = own_path("capture") + ".txt";
-};
-
-std::string flag_text(const Unit& unit, const Reading& reading) {
-  std::string text;
-  for (const Flags& flags : alarms_of(unit, reading)) text += to_text(Value(flags));
-  return text;
-}
 
 // ---- The check of an unknown encoder
 
@@ -344,78 +321,6 @@ TEST(ClientEncoder, AnotherEndLeavesCancelAsItIs) {
   EXPECT_THROW(static_cast<void>(encoder.read()), Cancelled);
 }
 
-// ---- A virtual encoder that others open: half a second for the way, because others may use the machine
-
-TEST(ClientEmulation, EveryUnitOfALineIsServedAndRead) {
-  for (const Unit* unit : all_units()) {
-    const bool goes = unit->link != LinkKind::spi && unit->link != LinkKind::clocked;
-    const std::string text = std::string(unit->id);
-    if (!goes) {
-      EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(emulate(text)); }), HasSubstr("sim:" + text));
-      continue;
-    }
-    const Emulation emulation = emulate(text);
-    Encoder encoder = open(emulation.address() + "?latency=500");
-    const Reading reading = encoder.read();
-    EXPECT_EQ(reading.singleturn, 0u) << text;
-    EXPECT_GT(emulation.answer_count(), 0u) << text;
-  }
-}
-
-TEST(ClientEmulation, AnInterfaceThatIsNotThereSaysSo) {
-  EXPECT_THAT(thrown_by<os::Failure>([] { static_cast<void>(emulate("raa38-can", {.can = "nocan7"})); }),
-              Not(HasSubstr("nothing was thrown")));
-  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(emulate("tformat", {.can = "can0"})); }),
-              HasSubstr("does not go over a CAN"));
-  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(emulate("raa38-can", {.tcp = 0, .can = "can0"})); }),
-              HasSubstr("can0"));
-}
-
-TEST(ClientEmulation, WhatIsDoneToItIsSoAtOnce) {
-  Emulation emulation = emulate("tformat?singleturn=1000");
-  Encoder encoder = open(emulation.address() + "?latency=500");
-  EXPECT_EQ(encoder.read().singleturn, 1000u);
-  emulation.raise_alarm("over_heat");
-  Reading reading = encoder.read();
-  EXPECT_EQ(flag_text(emulation.unit(), reading), "over_heat");
-  emulation.lower_alarm("over_heat");
-  static_cast<void>(encoder.run("clear-alarms"));
-  reading = encoder.read();
-  EXPECT_EQ(flag_text(emulation.unit(), reading), "");
-  emulation.set_condition("temperature", 85);
-  EXPECT_EQ(to_text(encoder.run("temperature")["temperature_c"]), "85");
-  emulation.power_off();
-  EXPECT_EQ(thrown_by<EncoderFailure>([&] { static_cast<void>(encoder.read()); }).substr(0, 7), "timeout");
-  emulation.power_on();
-  EXPECT_EQ(encoder.read().singleturn, 1000u);
-  emulation.set_fault("silence", 1);
-  EXPECT_EQ(thrown_by<EncoderFailure>([&] { static_cast<void>(encoder.run("temperature")); }).substr(0, 7), "timeout");
-  emulation.clear_faults();
-  EXPECT_EQ(to_text(encoder.run("temperature")["temperature_c"]), "85");
-  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_fault("noise", 1); }), HasSubstr("corrupt"));
-  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_fault("corrupt", 1.5); }), HasSubstr("from 0 to 1"));
-  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.raise_alarm("over_haet"); }), HasSubstr("over_heat"));
-  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_condition("temprature", 1); }), HasSubstr("temperature"));
-  EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_condition("temperature", 1000); }), HasSubstr("must be"));
-}
-
-TEST(ClientEmulation, APortThatGoesIsWaitedFor) {
-  const std::string link = own_path("link");
-  std::optional<Emulation> emulation = emulate("tformat?singleturn=7", {.link = link});
-  Encoder encoder = open("tformat:" + link);
-  std::vector<Kind> kinds;
-  for (const Sample& sample : encoder.samples({.rate_hz = 200})) {
-    if (kinds.empty() || kinds.back() != sample.kind) kinds.push_back(sample.kind);
-    if (sample.kind == Kind::reading && kinds.size() == 1) emulation.reset();
-    if (sample.kind == Kind::absent) emulation = emulate("tformat?singleturn=8", {.link = link});
-    if (sample.kind == Kind::reading && sample.reading.singleturn == 8) encoder.cancel();
-  }
-  const std::set<Kind> met(kinds.begin(), kinds.end());
-  EXPECT_EQ(met.count(Kind::lost) + met.count(Kind::absent) + met.count(Kind::back), 3u);
-  EXPECT_EQ(kinds.back(), Kind::reading);
-  EXPECT_EQ(encoder.losses(), 1u);
-}
-
 // ---- Memory
 
 MemoryImage some_bytes(std::uint32_t count) {
@@ -463,83 +368,6 @@ TEST(ClientMemory, WhateverBecomesOfItSaysWhatIsWritten) {
   change.write();
   change.verify();
   EXPECT_EQ(change.written(), some_bytes(6));
-}
-
-// ---- A capture as rows
-
-constexpr std::string_view good = "1A\n1A 00 45 23 01 11 34 12 00 00 4A\n";
-constexpr std::string_view bad = "1A\n1A 00 45 23 01 11 34 12 00 00 4B\n";
-
-TEST(ClientDecode, RowsHaveTypedColumns) {
-  const TestFile file(std::string(good) + std::string(bad) + std::string(good));
-  Decoded rows = decode(file.path(), "tformat");
-  std::vector<std::string> errors;
-  for (const Row& row : rows) {
-    ASSERT_EQ(row.columns.size(), row.values.size());
-    EXPECT_EQ(row.get<std::string>("kind"), "exchange");
-    EXPECT_EQ(row.get<ByteVector>("request"), ByteVector{0x1A});
-    errors.push_back(to_text(row["error"]));
-    const bool is_good = errors.back().empty();
-    EXPECT_EQ(std::holds_alternative<std::monostate>(row["singleturn"]), !is_good);
-    EXPECT_EQ(std::holds_alternative<std::monostate>(row["angle_deg"]), !is_good);
-    EXPECT_EQ(std::holds_alternative<std::monostate>(row["message"]), is_good);
-    if (!is_good) continue;
-    EXPECT_EQ(to_text(row["singleturn"]), "74565");
-    EXPECT_NEAR(row.get<double>("angle_deg"), 74565 * 360.0 / (1 << 17), 1e-9);
-  }
-  EXPECT_EQ(errors, (std::vector<std::string>{"", "bad_checksum", ""}));
-}
-
-TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
-  const Emulation emulation = emulate("tformat?motion=rpm=60");
-  Identified all;
-  // Every question that nobody answers takes several times the latency: much of it only on a machine that needs it.
-  for (const char* const latency : {"20", "200", "1000"}) {
-    all = identify(emulation.path() + "?latency=" + latency, {.limit = std::chrono::minutes(5)});
-    if (!all.found.empty() && all.found[0].sure) break;
-  }
-  ASSERT_FALSE(all.found.empty());
-  EXPECT_TRUE(all.found[0].sure);
-  EXPECT_EQ(all.found[0].unit, &emulation.unit());
-  EXPECT_LT(all.found[0].log10_chance, -3);
-  Encoder encoder = open(all.found[0].address);
-  bool ready = false;
-  for (int i = 0; i < 100 && !ready; ++i) ready = encoder.read().ready;
-  EXPECT_TRUE(ready);
-  EXPECT_THAT(thrown_by<UsageError>([] { static_cast<void>(identify("sim:tformat")); }), HasSubstr("which protocol"));
-}
-
-TEST(ClientIdentify, TellsWhoseFramesAreInACapture) {
-  const TestFile file("1A\n1A 00 45 23 01 11 34 12 00 00 4A\n1A\n1A 00 46 23 01 11 34 12 00 00 49\n");
-  const Identified all = identify_capture(file.path());
-  ASSERT_FALSE(all.found.empty());
-  EXPECT_EQ(all.found[0].unit->id, "tformat");
-  EXPECT_EQ(all.found[0].explained, 2u);
-  EXPECT_THROW(static_cast<void>(identify_capture(file.path(), {.model = "23-bit"})), UsageError);
-}
-
-TEST(ClientDecode, WhoeverHasEnoughEndsIt) {
-  std::string text;
-  for (int i = 0; i < 20'000; ++i) text += good;
-  const TestFile file(text);
-  {
-    Decoded rows = decode(file.path(), "tformat");
-    EXPECT_EQ(to_text((*rows.begin())["singleturn"]), "74565");
-  }
-  std::size_t count = 0;
-  for (const Row& row : decode(file.path(), "tformat")) count += to_text(row["error"]).empty() ? 1 : 0;
-  EXPECT_EQ(count, 20'000u);
-}
-
-TEST(ClientDecode, WhatCannotBeDecodedSaysSo) {
-  EXPECT_THAT(thrown_by<Failure>([] { static_cast<void>(decode("/nowhere/absenc.sr", "tformat")); }),
-              HasSubstr("/nowhere/absenc.sr"));
-  const TestFile file("nothing that could be bytes\n");
-  EXPECT_NE(thrown_by<Failure>([&] {
-              for (const Row& row : decode(file.path(), "tformat")) static_cast<void>(row);
-            }),
-            "nothing was thrown");
-  EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(decode(file.path(), "tfromat")); }), HasSubstr("tformat"));
 }
 
 }  // namespace absenc::client

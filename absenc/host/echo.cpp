@@ -89,8 +89,7 @@ void EchoFilter::hold(const ByteEvent& event) {
 }
 
 bool EchoFilter::is_reply(Bytes bytes) const {
-  NoFields nowhere;
-  return unit_ != nullptr && unit_->decode(*options_, {.bytes = sent_}, {.bytes = bytes}, nowhere) == Error::none;
+  return unit_ != nullptr && unit_->check(*options_, {.bytes = sent_}, {.bytes = bytes}) == Error::none;
 }
 
 // What is held begins like the request: an echo, or a reply that begins like it. Their number tells, or which of both

@@ -24,14 +24,12 @@ Time OwedReplies<Item>::pause_after(Items request) const {
 
 template <class Item>
 bool OwedReplies<Item>::is_reply(Items request, Items reply) const {
-  NoFields nowhere;
-  return unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) == Error::none;
+  return unit_->check(*options_, to_frame(request), to_frame(reply)) == Error::none;
 }
 
 template <class Item>
 bool OwedReplies<Item>::concerns(Items request, Items reply) const {
-  NoFields nowhere;
-  return !is_can || unit_->decode(*options_, to_frame(request), to_frame(reply), nowhere) != Error::unexpected_reply;
+  return !is_can || unit_->check(*options_, to_frame(request), to_frame(reply)) != Error::unexpected_reply;
 }
 
 template <class Item>

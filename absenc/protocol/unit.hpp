@@ -255,6 +255,11 @@ struct Unit {
 
   /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
+  /// Returns the error of `decode`; none: the reply is good, or with an empty reply the request.
+  [[nodiscard]] Error check(const Options& values, const Frame& request, const Frame& reply) const {
+    NoFields nowhere;
+    return decode(values, request, reply, nowhere);
+  }
   /// The request of a command, at most `longest_encoded` bytes; on CAN and clocked links its text, as in vectors. Empty
   /// where a host only clocks. Errors: invalid_argument, buffer_too_small, unsupported.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,

@@ -35,10 +35,7 @@ class Places final : public FieldSink {
 
   /// Whether it is one.
   bool look(const Options& options, const Held& request, const Held& reply) {
-    struct Nothing final : FieldSink {
-      void put(const FieldValue&) override {}
-    } nothing;
-    if (unit_.decode(options, request.frame(), reply.frame(), nothing) != Error::none) return false;
+    if (unit_.check(options, request.frame(), reply.frame()) != Error::none) return false;
     options_ = &options;
     request_ = &request;
     reply_ = &reply;

@@ -202,9 +202,17 @@ class TheCommand(SpidevCase):
         self.assertEqual(self.reading("ssi:spi:/dev/spidev9.0?spi_mode=0")["singleturn"], (0x1000 | 2748) >> 1)
         self.assertRegex(self.summary(process), r"another SPI mode than the encoder's, which is 3: \d+\n")
 
+    def test_a_wrong_speed_is_refused(self):
+        process = self.serve("encolink")
+        result = absenc("read", "encolink:spi:/dev/spidev9.0?speed=8000000")
+        self.assertEqual(result.returncode, 2, result.stdout)
+        self.assertIn("allows 4000000 Hz at most", result.stderr)
+        self.assertNotIn("clock faster than 4 MHz", self.summary(process))
+
     def test_a_wrong_speed_is_counted(self):
         process = self.serve("encolink")
-        self.good("read", "encolink:spi:/dev/spidev9.0?speed=8000000")
+        with Spi("/dev/spidev9.0", mode=1, speed=8_000_000) as spi:
+            spi.exchange(bytes(8))
         self.assertIn("clock faster than 4 MHz", self.summary(process))
         process = self.serve("ssi")
         self.good("read", "ssi:spi:/dev/spidev9.0?speed=500000")

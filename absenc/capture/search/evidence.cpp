@@ -110,7 +110,6 @@ double acceptance(const Unit& unit, const Options& options, const HeardExchange&
   std::mt19937_64 random(good.reply.bytes.size());  // the same answer each time
   HeardExchange noise = good;
   const std::size_t kept = repeated(good);
-  NoFields nowhere;
   unsigned accepted = 0;
   unsigned tried = 0;
   for (; tried < attempts && accepted < enough_accepted; ++tried) {
@@ -127,15 +126,14 @@ double acceptance(const Unit& unit, const Options& options, const HeardExchange&
     };
     fill(noise.reply.bytes.begin() + static_cast<std::ptrdiff_t>(kept), noise.reply.bytes.end());
     if (noise.reply.can) fill(noise.reply.can->data.begin(), noise.reply.can->data.begin() + noise.reply.can->size);
-    if (unit.decode(options, noise.request.frame(), noise.reply.frame(), nowhere) == Error::none) ++accepted;
+    if (unit.check(options, noise.request.frame(), noise.reply.frame()) == Error::none) ++accepted;
   }
   return std::max(accepted, 1u) / static_cast<double>(tried);
 }
 
 bool explains(const Unit& unit, const Options& options, const HeardExchange& exchange) {
-  NoFields nowhere;
   const Frame reply = exchange.reply.frame();
-  return !reply.empty() && unit.decode(options, exchange.request.frame(), reply, nowhere) == Error::none;
+  return !reply.empty() && unit.check(options, exchange.request.frame(), reply) == Error::none;
 }
 
 Evidence weigh(const Unit& unit, const Options& options, std::span<const HeardExchange> exchanges) {

@@ -156,10 +156,9 @@ class Stage {
     } else {
       // Only the last reply is compared: a procedure adds a verdict of its own.
       const Exchange<Item> last = conversation->exchange();
-      NoFields nowhere;
       const bool has_bytes = address.unit->link != LinkKind::clocked && !last.received.empty();
-      said.is_verdict = has_bytes && address.unit->decode(address.options, {.bytes = last.sent},
-                                                          {.bytes = last.received}, nowhere) == Error::none;
+      said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
+                                                         {.bytes = last.received}) == Error::none;
     }
     // A clock is in the capture.
     const bool can_follow = !port.moved || address.unit->link == LinkKind::clocked;

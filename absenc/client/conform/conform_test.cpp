@@ -45,7 +45,7 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
       for (unsigned check = 0; check < 0x10000; ++check) {
         said[said.size() - 1] = static_cast<std::uint8_t>(check);
         said[said.size() - 2] = static_cast<std::uint8_t>(before[said.size() - 2] + (check >> 8));
-        const Error error = error_of(*address.unit, address.options, {.bytes = mutant.heard()}, {.bytes = said});
+        const Error error = address.unit->check(address.options, {.bytes = mutant.heard()}, {.bytes = said});
         if (error != Error::bad_checksum) return;
       }
       said = before;
@@ -237,7 +237,7 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
             const auto asks = [&](const List& asked) {
               return encoder_of(*address.unit, address.options, {.bytes = asked});
             };
-            const bool is_request = error_of(*address.unit, address.options, {.bytes = request}, {}) == Error::none;
+            const bool is_request = address.unit->check(address.options, {.bytes = request}, {}) == Error::none;
             return is_request && (!asks(request) || asks(request) != asks(m.good));
           }
         };

@@ -80,22 +80,6 @@ bool holds(const Unit& unit, const Options& options, std::string_view need) {
 
 }  // namespace
 
-bool is_flat(const capture::HeardFrame& reply) {
-  const Frame frame = reply.frame();
-  const std::size_t bits = frame.bits;
-  for (std::size_t i = 1; i < bits; ++i) {
-    if ((frame.bytes[i / 8] >> (7 - i % 8) & 1) != (frame.bytes[0] >> 7 & 1)) return false;
-  }
-  return bits != 0;
-}
-
-const Attempted* Readings::first_good() const {
-  const auto found = std::find_if(all.begin(), all.end(), [](const Attempted& one) {
-    return one.error == Error::none && !is_flat(one.exchange.reply);
-  });
-  return found == all.end() ? nullptr : &*found;
-}
-
 std::string reason_against(const Unit& unit, const Options& options, const Clause& clause) {
   std::string_view rest = clause.needs;
   while (!rest.empty()) {
@@ -107,24 +91,17 @@ std::string reason_against(const Unit& unit, const Options& options, const Claus
   return {};
 }
 
-Error error_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
-  struct Nothing final : FieldSink {
-    void put(const FieldValue&) override {}
-  } nothing;
-  return unit.decode(options, request, reply, nothing);
-}
-
 Error reply_error(const Unit& unit, const Options& options, std::string_view command, const HeardExchange& exchange) {
   if (exchange.reply.frame().empty()) return Error::timeout;
   const HeardFrame request =
       command.empty() ? exchange.request : request_of(unit, options, *find_command(unit, command));
-  return error_of(unit, options, request.frame(), exchange.reply.frame());
+  return unit.check(options, request.frame(), exchange.reply.frame());
 }
 
 std::size_t changes_noticed(const Unit& unit, const Options& options, const HeardExchange& good, Errors errors) {
   std::size_t noticed = 0;
   const auto try_one = [&](const HeardFrame& request, const HeardFrame& reply) {
-    noticed += (errors & any_of(error_of(unit, options, request.frame(), reply.frame()))) != 0 ? 1 : 0;
+    noticed += (errors & any_of(unit.check(options, request.frame(), reply.frame()))) != 0 ? 1 : 0;
   };
   for (std::size_t bit = 0; bit < bits_of(good.reply); ++bit) {
     HeardFrame changed = good.reply;

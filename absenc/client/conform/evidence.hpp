@@ -23,21 +23,6 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
   result.evidence = std::move(evidence);
 }
 
-/// Whether all bits of a clocked word are alike: a line that nobody drives shows the same.
-[[nodiscard]] bool is_flat(const capture::HeardFrame& reply);
-
-/// Readings with one set of options, and their replies.
-struct Readings {
-  std::vector<Attempted> all{};
-  std::uint64_t requests = 0;   // requests, pulses and transfers that were sent
-  std::uint64_t answered = 0;   // of them
-  std::uint64_t good = 0;       // replies, or frames that came by themselves, of which a reading was made
-  std::uint64_t discarded = 0;  // damaged frames of a stream
-
-  /// Null: none, or nothing but words whose bits are all alike.
-  [[nodiscard]] const Attempted* first_good() const;
-};
-
 /// Why these options leave out what the clause is about: "" where they do not.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
@@ -45,9 +30,6 @@ struct Readings {
 /// an additional byte, or that it answers another request. 0: these options have no such check.
 [[nodiscard]] std::size_t changes_noticed(const Unit& unit, const Options& options, const capture::HeardExchange& good,
                                           Errors errors);
-
-/// Returns the error of this reply to this request; none if it is good.
-[[nodiscard]] Error error_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
 /// Returns the error of the reply as one to the request of this command; "": to its own request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absenc/client/conform/asked_test.hpp"
+#include "absenc/client/conform/strangers_test.hpp"
 #include "absenc/client/conform/trial_host_test.hpp"
 #include "absenc/sim/random.hpp"
 
@@ -128,16 +129,10 @@ void flip(std::vector<CanFrame>& request, std::size_t bit) {
 }
 
 Error error_of(const EncoderAddress& address, const std::vector<std::uint8_t>& request) {
-  struct Nothing final : FieldSink {
-    void put(const FieldValue&) override {}
-  } nothing;
-  return address.unit->decode(address.options, {.bytes = request}, {}, nothing);
+  return address.unit->check(address.options, {.bytes = request}, {});
 }
 Error error_of(const EncoderAddress& address, const std::vector<CanFrame>& request) {
-  struct Nothing final : FieldSink {
-    void put(const FieldValue&) override {}
-  } nothing;
-  return address.unit->decode(address.options, {.can = request.data()}, {}, nothing);
+  return address.unit->check(address.options, {.can = request.data()}, {});
 }
 
 /// The request for a position with one bit that makes it none.
@@ -245,27 +240,13 @@ void expect_none_kept(const Conformance& found, std::string_view who) {
   EXPECT_EQ(with_verdict(found, Verdict::kept), std::vector<std::string>{}) << who << "\n" << found.report();
 }
 
-template <class Item>
-std::vector<Item> noise(sim::Random& random) {
-  std::vector<Item> items(1 + random.below(5));
-  for (Item& item : items) {
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      item = {.id = static_cast<std::uint32_t>(random.below(0x800)), .size = 8};
-      for (std::uint8_t& byte : item.data) byte = static_cast<std::uint8_t>(random.below(256));
-    } else {
-      item = static_cast<std::uint8_t>(random.below(256));
-    }
-  }
-  return items;
-}
-
 /// Each of them sends again and again, whatever comes.
 template <class Item>
 void let_strangers_come(const EncoderAddress& address) {
   const auto judged_sending = [&](const auto& next) { return Host<Item>(address, {}).judged_sending(next); };
   sim::Random random(1);
   for (int i = 0; i < 3; ++i) {
-    expect_none_kept(judged_sending([&] { return noise<Item>(random); }), "random");
+    expect_none_kept(judged_sending([&] { return noise<Item>(random, 5); }), "random");
   }
   const std::vector<Item> good = request_of<Item>(address);
   const std::vector<std::vector<Item>> damaged = damaged_requests<Item>(address);

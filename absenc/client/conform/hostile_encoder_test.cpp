@@ -12,6 +12,8 @@
 
 #include "absenc/client/conform/evidence.hpp"
 #include "absenc/client/conform/mutant_test.hpp"
+#include "absenc/client/conform/readings.hpp"
+#include "absenc/client/conform/strangers_test.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/random.hpp"
@@ -144,20 +146,6 @@ bool is_same_kind(const Unit& one, const Unit& other) {
 }
 
 template <class Item>
-std::vector<Item> noise(sim::Random& random, std::size_t most) {
-  std::vector<Item> items(1 + random.below(most));
-  for (Item& item : items) {
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      item = {.id = static_cast<std::uint32_t>(random.below(0x800)), .size = 8};
-      for (std::uint8_t& byte : item.data) byte = static_cast<std::uint8_t>(random.below(256));
-    } else {
-      item = static_cast<std::uint8_t>(random.below(256));
-    }
-  }
-  return items;
-}
-
-template <class Item>
 std::vector<Item> zeros(const std::vector<Item>& like) {
   std::vector<Item> items(like.size());
   if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -189,18 +177,17 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   for (const auto& one : tap.exchanges) {
     if (one.reply.empty() || is_flat(frame_of(one.reply, one.bits))) continue;
     const HeardFrame request = frame_of(one.request);
-    good += error_of(unit, address.options, request.frame(), frame_of(one.reply, one.bits).frame()) == Error::none;
+    good += unit.check(address.options, request.frame(), frame_of(one.reply, one.bits).frame()) == Error::none;
     if (!one.request.empty() || unit.link == LinkKind::clocked) continue;
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       for (std::size_t at = 0; at < one.reply.size(); ++at) {
         const Bytes rest = Bytes(one.reply).subspan(at);
         const FrameEnd end = unit.frame_end(address.options, Direction::reply, rest);
         if (end.kind != FrameEnd::Kind::complete) continue;
-        good += error_of(unit, address.options, {}, {.bytes = rest.first(end.size)}) == Error::none;
+        good += unit.check(address.options, {}, {.bytes = rest.first(end.size)}) == Error::none;
       }
     } else {
-      for (const CanFrame& frame : one.reply)
-        good += error_of(unit, address.options, {}, {.can = &frame}) == Error::none;
+      for (const CanFrame& frame : one.reply) good += unit.check(address.options, {}, {.can = &frame}) == Error::none;
     }
   }
   return good;

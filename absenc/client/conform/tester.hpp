@@ -15,6 +15,7 @@
 
 #include "absenc/client/conform/changes.hpp"
 #include "absenc/client/conform/evidence.hpp"
+#include "absenc/client/conform/readings.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
@@ -66,11 +67,11 @@ class Tester {
   void test(const Clause& clause, ClauseResult& result) {
     switch (clause.demand) {
       case Demand::answered:
-        return test_answered(result);
+        return judge_answered(readings_, result);
       case Demand::streamed:
-        return test_streamed(result);
+        return judge_streamed(readings_, result);
       case Demand::in_time:
-        return test_time(result);
+        return judge_time(unit_, options_, readings_, latency_, result);
       case Demand::whole:
         return test_frames(clause, any_of(Error::wrong_length, Error::truncated), result);
       case Demand::checked:
@@ -148,10 +149,10 @@ class Tester {
       const std::uint64_t before = runner_.port().requests;
       const Attempted one = once(options);
       const std::uint64_t requests = runner_.port().requests - before;
-      const std::uint64_t unanswered = std::min(requests, one.unanswered + (came(one) ? 0 : 1));
+      const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
       // One that comes when the host has asked again is late, not missing.
-      readings.answered += came(one) && one.is_late() ? requests : requests - unanswered;
+      readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
       readings.discarded += one.discarded;
       return one;
@@ -159,7 +160,6 @@ class Tester {
     runner_.repeat({.count = count_}, attempt, readings.all);
     return readings;
   }
-  [[nodiscard]] static bool came(const Attempted& one) { return one.answered && one.error != Error::line_stuck; }
   [[nodiscard]] bool is_streamed(const Options& options) const {
     return unit_.streams != nullptr && unit_.streams(options);
   }
@@ -223,7 +223,7 @@ class Tester {
       runner_.listen(time, [&](std::span<const CanFrame> frames) {
         for (const CanFrame& frame : frames) {
           if (frame.id != good->exchange.reply.can->id) continue;
-          if (client::error_of(unit_, options_, {}, {.can = &frame}) != Error::none) continue;
+          if (unit_.check(options_, {}, {.can = &frame}) != Error::none) continue;
           heard.last = runner_.last().received_at;
           if (heard.frames++ == 0) heard.first = heard.last;
         }
@@ -235,78 +235,13 @@ class Tester {
 
   // ---- Readings
 
-  void test_answered(ClauseResult& result) const {
-    result.evidence = "with these options nothing is asked";
-    if (readings_.requests == 0) return;
-    std::string seen = fmt::format("{} of {} requests answered, {} of them well", readings_.answered,
-                                   readings_.requests, readings_.good);
-    if (readings_.answered != readings_.requests) return conclude(result, false, std::move(seen));
-    result.evidence = seen + ": what else came may be anything";
-    if (readings_.good != 0) conclude(result, true, std::move(seen));
-  }
-
-  void test_streamed(ClauseResult& result) const {
-    result.evidence = "with these options the encoder is asked";
-    if (readings_.requests != 0 || readings_.all.empty()) return;
-    std::string seen = fmt::format("{} good frames came by themselves", readings_.good);
-    const auto stopped = std::find_if(readings_.all.begin(), readings_.all.end(),
-                                      [](const Attempted& one) { return one.error == Error::timeout; });
-    const bool comes = readings_.good != 0 && stopped == readings_.all.end();
-    const Attempted& worst = stopped != readings_.all.end() ? *stopped : readings_.all.front();
-    if (!comes) seen += fmt::format("; {}", words_of(worst));
-    conclude(result, comes, std::move(seen));
-  }
-
-  void test_time(ClauseResult& result) const {
-    const Attempted* worst = nullptr;
-    std::size_t timed = 0;
-    for (const Attempted& one : readings_.all) {
-      if (!came(one) || one.limit == Time{}) continue;
-      const bool is_good = one.error == Error::none || client::error_of(unit_, options_, one.exchange.request.frame(),
-                                                                        one.exchange.reply.frame()) == Error::none;
-      if (!is_good) continue;
-      ++timed;
-      if (worst == nullptr || one.answered_after > worst->answered_after) worst = &one;
-    }
-    result.evidence = "no good reply to a request came";
-    if (worst == nullptr) return;
-    const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
-    std::string seen = fmt::format("{} good replies, after at most {:.1f} us, of {:.1f} us that a host waits", timed,
-                                   us(worst->answered_after), us(worst->limit));
-    if (latency_ > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(latency_));
-    conclude(result, worst->answered_after <= worst->limit, std::move(seen));
-  }
-
-  static std::string words_of(const Attempted& one) {
-    const std::string_view name = error_texts[static_cast<std::size_t>(one.error)].name;
-    return one.detail.empty() ? std::string(name) : fmt::format("{} {}", name, one.detail);
-  }
-
   void test_frames(const Clause& clause, Errors errors, ClauseResult& result) {
+    if (clause.option.empty()) return judge_frames(unit_, options_, readings_, errors, result);
     Options options = options_;
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       if (unit_.options[i].name == clause.option) options.values[i] = clause.value;
     }
-    const Readings other = clause.option.empty() ? Readings{} : read_all(options);
-    const Readings& readings = clause.option.empty() ? readings_ : other;
-    std::size_t bad = 0;
-    std::string first;
-    for (const Attempted& one : readings.all) {
-      if (one.error == Error::none || (errors & any_of(one.error)) == 0) continue;
-      if (++bad == 1) first = fmt::format(": {}", words_of(one));
-    }
-    std::string seen = fmt::format("{} good replies, {} that break it{}", readings.good, bad, first);
-    if (readings.discarded != 0) seen += fmt::format("; {} frames of the stream were discarded", readings.discarded);
-    if (bad != 0) return conclude(result, false, std::move(seen));
-    const Attempted* const good = readings.first_good();
-    result.evidence = readings.good == 0
-                          ? "no good reply came"
-                          : "all bits were alike, as on a line that nobody drives: turn the shaft a little";
-    if (good == nullptr) return;
-    const std::size_t noticed = changes_noticed(unit_, options, good->exchange, errors);
-    result.evidence = "with these options nothing could be wrong with it";
-    if (noticed == 0) return;
-    conclude(result, true, fmt::format("{}; of one changed it would be seen in {} ways", seen, noticed));
+    judge_frames(unit_, options, read_all(options), errors, result);
   }
 
   void test_command(const Clause& clause, ClauseResult& result) {
@@ -379,7 +314,7 @@ class Tester {
     if (!size || *size == 0) return false;
     if constexpr (is_can) return true;
     const Frame frame{.bytes = Bytes(request).first(*size)};
-    return client::error_of(unit_, options_, frame, {}) == Error::none &&
+    return unit_.check(options_, frame, {}) == Error::none &&
            encoder_of(unit_, options_, frame).value_or(value) == value;
   }
   // On CAN not what comes counts, but what would be an answer: a node may say something else at any time.
@@ -392,7 +327,7 @@ class Tester {
     return good != nullptr ? good->exchange.request : capture::HeardFrame{};
   }
   [[nodiscard]] Error error_of(const capture::HeardFrame& request, const Attempted& one) const {
-    return client::error_of(unit_, options_, request.frame(), one.exchange.reply.frame());
+    return unit_.check(options_, request.frame(), one.exchange.reply.frame());
   }
 
   enum class Seen : std::uint8_t { as_demanded, contrary, unclear };

@@ -29,8 +29,7 @@ bool is_mended(const Case& one, const Frame& request, std::vector<std::uint8_t> 
 }  // namespace
 
 bool decodes(const Case& one, const Frame& request, const Frame& reply) {
-  NoFields nowhere;
-  return one.unit.decode(one.options, request, reply, nowhere) == Error::none;
+  return one.unit.check(one.options, request, reply) == Error::none;
 }
 
 bool has_good_part(const Case& one, const Attempted& attempt) {

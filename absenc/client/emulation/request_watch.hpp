@@ -128,10 +128,7 @@ class RequestWatch final : public Machine<Item> {
   }
 
   [[nodiscard]] Error error_of(const Frame& request) const {
-    struct Nothing final : FieldSink {
-      void put(const FieldValue&) override {}
-    } nothing;
-    return unit_.decode(options_, request, {}, nothing);
+    return unit_.check(options_, request, {});
   }
 
   // A port that is opened may bring a few bytes before the host has said anything.

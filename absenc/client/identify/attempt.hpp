@@ -6,20 +6,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <memory>
 #include <type_traits>
 #include <utility>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/identify/line.hpp"
 #include "absenc/client/identify/patience.hpp"
+#include "absenc/client/identify/ways.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/link.hpp"
 #include "absenc/client/way/runner.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
 
@@ -30,50 +28,11 @@ using capture::Hypothesis;
 inline constexpr unsigned reads = 6;              // of each encoder that answers
 inline constexpr Time listening = 100ms;          // before anything is sent
 inline constexpr std::size_t stream_size = 2048;  // bytes: as much of a stream as is judged
-inline constexpr std::size_t most_ways = 8;       // in which a unit is asked
 inline constexpr unsigned most_unanswered = 3;    // of them, until it is given up
 inline constexpr Time settled = 5ms;              // without a byte: nothing of what was asked before is under way
 inline constexpr Time longest_settling = 200ms;   // on a line that is never silent
 inline constexpr Time late_window = 100ms;        // behind a request that was not answered: its reply may be late
 inline constexpr Time most_allowance = 400ms;     // for replies that are
-
-using Settings = std::vector<std::string>;
-
-enum class Way : std::uint8_t { serial, tcp, spi, can };
-
-inline Way way_of(const LineSearch& search) {
-  const std::string& place = search.place;
-  if (place.starts_with("spi:")) return Way::spi;
-  if (place.starts_with("tcp:")) return Way::tcp;
-  // Of what is no path, only a network interface can be meant.
-  return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Way::can : Way::serial;
-}
-
-inline bool fits(const Unit& unit, const LineSearch& search) {
-  const Way way = way_of(search);
-  if (way == Way::can) return unit.link == LinkKind::can;
-  if (way == Way::spi) return unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
-  return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
-}
-
-inline bool has_setting(const Settings& settings, std::string_view name) {
-  return std::any_of(settings.begin(), settings.end(),
-                     [&](const std::string& one) { return split_setting(one).name == name; });
-}
-
-/// Those of the settings that are options of the unit.
-inline std::vector<OptionText> option_settings(const Unit& unit, const Settings& settings, bool with_model) {
-  std::vector<OptionText> options;
-  for (const std::string& setting : settings) {
-    const OptionText one = split_setting(setting);
-    if (const Option* option = find_option(unit, one.name)) {
-      options.push_back({option->name, one.value});
-    } else if (with_model && one.name == "model") {
-      options.push_back(one);
-    }
-  }
-  return options;
-}
 
 /// Who was found by a scan.
 struct Addresses final : FieldSink {
@@ -105,22 +64,6 @@ struct IdentitySink final : FieldSink {
   AnswerSink all;
 };
 
-inline std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command) {
-  std::vector<std::int64_t> arguments;
-  for (const Argument& argument : command.arguments) arguments.push_back(argument.default_value);
-  std::array<std::uint8_t, 256> bytes{};
-  const Result<std::size_t> size = unit.encode(options, command, arguments, bytes);
-  if (!size) return {};
-  return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*size)};
-}
-
-/// Whether both may listen to what is sent at a rate.
-inline bool hears(const Unit& unit, std::uint32_t rate, const LineSearch& search) {
-  const bool any_rate = unit.line.rate == 0 || find_role(unit.options, Role::rate) != nullptr;
-  const bool users_rate = has_setting(search.settings, rate_setting);
-  return any_rate || users_rate || way_of(search) == Way::tcp || unit.line.rate == rate;
-}
-
 /// One attempt: a unit at the settings of a port.
 template <class Item>
 class Attempt {
@@ -134,9 +77,7 @@ class Attempt {
         findings_(findings),
         address_(parse_address(fmt::format("{}:{}", unit.id, search.place), settings_)),
         runner_(address_) {
-    for (const Unit* other : all_units()) {
-      if (other != &unit && fits(*other, search) && hears(*other, address_.line.rate, search)) add_harmful(*other);
-    }
+    if constexpr (!is_can) harmful_ = harmful_to_others(unit, address_.line.rate, search);
     runner_.port().deadline = deadline;
     runner_.on_event = [this](const Event<Item>& event) {
       if (talk_ != nullptr) talk_->patience.see(event);
@@ -177,7 +118,7 @@ class Attempt {
   void ask() {
     const Command* read = find_command(unit_, Verb::read);
     if (read == nullptr || read->changes_encoder) return;
-    for (const Settings& way : ways(*read)) {
+    for (const Settings& way : ways_to_ask(unit_, settings_, *read)) {
       Settings settings = settings_;
       settings.insert(settings.end(), way.begin(), way.end());
       const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
@@ -232,10 +173,14 @@ class Attempt {
     }
     if (step.answer != Time{}) step.answer += allowance_;
     talk.patience.see(step, now);
-    if (step.kind != Kind::transfer) return;
-    for (const std::vector<Item>& one : harmful_) {
-      if (step.out.size() >= one.size() && std::equal(one.begin(), one.end(), step.out.begin())) throw Stop::harmful;
+    if constexpr (!is_can) {  // identifiers tell CAN nodes apart
+      if (step.kind == Kind::transfer && begins_harmful(step.out)) throw Stop::harmful;
     }
+  }
+  [[nodiscard]] bool begins_harmful(Bytes request) const {
+    return std::any_of(harmful_.begin(), harmful_.end(), [&](const std::vector<std::uint8_t>& one) {
+      return request.size() >= one.size() && std::equal(one.begin(), one.end(), request.begin());
+    });
   }
   void keep_exchange(const LineExchange<Item>& line, Talk& talk) {
     talk.exchanges.push_back(heard_exchange(line));
@@ -243,19 +188,6 @@ class Attempt {
   }
   [[nodiscard]] bool is_good(const HeardExchange& one, const Options& options) const {
     return !one.reply.frame().empty() && capture::explains(unit_, options, one);
-  }
-
-  void add_harmful(const Unit& other) {
-    if constexpr (is_can) return;  // identifiers tell them apart
-    Options defaults;
-    for (std::size_t i = 0; i < other.options.size(); ++i) defaults.values[i] = other.options[i].default_value;
-    for (const Command& command : other.commands) {
-      if (!command.changes_encoder) continue;
-      const std::vector<std::uint8_t> request = request_of(other, defaults, command);
-      if constexpr (!is_can) {
-        if (!request.empty()) harmful_.push_back(request);
-      }
-    }
   }
 
   struct Conversed {
@@ -336,36 +268,6 @@ class Attempt {
       return std::all_of(bytes.begin(), bytes.end(), [value](std::uint8_t byte) { return byte == value; });
     };
     return !same_as(0x00) && !same_as(0xFF);
-  }
-
-  // The usual options, then single choices that change the request; on clocked links the models, which differ in the
-  // number of bits. Without those by which nobody is asked.
-  [[nodiscard]] std::vector<Settings> ways(const Command& read) const {
-    std::vector<Settings> all;
-    std::vector<std::vector<std::uint8_t>> requests;
-    const Command* scan = find_command(unit_, Verb::scan);
-    const auto add = [&](const Settings& way) {
-      Settings settings = settings_;
-      settings.insert(settings.end(), way.begin(), way.end());
-      const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
-      if (all.size() >= most_ways || (unit_.streams != nullptr && unit_.streams(options))) return;
-      std::vector<std::uint8_t> request = request_of(unit_, options, read);
-      if (scan != nullptr) {
-        const std::vector<std::uint8_t> scanning = request_of(unit_, options, *scan);
-        request.insert(request.end(), scanning.begin(), scanning.end());
-      }
-      const bool known = std::find(requests.begin(), requests.end(), request) != requests.end();
-      if (known && unit_.link != LinkKind::clocked) return;
-      requests.push_back(std::move(request));
-      all.push_back(way);
-    };
-    add({});
-    for (const Model& model : unit_.models) add({fmt::format("model={}", model.name)});
-    for (const Option& option : unit_.options) {
-      if (unit_.link == LinkKind::clocked || option.role == Role::rate || has_setting(settings_, option.name)) continue;
-      for (const std::string_view choice : option.choices) add({fmt::format("{}={}", option.name, choice)});
-    }
-    return all;
   }
 
   // The settings of each encoder that answers to a scan.
@@ -452,7 +354,7 @@ class Attempt {
   EncoderAddress address_;
   Link link_;  // outlives the runner
   Runner<Item> runner_;
-  std::vector<std::vector<Item>> harmful_;
+  std::vector<std::vector<std::uint8_t>> harmful_;  // requests; on CAN none
   Talk* talk_ = nullptr;
   bool cut_ = false;
   bool asked_ = false;          // anything

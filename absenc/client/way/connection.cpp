@@ -191,8 +191,7 @@ class ConnectionOn final : public Connection {
       return diagnose(unit(), uri().options, sent, to_frame(reply, line_.clocks));
     };
     if (line_.echo == 0 || line_.reply().empty()) return diagnosed(line_.received);
-    NoFields ignored;
-    if (unit().decode(uri().options, sent, to_frame(std::span<const Item>(line_.received)), ignored) == Error::none) {
+    if (unit().check(uri().options, sent, to_frame(std::span<const Item>(line_.received))) == Error::none) {
       return {"it is a good reply if no echo is taken from it", "set echo=off or echo=auto"};
     }
     return diagnosed(line_.reply());

@@ -12,8 +12,7 @@ namespace absenc::client {
 namespace {
 
 bool is_good(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
-  NoFields nowhere;
-  return unit.decode(options, request, reply, nowhere) == Error::none;
+  return unit.check(options, request, reply) == Error::none;
 }
 
 std::string bytes_text(std::size_t count) { return fmt::format("{} byte{}", count, count == 1 ? "" : "s"); }

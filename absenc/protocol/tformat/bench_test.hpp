@@ -53,4 +53,12 @@ struct Bench : author::testing::UnitBench<17> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
+/// Sends the requests of a reset, 40 us apart.
+inline void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
+  for (unsigned i = 0; i < times; ++i) {
+    EXPECT_EQ(bench.raw({control_field(id)}).size(), 6u);
+    bench.pass(40us);
+  }
+}
+
 }  // namespace absenc::tformat::testing

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tamagawa T-format (RS-485, 2.5 Mbps, 8N1, LSB first): its times and memory; frames: encode, decode and every check
-// that they allow. Paragraph numbers are those of the TS5700N8500 specification; README.md draws the frames.
+// Frames of the T-format: encode, decode, every check that they allow, and the reading that a good reply makes.
+// Paragraph numbers are those of the TS5700N8500 specification; README.md draws the frames.
 #pragma once
 
 #include <algorithm>
@@ -17,108 +17,9 @@
 #include "absenc/core/result.hpp"
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/author/dialog.hpp"
+#include "absenc/protocol/tformat/format.hpp"
 
 namespace absenc::tformat {
-
-using namespace std::chrono_literals;
-
-inline constexpr LineSettings line_settings{.rate = 2'500'000};  // 6.1
-
-inline constexpr Time answer_time = 3us;        // from the request's delimiter to the reply's start bit, typical (8.1)
-inline constexpr unsigned reset_requests = 10;  // of one kind in one sequence make a reset (10)
-inline constexpr Time reset_interval = 40us;    // at least, between them (10)
-inline constexpr std::uint32_t zero_tolerance_millidegrees = 349;  // 0.35 degrees (10): 127 counts of 17 bits
-inline constexpr Time memory_time = 18ms;          // at most, for a write, a page change or the zero position (9.1, 10)
-inline constexpr Time start_up_with_battery = 1s;  // no request is accepted (5.4)
-inline constexpr Time start_up_without_battery = 1500ms;
-
-/// Limits the host waits for; the document gives only the typical answer time.
-inline constexpr Time answer_limit = 100us;
-inline constexpr Time gap_limit = 3 * line_settings.character();
-
-inline constexpr std::uint8_t user_pages = 6;        // 0 to 5 (6.1.1)
-inline constexpr std::uint8_t page_addresses = 127;  // 0 to 126
-inline constexpr std::uint8_t page_select_address = 127;
-inline constexpr std::uint8_t service_page = 7;
-inline constexpr std::uint32_t write_life = 100'000;    // of all bytes together (6.1.1)
-inline constexpr std::uint8_t overheat_address = 4;     // on the service page (7.2)
-inline constexpr std::uint8_t temperature_address = 5;  // on the service page (7.3)
-inline constexpr std::uint8_t overheat_at_shipping = 0xDA;
-/// Watched at 0 degC: the document wants 1 degC or more (7.4), or a byte below 0x80, which is "off" (7.2.2).
-inline constexpr std::uint8_t overheat_at_zero = 0x80;
-
-/// The area open to the user; page select is not part of it.
-inline constexpr std::array<MemoryArea, user_pages + 2> memory_areas = [] {
-  std::array<MemoryArea, user_pages + 2> areas{};
-  for (std::uint8_t page = 0; page < user_pages; ++page) {
-    areas[page] = {page, 0, page_addresses, "the user's EEPROM", true, true, write_life, {}, true};
-  }
-  areas[user_pages] = {service_page, overheat_address, 1, "over-heat threshold", true, false, write_life, {}, true};
-  areas[user_pages + 1] = {service_page, temperature_address, 1, "temperature", false, false};
-  return areas;
-}();
-/// Null for what is closed.
-[[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
-  const auto* const found = std::find_if(memory_areas.begin(), memory_areas.end(),
-                                         [&](const MemoryArea& one) { return one.has(page, address); });
-  return found == memory_areas.end() ? nullptr : found;
-}
-[[nodiscard]] constexpr bool is_page(unsigned page) { return page < user_pages || page == service_page; }
-
-/// Data ID codes of Table 1.
-enum class DataId : std::uint8_t {
-  singleturn = 0,
-  multiturn = 1,
-  encoder_id = 2,
-  everything = 3,
-  write_memory = 6,
-  clear_alarms = 7,
-  zero = 8,
-  reset_multiturn = 0xC,
-  read_memory = 0xD,
-};
-
-/// Bits of the status field SF (6.3.2). The low four are information bits, always 0.
-namespace status {
-inline constexpr std::uint8_t information = 0x0F;
-inline constexpr std::uint8_t counting_error = 0x10;   // ea0
-inline constexpr std::uint8_t alarm = 0x20;            // ea1: over-heat, multi-turn error, battery error or alarm
-inline constexpr std::uint8_t parity_error = 0x40;     // ca0, of the request
-inline constexpr std::uint8_t delimiter_error = 0x80;  // ca1, of the request
-inline constexpr std::uint8_t rejected = parity_error | delimiter_error;
-}  // namespace status
-
-/// Bits of ALMC (Table 3).
-namespace alarms {
-inline constexpr std::uint8_t over_speed = 0x01;
-inline constexpr std::uint8_t full_absolute_status = 0x02;
-inline constexpr std::uint8_t counting_error = 0x04;
-inline constexpr std::uint8_t counter_overflow = 0x08;
-inline constexpr std::uint8_t over_heat = 0x10;
-inline constexpr std::uint8_t multiturn_error = 0x20;
-inline constexpr std::uint8_t battery_error = 0x40;
-inline constexpr std::uint8_t battery_alarm = 0x80;
-inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | battery_error | battery_alarm;
-inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
-/// Held until a reset request or, some of them, until power off (6.5).
-inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
-/// What an encoder without a battery shows, and is no fault of it (2 (1), 6.5).
-inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;
-}  // namespace alarms
-
-/// What a model's frames carry, and how strictly they are checked.
-struct Format {
-  unsigned singleturn_bits = 17;  // 1 to 24
-  unsigned multiturn_bits = 16;   // 0 to 24
-  int encoder_id = -1;            // ENID, 0 to 255; -1: any
-  bool strict = true;             // also the checks that only a specification-true encoder passes
-  bool battery = true;            // false: none is connected; the turns mean nothing then (2 (1))
-
-  [[nodiscard]] static constexpr LineSettings line() { return line_settings; }
-  /// Bits of the turns that may be used.
-  [[nodiscard]] constexpr unsigned turns_bits() const { return battery ? multiturn_bits : 0; }
-  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, turns_bits()}; }
-};
 
 inline constexpr std::uint8_t busy_bit = 0x80;     // of ADF, in replies
 inline constexpr unsigned full_absolute_bits = 5;  // of the position hold with full_absolute_status (5.4.1)

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/conform/readings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "absenc/client/conform/evidence.hpp"
+#include "absenc/client/error.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+std::string words_of(const Attempted& one) {
+  const std::string_view name = error_texts[static_cast<std::size_t>(one.error)].name;
+  return one.detail.empty() ? std::string(name) : fmt::format("{} {}", name, one.detail);
+}
+
+}  // namespace
+
+bool is_flat(const capture::HeardFrame& reply) {
+  const Frame frame = reply.frame();
+  const std::size_t bits = frame.bits;
+  for (std::size_t i = 1; i < bits; ++i) {
+    if ((frame.bytes[i / 8] >> (7 - i % 8) & 1) != (frame.bytes[0] >> 7 & 1)) return false;
+  }
+  return bits != 0;
+}
+
+const Attempted* Readings::first_good() const {
+  const auto found = std::find_if(all.begin(), all.end(), [](const Attempted& one) {
+    return one.error == Error::none && !is_flat(one.exchange.reply);
+  });
+  return found == all.end() ? nullptr : &*found;
+}
+
+void judge_answered(const Readings& readings, ClauseResult& result) {
+  result.evidence = "with these options nothing is asked";
+  if (readings.requests == 0) return;
+  std::string seen =
+      fmt::format("{} of {} requests answered, {} of them well", readings.answered, readings.requests, readings.good);
+  if (readings.answered != readings.requests) return conclude(result, false, std::move(seen));
+  result.evidence = seen + ": what else came may be anything";
+  if (readings.good != 0) conclude(result, true, std::move(seen));
+}
+
+void judge_streamed(const Readings& readings, ClauseResult& result) {
+  result.evidence = "with these options the encoder is asked";
+  if (readings.requests != 0 || readings.all.empty()) return;
+  std::string seen = fmt::format("{} good frames came by themselves", readings.good);
+  const auto stopped = std::find_if(readings.all.begin(), readings.all.end(),
+                                    [](const Attempted& one) { return one.error == Error::timeout; });
+  const bool comes = readings.good != 0 && stopped == readings.all.end();
+  const Attempted& worst = stopped != readings.all.end() ? *stopped : readings.all.front();
+  if (!comes) seen += fmt::format("; {}", words_of(worst));
+  conclude(result, comes, std::move(seen));
+}
+
+void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency,
+                ClauseResult& result) {
+  const Attempted* worst = nullptr;
+  std::size_t timed = 0;
+  for (const Attempted& one : readings.all) {
+    if (!was_answered(one) || one.limit == Time{}) continue;
+    const bool is_good = one.error == Error::none ||
+                         unit.check(options, one.exchange.request.frame(), one.exchange.reply.frame()) == Error::none;
+    if (!is_good) continue;
+    ++timed;
+    if (worst == nullptr || one.answered_after > worst->answered_after) worst = &one;
+  }
+  result.evidence = "no good reply to a request came";
+  if (worst == nullptr) return;
+  const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
+  std::string seen = fmt::format("{} good replies, after at most {:.1f} us, of {:.1f} us that a host waits", timed,
+                                 us(worst->answered_after), us(worst->limit));
+  if (latency > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(latency));
+  conclude(result, worst->answered_after <= worst->limit, std::move(seen));
+}
+
+void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,
+                  ClauseResult& result) {
+  std::size_t bad = 0;
+  std::string first;
+  for (const Attempted& one : readings.all) {
+    if (one.error == Error::none || (errors & any_of(one.error)) == 0) continue;
+    if (++bad == 1) first = fmt::format(": {}", words_of(one));
+  }
+  std::string seen = fmt::format("{} good replies, {} that break it{}", readings.good, bad, first);
+  if (readings.discarded != 0) seen += fmt::format("; {} frames of the stream were discarded", readings.discarded);
+  if (bad != 0) return conclude(result, false, std::move(seen));
+  const Attempted* const good = readings.first_good();
+  result.evidence = readings.good == 0
+                        ? "no good reply came"
+                        : "all bits were alike, as on a line that nobody drives: turn the shaft a little";
+  if (good == nullptr) return;
+  const std::size_t noticed = changes_noticed(unit, options, good->exchange, errors);
+  result.evidence = "with these options nothing could be wrong with it";
+  if (noticed == 0) return;
+  conclude(result, true, fmt::format("{}; of one changed it would be seen in {} ways", seen, noticed));
+}
+
+}  // namespace absenc::client

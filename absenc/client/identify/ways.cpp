@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/identify/ways.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/protocol/all.hpp"
+
+namespace absenc::client {
+
+Way way_of(const LineSearch& search) {
+  const std::string& place = search.place;
+  if (place.starts_with("spi:")) return Way::spi;
+  if (place.starts_with("tcp:")) return Way::tcp;
+  // A place that is no path can only be a network interface.
+  return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Way::can : Way::serial;
+}
+
+bool fits(const Unit& unit, const LineSearch& search) {
+  const Way way = way_of(search);
+  if (way == Way::can) return unit.link == LinkKind::can;
+  if (way == Way::spi) return unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
+  return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
+}
+
+bool hears(const Unit& unit, std::uint32_t rate, const LineSearch& search) {
+  const bool any_rate = unit.line.rate == 0 || find_role(unit.options, Role::rate) != nullptr;
+  const bool users_rate = has_setting(search.settings, rate_setting);
+  return any_rate || users_rate || way_of(search) == Way::tcp || unit.line.rate == rate;
+}
+
+bool has_setting(const Settings& settings, std::string_view name) {
+  return std::any_of(settings.begin(), settings.end(),
+                     [&](const std::string& one) { return split_setting(one).name == name; });
+}
+
+std::vector<OptionText> option_settings(const Unit& unit, const Settings& settings, bool with_model) {
+  std::vector<OptionText> options;
+  for (const std::string& setting : settings) {
+    const OptionText one = split_setting(setting);
+    if (const Option* option = find_option(unit, one.name)) {
+      options.push_back({option->name, one.value});
+    } else if (with_model && one.name == "model") {
+      options.push_back(one);
+    }
+  }
+  return options;
+}
+
+std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command) {
+  std::vector<std::int64_t> arguments;
+  for (const Argument& argument : command.arguments) arguments.push_back(argument.default_value);
+  std::array<std::uint8_t, 256> bytes{};
+  const Result<std::size_t> size = unit.encode(options, command, arguments, bytes);
+  if (!size) return {};
+  return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*size)};
+}
+
+std::vector<Settings> ways_to_ask(const Unit& unit, const Settings& settings, const Command& read) {
+  constexpr std::size_t most_ways = 8;
+  std::vector<Settings> all;
+  std::vector<std::vector<std::uint8_t>> requests;
+  const Command* scan = find_command(unit, Verb::scan);
+  const auto add = [&](const Settings& way) {
+    Settings together = settings;
+    together.insert(together.end(), way.begin(), way.end());
+    const Options options = require_options(unit, {}, option_settings(unit, together, true));
+    if (all.size() >= most_ways || (unit.streams != nullptr && unit.streams(options))) return;
+    std::vector<std::uint8_t> request = request_of(unit, options, read);
+    if (scan != nullptr) {
+      const std::vector<std::uint8_t> scanning = request_of(unit, options, *scan);
+      request.insert(request.end(), scanning.begin(), scanning.end());
+    }
+    const bool known = std::find(requests.begin(), requests.end(), request) != requests.end();
+    if (known && unit.link != LinkKind::clocked) return;
+    requests.push_back(std::move(request));
+    all.push_back(way);
+  };
+  add({});
+  for (const Model& model : unit.models) add({fmt::format("model={}", model.name)});
+  for (const Option& option : unit.options) {
+    if (unit.link == LinkKind::clocked || option.role == Role::rate || has_setting(settings, option.name)) continue;
+    for (const std::string_view choice : option.choices) add({fmt::format("{}={}", option.name, choice)});
+  }
+  return all;
+}
+
+std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::uint32_t rate,
+                                                         const LineSearch& search) {
+  std::vector<std::vector<std::uint8_t>> all;
+  for (const Unit* other : all_units()) {
+    if (other == &unit || !fits(*other, search) || !hears(*other, rate, search)) continue;
+    Options defaults;
+    for (std::size_t i = 0; i < other->options.size(); ++i) defaults.values[i] = other->options[i].default_value;
+    for (const Command& command : other->commands) {
+      if (!command.changes_encoder) continue;
+      std::vector<std::uint8_t> request = request_of(*other, defaults, command);
+      if (!request.empty()) all.push_back(std::move(request));
+    }
+  }
+  return all;
+}
+
+}  // namespace absenc::client

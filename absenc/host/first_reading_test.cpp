@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/host/first_reading.hpp"
+
+#include <gtest/gtest.h>
+
+namespace absenc::host {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Reading reading_at(std::uint64_t singleturn, std::uint64_t multiturn, Time latched) {
+  return {.singleturn = singleturn,
+          .multiturn = multiturn,
+          .singleturn_bits = 17,
+          .multiturn_bits = 16,
+          .singleturn_valid_bits = 17,
+          .multiturn_valid = true,
+          .latched = latched};
+}
+
+constexpr Reading of_bits(unsigned bits, std::uint64_t singleturn, Time latched) {
+  return {.singleturn = singleturn, .singleturn_bits = bits, .singleturn_valid_bits = bits, .latched = latched};
+}
+
+constexpr bool agree(FirstReading first, const Reading& one, const Reading& other) {
+  return !first.confirms(one) && first.confirms(other);
+}
+
+TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
+  // 6000 rpm are 100 turns a second: 13 107 counts in 1 ms.
+  const auto confirmed = [](std::uint64_t singleturn, std::uint64_t multiturn) {
+    return agree(FirstReading(6000), reading_at(0, 0, {}), reading_at(singleturn, multiturn, 1ms));
+  };
+  EXPECT_TRUE(confirmed(13'107, 0));
+  EXPECT_FALSE(confirmed(13'120, 0));
+  EXPECT_TRUE(confirmed(131'072 - 13'107, 65'535));  // backwards over both wraps
+  EXPECT_FALSE(confirmed(0, 1));
+  EXPECT_FALSE(confirmed(0, 32'768));
+}
+
+TEST(FirstReading, HasALimitEvenWhereNobodySaysOne) {
+  const auto confirmed = [](std::uint64_t singleturn, Time later) {
+    return agree(FirstReading(0), of_bits(13, 0, {}), of_bits(13, singleturn, later));
+  };
+  EXPECT_TRUE(confirmed(136, 100us)) << "a sixtieth of a turn";
+  EXPECT_FALSE(confirmed(150, 100us));
+  EXPECT_FALSE(confirmed(1024, 100us));
+}
+
+TEST(FirstReading, HalfATurnIsNeverConfirmed) {
+  for (const Time later : {Time(10ms), Time(1s), Time(24h), never}) {
+    EXPECT_FALSE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 4096, later)));
+    EXPECT_FALSE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 3841, later)));
+    EXPECT_TRUE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 3840, later)));
+  }
+}
+
+// 12 000 rpm are 200 turns a second: 0.2 of a turn in 1 ms.
+TEST(FirstReading, AShaftThatIsFasterIsSeenByItsThirdPosition) {
+  FirstReading first(6000);
+  EXPECT_FALSE(first.confirms(of_bits(13, 0, 0ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 1638, 1ms)));
+  EXPECT_TRUE(first.confirms(of_bits(13, 3277, 2ms)));
+  EXPECT_TRUE(first.confirms(of_bits(13, 4915, 3ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 3415, 4ms))) << "damaged";
+  EXPECT_FALSE(first.confirms(of_bits(13, 0, 5ms)));
+}
+
+TEST(FirstReading, AShaftThatIsMuchFasterIsNotBelieved) {
+  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // of 819 in a millisecond
+    FirstReading first(6000);
+    EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));
+    EXPECT_FALSE(first.confirms(of_bits(15, 4 * step, 1ms)));
+    EXPECT_EQ(first.confirms(of_bits(15, 8 * step, 2ms)), step <= 3276);
+  }
+}
+
+TEST(FirstReading, TwoDamagedPositionsMakeNoSpeed) {
+  FirstReading first(6000);
+  EXPECT_FALSE(first.confirms(of_bits(13, 100, 0ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100 + 2048, 1ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100, 2ms)));
+  EXPECT_TRUE(first.confirms(of_bits(13, 100, 3ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100 + 1024, 4ms)));
+  EXPECT_FALSE(first.confirms(of_bits(13, 100 + 4096, 5ms)));
+}
+
+TEST(FirstReading, ComparesTheTurnsWhereBothHaveThem) {
+  const Reading with = reading_at(5, 5, {});
+  Reading without = with;
+  without.multiturn_valid = false;
+  EXPECT_FALSE(agree(FirstReading(6000), with, without));
+  EXPECT_FALSE(agree(FirstReading(6000), without, with)) << "nothing is known of the turns before";
+  EXPECT_TRUE(agree(FirstReading(6000), without, without));
+}
+
+TEST(FirstReading, TakesPositionsOf64Bits) {
+  EXPECT_TRUE(agree(FirstReading(1), of_bits(64, ~std::uint64_t{0}, {}), of_bits(64, 3, {})));
+  EXPECT_FALSE(agree(FirstReading(1), of_bits(64, ~std::uint64_t{0}, {}), of_bits(64, 4, {})));
+  EXPECT_FALSE(agree(FirstReading(1), of_bits(64, 0, {}), of_bits(64, std::uint64_t{1} << 63, never)));
+  EXPECT_TRUE(agree(FirstReading(10'000), of_bits(64, 0, {}), of_bits(64, std::uint64_t{15} << 59, 3s)));
+}
+
+TEST(FirstReading, OfACarriageByItsOwnSpeed) {
+  // 1 m/s: 1000 counts of 1 um in a millisecond.
+  const FirstReading first(Reach::of({.mm_s = 1000}, {.singleturn_bits = 26, .multiturn_bits = 0, .unit_um = 1}));
+  EXPECT_TRUE(agree(first, of_bits(26, 0, {}), of_bits(26, 1004, 1ms)));
+  EXPECT_FALSE(agree(first, of_bits(26, 0, {}), of_bits(26, 1006, 1ms)));
+}
+
+static_assert(agree(FirstReading(6000), of_bits(17, 1, {}), of_bits(17, 2, {})));
+
+TEST(FirstReading, WaitsUntilTheEncoderIsReady) {
+  FirstReading first(6000);
+  Reading starting = reading_at(5, 5, {});
+  starting.ready = false;
+  EXPECT_FALSE(first.confirms(starting));
+  EXPECT_FALSE(first.confirms(reading_at(5, 5, {})));
+  EXPECT_FALSE(first.confirms(starting));
+  EXPECT_FALSE(first.confirms(reading_at(5, 5, {})));
+  EXPECT_TRUE(first.confirms(reading_at(5, 5, {})));
+}
+
+}  // namespace
+}  // namespace absenc::host

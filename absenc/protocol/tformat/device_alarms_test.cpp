@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// The alarms of the virtual Smart-Abs (6.5), its battery and its power.
+#include <gtest/gtest.h>
+
+#include "absenc/protocol/tformat/bench_test.hpp"
+#include "absenc/protocol/tformat/device.hpp"
+
+namespace absenc::tformat {
+namespace {
+
+using testing::Bench;
+using testing::PowerOn;
+using testing::reset;
+using testing::Wire;
+
+TEST(TformatDevice, OverHeatIsLatchedUntilCooledAndCleared) {
+  Bench bench;
+  bench.condition(temperature, 90);
+  EXPECT_EQ(bench.everything().alarms, 0);
+  bench.condition(temperature, 91);
+  const Reply hot = bench.everything();
+  EXPECT_EQ(hot.alarms, alarms::over_heat);
+  EXPECT_EQ(hot.status, status::alarm);
+  reset(bench, DataId::clear_alarms);
+  EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
+  bench.condition(temperature, 60);
+  EXPECT_EQ(bench.everything().alarms, alarms::over_heat);
+  reset(bench, DataId::clear_alarms);
+  EXPECT_EQ(bench.everything().alarms, 0);
+}
+
+TEST(TformatDevice, CounterOverflowGoesOnModulo65536) {
+  Bench bench;
+  bench.shaft.put(65535, 5);
+  EXPECT_EQ(bench.everything().alarms, 0);
+  bench.shaft.put(65536, 5);
+  EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
+  EXPECT_EQ(bench.everything().multiturn, 0u);
+  EXPECT_EQ(bench.everything().status, 0);  // SF does not show it
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
+}
+
+TEST(TformatDevice, FullAbsoluteStatusClearsBelow100Rpm) {
+  Bench bench;
+  bench.encoder.power_off(bench.line.now());
+  bench.shaft.put(0, 0x12345);
+  bench.shaft.spin(100, bench.line.now());
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  const Reply fast = bench.everything();
+  EXPECT_EQ(fast.alarms, alarms::full_absolute_status);
+  EXPECT_EQ(fast.singleturn & 0xFFF, 0u);  // only the top 5 bits hold
+  bench.shaft.spin(99, bench.line.now());
+  EXPECT_EQ(bench.everything().alarms, 0);
+  bench.shaft.spin(3000, bench.line.now());
+  EXPECT_EQ(bench.everything().alarms, 0);  // it arises at power on only
+}
+
+TEST(TformatDevice, BatteryFlags) {
+  Bench bench;
+  bench.shaft.put(9, 0);
+  bench.condition(battery_voltage, 3050);
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
+  bench.condition(battery_voltage, 3600);
+  EXPECT_EQ(bench.everything().alarms, 0);  // not latched
+  bench.condition(battery_voltage, 2600);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);      // it is on
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises with the power off only
+  bench.restart();
+  const Reply lost = bench.everything();
+  EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
+  EXPECT_FALSE(to_reading({}, lost).multiturn_valid);
+  EXPECT_EQ(lost.multiturn, 0u);  // nothing counted them
+  bench.condition(battery_voltage, 3600);
+  reset(bench, DataId::reset_multiturn);
+  EXPECT_EQ(bench.everything().alarms, 0);
+}
+
+// 6.5: "3.1 V or less", "2.75 V or less".
+TEST(TformatDevice, BatteryLimitsBelongToTheFlags) {
+  for (const auto& [millivolts, alarm, error] : {std::tuple(3101, false, false),
+                                                 {3100, true, false},
+                                                 {2751, true, false},
+                                                 {2750, true, true},
+                                                 {0, true, true}}) {
+    Bench bench;
+    bench.condition(battery_voltage, millivolts);
+    EXPECT_EQ(bench.everything().alarms, alarm ? alarms::battery_alarm : 0) << millivolts;
+    bench.restart();
+    EXPECT_EQ((bench.everything().alarms & alarms::battery_error) != 0, error) << millivolts;
+  }
+}
+
+TEST(TformatDevice, ABatteryThatWasAwayWhileThePowerWasOffIsTold) {
+  Bench bench;
+  bench.shaft.put(9, 0);
+  bench.encoder.power_off(bench.line.now());
+  bench.condition(battery_voltage, 0);
+  bench.pass(1s);
+  bench.condition(battery_voltage, 3600);
+  bench.pass(1s);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_error);
+  EXPECT_EQ(bench.everything().multiturn, 0u);
+  reset(bench, DataId::reset_multiturn);
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, 0);  // it has been there since
+  // Changed while the power was on: nothing was lost.
+  bench.condition(battery_voltage, 0);
+  bench.condition(battery_voltage, 3600);
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, 0);
+}
+
+// Of over_heat 6.5 says the same with a battery and without; over_speed and counter_overflow are "indefinite".
+TEST(TformatDevice, OverHeatIsLatchedWithoutABattery) {
+  Bench bench;
+  bench.condition(battery_voltage, 0);
+  bench.encoder.raise_alarms(alarms::over_heat | alarms::over_speed | alarms::counter_overflow);
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, alarms::over_heat | alarms::battery_error | alarms::battery_alarm);
+}
+
+TEST(TformatDevice, WithoutTurnsNoCounterOverflows) {
+  testing::TestShaft shaft;
+  VirtualEncoder encoder({.multiturn_bits = 0}, shaft);
+  encoder.power_on(Time{}, PowerOn::skip);
+  const Wire request{0x1A};
+  for (const int turns : {1, 5, -3}) {
+    shaft.put(turns, 77);
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1s * (10 + turns), .items = request});
+    EXPECT_EQ(encoder.everything(1s * (10 + turns)).alarms, 0) << turns;
+    encoder.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = 1s * (10 + turns)});
+  }
+  encoder.power_off(20s);
+  shaft.spin(9'000, 20s);
+  encoder.power_on(30s, PowerOn::skip);
+  EXPECT_EQ(encoder.everything(30s).alarms & alarms::over_speed, 0);
+}
+
+TEST(TformatDevice, OneWithoutBatteryNeverHasOne) {
+  testing::TestShaft shaft;
+  shaft.put(3, 5);
+  VirtualEncoder encoder({.battery = false}, shaft);
+  for (std::size_t i = 0; i < conditions.size(); ++i) encoder.set_condition(i, conditions[i].normal, Time{});
+  encoder.power_on(Time{}, PowerOn::skip);
+  EXPECT_EQ(encoder.everything(Time{}).alarms, alarms::without_battery);
+}
+
+TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
+  Bench bench;
+  bench.shaft.spin(6000, bench.line.now());
+  bench.encoder.power_off(bench.line.now());
+  bench.pass(1s);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  EXPECT_EQ(bench.everything().alarms & alarms::over_speed, 0);
+  bench.encoder.power_off(bench.line.now());
+  bench.shaft.spin(6100, bench.line.now());
+  bench.pass(1s);
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  const Reply reply = bench.encoder.everything(bench.line.now());
+  EXPECT_EQ(reply.alarms & alarms::over_speed, alarms::over_speed);
+  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the count is wrong
+}
+
+// 5.4.2: for the first five seconds without power the counter follows a faster jolt.
+TEST(TformatDevice, TheLimitOfAJoltFallsFiveSecondsAfterPowerOff) {
+  struct Jolt final : Shaft {
+    [[nodiscard]] ShaftState at(Time time) const override {
+      return {.acceleration = time >= when && time < when + 100ms ? 40'000 : 0};
+    }
+    Time when{};
+  } jolt;
+  for (const auto& [when, is_seen] : {std::pair<Time, bool>{4'800ms, false}, {5'100ms, true}}) {
+    jolt.when = when;
+    VirtualEncoder encoder({}, jolt);
+    encoder.power_on(Time{}, PowerOn::skip);
+    encoder.power_off(Time{});
+    encoder.power_on(10s, PowerOn::skip);
+    EXPECT_EQ(encoder.everything(10s).alarms, is_seen ? alarms::over_speed : 0) << when.count();
+  }
+}
+
+TEST(TformatDevice, CountingAndMultiturnErrorsEndWithThePower) {
+  Bench bench;
+  bench.encoder.raise_alarms(alarms::counting_error | alarms::multiturn_error | alarms::over_speed);
+  EXPECT_EQ(bench.everything().status, status::counting_error | status::alarm);
+  bench.restart();
+  EXPECT_EQ(bench.everything().alarms, alarms::over_speed);
+}
+
+TEST(TformatDevice, IsSilentWhileItStarts) {
+  for (const bool battery : {true, false}) {
+    Bench bench;
+    bench.condition(battery_voltage, battery ? 3600 : 0);
+    bench.restart(PowerOn::real);
+    const Time start = battery ? 1s : 1500ms;  // 5.4
+    testing::RawHost early({0x1A}, start - 1ms);
+    EXPECT_TRUE(bench.run(early).reply.empty());
+    testing::RawHost late({0x1A}, start);
+    ASSERT_EQ(bench.run(late).reply.size(), 11u);
+    EXPECT_EQ(late.reply[9], battery ? 0 : alarms::battery_alarm | alarms::battery_error);
+  }
+}
+
+}  // namespace
+}  // namespace absenc::tformat
