@@ -101,13 +101,7 @@ class Bench {
   Device<Item>* make_device() {
     device_storage.resize(unit.device_storage);
     host_storage.resize(unit.host_storage);
-    const Any<Device> made = unit.device(options, shaft, device_storage);
-    Device<Item>* device_made = nullptr;
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      device_made = made.frames;
-    } else {
-      device_made = made.bytes;
-    }
+    Device<Item>* const device_made = unit.device(options, shaft, device_storage).template of<Item>();
     device_made->power_on(Time{}, Device<Item>::PowerOn::skip);
     return device_made;
   }

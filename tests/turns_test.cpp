@@ -89,12 +89,7 @@ class Bench {
         device_storage_(one.unit->device_storage),
         host_storage_(one.unit->host_storage) {
     const Options built = options_of(*one.unit, one.model, one.encoder);
-    const Any<Device> made = one.unit->device(built, shaft_, device_storage_);
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      device_ = made.frames;
-    } else {
-      device_ = made.bytes;
-    }
+    device_ = one.unit->device(built, shaft_, device_storage_).template of<Item>();
     device_->power_on(Time{}, Device<Item>::PowerOn::skip);
     const LineSettings line = line_settings(*one.unit, built);
     port_ = std::make_unique<sim::SimPort<Item>>(one.unit->link, line.with_some_rate(), *device_);

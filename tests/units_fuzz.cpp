@@ -101,7 +101,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   using Wanted = typename Step<Item>::Kind;
   static std::vector<std::byte> storage;
   storage.resize(std::max(storage.size(), unit.host_storage));
-  Conversation<Item>* conversation = machine_of<Item>(unit.host(options, command, least_arguments(command), storage));
+  Conversation<Item>* conversation = unit.host(options, command, least_arguments(command), storage).template of<Item>();
   if (conversation == nullptr) return;
   std::vector<Item> items = items_of<Item>(unit, input);
   const bool clocks = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
@@ -149,7 +149,7 @@ void ask_device(const Unit& unit, const Options& options, Bytes input) {
   storage.resize(std::max(storage.size(), unit.device_storage));
   const bool streams = unit.streams != nullptr && unit.streams(options);
   const fuzz::Still still;
-  Device<Item>* device = machine_of<Item>(unit.device(options, still, storage));
+  Device<Item>* device = unit.device(options, still, storage).template of<Item>();
   if (device == nullptr) return;
   device->power_on(Time{}, Device<Item>::PowerOn::skip);
   Time now{};

@@ -36,8 +36,9 @@ struct DecodeChoices {
 /// `angle_deg` (of linear encoders `position_mm`), then each field of the unit under its name, and `error` with
 /// `message`, which are empty in a good row. A row with an error has no other values than these, its times and frames.
 ///
-/// What a reply does not carry, as alarms, is completed by what an earlier reply of the same encoder has reported; the
-/// encoder is taken to stay switched on. Where none has, alarms and the position that depends on them are `Unknown`.
+/// Where a reply does not carry the alarms, an earlier reply of the same encoder completes them, as
+/// long as requests are answered and clear none. Without such a reply, alarms and the position that depends on them are
+/// `Unknown`.
 class Decoded {
  public:
   using value_type = Row;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the client library throws beside os::Failure, of a port, and os::Interrupted. All are std::exceptions.
+// Exceptions of the client library; a port throws os::Failure and os::Interrupted. All are std::exceptions.
 #pragma once
 
 #include <stdexcept>

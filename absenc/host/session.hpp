@@ -242,13 +242,7 @@ class Session {
 
   Conversation<Item>* make(const Command& command, Arguments arguments) {
     discarded_before_ = 0;
-    const Any<Conversation> made = unit_->host(options_, command, arguments, storage_);
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      current_ = made.frames;
-    } else {
-      current_ = made.bytes;
-    }
-    return current_;
+    return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
   // On a link whose clock is the host's nothing comes late. On a CAN bus others send too: what listens to all of them

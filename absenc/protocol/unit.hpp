@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "absenc/core/shaft.hpp"
 #include "absenc/link/can.hpp"
@@ -204,11 +205,21 @@ template <template <class> class Role>
 struct Any {
   Role<std::uint8_t>* bytes = nullptr;
   Role<CanFrame>* frames = nullptr;
+
+  /// Returns the machine of this item; null if there is none.
+  template <class Item>
+  [[nodiscard]] constexpr Role<Item>* of() const {
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      return frames;
+    } else {
+      return bytes;
+    }
+  }
 };
 
-/// Bits of a position; 0: it has no such part.
-inline constexpr std::size_t longest_encoded = 1024;
+inline constexpr std::size_t longest_encoded = 1024;  // bytes of a request that `encode` writes
 
+/// Bits of a position; 0: it has no such part.
 struct Resolution {
   unsigned singleturn_bits = 0;
   unsigned multiturn_bits = 0;

@@ -61,7 +61,8 @@ py::object encode(const std::string& name, const std::string& command_name, cons
   const Result<std::size_t> size =
       unit.encode(options, command, client::complete_arguments(command, given), MutableBytes(bytes));
   if (!size) {
-    throw client::UsageError(command_name + " cannot be encoded: " + std::string(text_of(size.error()).description));
+    throw client::UsageError(command_name + " cannot be encoded: " + std::string(text_of(size.error()).description) +
+                             ". Try: " + std::string(text_of(size.error()).advice));
   }
   const Bytes encoded = Bytes(bytes).first(*size);
   if (unit.link == LinkKind::can || unit.link == LinkKind::clocked) return py::str(std::string(encoded.begin(), encoded.end()));

@@ -41,7 +41,7 @@ struct Feeding {
   Outcome converse(const std::vector<Item>& asks, const typename Player<Item>::Reply& comes,
                    const std::function<void(const Conversation<Item>&)>& on_emit = {}) const {
     std::vector<std::byte> storage(unit.host_storage);
-    Conversation<Item>* conversation = machine_of<Item>(unit.host(options, command, arguments, storage));
+    Conversation<Item>* conversation = unit.host(options, command, arguments, storage).template of<Item>();
     if (conversation == nullptr) return {};
     Player<Item> player(unit, options);
     Outcome outcome;
@@ -324,7 +324,7 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   using Kind = typename Step<Item>::Kind;
   const Command& command = *find_command(unit, Verb::read);
   std::vector<std::byte> storage(unit.host_storage);
-  Conversation<Item>* conversation = machine_of<Item>(unit.host(options, command, least_arguments(command), storage));
+  Conversation<Item>* conversation = unit.host(options, command, least_arguments(command), storage).template of<Item>();
   if (conversation == nullptr) return std::nullopt;
   Time now{};
   Step<Item> step = conversation->next(now);

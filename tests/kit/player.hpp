@@ -16,16 +16,6 @@ struct Still final : Shaft {
   [[nodiscard]] ShaftState at(Time) const override { return {}; }
 };
 
-/// The machine of an Any that carries this item.
-template <class Item, template <class> class Role>
-Role<Item>* machine_of(const Any<Role>& any) {
-  if constexpr (std::is_same_v<Item, CanFrame>) {
-    return any.frames;
-  } else {
-    return any.bytes;
-  }
-}
-
 template <class Item>
 class Player {
  public:
@@ -36,7 +26,7 @@ class Player {
   /// On a line on which nobody is.
   Player() = default;
   Player(const Unit& unit, const Options& options) : device_storage_(unit.device_storage) {
-    device_ = machine_of<Item>(unit.device(options, still_, device_storage_));
+    device_ = unit.device(options, still_, device_storage_).template of<Item>();
     if (device_ != nullptr) device_->power_on(now_, Device<Item>::PowerOn::skip);
   }
 

@@ -11,7 +11,7 @@ template <class Item>
 void meet_silence(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);
   Conversation<Item>* conversation =
-      machine_of<Item>(unit.host(way.options, command, least_arguments(command), storage));
+      unit.host(way.options, command, least_arguments(command), storage).template of<Item>();
   if (conversation == nullptr) return;
   Player<Item> player;
   constexpr unsigned every_address = 100'000;  // steps

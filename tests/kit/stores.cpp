@@ -122,7 +122,7 @@ void store(const Unit& unit, const Configuration& way, const Command& command, F
   const Values values = least_arguments(command);
   const auto made = [&](std::size_t size) {
     Fenced storage(size, unit.host_storage + unit.device_storage);
-    const bool is = machine_of<Item>(unit.host(way.options, command, values, storage.given())) != nullptr;
+    const bool is = unit.host(way.options, command, values, storage.given()).template of<Item>() != nullptr;
     findings.require(storage.is_whole(), [&] { return std::string(command.name) + ": made beyond its storage"; });
     return is;
   };
@@ -157,7 +157,7 @@ void store_device(const Unit& unit, const Configuration& way, Findings& findings
   const Hand shaft;
   const auto made = [&](std::size_t size) {
     Fenced storage(size, unit.host_storage + unit.device_storage);
-    const bool is = machine_of<Item>(unit.device(way.options, shaft, storage.given())) != nullptr;
+    const bool is = unit.device(way.options, shaft, storage.given()).template of<Item>() != nullptr;
     findings.require(storage.is_whole(), [] { return "the virtual encoder is made beyond its storage"; });
     return is;
   };

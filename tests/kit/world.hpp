@@ -54,7 +54,7 @@ class World {
         options_(options),
         device_storage_(unit.device_storage),
         host_storage_(unit.host_storage),
-        device_(machine_of<Item>(unit.device(options, shaft_, device_storage_))) {
+        device_(unit.device(options, shaft_, device_storage_).template of<Item>()) {
     if (device_ == nullptr) return;
     device_->power_on(Time{}, Device<Item>::PowerOn::skip);
     faulty_ = std::make_unique<Faulty>(*device_, sim::FaultRates{}, seed);
@@ -93,7 +93,7 @@ class World {
   Ended run_in(std::span<std::byte> storage, const Command& command, Arguments arguments,
                Time limit = std::chrono::seconds(100)) {
     Ended result;
-    Conversation<Item>* conversation = machine_of<Item>(unit_.host(options_, command, arguments, storage));
+    Conversation<Item>* conversation = unit_.host(options_, command, arguments, storage).template of<Item>();
     if (conversation == nullptr) return result;
     result.made = true;
     result.unfounded = conversation->reading() != nullptr;

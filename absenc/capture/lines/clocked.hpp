@@ -19,7 +19,7 @@ struct ClockedFormat {
   Tick settle = 0;           // then: so long behind the last change its bit stands on the line; 0: not looked at
 };
 
-/// What the first changes of a clock say of its pauses.
+/// The pauses of a clock, as its first changes show them.
 struct ClockRests {
   Tick half_period = 0;
   std::vector<Tick> pauses;  // a clock that rests for longer ends a word: first three periods, then one between each

@@ -56,7 +56,8 @@ struct ClockedLine {
   bool rising = false;               // the change of the clock that takes a bit
   bool select_high = false;          // chip select is active high
   Tick pause = 0;                    // without chip select: a clock that rests for longer ends a word; 0: `choose`
-  /// Which of the pauses that the beginning of the capture allows: the index of one. Null: three periods of the clock.
+  /// Chooses one of the pauses that the beginning of the capture allows, by its index. Null: three periods of the
+  /// clock.
   std::function<std::size_t(std::span<const PauseReading>)> choose{};
 };
 

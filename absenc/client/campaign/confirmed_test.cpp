@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is presented as confirmed on a bad line is compared with the true shaft: every model, at rest and turning. Wrong
-// ones are no more than frame checks and speed limit together let through.
+// Compares each confirmed position on a bad line with the true shaft: every model, at rest and turning. Wrong positions
+// are no more than frame checks and speed limit together let through.
 #include <gtest/gtest.h>
 
 #include <cctype>

@@ -67,13 +67,7 @@ struct RoughBench {
   }
 
   Device<Item>& make_device(Time now = {}) {
-    const Any<Device> made = unit.device(options, shaft, device_storage);
-    Device<Item>* one = nullptr;
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      one = made.frames;
-    } else {
-      one = made.bytes;
-    }
+    Device<Item>* const one = unit.device(options, shaft, device_storage).template of<Item>();
     if (one == nullptr) {
       throw UsageError(std::string(unit.id) + " has no virtual encoder with these options");
     }

@@ -71,7 +71,7 @@ class CaptureRun {
   /// At most so many characters.
   CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                               capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
-  /// Of the pauses that can end a word, that which reads the beginning of the capture best.
+  /// Returns the pause that reads the beginning of the capture best, by its index.
   [[nodiscard]] std::size_t likely_pause(std::span<const capture::PauseReading> readings,
                                          std::vector<std::string>& notes) const;
   CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);

@@ -193,7 +193,7 @@ void Changes::test_offset(const Clause& clause, ClauseResult& result) {
   if (!is_near(before, 0)) conclude(result, true, seen);
 }
 
-// Which direction it has, only the position shows: as it is now, or mirrored.
+// Only the position shows the direction: it is as it is now, or mirrored.
 void Changes::test_direction(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const std::uint64_t turn = std::uint64_t{1} << before.singleturn_bits;

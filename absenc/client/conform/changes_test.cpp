@@ -28,15 +28,6 @@ namespace {
 
 using ByteList = std::vector<std::uint8_t>;
 
-template <class Item>
-Device<Item>& device_of(const VirtualDevice& device) {
-  if constexpr (std::is_same_v<Item, CanFrame>) {
-    return *device.device().frames;
-  } else {
-    return *device.device().bytes;
-  }
-}
-
 /// An encoder that obeys, but not all of it.
 template <class Item>
 class Disobedient final : public Machine<Item> {
@@ -44,7 +35,7 @@ class Disobedient final : public Machine<Item> {
   using Kind = typename Event<Item>::Kind;
 
   explicit Disobedient(const VirtualDevice& device)
-      : line_(machine_of<Item>(device)), device_(device_of<Item>(device)) {}
+      : line_(machine_of<Item>(device)), device_(*device.device().template of<Item>()) {}
 
   void feed(const Event<Item>& event) override {
     // A request by clock has no bytes.
@@ -125,7 +116,7 @@ struct Bench {
   explicit Bench(const EncoderAddress& where) : address(where) {
     link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
     link.device->power_on(Time{});
-    device = &device_of<Item>(*link.device);
+    device = link.device->device().template of<Item>();
     mutant = std::make_unique<Disobedient<Item>>(*link.device);
     line = std::make_unique<sim::RoughLine<Item>>(address.unit->link, address.line.with_some_rate(), *mutant, 1);
     port = std::make_unique<EndingPort<Item>>(*line);

@@ -351,7 +351,7 @@ class Tester {
       if (!one) return;
       last = what_came(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
       const Seen seen = reaction_of(clause, *one);
-      // Which port is at the right rate again when the reply begins, is not known.
+      // A port may not be at the right rate again when the reply begins.
       const bool missed = slow && (is_silent(*one) || seen == Seen::unclear);
       result.evidence = last + ": a port that changes its rate may be too late to hear the reply";
       if (missed) return;

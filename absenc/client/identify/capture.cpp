@@ -36,7 +36,7 @@ struct Collector final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     using Kind = capture::Annotation::Kind;
     if (os::interrupted()) throw os::Interrupted{};
-    // What exchanges carried in parts was on the line in them.
+    // A composed frame was on the line in the exchanges that carried its parts.
     if (annotation.remark == capture::Remark::cut || annotation.composed) return;
     if (annotation.kind == Kind::noise) {
       for (const std::uint8_t byte : annotation.reply.bytes) exchanges.push_back({.reply = {.bytes = {byte}}});

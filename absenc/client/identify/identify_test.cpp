@@ -10,7 +10,7 @@
 namespace absenc::client {
 namespace {
 
-/// Whoever opens this line finds the same encoder, switched on anew.
+/// A line with one encoder, which is switched on anew each time the line is opened.
 struct Place {
   explicit Place(const std::string& text, std::vector<std::string> faults = {}, VirtualWay between = {})
       : encoder(parse_address(text)), way(between) {
@@ -30,7 +30,7 @@ struct Place {
   VirtualClock clock;
 };
 
-/// What speaks for the unit when it alone is asked, and how many requests that took.
+/// Returns the evidence for the unit when it alone is asked, and the number of requests.
 std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const std::vector<std::string>& faults,
                                                 const VirtualWay& way = {}) {
   Place place(text, faults, way);

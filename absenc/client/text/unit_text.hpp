@@ -80,7 +80,7 @@ struct RoleArgument {
 
 /// Those that are set in `bits` and have a name.
 [[nodiscard]] std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits);
-/// What to do about a flag; "" also where that is to look at the alarms, which are shown beside it.
+/// Returns what to do about a flag; "" also where the alarms, which are shown beside it, say it.
 [[nodiscard]] std::string_view action_of(const FlagInfo& flag, bool beside_alarms);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);

@@ -98,12 +98,7 @@ class Talk {
     for (std::size_t i = arguments.size(); i < command.arguments.size(); ++i) {
       arguments.push_back(command.arguments[i].default_value);
     }
-    const Any<Conversation> made = unit.host(options, command, arguments, storage_);
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      made_ = made.frames;
-    } else {
-      made_ = made.bytes;
-    }
+    made_ = unit.host(options, command, arguments, storage_).template of<Item>();
   }
   Conversation<Item>& operator*() const { return *made_; }
   Conversation<Item>* operator->() const { return made_; }

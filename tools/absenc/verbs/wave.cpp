@@ -113,13 +113,8 @@ struct Conversations {
   template <class Item>
   void hold(sim::SimPort<Item>& port, const Spoken& one) {
     std::vector<std::byte> storage(uri.unit->host_storage);
-    const Any<Conversation> made = uri.unit->host(uri.options, *one.command, one.arguments, storage);
-    Conversation<Item>* conversation = nullptr;
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      conversation = made.frames;
-    } else {
-      conversation = made.bytes;
-    }
+    Conversation<Item>* const conversation =
+        uri.unit->host(uri.options, *one.command, one.arguments, storage).template of<Item>();
     if (conversation == nullptr) {
       throw UsageError(fmt::format("{} cannot do {} with these options", uri.unit->id, one.command->name));
     }
