@@ -6,7 +6,6 @@ import unittest
 import urllib.parse
 
 from page_scenes import Browser  # first: it looks for selenium
-from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
@@ -36,10 +35,10 @@ class Page(ServeCase):
         self.browser.get(self.served.url + hash_text)
 
     def text(self, selector="body"):
-        try:
-            return "\n".join(one.text for one in self.browser.find_elements(By.CSS_SELECTOR, selector))
-        except StaleElementReferenceException:
-            return ""
+        """What is shown, in one look: the page may replace its nodes between two."""
+        return self.browser.execute_script("""
+            return [...document.querySelectorAll(arguments[0])].filter((one) => one.getClientRects().length > 0)
+                   .map((one) => one.innerText).join("\\n");""", selector)
 
     def wait_for(self, words, selector="body"):
         return wait_until(lambda: words in self.text(selector) and self.text(selector), f"{selector} says {words!r}")
@@ -51,7 +50,7 @@ class Page(ServeCase):
         self.assertEqual([entry["message"] for entry in wrong], [])
 
     def pills(self):
-        return self.browser.execute_script("return [...document.querySelectorAll('.pill')].map((pill) => pill.textContent)")
+        return self.browser.execute_script("return [...document.querySelectorAll('.pill:not([hidden])')].map((pill) => pill.textContent)")
 
     def card(self, name):
         return f".card:has(a[href='#encoder={urllib.parse.quote(name, safe='')}'])"

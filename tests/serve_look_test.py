@@ -157,7 +157,7 @@ class Look(ServeCase):
         wait_until(lambda: server.encoder()["state"] == "lost", "it is lost")
         self.open(server, self.READY)
         wait_until(lambda: self.browser.ask("return document.querySelector('.card')?.dataset.state") == "lost", "the ill are first")
-        groups = self.browser.ask("return [...document.querySelectorAll('.pill')].map((pill) => pill.dataset.group)")
+        groups = self.browser.ask("return [...document.querySelectorAll('.pill:not([hidden])')].map((pill) => pill.dataset.group)")
         self.assertEqual(groups, ["lost", "alarm", "errors", "live", "good"])
         self.look("overview")
         for name in ("press-2", "elbow", "wrist", "shoulder", "slide-x", "axis-7", "table", "turret", "chain-a"):
@@ -196,7 +196,7 @@ class Look(ServeCase):
         path = self.file("absenc.toml", config({"elbow": ("tformat", "motion=rpm=60")}))
         server = self.without_history(ABSENC_CONFIG=path)
         self.open(server, self.READY)
-        self.assertEqual(self.browser.ask("return document.querySelector('.pill').textContent"), "● good")
+        self.assertEqual(self.browser.ask("return document.querySelector('.pill:not([hidden])').textContent"), "● good")
         self.look("single")
         self.open(server, "document.querySelector('.one .plot canvas')", encoder="elbow")
         wait_until(lambda: "the server has no tokens" in self.browser.ask("return document.body.innerText"), "it says why")

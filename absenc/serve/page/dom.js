@@ -17,6 +17,15 @@ export function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
+/** Replaces the children only if they would be others, and keeps the focus on the region of the same name. */
+export function setChildren(node, ...children) {
+  const made = element("div", {}, ...children);
+  if (node.innerHTML === made.innerHTML) return;
+  const label = node.contains(document.activeElement) ? document.activeElement.getAttribute("aria-label") : null;
+  node.replaceChildren(...made.childNodes);
+  if (label !== null) [...node.querySelectorAll("[aria-label]")].find((one) => one.getAttribute("aria-label") === label)?.focus({preventScroll: true});
+}
+
 const SVG = "http://www.w3.org/2000/svg";
 
 function drawing(name, attributes = {}, ...children) {

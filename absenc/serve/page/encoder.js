@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One encoder: what it does, what is wrong, what can be done; the rest in tabs.
 import {askCommand} from "./dialog.js";
-import {breakable, choice, dial, element, histogram, rich, scale, setText, table, terms} from "./dom.js";
+import {breakable, choice, dial, element, histogram, rich, scale, setChildren, setText, table, terms} from "./dom.js";
 import {Examine} from "./examine.js";
 import {figureNode, showParts, showState, stateNode} from "./overview.js";
 import {Trace, isMarked, markText, quantities} from "./plots.js";
@@ -289,7 +289,7 @@ export class One {
       if (point[0] - (this.points.at(-1)?.[0] ?? 0) >= LEAST_MS) this.points.push(point);
     }
     while (this.points.length > MOST_POINTS) this.points.shift();
-    this.changed = true;
+    if (this.range === "live") this.changed = true;  // the past is drawn anew with each look at the encoder
   }
 
   /** Rows of the plot from the points or the history, in the unit that is chosen. */
@@ -360,17 +360,18 @@ export class One {
     this.showTab();
     this.showLine(one);
     this.offer(one);
+    this.changed = true;
     const missing = one.singleturn_valid === false || one.multiturn_valid === false ? "INVALID" : "unknown";
-    this.fields.replaceChildren(one.fields === null ? element("p", {class: "faint"}, "none is new") :
+    setChildren(this.fields, one.fields === null ? element("p", {class: "faint"}, "none is new") :
       terms(Object.entries(one.fields).map(([field, value]) => {
         const {name, unit} = namedUnit(field);
         return [name, value === null || unit === "" ? fieldText(value, missing) : `${fieldText(value)} ${unit}`];
       })));
     const errors = Object.entries(one.errors).sort(([, a], [, b]) => b - a).map(([name, count]) => [plain(name), count]);
     const latencies = latencyRows(one.latency_us.buckets);
-    this.latencies.replaceChildren(latencies.length === 0 || one.readings === 0 ? element("p", {class: "faint"}, "no reply yet") : histogram(["latency", "replies"], latencies, "replies by latency"));
-    this.errors.replaceChildren(errors.length === 0 ? element("p", {class: "faint"}, "none") : histogram(["error", "attempts"], errors, "failed attempts by kind"));
-    this.bad.replaceChildren(one.bad_exchanges.length === 0 ? element("p", {class: "faint"}, "none") : table(
+    setChildren(this.latencies, latencies.length === 0 || one.readings === 0 ? element("p", {class: "faint"}, "no reply yet") : histogram(["latency", "replies"], latencies, "replies by latency"));
+    setChildren(this.errors, errors.length === 0 ? element("p", {class: "faint"}, "none") : histogram(["error", "attempts"], errors, "failed attempts by kind"));
+    setChildren(this.bad, one.bad_exchanges.length === 0 ? element("p", {class: "faint"}, "none") : table(
       ["ago", "what", "sent", "received"], one.bad_exchanges,
       (bad) => [duration(bad.age_s), `${plain(bad.error)}: ${bad.meaning}`, element("code", {}, bad.sent), element("code", {}, bad.received || "nothing")],
       "last bad exchanges"));
@@ -379,7 +380,7 @@ export class One {
   showLine(one) {
     const latency = one.latency_us;
     const live = one.state === "live";
-    this.line.replaceChildren(terms([
+    setChildren(this.line, terms([
       ["readings", `${live ? numberText(one.rate_hz, one.rate_hz < 10 ? 1 : 0) : 0} /s`],
       ["reply after", one.readings === 0 ? "no reply yet" : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
       ["errors, last minute", numberText(one.errors_last_minute)],

@@ -153,7 +153,12 @@ export class Overview {
       element("p", {}, element("code", {}, "absenc serve \"sim:tformat?motion=rpm=60\" sim:esl")));
     this.noMatch = element("p", {class: "none", hidden: true}, "No encoder matches. ", element("button", {type: "button", onclick: () => this.clearFilter()}, "Show all"));
     main.replaceChildren(this.none, this.noMatch, this.list);
-    this.pills = element("div", {class: "pills", role: "group", "aria-label": "show only"});
+    // They stay the same nodes, so that none loses the focus.
+    this.groups = new Map(GROUPS.map((group) => {
+      const [shape, words] = [element("span", {"aria-hidden": "true"}), element("span")];
+      return [group, {shape, words, node: element("button", {type: "button", class: "pill", hidden: true, "data-group": group, onclick: () => this.choose(group)}, shape, words)}];
+    }));
+    this.pills = element("div", {class: "pills", role: "group", "aria-label": "show only"}, ...[...this.groups.values()].map(({node}) => node));
     this.filter = element("input", {type: "search", placeholder: "Filter", "aria-label": "filter by name", oninput: () => this.arrange(true)});
     this.order = element("select", {"aria-label": "order", onchange: () => this.arrange(true)},
       element("option", {value: "ill"}, "Ill first"), element("option", {value: "name"}, "By name"), element("option", {value: "given"}, "As configured"));
@@ -202,20 +207,18 @@ export class Overview {
   showPills() {
     const counts = Object.fromEntries(GROUPS.map((group) => [group, []]));
     for (const card of this.cards.values()) counts[card.condition.group].push(card);
-    const key = GROUPS.map((group) => counts[group].length).join() + this.group;
-    if (key === this.shownPills) return;
-    this.shownPills = key;
     const total = this.cards.size;
-    const pills = GROUPS.filter((group) => counts[group].length > 0).map((group) => {
-      const {kind} = counts[group][0].condition;
+    for (const [group, {node, shape, words}] of this.groups) {
+      const [first] = counts[group];
       const count = counts[group].length;
-      const words = group === "good" && count === total ? (total === 1 ? "good" : `all ${total} good`) : GROUP_WORDS[group](count);
-      return element("button", {type: "button", class: `pill ${kind}`, "data-group": group, "aria-pressed": String(this.group === group),
-                                onclick: () => this.choose(group)}, element("span", {"aria-hidden": "true"}, SHAPES[kind] + " "), words);
-    });
-    const focused = this.pills.contains(document.activeElement) ? document.activeElement.dataset.group : null;
-    this.pills.replaceChildren(...pills);
-    if (focused) this.pills.querySelector(`[data-group=${focused}]`)?.focus();
+      node.toggleAttribute("hidden", count === 0);
+      if (count === 0) continue;
+      const {kind} = first.condition;
+      node.className = `pill ${kind}`;
+      node.setAttribute("aria-pressed", String(this.group === group));
+      setText(shape, `${SHAPES[kind]} `);
+      setText(words, group === "good" && count === total ? (total === 1 ? "good" : `all ${total} good`) : GROUP_WORDS[group](count));
+    }
   }
 
   choose(group) {
@@ -243,9 +246,13 @@ export class Overview {
     this.noMatch.toggleAttribute("hidden", shown.length > 0 || cards.length === 0);
     const nodes = shown.map((card) => card.node);
     if (nodes.length === this.list.childElementCount && nodes.every((node, i) => node === this.list.children[i])) return;
-    const focused = document.activeElement;
-    this.list.replaceChildren(...nodes);
-    if (this.list.contains(focused)) focused.focus({preventScroll: true});
+    // The card with the focus stays where it is while the others are put around it: a node that is moved loses the focus.
+    const kept = nodes.find((node) => node.contains(document.activeElement));
+    for (const node of [...this.list.children]) {
+      if (node !== kept) node.remove();
+    }
+    if (kept) kept.before(...nodes.slice(0, nodes.indexOf(kept)));
+    this.list.append(...nodes.slice(kept ? nodes.indexOf(kept) + 1 : 0));
   }
 
   /** Nothing is known any more: no value is shown as the present one. */
