@@ -208,6 +208,17 @@ class ClockSweep(InterfaceCase):
             self.assertEqual((fields["recommended_khz"], fields["restored_clock"]), (280, 4))
             self.assertFalse(fields["aborted"])
 
+    def test_clocks_of_resolute_are_named_when_another_is_set(self):
+        self.assertRegex(absenc("list", "e201").stdout, r"resolute-26 +Renishaw Resolute, 26 bits: MA at 280 or 560 kHz")
+        with self.emulator("--model", "resolute-26") as emulator:
+            for encoder, clock, advised in (("resolute", "2200", True), ("resolute", "560", False), ("other", "2200", False)):
+                result = absenc("run", f"e201:{emulator.path}?singleturn_bits=26&encoder={encoder}", "set-clock", clock,
+                                "--yes", "--json")
+                fields = json.loads(result.stdout)["fields"]
+                self.assertEqual("280 or 560 kHz" in fields.get("advice", ""), advised, (encoder, clock))
+            plain = absenc("info", f"e201:{emulator.path}?singleturn_bits=26", "--json")
+            self.assertNotIn("advice", json.loads(plain.stdout))
+
     def test_a_long_line_fails_at_high_clocks(self):
         with self.emulator("--option", "line_delay_ns=905", "--option", "latency_us=0") as emulator:
             self.assert_good(absenc("config", "set", f"e201:{emulator.path}", "clock", "6", "--yes"))

@@ -69,11 +69,17 @@ inline constexpr Time supply_time = 200ms;  // until the encoder is up, or the s
 /// What is behind the interface.
 enum class Carries : std::uint8_t { biss, ssi };
 
+/// Encoders of which their maker says how they want to be clocked behind this interface.
+enum class Kind : std::uint8_t { other, resolute };
+inline constexpr unsigned resolute_slowest = 4;  // clocks that are recommended for Renishaw Resolute: 280 kHz
+inline constexpr unsigned resolute_fastest = 5;  // 560 kHz
+
 struct Format {
   WordFormat word = biss::Format{}.word;
   Scale scale{};
   Carries carries = Carries::biss;
   ssi::AfterWord after_word = ssi::AfterWord::repeat;
+  Kind kind = Kind::other;
   // Of the virtual interface and its encoder.
   Version firmware{1, 16};
   Time latency = 10us;

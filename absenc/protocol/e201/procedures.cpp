@@ -55,6 +55,7 @@ Procedure inform(Dialog& dialog, Found& found) {
     const Result<Reply> reply = co_await dialog.attempt({asked}).until_silence();
     if (!reply && (asked == letter::version || dialog.is_noisy())) co_return {reply.error()};
     if (reply) found.take(asked, *reply);
+    if (found.clock) found.take_clock(dialog.format(), *found.clock);
   }
   co_return done;
 }
@@ -79,7 +80,7 @@ Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments) {
   const Error error = co_await switch_clock(dialog, clock);
   if (error == Error::cross_check_failed)
     co_return {error, "the interface has another setting than it was given", check_clocks};
-  found.clock = clock;
+  found.take_clock(dialog.format(), clock);
   co_return {error};
 }
 

@@ -25,6 +25,7 @@ struct Found {
   std::optional<std::int64_t> clock{};
   std::optional<std::int64_t> width{};
   std::optional<std::int64_t> counts{};
+  std::optional<std::string_view> advice{};  // of the clock that is set
 
   // clock-sweep
   unsigned frames = 0;  // to be read at each clock
@@ -43,6 +44,13 @@ struct Found {
     if (asked == letter::clock) clock = reply.number;
     if (asked == letter::width) width = reply.number;
     if (asked == letter::decimal || asked == letter::hexadecimal) counts = reply.number;
+  }
+  /// The clock is this one: what the maker of the encoder recommends, where that is another.
+  constexpr void take_clock(const Format& format, std::int64_t now) {
+    clock = now;
+    if (format.kind == Kind::resolute && (now < resolute_slowest || now > resolute_fastest)) {
+      advice = "280 or 560 kHz are recommended for Renishaw Resolute";
+    }
   }
   /// The middle of the longest run of clocks at which all frames were good; 0: there is none.
   [[nodiscard]] unsigned recommended() const;

@@ -29,12 +29,14 @@ struct Settings {
   Carries carries = Carries::biss;
   bool gray = false;
   ssi::AfterWord after_word = ssi::AfterWord::repeat;
+  Kind kind = Kind::other;
   std::int64_t latency_ns = 10'000;
   std::int64_t line_delay_ns = 0;
   unsigned firmware = 116;  // hundredths
 };
 
 constexpr std::array<std::string_view, 2> carries_choices{"biss", "ssi"};
+constexpr std::array<std::string_view, 2> kind_choices{"other", "resolute"};
 
 constexpr auto options = OptionsOf{
     OptionOf<&Settings::singleturn_bits>{singleturn_bits_option},
@@ -45,6 +47,8 @@ constexpr auto options = OptionsOf{
     option<&Settings::carries>("carries", "what the encoder speaks", carries_choices),
     describing_word(option<&Settings::gray>("gray", "SSI: turns and position are one Gray-coded number")),
     OptionOf<&Settings::after_word>{after_word_option},
+    option<&Settings::kind>("encoder", "resolute: a Renishaw Resolute, for which 280 and 560 kHz are recommended",
+                            kind_choices),
     decimal<3>(option<&Settings::latency_ns>("latency_us", "virtual encoder: time until its position is ready, us", 0,
                                              1'000'000)),
     option<&Settings::line_delay_ns>("line_delay_ns", "virtual encoder: delay of the line, there and back", 0, 100'000),
@@ -66,10 +70,30 @@ constexpr Format format_of(const Settings& given, const WordFormat* word) {
                     .unit_um = static_cast<double>(given.unit_pm) / 1e6},
           .carries = given.carries,
           .after_word = given.after_word,
+          .kind = given.kind,
           .firmware = {given.firmware / 100, given.firmware % 100},
           .latency = Time(given.latency_ns),
           .line_delay = Time(given.line_delay_ns)};
 }
+
+// A length alone is no Resolute: the one without it comes first.
+constexpr auto resolute_models = std::array{
+    ModelText{"rotary-26", "single-turn, 26 bits", 0,
+              "singleturn_bits=26 multiturn_bits=0 position_bits=0 encoder=other"},
+    ModelText{"rotary-32", "single-turn, 32 bits", 0,
+              "singleturn_bits=32 multiturn_bits=0 position_bits=0 encoder=other"},
+    ModelText{"resolute-26", "Renishaw Resolute, 26 bits: MA at 280 or 560 kHz (M4, M5)", 0,
+              "singleturn_bits=26 multiturn_bits=0 position_bits=0 encoder=resolute"},
+    ModelText{"resolute-32", "Renishaw Resolute, 32 bits: MA at 280 or 560 kHz (M4, M5)", 0,
+              "singleturn_bits=32 multiturn_bits=0 position_bits=0 encoder=resolute"},
+};
+constexpr auto models = [] {
+  std::array<ModelText, position_models.size() + resolute_models.size()> all{};
+  std::size_t count = 0;
+  for (const ModelText& one : position_models) all[count++] = one;
+  for (const ModelText& one : resolute_models) all[count++] = one;
+  return all;
+}();
 
 // ---- Fields
 
@@ -117,6 +141,7 @@ constexpr auto own_fields = fields_of<Found>(
     field<milli<'A'>>({"supply_ma", number, "mA", "current in that text"}),
     field<&Found::clock>({"clock", number, "", "setting of the MA clock, 1 to 8"}),
     field<khz<set_clock_of>>({"clock_khz", number, "kHz", "MA clock"}),
+    field<&Found::advice>("advice", "", "the clocks that are recommended for this encoder, where another is set"),
     field<&Found::width>({"width", number, "bits", "width of the position that ? gives"}),
     field<&Found::counts>({"counts", number, "counts", "position, the interface's zero taken off"}),
     field<frames>({"frames", number, "", "frames read at each clock"}),
@@ -262,7 +287,7 @@ constexpr Declaration<Protocol, VirtualInterface> declaration{
     .link = LinkKind::full_duplex,
     .options = options.infos,
     .format = format_by,
-    .models = position_models,
+    .models = models,
     .fields = all_fields,
     .commands = commands,
     .vectors = vectors,
