@@ -222,6 +222,43 @@ class Registers(Case):
         self.assertEqual(positions, [row["fields"]["singleturn"] for row in rows if row["kind"] == "reply"])
 
 
+class Settings(Case):
+    def test_the_timeout_is_that_of_both_sides(self):
+        for timeout in ("timeout_us=12.5", "timeout_us=40", "adaptive_timeout=true"):
+            for unit in ("biss", "biss-safety", "biss-chain"):
+                with self.subTest(timeout=timeout, unit=unit):
+                    self.assert_good(absenc("read", f"sim:{unit}?{timeout}"))
+        times = {}
+        for timeout in ("timeout_us=0", "timeout_us=12.5", "adaptive_timeout=true&ma_khz=10000"):
+            path = self.file(f"{len(times)}.vcd")
+            self.assert_good(absenc("wave", f"biss?latency_us=1&{timeout}", path, "--count", "3", "--rate", "1000000"))
+            rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+            starts = [row["time_s"] for row in rows if "time_s" in row]
+            times[timeout] = starts[1] - starts[0]
+        at_40, at_12, adaptive = times.values()
+        self.assertAlmostEqual(at_40 - at_12, 27.5e-6, 7)
+        self.assertLess(adaptive, at_12 / 4)
+        for wrong in ("12", "12.7", "41"):
+            refused = absenc("read", f"sim:biss?timeout_us={wrong}")
+            self.assertIn("0 or 12.5 to 40.0 in steps of 0.5", refused.stderr)
+
+    def test_banks_up_to_255_are_pages(self):
+        page = f"sim:biss?singleturn_bits=24"
+        read = absenc("memory", "read", page, "0", "--page", "3", "--json")
+        self.assertEqual(json.loads(read.stdout)["page"], 3)
+        for bank in ("4", "255"):
+            refused = absenc("memory", "read", page, "0", "--page", bank)
+            self.assert_failed(refused, "request_rejected")
+        self.assert_wrong_usage(absenc("memory", "read", page, "0", "--page", "256"), "page 1 to 255: 0x00 to 0x3F")
+        self.assertIn("page 1 to 255: 0x00 to 0x3F", absenc("list", "biss").stdout)
+
+    def test_turns_of_24_bits_have_models(self):
+        for model, bits in (("RLM", 16), ("RLH", 24)):
+            reading, = json_lines(absenc("read", f"sim:biss-safety?model={model}&multiturn=16777215", "--json").stdout)
+            self.assertEqual((reading["multiturn"], reading["multiturn_bits"], reading["singleturn_bits"]),
+                             (16777215, 24, bits))
+
+
 class Start(Case):
     def test_an_encoder_that_waits_for_its_start_is_started(self):
         for encoder in ("sim:biss?start_sequence=true", "sim:biss-safety?start_sequence=true",

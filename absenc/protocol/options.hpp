@@ -36,7 +36,8 @@ struct Option {
   bool describes_word = false;  // a word format says it instead: the two cannot be given together
   std::uint32_t step = 1;       // the values are `minimum` and what is multiples of this above it
   Role role = Role::other;
-  bool in_hex = false;  // texts show it in hexadecimal, as FieldInfo::in_hex
+  bool in_hex = false;   // texts show it in hexadecimal, as FieldInfo::in_hex
+  bool or_zero = false;  // 0 is a value too, below the range
 };
 
 struct OptionValue {
@@ -51,7 +52,7 @@ struct Model {
   std::span<const OptionValue> values;
 };
 
-inline constexpr std::size_t maximum_options = 65;  // nine of biss-chain, and seven of each of its eight words
+inline constexpr std::size_t maximum_options = 68;  // twelve of biss-chain, and seven of each of its eight words
 
 /// What a word format is given as, beside the options of units that take one.
 inline constexpr std::string_view word_option_name = "word";
@@ -151,6 +152,7 @@ void tell_shared(const Unit& unit, Options& options);
   }
   if (!option.choices.empty()) return Error::invalid_argument;
   const Result<std::int64_t> number = option.decimals > 0 ? parse_decimal(text, option.decimals) : parse_number(text);
+  if (number && *number == 0 && option.or_zero) return number;
   if (!number || *number < option.minimum || *number > option.maximum) return Error::invalid_argument;
   if ((*number - option.minimum) % option.step != 0) return Error::invalid_argument;
   return number;

@@ -77,9 +77,10 @@ struct MemoryArea {
   std::uint32_t write_life = 0;   // writes that the document permits; 0: not known
   std::string_view protection{};  // why only memory_write's argument of the role force writes it; "": it needs none
   bool life_in_total = false;     // write_life is of all bytes together; false: the document does not say of what
+  std::uint32_t pages = 1;        // this one and those behind it, which are alike and which an encoder may lack
 
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
-    return on_page == page && address >= first && address - first < count;
+    return on_page - page < pages && address >= first && address - first < count;
   }
 };
 

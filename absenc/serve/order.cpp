@@ -193,8 +193,10 @@ Order memory_order(const Unit& unit, std::int64_t page) {
   require_memory(unit, client::Access::read);
   if (page < 0) order.addresses = dump_addresses(unit);
   for (const MemoryArea& area : unit.memory) {
-    if (area.page != page) continue;
-    for (std::uint32_t i = 0; i < area.count; ++i) order.addresses[{area.page, area.first + i}] = 0;
+    if (page < 0 || !area.has(static_cast<std::uint32_t>(page), area.first)) continue;
+    for (std::uint32_t i = 0; i < area.count; ++i) {
+      order.addresses[{static_cast<std::uint32_t>(page), area.first + i}] = 0;
+    }
   }
   if (order.addresses.empty()) throw UsageError(fmt::format("the memory of {} has no page {}", unit.id, page));
   if (order.addresses.size() > most_bytes) {
@@ -230,6 +232,7 @@ Json readable_json(const Unit& unit) {
     if (!has_memory) break;
     memory.append(Json::object()
                       .set("page", area.page)
+                      .set("pages", area.pages)
                       .set("first", area.first)
                       .set("count", area.count)
                       .set("meaning", area.meaning)

@@ -34,7 +34,7 @@ void declared_memory(const Unit& unit, Findings& findings) {
     for (const Command* command : {reads, writes}) {
       if (command == writes && !area.writable) continue;
       require(takes(command, Role::address, area.first, last), "is not reached by an argument of the role address");
-      require(area.page == 0 || takes(command, Role::page, area.page, area.page),
+      require(area.page == 0 || takes(command, Role::page, area.page, area.page + area.pages - 1),
               "is not reached by an argument of the role page");
       require(command == reads || takes(command, Role::value, 0, 255),
               "is not written by an argument of the role value");

@@ -23,7 +23,9 @@ bool has_pages(const Unit& unit) {
 }
 
 void add(MemoryImage& image, const MemoryArea& area) {
-  for (std::uint32_t i = 0; i < area.count; ++i) image[{area.page, area.first + i}] = 0;
+  for (std::uint32_t page = area.page; page < area.page + area.pages; ++page) {
+    for (std::uint32_t i = 0; i < area.count; ++i) image[{page, area.first + i}] = 0;
+  }
 }
 
 }  // namespace

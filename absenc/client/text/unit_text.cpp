@@ -234,7 +234,8 @@ std::uint32_t require_alarms(const Unit& unit, const Options& options, std::span
 
 std::string range_of(const Option& option) {
   if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, " or "));
-  const std::string ends = fmt::format("{} to {}", to_text(option, option.minimum), to_text(option, option.maximum));
+  const std::string ends = fmt::format("{}{} to {}", option.or_zero ? "0 or " : "", to_text(option, option.minimum),
+                                       to_text(option, option.maximum));
   return option.step == 1 ? ends : fmt::format("{} in steps of {}", ends, to_text(option, option.step));
 }
 

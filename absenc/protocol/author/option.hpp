@@ -98,6 +98,13 @@ template <unsigned decimals, auto member>
   return one;
 }
 
+/// The same option, which may also be 0, below its range.
+template <auto member>
+[[nodiscard]] constexpr OptionOf<member> or_zero(OptionOf<member> one) {
+  one.info.or_zero = true;
+  return one;
+}
+
 /// The same option, which others than its unit know by this role.
 template <Role role, auto member>
 [[nodiscard]] constexpr OptionOf<member> with_role(OptionOf<member> one) {

@@ -18,11 +18,13 @@ struct ChainFormat {
   RegisterOrder register_order = RegisterOrder::big;
   std::uint16_t register_delay_us = 0;
   bool start_sequence = false;
+  Timeout timeout{};
+  StopBit stop_bit = StopBit::next;
   // As in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};
-  Time line_delay{};
+  std::uint32_t line_delay_ns = 0;
   Scale scale{};  // of all: linear encoders
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }

@@ -37,7 +37,7 @@ struct ChannelSettings {
 template <class>
 struct ChainSettingsOf;
 template <std::size_t... channel>
-struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, ChannelSettings<channel>... {
+struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, TimeoutSettings, ChannelSettings<channel>... {
   std::uint8_t slaves = 2;
   std::int64_t unit_pm = 0;
 
@@ -102,10 +102,13 @@ constexpr auto chain_options = std::apply(
                 "latency_us",
                 "the longest time until the positions are ready, us: of the encoders, and of the line there and back",
                 0, 1'000'000)),
-            line_delay_option<&ChainSettings::line_delay>,
+            line_delay_option<&ChainSettings::line_delay_ns>,
             register_order_option<&ChainSettings::register_order>,
             register_delay_option<&ChainSettings::register_delay_us>,
             start_sequence_option<&ChainSettings::start_sequence>,
+            timeout_option,
+            adaptive_timeout_option,
+            stop_bit_option<&ChainSettings::stop_bit>,
         },
         options_of_channels(EveryChannel{})));
 
@@ -152,6 +155,7 @@ constexpr auto all_chain_fields =
 constexpr ChainFormat chain_format(const Options& values) {
   ChainSettings given = chain_options.format(values);
   given.count = given.slaves;
+  given.timeout = given.timeout_given();
   given.channels = given.all();
   if (values.has_word()) {
     for (Channel& channel : given.channels) channel.word = values.word;

@@ -50,6 +50,29 @@ constexpr author::NoRequest no_request(const F&, Arguments) {
 // The options that all units of BiSS have.
 template <auto member>
 inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
+/// The timeout as options say it.
+struct TimeoutSettings {
+  std::uint16_t timeout_tenths = 0;  // of a microsecond
+  bool adaptive_timeout = false;
+
+  [[nodiscard]] constexpr Timeout timeout_given() const {
+    if (adaptive_timeout) return Timeout::adaptive();
+    return timeout_tenths == 0 ? Timeout{} : Timeout::fixed(Time(timeout_tenths * 100));
+  }
+};
+inline constexpr auto timeout_option = author::or_zero(author::decimal<
+                                                       1>(author::option<&TimeoutSettings::timeout_tenths>(
+    "timeout_us",
+    "how long SLO stays low behind the last clock, us; 0: not known: the host leaves 40, the virtual encoder takes 20",
+    125, 400, 5)));
+inline constexpr auto adaptive_timeout_option = author::option<&TimeoutSettings::adaptive_timeout>(
+    "adaptive_timeout", "it is one and a half periods of the clock instead, however fast that is");
+template <auto member>
+inline constexpr auto stop_bit_option = author::option<member>(
+    "stop_bit",
+    "virtual encoder: the bit P behind a register: next is 1 where the one behind it would be refused, as the document "
+    "has it",
+    stop_bit_choices);
 template <auto member>
 inline constexpr auto line_delay_option = author::option<member>("line_delay_ns",
                                                                  "virtual encoder: delay of the line, there and back",

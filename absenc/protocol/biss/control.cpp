@@ -280,7 +280,7 @@ bool ControlSlaves::next_allowed(const ControlTarget& target) const {
 bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) return (bits_ >> (byte_bits - 1 - at) & 1) != 0;
-  if (at == byte_bits) return !next_allowed(target);
+  if (at == byte_bits) return target.stop_bit(next_allowed(target));
   if (!cdm || !next_allowed(target)) return end();
   ++bytes_;
   ++request_.address;
@@ -297,7 +297,7 @@ bool ControlSlaves::write(bool cdm, ControlTarget& target) {
     }
     return cdm;
   }
-  if (at == byte_bits) return !next_allowed(target);
+  if (at == byte_bits) return target.stop_bit(next_allowed(target));
   if (!cdm || !next_allowed(target)) return end();
   ++bytes_;
   ++request_.address;

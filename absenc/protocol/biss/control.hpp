@@ -150,6 +150,8 @@ struct ControlTarget {
   [[nodiscard]] virtual bool allows(unsigned slave, unsigned address, bool write) const = 0;
   [[nodiscard]] virtual std::uint8_t read(unsigned slave, unsigned address) = 0;
   virtual void write(unsigned slave, unsigned address, std::uint8_t value) = 0;
+  /// The bit P behind a register, where the one behind it may be accessed so or not.
+  [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
   /// Whether the byte can begin now: the encoder has it, or can take it.
   [[nodiscard]] virtual bool is_ready() const = 0;
   /// Whether the slave does this.

@@ -30,11 +30,12 @@ void put_locks(ControlFrame& frame, const ControlBits& cds) {
 
 // Byte after byte; `cdm` of a read only says how many.
 Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, ControlFrame& frame) {
+  bool refused = false;  // by P of the byte before; some encoders go on all the same
   for (unsigned due = direction_at + 3;; due += byte_bits + 2) {
     unsigned at = due;
     for (unsigned zeros = 0; !cds[at]; ++at) {
       zeros = cdm[at] ? 0 : zeros + 1;
-      if (zeros == control_pause) return Error::timeout;
+      if (zeros == control_pause) return refused ? Error::request_rejected : Error::timeout;
     }
     const bool first = due == direction_at + 3;
     if (first && write && at != due) return Error::bad_framing;  // the first byte that is written is not delayed
@@ -47,7 +48,7 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
     frame.start_delay.push_back(static_cast<std::uint16_t>(at - due));
     frame.next_address_accepted = !cds[at + byte_bits + 1];
     if (!cdm[at + byte_bits + 1]) return Error::none;
-    if (!frame.next_address_accepted) return Error::request_rejected;
+    refused = !frame.next_address_accepted;
     due = at;
   }
 }

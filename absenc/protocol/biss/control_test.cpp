@@ -115,7 +115,7 @@ TEST(BissControl, WhatIsNoControlFrame) {
 // ---- Both sides
 
 /// Registers of some slaves; those at odd multiples of 16 are read only, from 0x70 on there are none.
-struct Target final : ControlTarget {
+struct Target : ControlTarget {
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override {
     return slave < 3 && address < 0x70 && !(write && (address & 0x10) != 0);
   }
@@ -168,6 +168,42 @@ TEST(BissControl, HostAndEncoderSayWhatTheTableShows) {
   EXPECT_EQ(talk.cdm, read_44.substr(0, talk.cdm.size()));
   EXPECT_EQ(talk.cds, read_44_answer.substr(0, talk.cds.size()));
   EXPECT_EQ(talk.cdm.size(), 14u + 33u);
+}
+
+/// Answers P = 1 behind each register, and goes on all the same.
+struct Stopping final : Target {
+  [[nodiscard]] bool stop_bit(bool) const override { return true; }
+};
+
+TEST(BissControl, AHostThatGoesOnBehindPIsDecoded) {
+  Stopping target;
+  target.values[0][0x44] = 10;
+  target.values[0][0x45] = 11;
+  ControlSlaves slaves(1);
+  ControlMaster master;
+  master.read(0, 0x44, 2);
+  EXPECT_EQ((run(master, slaves, target), master.error()), Error::request_rejected);
+  EXPECT_EQ(master.frame().data.size(), 1u);
+  EXPECT_EQ(master.frame().data[0], 10);
+  // LENZ's reader does not look at P of a read.
+  BitBuffer<256> cdm;
+  BitBuffer<256> cds;
+  slaves.reset();
+  for (const char c : std::string(14, '0') + std::string(read_44.substr(14, 19))) {
+    cdm.append(c == '1' ? 1 : 0, 1);
+    cds.append(slaves.cds() ? 1 : 0, 1);
+    slaves.take(c == '1', target);
+  }
+  for (unsigned i = 0; i < 44; ++i) {
+    const bool goes_on = i == 13;  // in the frame of P
+    cdm.append(goes_on ? 1 : 0, 1);
+    cds.append(slaves.cds() ? 1 : 0, 1);
+    slaves.take(goes_on, target);
+  }
+  const Result<ControlFrame> frame = decode_control(cdm.view(), cds.view());
+  ASSERT_EQ(frame.error(), Error::none);
+  ASSERT_EQ(frame->data.size(), 2u);
+  EXPECT_EQ(frame->data[1], 11);
 }
 
 TEST(BissControl, EveryAccessEndsAsItShould) {

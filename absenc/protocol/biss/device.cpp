@@ -37,7 +37,8 @@ constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, manufacturer
 }  // namespace
 
-VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order) : slaves_(slaves) {
+VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit)
+    : slaves_(slaves), stop_bit_(stop_bit) {
   const unsigned lowest = registers::serial_number + (order == RegisterOrder::big ? 3 : 0);
   for (unsigned slave = 0; slave < most_slaves; ++slave) {
     const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
@@ -82,6 +83,10 @@ void VirtualRegisters::write(unsigned slave, unsigned address, std::uint8_t valu
     memory_[place(slave, address)] = value;
     ++written_;
   }
+}
+
+bool VirtualRegisters::stop_bit(bool next_allowed) const {
+  return stop_bit_ == StopBit::next ? !next_allowed : stop_bit_ == StopBit::one;
 }
 
 bool VirtualRegisters::is_ready() const {

@@ -15,9 +15,8 @@ namespace absenc::biss {
 /// The encoder and the line to it.
 struct Behaviour {
   Time latency = 10us;
-  Time line_delay{};       // there and back; SLO is sampled one period of MA after the edge that drives it
-  Time edge_noise = 20ns;  // a sample so near to a delayed edge is the old bit or the new one
-  Time timeout = 20us;
+  Time line_delay{};            // there and back; SLO is sampled one period of MA after the edge that drives it
+  Time edge_noise = 20ns;       // a sample so near to a delayed edge is the old bit or the new one
   Time register_delay{};        // from what asks for a register to its start bit
   bool start_sequence = false;  // without it after power on SLO stays idle
 };
@@ -44,7 +43,7 @@ class EncoderOf {
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
     // The half of a period without an edge that is longer than the timeout ends the frame: SLO is idle again.
-    if (period / 2 >= behaviour_.timeout) {
+    if (period / 2 >= format_.timeout.of_encoder(period)) {
       samples.append(~std::uint64_t{0}, 64);
       return;
     }
@@ -88,7 +87,7 @@ class VirtualRegisters final : public ControlTarget {
   static constexpr unsigned most_slaves = ChainFormat::most;
 
   /// Of so many slaves: 1 to `most_slaves`.
-  VirtualRegisters(unsigned slaves, RegisterOrder order);
+  VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit);
   void power_on();
   /// What is asked for now is there `delay` later.
   void set_time(Time at, Time delay);
@@ -98,6 +97,7 @@ class VirtualRegisters final : public ControlTarget {
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
   [[nodiscard]] std::uint8_t read(unsigned slave, unsigned address) override;
   void write(unsigned slave, unsigned address, std::uint8_t value) override;
+  [[nodiscard]] bool stop_bit(bool next_allowed) const override;
   [[nodiscard]] bool is_ready() const override;
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
   void execute(std::uint8_t slaves, unsigned command) override;
@@ -108,6 +108,7 @@ class VirtualRegisters final : public ControlTarget {
   std::array<std::uint8_t, most_slaves * slave_size> memory_{};
   std::array<std::uint8_t, most_slaves> bank_{};
   unsigned slaves_;
+  StopBit stop_bit_;
   Time now_{};
   Time delay_{};
   mutable Time asked_at_{};
@@ -127,13 +128,13 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   VirtualEncoderOf(const F& format, const Shaft& shaft)
       : VirtualEncoderOf(format, shaft,
                          {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
-                          .line_delay = format.line_delay,
+                          .line_delay = Time(format.line_delay_ns),
                           .register_delay = std::chrono::microseconds(format.register_delay_us),
                           .start_sequence = format.start_sequence}) {}
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour),
         slaves_(slaves_of(format)),
-        registers_(slaves_of(format), format.register_order) {}
+        registers_(slaves_of(format), format.register_order, format.stop_bit) {}
 
   [[nodiscard]] MutableBytes memory() override { return registers_.memory(); }
 
@@ -148,7 +149,8 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       samples.append(0, 64);
       return;
     }
-    expect(period / 2 < behaviour.timeout, "MA slower than the BiSS timeout allows", at);
+    timeout_ = encoder_.format().timeout.of_encoder(period);
+    expect(period / 2 < timeout_, "MA slower than the BiSS timeout allows", at);
     if (behaviour.start_sequence && !woken_) return;
     registers_.set_time(at, behaviour.register_delay);
     const std::uint32_t written = registers_.written();
@@ -167,7 +169,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       count_answer();
     }
     clocked_before_ = true;
-    free_at_ = at + encoder_.behaviour().timeout;
+    free_at_ = at + timeout_;
   }
   void started(Time) override {
     registers_.power_on();
@@ -182,6 +184,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   ControlSlaves slaves_;
   VirtualRegisters registers_;
   unsigned needed_ = 0;  // clocks of this frame; 0: there is none
+  Time timeout_{};       // of this frame
   Time free_at_{};       // the timeout after the last clock
   bool clocked_before_ = false;
   bool woken_ = false;  // by the start sequence

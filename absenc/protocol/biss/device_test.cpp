@@ -18,7 +18,7 @@ Format format_with(Time latency, Time ready, Time line_delay = {}) {
   Format format = bits_19;
   format.latency = latency;
   format.ready = ready;
-  format.line_delay = line_delay;
+  format.line_delay_ns = static_cast<std::uint32_t>(line_delay.count());
   return format;
 }
 
@@ -48,6 +48,27 @@ TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
   EXPECT_EQ(soon.encoder.answer_count(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
   EXPECT_EQ(soon.encoder.violation_count(), 2u);  // and that frame was too short
+}
+
+TEST(BissDevice, TimeoutIsThatOfItsFormat) {
+  const auto allows = [](Timeout timeout, std::uint32_t rate, Time pause) {
+    Format format = bits_19;
+    format.timeout = timeout;
+    Bench bench(line_settings, format);
+    bench.clock(64, 1ms, rate);
+    bench.clock(64, pause, rate);
+    return bench.last_rule() != "clocked before the BiSS timeout has passed";
+  };
+  EXPECT_FALSE(allows({}, 1'000'000, 19'900ns));
+  EXPECT_TRUE(allows({}, 1'000'000, 20us));
+  for (const Time fixed : {12'500ns, 20'000ns, 40'000ns}) {
+    EXPECT_FALSE(allows(Timeout::fixed(fixed), 1'000'000, fixed - 100ns)) << fixed.count();
+    EXPECT_TRUE(allows(Timeout::fixed(fixed), 1'000'000, fixed)) << fixed.count();
+  }
+  EXPECT_FALSE(allows(Timeout::adaptive(), 1'000'000, 1'400ns));
+  EXPECT_TRUE(allows(Timeout::adaptive(), 1'000'000, 1'500ns));
+  EXPECT_FALSE(allows(Timeout::adaptive(), 100'000, 14'900ns));
+  EXPECT_TRUE(allows(Timeout::adaptive(), 100'000, 15us));
 }
 
 TEST(BissDevice, ItsOwnTimeIsThatOfTheOptionsOrTenMicroseconds) {

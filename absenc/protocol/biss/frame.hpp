@@ -27,6 +27,38 @@ inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
 inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
 inline constexpr unsigned start_pulses = 2;     // of MA after power on, with 40 us before and behind them
 
+/// How long SLO stays low behind the last clock: fixed, or one and a half periods of MA (adaptive), in one byte.
+class Timeout {
+ public:
+  constexpr Timeout() = default;  // not known
+  /// 12.5 us to 40 us, in halves of a microsecond.
+  static constexpr Timeout fixed(Time length) { return Timeout(static_cast<std::uint8_t>(length / 500ns)); }
+  static constexpr Timeout adaptive() { return Timeout(is_adaptive); }
+
+  /// The time that the host leaves. An encoder that measures the period may be three of its own samples late (iC-PVS,
+  /// table 50): 1 us is more than that of any known.
+  [[nodiscard]] constexpr Time of_host(Time period) const {
+    if (code_ == 0) return timeout_maximum;
+    return code_ == is_adaptive ? period + period / 2 + 1us : code_ * Time(500);
+  }
+  /// The time that the virtual encoder takes.
+  [[nodiscard]] constexpr Time of_encoder(Time period) const {
+    if (code_ == 0) return 20us;
+    return code_ == is_adaptive ? period + period / 2 : code_ * Time(500);
+  }
+  friend constexpr bool operator==(const Timeout&, const Timeout&) = default;
+
+ private:
+  static constexpr std::uint8_t is_adaptive = 1;
+  explicit constexpr Timeout(std::uint8_t code) : code_(code) {}
+
+  std::uint8_t code_ = 0;  // halves of a microsecond
+};
+
+/// What the virtual encoder answers as P, behind each register.
+enum class StopBit : std::uint8_t { next, zero, one };
+inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero", "one"};
+
 /// Of registers that are one number.
 enum class RegisterOrder : std::uint8_t { big, little };
 inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
@@ -41,10 +73,12 @@ struct Format {
   RegisterOrder register_order = RegisterOrder::big;
   std::uint16_t register_delay_us = 0;  // of the virtual encoder: until a register that was asked for is there
   bool start_sequence = false;          // of the virtual encoder: it shows nothing before it
-  Time latency = 10us;                  // the longest that the encoder needs, up to 1 ms: makes the number of clocks
+  Timeout timeout{};
+  Time latency = 10us;  // the longest that the encoder needs, up to 1 ms: makes the number of clocks
   // Of the virtual encoder.
+  StopBit stop_bit = StopBit::next;
+  std::uint32_t line_delay_ns = 0;
   Time ready{};  // what it needs itself; 0: as `latency`, but at most 10 us
-  Time line_delay{};
 
   /// Of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000u + ma_khz / 2u) / ma_khz); }
@@ -210,6 +244,7 @@ template <const Format& known>
 struct KnownFormat {
   static constexpr std::uint16_t ma_khz = known.ma_khz;
   static constexpr Time latency = known.latency;
+  static constexpr Timeout timeout = known.timeout;
   [[nodiscard]] static constexpr Time period() { return known.period(); }
 };
 template <const Format& format>

@@ -36,7 +36,7 @@ struct ProtocolOf {
   static constexpr unsigned most_clocks = 512;
 
   static constexpr author::ClockedHostTimes host_times(const F& format) {
-    return {std::uint32_t{format.ma_khz} * 1000, timeout_maximum};
+    return {std::uint32_t{format.ma_khz} * 1000, format.timeout.of_host(format.period())};
   }
   static constexpr unsigned clocks(const F& format) { return biss::clocks(format, format.latency, format.period()); }
   /// Of a frame whose delay is not known.

@@ -36,6 +36,21 @@ TEST(BissHost, ReadsAtTheFirstFallingEdge) {
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
 }
 
+TEST(BissHost, LeavesTheTimeoutOfItsFormat) {
+  for (const auto& [timeout, rest] : std::to_array<std::pair<Timeout, Time>>({{{}, 40us},
+                                                                              {Timeout::fixed(12'500ns), 12'500ns},
+                                                                              {Timeout::fixed(25us), 25us},
+                                                                              {Timeout::adaptive(), 2'500ns}})) {
+    Format format = turns_19;
+    format.timeout = timeout;
+    Bench bench(line_settings, format);
+    ReadPosition read(format);
+    ASSERT_EQ(bench.run(read).error(), Error::none);
+    EXPECT_EQ(read.reading()->latched, rest);
+    EXPECT_EQ(bench.encoder.violation_count(), 0u);
+  }
+}
+
 TEST(BissHost, AckFollowsTheClock) {
   for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 6'000, 10'000})) {
     const Format format{.word = turns_19.word, .ma_khz = khz};
@@ -237,15 +252,15 @@ TEST(BissHost, GivesTheStartSequenceWhereNothingComes) {
 
 TEST(BissHost, LooksFurtherBeforeALineIsStuck) {
   for (const auto& [khz, latency, delay] :
-       std::to_array<std::tuple<std::uint16_t, Time, Time>>({{1000, 10us, 39'500ns}, {10'000, 1us, 5'050ns}})) {
+       std::to_array<std::tuple<std::uint16_t, Time, std::uint32_t>>({{1000, 10us, 39'500}, {10'000, 1us, 5'050}})) {
     Format format = turns_19;
     format.ma_khz = khz;
     format.latency = latency;
-    format.line_delay = delay;
+    format.line_delay_ns = delay;
     Bench bench(line_settings, format);
     bench.shaft.state.position = 0x1234'5678;
     FindPosition<Format> found(format);
-    ASSERT_EQ(bench.run(found).error(), Error::none) << khz << " kHz, " << delay.count() << " ns";
+    ASSERT_EQ(bench.run(found).error(), Error::none) << khz << " kHz, " << delay << " ns";
     EXPECT_EQ(found.reading()->singleturn, 0x1234'5678u >> 13);
   }
 }

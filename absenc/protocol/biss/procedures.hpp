@@ -66,7 +66,8 @@ Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
 }
 
 /// Registers one behind the other, 64 at the most; appended to `bytes`. Those that came late are read until the same
-/// comes twice.
+/// comes twice. Where P says that the next one would be refused, it is asked for by a control frame of its own: some
+/// encoders answer P = 1 behind each register.
 template <class F>
 Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
                            unsigned first, std::size_t count) {
@@ -76,16 +77,22 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
   for (unsigned attempt = 0; attempt < control_attempts; ++attempt) {
     master.read(slave, first, count);
     error = co_await carry(dialog, master);
-    if (!may_pass(error)) break;
-    if (error != Error::none) continue;
     const Bytes data = master.frame().data;
+    const bool stopped = error == Error::request_rejected && !data.empty();
+    if (!stopped && !may_pass(error)) break;
+    if (!stopped && error != Error::none) continue;
     const bool confirmed = std::equal(data.begin(), data.end(), before.view().begin(), before.view().end());
-    if (confirmed || !was_late(master.frame())) {
-      bytes.append(data);
-      co_return Error::none;
+    if (!confirmed && was_late(master.frame())) {
+      before = master.frame().data;
+      error = Error::cross_check_failed;
+      continue;
     }
-    before = master.frame().data;
-    error = Error::cross_check_failed;
+    bytes.append(data);
+    if (!stopped) co_return Error::none;
+    first += static_cast<unsigned>(data.size());
+    count -= data.size();
+    attempt = 0;
+    before = {};
   }
   co_return error;
 }

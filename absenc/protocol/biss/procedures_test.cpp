@@ -47,6 +47,19 @@ TEST(BissProcedures, AStartBitIsWaitedForFortyMilliseconds) {
   asked(42'000, Error::busy);
 }
 
+// LENZ's reader takes P = 1 behind a bank select for a fault; other encoders answer it behind each register.
+TEST(BissProcedures, StopBitDoesNotEndWhatIsRead) {
+  for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
+    Format format = testing::bits_24;
+    format.stop_bit = stop_bit;
+    Questions one(format);
+    EXPECT_EQ(one.ask<read_memory<Format>>({registers::device_id, 0, 6}).bytes.view()[2], 's');
+    EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 2, 1}).written, true);
+    EXPECT_EQ(one.ask<read_memory<Format>>({3, 2, 1}).value, 7);
+  }
+  EXPECT_EQ(Questions().ask<read_memory<Format>>({0, 9, 1}, Error::request_rejected).bytes.size(), 0u);
+}
+
 /// An encoder that does not keep what is written.
 struct Forgets final : Machine<std::uint8_t> {
   explicit Forgets(VirtualEncoder& of) : encoder(of) {}

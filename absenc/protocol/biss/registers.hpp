@@ -36,21 +36,13 @@ inline constexpr unsigned end = 0x80;
   }
 }
 
-inline constexpr unsigned known_banks = 4;  // that are listed; an encoder may have up to 256, or none
+inline constexpr unsigned most_banks = 256;  // an encoder may have fewer, or none
 
 /// Pages are banks; what is behind the banks is on page 0. A copy of the memory is the bank that the user may write:
 /// the rest says which encoder it is, and is not for another.
-inline constexpr std::array<MemoryArea, known_banks + 4> areas = [] {
-  const auto bank = [](unsigned page) {
-    return MemoryArea{.page = page,
-                      .first = 0,
-                      .count = bank_size,
-                      .meaning = "bank",
-                      .in_dump = page == 0,
-                      .protection = page == 0 ? "" : "only its maker says what a bank holds"};
-  };
-  return std::array<MemoryArea, known_banks + 4>{{
-      bank(0),
+inline constexpr std::array<MemoryArea, 6> areas = [] {
+  return std::array<MemoryArea, 6>{{
+      {.page = 0, .first = 0, .count = bank_size, .meaning = "bank"},
       {.page = 0, .first = bank_select, .count = 1, .meaning = "bank select", .in_dump = false},
       {.page = 0,
        .first = eds_bank,
@@ -70,9 +62,13 @@ inline constexpr std::array<MemoryArea, known_banks + 4> areas = [] {
        .meaning = "device id, manufacturer",
        .writable = false,
        .in_dump = false},
-      bank(1),
-      bank(2),
-      bank(3),
+      {.page = 1,
+       .first = 0,
+       .count = bank_size,
+       .meaning = "bank",
+       .in_dump = false,
+       .protection = "only its maker says what a bank holds",
+       .pages = most_banks - 1},
   }};
 }();
 

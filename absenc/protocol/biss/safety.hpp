@@ -35,9 +35,11 @@ struct SafetyFormat {
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};
-  Time line_delay{};
+  std::uint32_t line_delay_ns = 0;
   std::uint16_t register_delay_us = 0;
   bool start_sequence = false;
+  Timeout timeout{};
+  StopBit stop_bit = StopBit::next;
   std::uint8_t slave = 0;
   RegisterOrder register_order = RegisterOrder::big;
 

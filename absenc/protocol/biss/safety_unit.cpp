@@ -14,7 +14,7 @@ namespace {
 
 using namespace author;
 
-struct SafetySettings : SafetyFormat {
+struct SafetySettings : SafetyFormat, TimeoutSettings {
   std::uint8_t cpw_singleturn_bits = 24;
   std::uint8_t cpw_multiturn_bits = 0;
   std::uint8_t cpw_crc_width = crc6.width;
@@ -110,12 +110,15 @@ constexpr auto safety_options = OptionsOf{
                                                 "the longest time until the position is ready, us: of the encoder, and "
                                                 "of the line there and back",
                                                 0, 1'000'000)),
-    line_delay_option<&SafetySettings::line_delay>,
+    line_delay_option<&SafetySettings::line_delay_ns>,
     option<&SafetySettings::slave>("slave", "whose registers are meant: the safety word is 0, the control word 1", 0,
                                    7),
     register_order_option<&SafetySettings::register_order>,
     register_delay_option<&SafetySettings::register_delay_us>,
     start_sequence_option<&SafetySettings::start_sequence>,
+    timeout_option,
+    adaptive_timeout_option,
+    stop_bit_option<&SafetySettings::stop_bit>,
 };
 constexpr auto safety_models = std::array{
     ModelText{
@@ -135,11 +138,18 @@ constexpr auto safety_models = std::array{
     ModelText{
         "RUM", "16 bits and turns, safety word 12", 0,
         "cpw_singleturn_bits=16 cpw_multiturn_bits=12 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9"},
+    ModelText{
+        "RLM", "16 bits and 24 bits of turns, safety word 12 and turns", 0,
+        "cpw_singleturn_bits=16 cpw_multiturn_bits=24 spw_singleturn_bits=12 spw_multiturn_bits=24 compare_bits=9"},
+    ModelText{
+        "RLH", "24 bits and 24 bits of turns, safety word 16 and turns", 0,
+        "cpw_singleturn_bits=24 cpw_multiturn_bits=24 spw_singleturn_bits=16 spw_multiturn_bits=24 compare_bits=13"},
 };
 constexpr auto all_safety_fields = joined_fields(joined_fields(safety_fields, own_fields), register_fields.infos);
 
 constexpr SafetyFormat safety_format(const Options& values) {
   SafetySettings given = safety_options.format(values);
+  given.timeout = given.timeout_given();
   given.cpw = {
       word_with_status({given.cpw_singleturn_bits, given.cpw_multiturn_bits, true}),
       {given.cpw_crc_width, given.cpw_crc_poly, given.cpw_crc_init, given.cpw_crc_inverted, given.cpw_life_counter}};

@@ -18,7 +18,7 @@ namespace {
 using namespace author;
 
 // The members of the check are those of the format, as options are.
-struct Settings : WordSettings<Format> {
+struct Settings : WordSettings<Format>, TimeoutSettings {
   std::uint8_t crc_width = crc6.width;
   std::uint16_t crc_poly = crc6.poly;
   std::uint16_t crc_init = crc6.init;
@@ -44,7 +44,7 @@ constexpr auto options = OptionsOf{
         "latency_us",
         "the longest time until the position is ready, us: of the encoder, and of the line there and back", 0,
         1'000'000)),
-    line_delay_option<&Settings::line_delay>,
+    line_delay_option<&Settings::line_delay_ns>,
     decimal<3>(option<&Settings::ready>(
         "ready_us", "virtual encoder: the time that it needs itself, us; 0: as latency_us, but at most 10", 0,
         1'000'000)),
@@ -52,12 +52,16 @@ constexpr auto options = OptionsOf{
     register_order_option<&Settings::register_order>,
     register_delay_option<&Settings::register_delay_us>,
     start_sequence_option<&Settings::start_sequence>,
+    timeout_option,
+    adaptive_timeout_option,
+    stop_bit_option<&Settings::stop_bit>,
 };
 constexpr auto all_fields = joined_fields(joined_fields(word_fields, own_fields), register_fields.infos);
 
 constexpr Format format_by(const Options& values) {
   Settings given = options.format(values);
   given.check = {given.crc_width, given.crc_poly, given.crc_init, given.crc_inverted, given.life_counter};
+  given.timeout = given.timeout_given();
   return given.with_word(values, word_with_status(given.bits()), given.position_bits != 0);
 }
 constexpr Resolution resolution_by(const Format& format) { return resolution_of(format.word, format.scale); }

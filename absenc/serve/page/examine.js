@@ -123,7 +123,11 @@ class Memory extends Asked {
 
   describe(areas, registers) {
     const pages = new Map();
-    for (const area of areas) pages.set(area.page, [...new Set([...(pages.get(area.page) ?? []), area.meaning])]);
+    for (const area of areas) {
+      for (let page = area.page; page < area.page + area.pages; page += 1) {
+        pages.set(page, [...new Set([...(pages.get(page) ?? []), area.meaning])]);
+      }
+    }
     const all = areas.filter((area) => area.in_dump).reduce((sum, area) => sum + area.count, 0);
     this.part.replaceChildren(element("option", {value: ""}, registers > 0 ? `${registers} registers` : `all that a copy has: ${all} bytes`),
                               ...[...pages].map(([page, meanings]) => element("option", {value: page}, `page ${page}: ${meanings.join(", ")}`)));

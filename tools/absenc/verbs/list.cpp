@@ -134,7 +134,9 @@ Rows memory_rows(const Unit& unit) {
     std::string writes = area.writable ? "" : "read only";
     if (!area.protection.empty()) writes = "written only with --force";
     if (area.write_life != 0 && area.protection.empty()) writes = life_of(area);
-    rows.push_back({fmt::format("page {}: 0x{:02X}{}", area.page, area.first, to), std::string(area.meaning), writes});
+    const std::string pages = area.pages == 1 ? "" : fmt::format(" to {}", area.page + area.pages - 1);
+    rows.push_back(
+        {fmt::format("page {}{}: 0x{:02X}{}", area.page, pages, area.first, to), std::string(area.meaning), writes});
   }
   return rows;
 }
@@ -210,6 +212,7 @@ Json options_json(const Unit& unit) {
     json.set("default", to_json(option, option.default_value));
     json = with_role(std::move(json), option.role);
     if (option.choices.empty()) {
+      if (option.or_zero) json.set("or_zero", true);
       return json.set("minimum", to_json(option, option.minimum)).set("maximum", to_json(option, option.maximum));
     }
     Json choices = Json::array();
@@ -252,6 +255,7 @@ Json memory_json(const Unit& unit) {
   return Json::list(unit.memory, [](const MemoryArea& area) {
     return Json::object()
         .set("page", area.page)
+        .set("pages", area.pages)
         .set("first", area.first)
         .set("count", area.count)
         .set("meaning", area.meaning)
