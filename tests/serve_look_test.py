@@ -160,6 +160,11 @@ class Look(ServeCase):
         groups = self.browser.ask("return [...document.querySelectorAll('.pill:not([hidden])')].map((pill) => pill.dataset.group)")
         self.assertEqual(groups, ["lost", "alarm", "errors", "live", "good"])
         self.look("overview")
+        for width in (1280, 1400, 1920, 3840):
+            self.browser.window(width)
+            self.draw()
+            tops = self.browser.ask("return [...document.querySelectorAll('header .pill:not([hidden]), header input, header button#token')].map((one) => { const {top, bottom} = one.getBoundingClientRect(); return (top + bottom) / 2; })")
+            self.assertLess(max(tops) - min(tops), 4, f"the bar has one line at {width}")
         for name in ("press-2", "elbow", "wrist", "shoulder", "slide-x", "axis-7", "table", "turret", "chain-a"):
             self.open(server, self.ONE, encoder=name)
             self.look(f"one-{name}", WIDTHS if name in ("press-2", "elbow", "slide-x") else (390, 1280, 1920))

@@ -199,6 +199,28 @@ class Values(ServeCase):
             self.assertEqual(status, 401)
             self.assertIn("token is wrong", json.loads(body)["error"])
 
+    def test_the_last_points_lie_close_to_each_other(self):
+        name = "sim:tformat?motion=rpm=60"
+        server = self.without_history(name, "--rate", "100")
+        wait_until(lambda: len(server.json(of(name, "points"))["points"]) > 100, "it was read for a second")
+        points = server.json(of(name, "points"))["points"]
+        times = [at_ms for at_ms, _, _ in points]
+        steps = sorted(after - before for before, after in zip(times, times[1:]))
+        self.assertGreaterEqual(steps[0], 10)
+        self.assertLess(steps[len(steps) // 2], 50)
+        turned = points[-1][1] - points[0][1]  # at 360 degrees a second
+        self.assertAlmostEqual(turned / 360, (times[-1] - times[0]) / 1000, delta=0.1 * BUSY)
+
+    def test_one_setting_alone_is_asked_for(self):
+        server = self.without_history("sim:tformat")
+        found = server.json(of("sim:tformat", "settings"), setting="overheat-threshold")
+        self.assertEqual({row["setting"] for row in found["rows"]}, {"overheat-threshold"})
+        status, body = server.ask(of("sim:tformat", "settings"), setting="overheat-treshold")
+        self.assertEqual(status, 400)
+        self.assertIn("did you mean overheat-threshold?", json.loads(body)["error"])
+        shown = server.json(of("sim:tformat", "settings"))["rows"] + wait_until(lambda: server.json(of("sim:tformat"))["reply"], "there is a reply")
+        self.assertNotIn("data_id", {row["field"] for row in shown})
+
     def test_what_describes_it(self):
         server = self.without_history("sim:tformat")
         paths = set(server.json("/openapi.json")["paths"])
@@ -512,7 +534,7 @@ class Inside(ServeCase):
         self.assertEqual(row["value"], "77 degC")
         self.assertEqual([row["value"] for row in found["rows"] if row["field"] == "status"], ["none"])
         self.assertEqual([row["range"] for row in found["rows"] if row["range"]],
-                         ["degrees: degC, 1 to 127; 0: never (0 to 127)"])
+                         ["degrees: degC, 1 to 127; 0: never (0 to 127)"] * 2)
 
     def test_memory_is_what_was_written(self):
         emulator, name = self.emulator()

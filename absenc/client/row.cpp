@@ -73,7 +73,9 @@ const Value& Answer::operator[](std::string_view name) const { return values[ind
 Column column_of(const FieldInfo& field) {
   static constexpr std::array types{Type::int64, Type::uint64, Type::boolean, Type::flags,
                                     Type::real,  Type::text,   Type::bytes};
-  return {field.name, field.unit, types[static_cast<std::size_t>(field.kind)], field.meaning, {.in_hex = field.in_hex}};
+  const bool is_exchange = field.role == Role::exchange || field.role == Role::data;
+  const Column::Look look{.in_hex = field.in_hex, .is_exchange = is_exchange};
+  return {field.name, field.unit, types[static_cast<std::size_t>(field.kind)], field.meaning, look};
 }
 
 Value value_of(const FieldValue& value) {

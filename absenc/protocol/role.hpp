@@ -28,13 +28,14 @@ enum class Role : std::uint8_t {
   check_init,        // start value
   check_inverted,    // whether it is sent inverted
   // Of a memory, of registers, and of settings
-  address,  // argument: of the byte or register
-  page,     // argument, where there are pages
-  count,    // argument: bytes to read; without it one at a time
-  force,    // argument: 1: also what is protected, or is so already
-  value,    // argument, field: the byte, or what a register holds, most significant byte first
-  data,     // field: the bytes, of several or of a register
-  written,  // field: 0: nothing was sent, because it is so already
+  address,   // argument: of the byte or register
+  page,      // argument, where there are pages
+  count,     // argument: bytes to read; without it one at a time
+  force,     // argument: 1: also what is protected, or is so already
+  value,     // argument, field: the byte, or what a register holds, most significant byte first
+  data,      // field: the bytes, of several or of a register
+  written,   // field: 0: nothing was sent, because it is so already
+  exchange,  // field: what was asked for and how it was sent: it says nothing of the encoder
 };
 
 /// Whether what has this role holds only as long as the reading, or a part of it, does.

@@ -63,8 +63,8 @@ Range range_in(const Request& request) {
 }
 
 constexpr std::string_view encoders_path = "/api/encoders/";
-constexpr std::array<std::string_view, 8> parts_of_encoder{"command",     "doctor", "events",   "history",
-                                                           "history.csv", "memory", "settings", "stream"};
+constexpr std::array<std::string_view, 9> parts_of_encoder{"command", "doctor", "events",   "history", "history.csv",
+                                                           "memory",  "points", "settings", "stream"};
 
 /// A path /api/encoders/NAME/PART. The name may contain slashes; the part is empty for the encoder itself.
 struct Target {
@@ -187,6 +187,7 @@ void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, con
                  const Reply& reply) {
   if (part.empty()) return reply.send(json_response(details(*watch)));
   if (part == "history" || part == "events") return past(watch->name(), part == "events", request, reply);
+  if (part == "points") return reply.send(json_response(points(*watch, watch->recent_points())));
   if (part == "history.csv") return past_as_csv(watch->name(), request, reply);
   if (part == "command" || part == "doctor" || request.method == "HEAD") {
     Response response = error_response(
@@ -196,7 +197,7 @@ void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, con
   }
   if (part == "stream") return stream(watch->name(), reply);
   const Unit& unit = *watch->address().unit;
-  if (part == "settings") return give(*watch, settings_order(unit), request, reply);
+  if (part == "settings") return give(*watch, settings_order(unit, request.value("setting")), request, reply);
   give(*watch, memory_order(unit, number_in(request, "page", -1, 0, UINT16_MAX)), request, reply);
 }
 

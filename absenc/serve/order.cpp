@@ -9,6 +9,7 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/settings.hpp"
+#include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 
@@ -95,17 +96,25 @@ std::string range_of(const Unit& unit, const Command& getter) {
 Json shown(const Column& column, const Value& value) {
   if (std::holds_alternative<Invalid>(value)) return {};
   if (std::holds_alternative<Unknown>(value)) return "unknown";
-  const std::string text = to_text(column, value);
+  const Flags* const flags = std::get_if<Flags>(&value);
+  const std::string text = flags != nullptr ? fmt::format("{}", fmt::join(flag_names(*flags->field, flags->bits), ", "))
+                                            : to_text(column, value);
   return text.empty() ? "none" : text;
 }
 
-Done read_settings(Encoder& live, const Between& between) {
+Json shown_row(const Column& column, const Value& value) {
+  return Json::object().set("field", column.name).set("value", shown(column, value)).set("meaning", column.meaning);
+}
+
+// `wanted`: the command that reads one setting; null: all.
+Done read_settings(Encoder& live, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();
   Json rows = Json::array();
   Json failed = Json::object();
   Questions asked(live, between);
   for (const Command* getter : questions(live.unit())) {
+    if (wanted != nullptr && wanted != getter) continue;
     const bool is_setting = getter->verb == Verb::config_get;
     const std::optional<Answer> answer = asked.ask(getter->name, {});
     if (!answer) {
@@ -115,12 +124,9 @@ Done read_settings(Encoder& live, const Between& between) {
     (is_setting ? settings : identity).set(getter->name, to_json(answer->row()));
     for (std::size_t i = 0; i < answer->columns.size(); ++i) {
       const Column& column = answer->columns[i];
-      rows.append(Json::object()
-                      .set("setting", getter->name)
-                      .set("field", column.name)
-                      .set("value", shown(column, answer->values[i]))
-                      .set("meaning", column.meaning)
-                      .set("range", i == 0 ? range_of(live.unit(), *getter) : ""));
+      if (column.look.is_exchange) continue;
+      Json row = shown_row(column, answer->values[i]);
+      rows.append(row.set("setting", getter->name).set("range", range_of(live.unit(), *getter)));
     }
   }
   Json json = Json::object().set("ok", true).set("identity", identity).set("settings", settings);
@@ -179,9 +185,27 @@ std::string_view Order::name() const {
   return command->name;
 }
 
-Order settings_order(const Unit& unit) {
-  if (questions(unit).empty()) throw UsageError(fmt::format("{} has no settings and does not say what it is", unit.id));
+Json shown_values(const Answer& answer) {
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < answer.columns.size(); ++i) {
+    if (!answer.columns[i].look.is_exchange) rows.append(shown_row(answer.columns[i], answer.values[i]));
+  }
+  return rows;
+}
+
+Order settings_order(const Unit& unit, std::string_view setting) {
+  const std::vector<const Command*> all = questions(unit);
+  if (all.empty()) throw UsageError(fmt::format("{} has no settings and does not say what it is", unit.id));
   Order order;
+  if (!setting.empty()) {
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Command* one) { return one->name == setting; });
+    std::vector<std::string_view> names;
+    for (const Command* one : all) names.push_back(one->name);
+    if (found == all.end()) {
+      throw UsageError(fmt::format("{} has no setting \"{}\"{}", unit.id, setting, suggestion(setting, names)));
+    }
+    order.command = *found;
+  }
   order.kind = Order::Kind::settings;
   return order;
 }
@@ -215,7 +239,7 @@ Order examination_order() {
 Done carry_out(Encoder& live, const Order& order, const Between& between) {
   switch (order.kind) {
     case Order::Kind::settings:
-      return read_settings(live, between);
+      return read_settings(live, order.command, between);
     case Order::Kind::memory:
       if (order.addresses.empty()) return read_registers(live, between);
       return read_memory(live, order.addresses, between);

@@ -24,7 +24,7 @@ struct Done {
 struct Order {
   enum class Kind : std::uint8_t {
     command,
-    settings,     // all that can be read, and what it says of itself
+    settings,     // all that can be read, and what it says of itself; with `command` that alone
     memory,       // the bytes of `addresses`; of encoders with registers all that can be read
     examination,  // as `absenc doctor`
   };
@@ -41,8 +41,8 @@ struct Order {
   [[nodiscard]] bool changes_encoder() const { return kind == Kind::command && command->changes_encoder; }
 };
 
-/// Throws UsageError where the unit has none of it.
-[[nodiscard]] Order settings_order(const Unit& unit);
+/// `setting`: the command that reads one of them; "": all. Throws UsageError where the unit has none of it.
+[[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
 /// `page` less than 0: what belongs to a copy of the memory. Throws also for more than can be read at once.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
@@ -50,6 +50,9 @@ struct Order {
 /// Of all but an examination. `between` is called between two requests of one that reads, and may read the position.
 /// Throws what the encoder and its port throw.
 [[nodiscard]] Done carry_out(client::Encoder& live, const Order& order, const std::function<void()>& between);
+
+/// A list of {"field","value","meaning"} for people, without what belongs to the exchange; null: it does not hold.
+[[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
 /// What of it can be read: {"settings":[names],"memory":[{"page","first","count","meaning","in_dump"}],"registers":n}
 [[nodiscard]] client::Json readable_json(const Unit& unit);

@@ -64,6 +64,7 @@ Json arguments_json(const Command& command) {
     return Json::object()
         .set("name", argument.name)
         .set("meaning", argument.meaning)
+        .set("role", client::name_of(argument.role))
         .set("minimum", argument.minimum)
         .set("maximum", argument.maximum)
         .set("default", argument.required ? Json() : Json(argument.default_value));
@@ -81,6 +82,8 @@ std::string_view name_of(Verb verb) {
       return "reset_multiturn";
     case Verb::config_set:
       return "config_set";
+    case Verb::memory_write:
+      return "memory_write";
     default:
       return "";
   }
@@ -94,6 +97,7 @@ Json commands_json(const Unit& unit) {
                    .set("name", command.name)
                    .set("meaning", command.meaning)
                    .set("verb", name_of(command.verb))
+                   .set("reads_back", command.reads_back)
                    .set("changes_encoder", command.changes_encoder)
                    .set("arguments", arguments_json(command)));
   }
@@ -205,6 +209,7 @@ Json details(const Watch& watch) {
   json.set("repeated", snapshot.counters.repeated).set("errors", errors_json(snapshot.counters));
   json.set("latency_us", latency_json(snapshot.latency));
   json.set("fields", snapshot.state == State::live ? more.fields : Json());
+  json.set("reply", snapshot.state == State::live ? more.reply : Json());
   json.set("bad_exchanges", bad_json(more));
   json.set("readable", readable_json(*watch.address().unit));
   return json.set("commands", commands_json(*watch.address().unit));

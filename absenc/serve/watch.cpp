@@ -24,6 +24,8 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t most_points = 4096;
+constexpr std::int64_t recent_ms = 20'000;
+constexpr std::int64_t between_recent_ms = 10;
 constexpr std::size_t most_seconds = 120;  // that wait for the history
 constexpr Time between_summaries = 1s;
 constexpr Time between_tellings = 1s;    // of failures, which may come with each reading
@@ -126,6 +128,11 @@ std::vector<Point> Watch::take_points() {
   std::vector<Point> taken(points_.begin(), points_.end());
   points_.clear();
   return taken;
+}
+
+std::vector<Point> Watch::recent_points() const {
+  const std::lock_guard lock(mutex_);
+  return {recent_.begin(), recent_.end()};
 }
 
 Outbox::Taken Watch::take_passing(Outlet outlet) {
@@ -290,6 +297,7 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
     AnswerSink sink;
     encoder.report(sink);
     details_.fields = to_json(sink.answer.row());
+    details_.reply = shown_values(sink.answer);
   }
   known_.rate = live.rate();
   const host::Latencies& latencies = encoder.latencies();
@@ -324,6 +332,10 @@ void Watch::count_second(const Sample& sample, std::uint64_t errors) {
   if (sample.speed_valid) {
     point.speed = sample.speed;
     second_.speed.add(sample.speed);
+  }
+  if (recent_.empty() || at_ms - recent_.back().at_ms >= between_recent_ms || at_ms < recent_.back().at_ms) {
+    recent_.push_back(point);
+    while (recent_.front().at_ms < at_ms - recent_ms || recent_.front().at_ms > at_ms) recent_.pop_front();
   }
   if (!traced_) return;
   points_.push_back(point);

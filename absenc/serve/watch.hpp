@@ -76,6 +76,7 @@ struct Snapshot {
 struct Details {
   std::vector<client::BadExchangeText> bad{};  // the newest first
   client::Json fields{};                       // of the last reply, at most a second old
+  client::Json reply{};                        // the same for people: `shown_values`
 };
 
 /// Position, continued past the end of a turn, and speed: in degrees and rpm, of linear encoders mm and mm/s.
@@ -122,6 +123,8 @@ class Watch {
   /// From now on points are kept until they are taken, the newest `most_points` of them.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
+  /// The newest of the last 20 seconds in which it was read, 10 ms or more apart; the oldest first.
+  [[nodiscard]] std::vector<Point> recent_points() const;
   /// All good readings since the last time: each of those who send them on has them all.
   enum class Outlet : std::uint8_t { mqtt, udp };
   [[nodiscard]] Outbox::Taken take_passing(Outlet outlet);
@@ -172,6 +175,7 @@ class Watch {
   bool examines_ = false;  // and takes none meanwhile
   bool traced_ = false;
   std::deque<Point> points_;
+  std::deque<Point> recent_;
   std::array<Outbox, 2> outboxes_;  // by Outlet
   Second second_{};
   std::deque<Second> seconds_;

@@ -371,11 +371,11 @@ std::string to_text(Time time) {
 }
 
 std::string_view name_of(Role role) {
-  static constexpr std::array<std::string_view, 21> names{
+  static constexpr std::array<std::string_view, 22> names{
       "",           "position",       "turns",   "of_position", "sequence",    "encoder",
       "identity",   "clash",          "trouble", "rate",        "check_width", "check_polynomial",
       "check_init", "check_inverted", "address", "page",        "count",       "force",
-      "value",      "data",           "written"};
+      "value",      "data",           "written", "exchange"};
   return names[static_cast<std::size_t>(role)];
 }
 

@@ -130,7 +130,7 @@ constexpr auto models = std::array{
 };
 constexpr auto fields = fields_of<Values>(
     field<&Values::encoder_address>("encoder_address", "", "whose request this is", Role::encoder),
-    field<&Values::command>("command", "", "what was asked"),
+    field<&Values::command>("command", "", "what was asked", Role::exchange),
     field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
     field<&Values::multiturn>("multiturn", "revolutions", "turns", Role::turns),
     field<&Values::clash>("clash", "", "what came was damaged: two encoders of one address, or a bad line",

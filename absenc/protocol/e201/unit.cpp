@@ -133,7 +133,7 @@ constexpr std::optional<unsigned> khz(const Found& found) {
 
 using enum FieldInfo::Kind;
 constexpr auto own_fields = fields_of<Found>(
-    field<words<&Found::command>>({"command", text, "", "the request"}),
+    field<words<&Found::command>>({"command", text, "", "the request", {}, Role::exchange}),
     field<words<&Found::version>>({"version", text, "", "firmware of the interface", {}, Role::identity}),
     field<words<&Found::serial>>({"serial", text, "", "serial number of the interface", {}, Role::identity}),
     field<words<&Found::supply>>({"supply", text, "", "supply of the encoder, as the interface says it"}),

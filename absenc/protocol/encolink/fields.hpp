@@ -125,9 +125,9 @@ inline constexpr auto frame_fields = [] {
                              "first byte of a request: 00 position, AA reset of the channels, BB identify"),
       field<&Values::ra>("ra", "", "second byte of a request: one byte of a register access"),
       field<&Values::op>("op", "", "read or write"),
-      field<&Values::name>("register", "", "its name in the table of registers"),
-      field<&Values::address>("address", "", "of the register"),
-      field<&Values::length>("length", "bytes", "of the register"),
+      field<&Values::name>("register", "", "its name in the table of registers", Role::exchange),
+      field<&Values::address>("address", "", "of the register", Role::exchange),
+      field<&Values::length>("length", "bytes", "of the register", Role::exchange),
       field<&Values::data>("data", "", "the register's bytes, most significant first", Role::data),
       field<&Values::value>({"value", number, "", "the same as a number", {}, Role::value}));
 }();

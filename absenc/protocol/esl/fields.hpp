@@ -118,33 +118,34 @@ inline constexpr auto fields = [] {
   using detail::in;
   using enum Channel;
   return author::fields_of<Shown>(
-      field<&Shown::data_id>("data_id", "", "which data was asked for (Table 3)"),
-      author::in_hex(field<&Shown::control_field>("control_field", "", "CF: encoder address, data id, parity")),
-      field<&Shown::encoder_address>("encoder_address", "", "EAD: which encoder on the line", Role::encoder),
+      field<&Shown::data_id>("data_id", "", "which data was asked for (Table 3)", Role::exchange),
+      author::in_hex(
+          field<&Shown::control_field>("control_field", "", "CF: encoder address, data id, parity", Role::exchange)),
+      field<&Shown::encoder_address>("encoder_address", "", "which encoder on the line (EAD)", Role::encoder),
       field<&Shown::clash>("clash", "",
                            "yes: its answer is damaged every time; two encoders share the address, or the line is bad",
                            Role::clash),
       field<&Shown::trouble>("trouble", "", "why an answer that came whole is not good", Role::trouble),
-      field<in<one, part::status, &ChannelReply::status>>("ch1_status", "SF of channel 1", status_flags),
-      field<in<one, part::alarms, &ChannelReply::alarms>>("ch1_alarms", "ALM of channel 1", alarm_flags),
-      field<in<one, part::singleturn, &Reply::singleturn>>("singleturn", "counts", "ABS: position within the turn",
+      field<in<one, part::status, &ChannelReply::status>>("ch1_status", "status of channel 1 (SF)", status_flags),
+      field<in<one, part::alarms, &ChannelReply::alarms>>("ch1_alarms", "alarms of channel 1 (ALM)", alarm_flags),
+      field<in<one, part::singleturn, &Reply::singleturn>>("singleturn", "counts", "position within the turn (ABS)",
                                                            Role::position),
-      field<detail::turns_in>("multiturn", "revolutions", "ABM", Role::turns),
+      field<detail::turns_in>("multiturn", "revolutions", "turns (ABM)", Role::turns),
       author::in_hex(field<in<one, part::encoder_id, &ChannelReply::encoder_id>>(
-          "encoder_id", "", "ENID: D8 multi-turn, 98 single-turn", Role::identity)),
+          "encoder_id", "", "D8 multi-turn, 98 single-turn (ENID)", Role::identity)),
       field<detail::of_encoder_id<7, 1>>("safety", "", "1: a safety encoder (ENID bit 7)"),
       field<detail::of_encoder_id<5, 3>>("multiturn_bytes", "", "of turns (ENID bits 6 and 5)"),
       field<detail::of_encoder_id<0, 0x1F>>("singleturn_bits", "",
                                             "of the position within the turn (ENID bits 4 to 0)"),
-      field<in<one, part::sequence, &ChannelReply::sequence>>("ch1_sequence", "", "SC1: counts the replies, 0 to 255",
+      field<in<one, part::sequence, &ChannelReply::sequence>>("ch1_sequence", "", "counts the replies, 0 to 255 (SC1)",
                                                               Role::sequence),
       field<in<one, part::temperature, &Reply::temperature>>("temperature_c", "degC", "inside the encoder"),
-      field<in<two, part::status, &ChannelReply::status>>("ch2_status", "SF of channel 2", status_flags),
-      field<in<two, part::alarms, &ChannelReply::alarms>>("ch2_alarms", "ALM of channel 2", alarm_flags),
+      field<in<two, part::status, &ChannelReply::status>>("ch2_status", "status of channel 2 (SF)", status_flags),
+      field<in<two, part::alarms, &ChannelReply::alarms>>("ch2_alarms", "alarms of channel 2 (ALM)", alarm_flags),
       field<in<two, part::redundant, &Reply::redundant>>(
-          "redundant_singleturn", "counts", "RS: the position of channel 2, 9 bits (ID 6: 16)", Role::of_position),
+          "redundant_singleturn", "counts", "position of channel 2 in 9 bits, with ID 6 in 16 (RS)", Role::of_position),
       field<in<two, part::zero_sequence | part::redundant_sequence, &ChannelReply::sequence>>(
-          "ch2_sequence", "", "SC2: counts the replies, 0 to 127", Role::sequence),
+          "ch2_sequence", "", "counts the replies, 0 to 127 (SC2)", Role::sequence),
       field<&Shown::page>("page", "", "memory page"),
       field<&Shown::memory_address>("memory_address", "", "ADF: 0 to 126; 127 selects the page"),
       field<&Shown::busy>(

@@ -69,15 +69,15 @@ inline constexpr auto fields = [] {
   using author::field;
   using author::in_hex;
   return author::fields_of<Values>(
-      field<&Values::data_id>("data_id", "", "which data was asked for (Table 1)"),
-      in_hex(
-          field<&Values::control_field>("control_field", "", "first byte of the request: sync code, data id, parity")),
-      field<&Values::status>("status", "SF", status_flags),
-      field<&Values::singleturn>("singleturn", "counts", "ABS: position within the turn, rising counter-clockwise",
+      field<&Values::data_id>("data_id", "", "which data was asked for (Table 1)", Role::exchange),
+      in_hex(field<&Values::control_field>("control_field", "", "first byte of the request: sync code, data id, parity",
+                                           Role::exchange)),
+      field<&Values::status>("status", "status of the reply (SF)", status_flags),
+      field<&Values::singleturn>("singleturn", "counts", "position within the turn, rising counter-clockwise (ABS)",
                                  Role::position),
-      in_hex(field<&Values::encoder_id>("encoder_id", "", "ENID", Role::identity)),
-      field<&Values::multiturn>("multiturn", "revolutions", "ABM", Role::turns),
-      field<&Values::alarms>("alarms", "ALMC", alarm_flags), field<&Values::page>("page", "", "memory page"),
+      in_hex(field<&Values::encoder_id>("encoder_id", "", "which kind of encoder it is (ENID)", Role::identity)),
+      field<&Values::multiturn>("multiturn", "revolutions", "turns (ABM)", Role::turns),
+      field<&Values::alarms>("alarms", "alarms (ALMC)", alarm_flags), field<&Values::page>("page", "", "memory page"),
       field<&Values::address>("address", "", "ADF: memory address; 127 selects the page"),
       field<&Values::busy>(
           {"busy", FieldInfo::Kind::number, "", "1 while the encoder writes: the request was not executed"}),

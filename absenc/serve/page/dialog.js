@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Questions: the token, and whether an encoder is to be changed.
 import {element, terms} from "./dom.js";
+import {plain, forPeople} from "./words.js";
 import {forgetToken, tokenInfo, tryToken} from "./server.js";
 
 const dialog = document.getElementById("dialog");
@@ -9,6 +10,7 @@ const body = document.getElementById("dialog-body");
 const wrong = document.getElementById("dialog-wrong");
 const yes = document.getElementById("dialog-yes");
 const no = document.getElementById("dialog-no");
+const WRITING_MS = 300;  // after a key, before the encoder is asked
 
 /** Shows `nodes`; `agree` answers "" when all is well, else what is wrong. Resolves to whether it was agreed. */
 function ask(words, button, nodes, agree) {
@@ -54,7 +56,8 @@ export async function askToken() {
 }
 
 /**
- * Whether `command` is to be run. `now`: what is so now; `then(values)`: what will be. Returns the arguments, or null.
+ * Whether `command` is to be run. `now(values)`: what is so now, or "" where that says nothing; `then(values)`: what
+ * will be. Returns the arguments, or null.
  */
 export async function askCommand(name, command, now, then) {
   const {name: who} = await tokenInfo();
@@ -62,19 +65,41 @@ export async function askCommand(name, command, now, then) {
     value: argument.default ?? "", inputmode: "numeric", required: argument.default === null, pattern: "-?(0[xX][0-9a-fA-F]+|[0-9]+)"}));
   const labels = fields.map((input, i) => {
     const {name: word, meaning, minimum, maximum} = command.arguments[i];
-    return element("label", {class: "field"}, `${word}: ${meaning} (${minimum} to ${maximum})`, input);
+    return element("label", {class: "field"}, `${plain(word)}: ${forPeople(meaning)} (${minimum} to ${maximum})`, input);
   });
   const values = () => fields.map((input) => input.value.trim());
+  const before = element("span", {}, "is being read");
   const after = element("span");
   const showAfter = () => after.replaceChildren(then(values()));
-  for (const input of fields) input.addEventListener("input", showAfter);
+  let asked = 0;
+  const showBefore = async () => {
+    const question = ++asked;
+    let text;
+    try {
+      text = await now(values());
+    } catch (error) {
+      text = `not known: ${error.message}`;
+    }
+    if (question !== asked) return;  // another was asked meanwhile
+    before.replaceChildren(text);
+    before.closest("dl > div")?.toggleAttribute("hidden", text === "");
+  };
+  let pause;
+  for (const input of fields) {
+    input.addEventListener("input", () => {
+      showAfter();
+      clearTimeout(pause);
+      pause = setTimeout(showBefore, WRITING_MS);
+    });
+  }
   showAfter();
   const token = tokenField();
   const safe = element("input", {type: "checkbox", required: true, id: "dialog-safe"});
   const nodes = [element("p", {}, command.meaning.charAt(0).toUpperCase() + command.meaning.slice(1) + "."), ...labels];
   if (command.changes_encoder) {
-    nodes.push(terms([["now", now], ["then", after], ["named in the history", who ?? "the name of the token below"]]));
+    nodes.push(terms([["now", before], ["then", after], ["named in the history", who ?? "the name of the token below"]]));
   }
+  if (command.changes_encoder) showBefore();
   if (who === null) nodes.push(tokenLabel(token));
   if (command.changes_encoder) nodes.push(element("label", {class: "check"}, safe, ` Nothing moves or starts when ${name} is changed.`));
   const agreed = await ask(`${command.title}: ${name}`, command.title, nodes, async () => (who === null ? tryToken(token.value.trim()) : ""));

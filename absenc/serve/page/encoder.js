@@ -6,9 +6,9 @@ import {Examine} from "./examine.js";
 import {figureNode, showParts, showState, stateNode} from "./overview.js";
 import {Trace, isMarked, markText, quantities} from "./plots.js";
 import {download, pathOf, request, tokenInfo} from "./server.js";
-import {SHAPES, belowFigure, clock, condition, duration, fieldText, figure, happened, lastText, microseconds, namedUnit, numberText, plain, sentence, wrongs} from "./words.js";
+import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, happened, lastText, microseconds, numberText, plain, sentence, valueText, wrongs} from "./words.js";
 
-const LIVE_MS = 20000;
+const LIVE_MS = 20000;      // as long as the server keeps points
 const LOST_SHARE = .15;     // of the trace of a lost encoder: the time without readings
 const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
@@ -18,9 +18,10 @@ const MOST_EVENTS = 100;
 const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], "24h": ["24 h", 86400], "7d": ["7 days", 604800], all: ["All", 31 * 86400]};
 const TABS = {history: "History", exchanges: "Exchanges", settings: "Settings", memory: "Memory", doctor: "Doctor"};
 const AWAY = ["opening", "lost", "examined"];
-const SLOW_RPM = 20;
 const SHOWN_COMMANDS = 3;
 const LEAST_MS = 12;      // between two points
+
+const byteText = (byte) => (Number.isNaN(byte) ? "?" : `0x${byte.toString(16).toUpperCase().padStart(2, "0")} (${byte})`);
 
 function limitText(us) {
   if (us >= 1e6) return `${us / 1e6} s`;
@@ -88,7 +89,7 @@ export class One {
     this.panels = {
       history: element("div", {}, element("p", {class: "row"}, this.csv, this.past), this.eventTable),
       exchanges: element("div", {class: "figures"}, part("Replies by latency", this.latencies), part("Failed attempts", this.errors),
-                         part("Last reply", this.fields), element("div", {class: "wide"}, element("h4", {}, "Last bad exchanges"), this.bad)),
+                         element("div", {class: "wide"}, element("h4", {}, "Last reply"), this.fields), element("div", {class: "wide"}, element("h4", {}, "Last bad exchanges"), this.bad)),
       settings: this.examine.settings.node, memory: this.examine.memory.node, doctor: this.examine.doctor.node,
     };
     this.tabs = {};
@@ -179,17 +180,13 @@ export class One {
     return document.querySelector(`.one ${selector}`);
   }
 
-  /** The last minute that the server knows, of a lost encoder the one before its loss. */
+  /** The last seconds that the server knows, of a lost encoder those before its loss. */
   async seed() {
     try {
-      const {status, body} = await request("api/minute");
+      const {status, body} = await request(pathOf(this.name, "points"));
       if (status !== 200 || this.closed) return;
-      const seconds = body.encoders.find((one) => one.encoder === this.name)?.seconds ?? [];
-      // From second to second a fast encoder has turned further than they can tell.
-      const samples = seconds.filter(([, place, speed]) => place !== null && (this.one.state !== "live" || this.one.linear || Math.abs(speed ?? 0) < SLOW_RPM))
-        .map(([at, place, speed]) => [Math.min(at * 1000 + 999, this.one.last_reading?.at_ms ?? Infinity), place, speed]);
-      const fresh = samples.filter(([at]) => !this.points.some(([other]) => Math.abs(other - at) < 1000));
-      this.points = [...fresh, ...this.points].sort((a, b) => a[0] - b[0]);
+      const first = this.points[0]?.[0] ?? Infinity;
+      this.points.unshift(...body.points.filter(([at]) => at < first));
       this.changed = true;
     } catch {
       // the stream says that the server is away
@@ -336,8 +333,8 @@ export class One {
     const from = this.range === "live" ? LIVE_MS : RANGES[this.range][1] * 1000;
     const now = this.at_ms;
     // A loss must not lie beyond the end of the plot.
-    const to = this.range !== "live" ? now : isLive ? newest : Math.min(now, newest + LOST_SHARE * 60000);
-    const width = this.range === "all" ? Math.max(60000, to - rows[0][0]) : isLive || this.range !== "live" ? from : 60000;
+    const to = this.range !== "live" ? now : isLive ? newest : Math.min(now, newest + LOST_SHARE * LIVE_MS);
+    const width = this.range === "all" ? Math.max(60000, to - rows[0][0]) : isLive || this.range !== "live" ? from : to - rows[0][0] + 1;
     const marks = this.range === "live" ? [] : this.events.filter(isMarked).reverse();
     this.graph.draw(rows.filter((row) => row[0] >= to - width - 1000), [to - width, to], {marks, lostAt});
     const words = marks.length === 0 ? "" : `; marked: ${[...new Set(marks.map(markText))].join(", ")}`;
@@ -362,11 +359,8 @@ export class One {
     this.offer(one);
     this.changed = true;
     const missing = one.singleturn_valid === false || one.multiturn_valid === false ? "INVALID" : "unknown";
-    setChildren(this.fields, one.fields === null ? element("p", {class: "faint"}, "none is new") :
-      terms(Object.entries(one.fields).map(([field, value]) => {
-        const {name, unit} = namedUnit(field);
-        return [name, value === null || unit === "" ? fieldText(value, missing) : `${fieldText(value)} ${unit}`];
-      })));
+    setChildren(this.fields, one.reply === null ? element("p", {class: "faint"}, "none is new") : table(["field", "value", "meaning"], one.reply,
+      ({field, value, meaning}) => [fieldName(field), element("strong", {}, valueText(value, missing)), forPeople(meaning)], "last reply"));
     const errors = Object.entries(one.errors).sort(([, a], [, b]) => b - a).map(([name, count]) => [plain(name), count]);
     const latencies = latencyRows(one.latency_us.buckets);
     setChildren(this.latencies, latencies.length === 0 || one.readings === 0 ? element("p", {class: "faint"}, "no reply yet") : histogram(["latency", "replies"], latencies, "replies by latency"));
@@ -421,13 +415,32 @@ export class One {
       element("p", {class: "faint"}, "What a command changes is shown before, and stands in the history with the name of your token."));
   }
 
-  /** What is so now, in the words of the page. */
-  nowText() {
-    const {text, unit} = figure(this.one);
+  alarmsText() {
     const alarms = (this.one.alarms ?? []).map((alarm) => plain(alarm.name)).join(", ");
-    const parts = [`${text}${unit === "mm" ? " mm" : unit}`, ...(this.one.turns === null ? [] : [`${numberText(this.one.turns)} turns`]),
-                   alarms ? `alarms: ${alarms}` : this.one.alarms === null ? "alarms not reported" : "no alarms"];
-    return parts.join(", ");
+    return alarms || (this.one.alarms === null ? "alarms not reported" : "no alarms");
+  }
+
+  /** What the command would change, as it is now: of a setting and of a byte the encoder is asked. "": nothing to show. */
+  async now(command, values) {
+    if (command.verb === "zero") {
+      const {text, unit} = figure(this.one);
+      return `${text}${unit === "mm" ? " mm" : unit}`;
+    }
+    if (command.verb === "reset_multiturn") return this.one.turns === null ? `turns unknown; ${this.alarmsText()}` : `${numberText(this.one.turns)} turns; ${this.alarmsText()}`;
+    if (command.verb === "clear_alarms") return this.alarmsText();
+    if (command.reads_back) {
+      const {status, body} = await request(pathOf(this.name, "settings"), {setting: command.reads_back});
+      return status === 200 ? body.rows.map((row) => `${fieldName(row.field)} ${valueText(row.value)}`).join(", ") : `not known: ${body.error}`;
+    }
+    if (command.verb === "config_set") return "the encoder does not tell it";
+    if (command.verb !== "memory_write") return "";
+    const of = (role) => Number(values[command.arguments.findIndex((argument) => argument.role === role)] || NaN);
+    const [address, page] = [of("address"), of("page")];
+    if (Number.isNaN(address)) return "the byte at the address";
+    const {status, body} = await request(pathOf(this.name, "memory"), {page: page || 0});
+    if (status !== 200) return `not known: ${body.error}`;
+    const run = (body.memory ?? []).find((one) => address >= one.address && address < one.address + one.data.length / 2);
+    return run === undefined ? "not known" : byteText(parseInt(run.data.substr(2 * (address - run.address), 2), 16));
   }
 
   async run(command) {
@@ -435,12 +448,14 @@ export class One {
       if (command.verb === "zero") return this.one.linear ? "0.0000 mm" : "0.000°";
       if (command.verb === "reset_multiturn") return "0 turns";
       if (command.verb === "clear_alarms") return "alarms are clear whose cause is gone";
-      const written = command.arguments.map((argument, i) => `${plain(argument.name)} ${values[i] || "?"}`).join(", ");
-      return written || command.meaning;
+      if (command.verb === "memory_write") return byteText(Number(values[command.arguments.findIndex((argument) => argument.role === "value")] || NaN));
+      const written = command.arguments.map((argument, i) => [argument, values[i]]).filter(([argument, value]) => value !== String(argument.default))
+        .map(([argument, value]) => `${plain(argument.name)} ${value || "?"}`).join(", ");
+      return (written && command.reads_back ? `${plain(command.reads_back)}: ${written}` : written) || command.meaning;
     };
     let values;
     try {
-      values = await askCommand(this.name, command, this.nowText(), then);
+      values = await askCommand(this.name, command, (written) => this.now(command, written), then);
     } catch (error) {
       return setText(this.outcome, `${command.title} was not done: ${error.message}`);
     }

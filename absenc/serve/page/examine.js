@@ -2,7 +2,7 @@
 // Examination, settings and memory: each is asked of the encoder when its button is pressed, and says of when it is.
 import {element, setText, table, terms} from "./dom.js";
 import {pathOf, request} from "./server.js";
-import {namedUnit, plain, sentence} from "./words.js";
+import {fieldName, plain, sentence, valueText, forPeople} from "./words.js";
 
 const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
 const GONE = new Set(["opening", "lost", "ended"]);  // another encoder may be there when the port comes back
@@ -107,8 +107,8 @@ class Settings extends Asked {
     const names = [...new Set(found.rows.map((row) => row.setting))];
     this.result.replaceChildren(...names.flatMap((name) => {
       const own = found.rows.filter((row) => row.setting === name);
-      return [element("h4", {}, plain(name)), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${own[0].range}`),
-              table(["field", "value", "meaning"], own, (row) => [namedUnit(row.field).name, element("strong", {}, row.value ?? "INVALID"), row.meaning], name)];
+      return [element("h4", {}, plain(name)), element("p", {class: "faint"}, own[0].range === "" ? "" : `may be set to ${forPeople(own[0].range)}`),
+              table(["field", "value", "meaning"], own, (row) => [fieldName(row.field), element("strong", {}, valueText(row.value)), forPeople(row.meaning)], name)];
     }), ...failures(found.failed));
   }
 }

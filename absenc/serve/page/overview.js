@@ -2,7 +2,7 @@
 // All encoders: a card for each, the ill first, and the bar above them.
 import {breakable, dial, element, rich, scale, setText, spark} from "./dom.js";
 import {request} from "./server.js";
-import {GROUPS, GROUP_WORDS, SHAPES, belowFigure, condition, figure, numberText, wrongs} from "./words.js";
+import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, wrongs} from "./words.js";
 
 const MANY = 30;           // beyond it cards are small
 const FEW = 3;
@@ -155,8 +155,8 @@ export class Overview {
     main.replaceChildren(this.none, this.noMatch, this.list);
     // They stay the same nodes, so that none loses the focus.
     this.groups = new Map(GROUPS.map((group) => {
-      const [shape, words] = [element("span", {"aria-hidden": "true"}), element("span")];
-      return [group, {shape, words, node: element("button", {type: "button", class: "pill", hidden: true, "data-group": group, onclick: () => this.choose(group)}, shape, words)}];
+      const [shape, words, more] = [element("span", {"aria-hidden": "true"}), element("span"), element("span", {class: "where-wide"})];
+      return [group, {shape, words, more, node: element("button", {type: "button", class: "pill", hidden: true, "data-group": group, onclick: () => this.choose(group)}, shape, words, more)}];
     }));
     this.pills = element("div", {class: "pills", role: "group", "aria-label": "show only"}, ...[...this.groups.values()].map(({node}) => node));
     this.filter = element("input", {type: "search", placeholder: "Filter", "aria-label": "filter by name", oninput: () => this.arrange(true)});
@@ -208,7 +208,7 @@ export class Overview {
     const counts = Object.fromEntries(GROUPS.map((group) => [group, []]));
     for (const card of this.cards.values()) counts[card.condition.group].push(card);
     const total = this.cards.size;
-    for (const [group, {node, shape, words}] of this.groups) {
+    for (const [group, {node, shape, words, more}] of this.groups) {
       const [first] = counts[group];
       const count = counts[group].length;
       node.toggleAttribute("hidden", count === 0);
@@ -218,6 +218,7 @@ export class Overview {
       node.setAttribute("aria-pressed", String(this.group === group));
       setText(shape, `${SHAPES[kind]} `);
       setText(words, group === "good" && count === total ? (total === 1 ? "good" : `all ${total} good`) : GROUP_WORDS[group](count));
+      setText(more, MORE_WORDS[group] ?? "");
     }
   }
 

@@ -31,14 +31,14 @@ export function clock(at_ms) {
   return `${at.toLocaleDateString("en-GB", {day: "numeric", month: "short", year: "numeric"})}, ${time}`;
 }
 
-/** "battery_alarm" as "battery alarm" */
-export const plain = (name) => name.replace(/[_-]/g, " ");
-const UNITS = {c: "°C", mv: "mV", v: "V", us: "µs", ms: "ms", s: "s", hz: "Hz", deg: "°", mm: "mm"};
-/** {name, unit} of "temperature_c" */
-export function namedUnit(field) {
-  const found = /^(.+)_([a-z]+)$/.exec(field);
-  return found && found[2] in UNITS ? {name: plain(found[1]), unit: UNITS[found[2]]} : {name: plain(field), unit: ""};
-}
+/** "battery_alarm" as "battery alarm", "ch1_status" as "channel 1 status" */
+export const plain = (name) => name.replace(/[_-]/g, " ").replace(/\bch(?=\d)/, "channel ");
+/** "°C" for "degC", "over heat" for "over_heat" */
+export const forPeople = (text) => text.replace(/\bdegC\b/g, "°C").replace(/\b[a-z0-9]+(_[a-z0-9]+)+\b/g, plain);
+/** "temperature" of "temperature_c": the value has its unit. */
+export const fieldName = (field) => plain(field.replace(/_(c|mv|ma|v|us|ms|s|hz|khz|deg|mm|rpm)$/, ""));
+/** "80 °C" of "80 degC", "battery alarm, over heat" of flags; a value that does not hold is `missing`. */
+export const valueText = (value, missing = "INVALID") => (value === null ? missing : forPeople(value).replace(/ deg$/, "°").replace(/ us$/, " µs").replace(/ revolutions$/, " turns"));
 export const sentence = (text) => {
   const whole = text.charAt(0).toUpperCase() + text.slice(1);
   return /[.!?]$/.test(whole) ? whole : whole + ".";
@@ -95,8 +95,11 @@ export function condition(one) {
 /** The words of the bar: how many of a group. */
 export const GROUP_WORDS = {
   unknown: (count) => `${count} not known`, lost: (count) => `${count} lost`, alarm: (count) => (count === 1 ? "1 alarm" : `${count} with alarms`), errors: (count) => `${count} with errors`,
-  waiting: (count) => `${count} waiting`, live: (count) => `${count} live, alarms not reported`, good: (count) => `${count} good`,
+  waiting: (count) => `${count} waiting`, live: (count) => `${count} live`, good: (count) => `${count} good`,
 };
+
+/** Goes on behind them where there is room. */
+export const MORE_WORDS = {live: ", alarms not reported"};
 
 /** [kind, strong, text] of each line that says what is wrong. */
 export function wrongs(one) {
@@ -113,7 +116,7 @@ export function wrongs(one) {
   return list;
 }
 
-/** A value of a reply: flags are a list of names, and null where it does not hold. */
+/** A value of an answer: flags are a list of names, and null where it does not hold. */
 export function fieldText(value, missing = "INVALID") {
   if (value === null) return missing;
   return Array.isArray(value) ? value.map(plain).join(", ") || "none" : String(value);

@@ -59,8 +59,10 @@ constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
 using enum FieldInfo::Kind;
 constexpr auto fields = author::fields_of<Values>(
     field<&Values::node>("node", "", "number of the node", Role::encoder),
-    field<&Values::function>("function", "", "what the identifier stands for in CANopen; this encoder does not use it"),
-    field<&Values::data>("data", "", "its data"), field<&Values::command>("command", "", "what is asked, or answered"),
+    field<&Values::function>("function", "", "what the identifier stands for in CANopen; this encoder does not use it",
+                             Role::exchange),
+    field<&Values::data>("data", "", "its data"),
+    field<&Values::command>("command", "", "what is asked, or answered", Role::exchange),
     field<&Values::value>("value", "", "counting direction as command 22 carries it"),
     field<&Values::new_node>("new_node", "", "number that the node is given"),
     field<&Values::bit_rate>("bit_rate", "bit/s", "bit rate that the node is given"),
@@ -140,16 +142,8 @@ constexpr auto commands = std::array{
     author::command<report, found, look_for_node, to<Order::read>>(
         {"node", Verb::config_get, 0, "number of the node", {}, false, false}),
     author::command<report, surveyed, configure, to<Order::node>, Order::node>(
-        {"set-node",
-         Verb::config_set,
-         0,
-         "give the only node on the bus another number",
-         node_arguments,
-         true,
-         false,
-         "node",
-         "node",
-         asks_all}),
+        {"set-node", Verb::config_set, 0, "give the only node on the bus another number", node_arguments, true, false,
+         "node", "node", asks_all}),
     author::command<report, surveyed, configure, to<Order::rate>, Order::rate>(
         {"bitrate",
          Verb::config_set,

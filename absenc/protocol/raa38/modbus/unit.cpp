@@ -165,7 +165,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
 
 constexpr auto fields = author::fields_of<Values>(
     field<&Values::address>("address", "", "address of the encoder", Role::encoder),
-    field<&Values::function>("function", "", "function code"),
+    field<&Values::function>("function", "", "function code", Role::exchange),
     field<&Values::first_register>("first_register", "", "where reading begins"),
     field<&Values::registers>("registers", "", "how many are asked for"),
     field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
@@ -173,7 +173,7 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::new_address>("new_address", "", "address from now on"),
     field<&Values::parameter>("parameter", "", "what function CC sets"),
     field<&Values::setting>("setting", "", "the same in words"),
-    field<&Values::crc_order>("crc_order", "", "which byte of the CRC comes first"),
+    field<&Values::crc_order>("crc_order", "", "which byte of the CRC comes first", Role::exchange),
     field<&Values::baud>("baud", "bit/s", "the baud rate at which it answers"),
     field<&Values::direction>("direction", "", "in which direction it counts"),
     field<&Values::effect>("effect", "", "what became of the position"),
