@@ -36,8 +36,7 @@ PortFacts port_facts(const std::string& path, const std::filesystem::path& sys) 
   std::error_code error;
   const std::string terminal = std::filesystem::canonical(path, error).filename();
   if (error) return facts;
-  const std::filesystem::path driver = std::filesystem::canonical(sys / terminal / "device" / "driver", error);
-  if (!error) facts.driver = driver.filename();
+  facts.driver = driver_of(terminal, sys);
   facts.latency_timer = latency_timer(terminal, sys);
   if (is_pseudo_terminal(path)) return facts;
   const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));

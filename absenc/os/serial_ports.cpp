@@ -27,8 +27,25 @@ std::string first_line(const fs::path& path) {
   return line;
 }
 
+std::optional<std::uint32_t> decimal_of(const fs::path& path) {
+  const std::string text = first_line(path);
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{}) return std::nullopt;
+  return number;
+}
+
 bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+// The first link in the folder that leads to the file; "" when none does.
+std::string link_to(const fs::path& file, const fs::path& folder) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (fs::equivalent(entry.path(), file, error)) return entry.path();
+  }
+  return {};
 }
 
 // "sleep (process 4711)"
@@ -67,13 +84,7 @@ std::string opener(const fs::path& file) {
 }
 
 Failure in_use(const std::string& path) {
-  std::error_code ignored;
-  const fs::path file = fs::canonical(path, ignored);
-  struct stat status {};
-  std::string holder;
-  if (::stat(path.c_str(), &status) == 0) holder = lock_holder(status);
-  // A pseudo-terminal is always open in the program that made it, which is not the one that is in the way.
-  if (holder.empty() && !file.native().starts_with("/dev/pts/")) holder = opener(file);
+  std::string holder = holder_of(path);
   if (holder.empty()) holder = "another program";
   return {Failure::Kind::in_use, "the port " + path + " is in use by " + holder + ": end it, or use another port"};
 }
@@ -118,11 +129,43 @@ std::vector<std::string> serial_ports(const fs::path& sys) {
 }
 
 std::optional<unsigned> latency_timer(const std::string& terminal, const fs::path& sys) {
-  const std::string text = first_line(sys / terminal / "device" / "latency_timer");
-  unsigned milliseconds = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), milliseconds);
-  if (error != std::errc{}) return std::nullopt;
-  return milliseconds;
+  return decimal_of(sys / terminal / "device" / "latency_timer");
+}
+
+std::string driver_of(const std::string& terminal, const fs::path& sys) {
+  std::error_code error;
+  // Since Linux 6.5 two devices of the kernel's own stand between a terminal and its UART
+  // (drivers/tty/serial/serial_base_bus.c).
+  for (fs::path device = fs::canonical(sys / terminal / "device", error); !error; device = device.parent_path()) {
+    const std::string driver = fs::canonical(device / "driver", error).filename();
+    if (error || (driver != "port" && driver != "ctrl")) return driver;
+  }
+  return {};
+}
+
+std::string holder_of(const std::string& path) {
+  std::error_code ignored;
+  const fs::path file = fs::canonical(path, ignored);
+  struct stat status {};
+  std::string holder;
+  if (::stat(path.c_str(), &status) == 0) holder = lock_holder(status);
+  // A pseudo-terminal is always open in the program that made it, which is not the one that is in the way.
+  if (holder.empty() && !file.native().starts_with("/dev/pts/")) holder = opener(file);
+  return holder;
+}
+
+ListedPort look_at(const std::string& path, const fs::path& sys, const fs::path& links) {
+  const std::string terminal = fs::path(path).filename();
+  ListedPort port{path, link_to(path, links), driver_of(terminal, sys), usb_adapter(terminal, sys),
+                  latency_timer(terminal, sys)};
+  const AdapterChip* chip = port.usb ? chip_of(*port.usb) : nullptr;
+  if (chip != nullptr) port.highest_rate = chip->highest_rate;
+  // Of a UART of the computer: sixteen periods of its clock are a bit (Documentation/ABI/testing/sysfs-tty).
+  const std::uint32_t clock = decimal_of(sys / terminal / "uartclk").value_or(0);
+  if (clock >= 16) port.highest_rate = clock / 16;
+  if (::access(path.c_str(), R_OK | W_OK) != 0) port.refusal = open_failure(path, errno).what();
+  port.holder = holder_of(path);
+  return port;
 }
 
 Failure open_failure(const std::string& path, int error) {

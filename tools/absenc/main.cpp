@@ -214,8 +214,16 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
   return exit_failed;
 }
 
+// Who types nothing has just plugged something in.
+int welcome() {
+  const int status = ports_subcommand.run({});
+  print_line("\n`absenc --help` shows all that absenc does, `absenc list` all encoders.");
+  return status;
+}
+
 /// `understood` is the verb as far as it was found, also when this throws.
 int run_command_line(std::span<char*> words, std::string& understood) {
+  if (words.empty()) return welcome();
   const Subcommand* subcommand = find_verb(words, understood);
   if (subcommand == nullptr) return exit_good;
   const std::optional<Invocation> invocation = Parser(*subcommand).parse(words.subspan(1));
@@ -231,9 +239,19 @@ int run_command_line(std::span<char*> words, std::string& understood) {
 int main(int argument_count, char** arguments) {
   using namespace absenc::tool;
   std::string understood;
+  std::vector<char*> words(arguments, arguments + argument_count);
+  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows none at all
+  std::string help_option = "--help", version_option = "--version";
+  // `absenc help read` is `absenc read --help`: people type both.
+  if (!words.empty() && std::string_view(words.front()) == "help") {
+    words.erase(words.begin());
+    words.push_back(help_option.data());
+  } else if (!words.empty() && std::string_view(words.front()) == "version") {
+    words.front() = version_option.data();
+  }
   try {
     absenc::os::protect_standard_streams();
-    return run_command_line(std::span(arguments, static_cast<std::size_t>(argument_count)).subspan(1), understood);
+    return run_command_line(words, understood);
   } catch (const UsageError& error) {
     print_message(error.what());
     print_note(fmt::format("Try: absenc {}{}--help", understood, understood.empty() ? "" : " "));

@@ -64,6 +64,7 @@ struct Subcommand {
 /// The words that may come after `first`, or, when that is "", those that a verb may begin with.
 [[nodiscard]] std::vector<std::string_view> words_after(std::string_view first);
 
+extern const Subcommand ports_subcommand;
 extern const Subcommand list_subcommand;
 extern const Subcommand read_subcommand;
 extern const Subcommand monitor_subcommand;

@@ -22,10 +22,11 @@ namespace absenc::client {
 namespace {
 
 constexpr Time short_patience = 700ms;      // with a scan that nobody answers,
+constexpr Time brief_patience = 150ms;      // with others where one answers beyond doubt,
 constexpr Time long_patience = 5s;          // and at the end, when nothing was found
 constexpr std::size_t busy_line = 32;       // bytes while listening: nobody can be asked
 constexpr std::size_t most_introduced = 4;  // of candidates that explain the same encoder equally well
-constexpr double beyond_doubt = -3;         // log10 of chance: then no further rates are tried
+constexpr double beyond_doubt = -3;         // log10 of chance: no further rates are tried then
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
@@ -204,7 +205,8 @@ class Search {
   template <class Item>
   void attempt_on(const Unit& unit, const Settings& settings) {
     if (search_.now() >= deadline_) throw OutOfTime{};
-    Attempt<Item> one(search_, unit, settings, patience_, deadline_, findings_);
+    const Time patience = is_beyond_doubt() ? brief_patience : patience_;
+    Attempt<Item> one(search_, unit, settings, patience, deadline_, findings_);
     if (one.line().rate == 0 && way_of(search_) == Way::serial) return;  // the rates come later
     const std::string line = line_of(unit.link, one.line());
     if (search_.progress) {

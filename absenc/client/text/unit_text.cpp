@@ -344,16 +344,20 @@ std::string_view name_of(LinkKind link) {
   return names[static_cast<std::size_t>(link)];
 }
 
+std::string rate_text(std::uint32_t bits_per_second) {
+  const double rate = bits_per_second;
+  if (bits_per_second >= 1'000'000) return fmt::format("{} Mbit/s", rate / 1e6);
+  return fmt::format("{} kbit/s", rate / 1e3);
+}
+
 std::string line_of(const Unit& unit) { return line_of(unit.link, unit.line); }
 
 std::string line_of(LinkKind link, const LineSettings& line) {
   static constexpr std::array<std::string_view, 5> words{"RS-485 half duplex", "full-duplex UART", "SPI",
                                                          "clocked bits", "CAN"};
-  const double rate = line.rate;
   const std::string_view kind = words[static_cast<std::size_t>(link)];
   if (line.rate == 0) return fmt::format("{}, baud to be given", kind);
-  if (line.rate >= 1'000'000) return fmt::format("{}, {} Mbit/s", kind, rate / 1e6);
-  return fmt::format("{}, {} kbit/s", kind, rate / 1e3);
+  return fmt::format("{}, {}", kind, rate_text(line.rate));
 }
 
 std::string printable(Bytes bytes) {

@@ -94,6 +94,8 @@ struct RoleArgument {
 
 /// "half_duplex"
 [[nodiscard]] std::string_view name_of(LinkKind link);
+/// "2.5 Mbit/s", "9.6 kbit/s"
+[[nodiscard]] std::string rate_text(std::uint32_t bits_per_second);
 /// "RS-485 half duplex, 2.5 Mbit/s"
 [[nodiscard]] std::string line_of(const Unit& unit);
 [[nodiscard]] std::string line_of(LinkKind link, const LineSettings& line);

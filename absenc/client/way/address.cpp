@@ -10,6 +10,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/named_encoder.hpp"
+#include "absenc/client/way/settings_file.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/os/socketcan.hpp"
 #include "absenc/protocol/all.hpp"
@@ -224,9 +225,11 @@ void parse_tcp(EncoderAddress& uri, std::string_view where) {
 void parse_where(EncoderAddress& uri, std::string_view address) {
   const std::size_t colon = address.find(':');
   const std::string_view unit = address.substr(0, colon);
-  if (unit.empty() || unit.find('/') != std::string_view::npos) {
-    throw UsageError(fmt::format("\"{}\" does not say which protocol: write it before the port, as in tformat:{}",
-                                 address, address.starts_with('/') ? address : "/dev/ttyUSB0"));
+  if (const std::optional<std::string> port = bare_port(address)) {
+    throw UsageError(
+        fmt::format("\"{0}\" does not say which protocol: `absenc identify {1}` finds it out; if you know "
+                    "it, write it before the port, as in tformat:{1}",
+                    address, *port));
   }
   if (unit == "sim") {
     if (colon == std::string_view::npos || colon + 1 == address.size()) {
@@ -274,6 +277,13 @@ EncoderAddress parse_place(std::string_view address) {
 bool is_name(std::string_view address) {
   return !address.empty() && address.find_first_of(":/") == std::string_view::npos && address != "sim" &&
          find_unit(address) == nullptr;
+}
+
+// A name that somebody gave to an encoder counts more than that of a port.
+bool is_in_settings_file(std::string_view name) {
+  const std::optional<SettingsFile> file = load_settings_file();
+  return file && std::any_of(file->encoders.begin(), file->encoders.end(),
+                             [&](const FileSection& encoder) { return encoder.name == name; });
 }
 
 bool fits(const EncoderAddress& uri, std::string_view setting) {
@@ -342,6 +352,22 @@ const LinkParameter* find_link_parameter(std::string_view name) {
   return found == link_parameters.end() ? nullptr : &*found;
 }
 
+std::optional<std::string> bare_port(std::string_view text) {
+  const std::string_view address = text.substr(0, text.find('?'));
+  const std::string_view first = address.substr(0, address.find(':'));
+  const bool is_place =
+      first.find('/') != std::string_view::npos || first == "tcp" || first == "spi" || first == "slcan";
+  if (is_place) return std::string(text);
+  if (!is_name(address)) return std::nullopt;
+  const auto is_one_of = [](const std::vector<std::string>& ports, std::string_view name) {
+    return std::find(ports.begin(), ports.end(), name) != ports.end();
+  };
+  const bool is_serial = is_one_of(os::serial_ports(), fmt::format("/dev/{}", address));
+  const bool is_port = is_serial || is_one_of(os::can_interfaces(), address);
+  if (!is_port || is_in_settings_file(address)) return std::nullopt;
+  return (is_serial ? "/dev/" : "") + std::string(text);
+}
+
 EncoderAddress parse_address(std::string_view text, std::span<const std::string> more) {
   const std::size_t question = std::min(text.find('?'), text.size());
   const std::string_view address = text.substr(0, question);
@@ -354,7 +380,7 @@ EncoderAddress parse_address(std::string_view text, std::span<const std::string>
   }
   for (const std::string& setting : more) settings.push_back(split_setting(setting));
   require_once(settings);
-  if (is_name(address)) {
+  if (is_name(address) && !bare_port(address)) {
     return parse_named(address, settings,
                        require_names(fmt::format("\"{}\" is no PROTOCOL:PORT, so it would have to be "
                                                  "a name of absenc.toml",

@@ -103,6 +103,10 @@ struct EncoderAddress {
 /// How fast the encoder may be taken to move: what the user says, or else as host::speed_limit.
 [[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
 
+/// Where the text names a port of this computer, or one on the network, and no protocol: that port with what stands
+/// behind ?, as `absenc identify` takes it. Empty for all others.
+[[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
+
 /// `settings` ("name=value") count as if they stood behind the text; both override what absenc.toml says of a name.
 /// Throws UsageError, which names what is wrong and the nearest name that would be right.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});

@@ -124,6 +124,25 @@ std::vector<std::string> advice(std::span<const Candidate> candidates) {
 
 }  // namespace
 
+std::string advice_for(const LineFindings& findings, const LineSearch& search) {
+  if (findings.heard == 0 && findings.unasked == 0 && findings.only_echo) {
+    return "only what was sent came back (the adapter's echo), and nothing from an encoder\n"
+           "  Try: the encoder's supply and ground; A and B swapped; the wires between adapter and encoder";
+  }
+  if (findings.heard == 0 && findings.unasked == 0) {
+    return fmt::format(
+        "{} requests were sent, and nothing came back\n"
+        "  Try: the encoder's supply and ground; A and B (or TX and RX) swapped; termination; an adapter that can\n"
+        "  send at these rates; more time, as in {}?latency=50",
+        findings.requests, search.place);
+  }
+  return fmt::format(
+      "{} bytes came, but no protocol explains them\n"
+      "  Try: A and B swapped, which makes every byte wrong; the baud rate, as in {}?baud=9600; shielding and\n"
+      "  termination; it may be an encoder that absenc does not know: `absenc crc find` looks into its frames",
+      findings.heard + findings.unasked, search.place);
+}
+
 std::string read_command(const Candidate& candidate, std::string_view place) {
   const std::string address = address_of(candidate, place);
   const std::string_view quote = address.find('?') == std::string::npos ? "" : "\"";
@@ -152,10 +171,11 @@ int show_candidates(std::span<const Candidate> candidates, const std::function<s
   show_table(shown);
   show_identities(shown);
   const std::vector<std::string> notes = advice(candidates);
-  std::string next = found ? "\ngo on with: " : "";
+  std::string next = "\ngo on with: ";
   for (const Candidate* one : encoders(candidates)) {
     print_line(std::exchange(next, "       and: ") + command(*one));
   }
+  if (!found) print_line("\nif it is the first: " + command(candidates.front()));
   for (const std::string& note : notes) print_message(note);
   return found ? exit_good : exit_failed;
 }

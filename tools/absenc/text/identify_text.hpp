@@ -14,6 +14,9 @@ namespace absenc::tool {
 
 using namespace client;
 
+/// Why a search found nothing, by what came, and what to try.
+[[nodiscard]] std::string advice_for(const LineFindings& findings, const LineSearch& search);
+
 /// absenc read "tformat:/dev/ttyUSB0?model=23-bit"
 [[nodiscard]] std::string read_command(const Candidate& candidate, std::string_view place);
 /// absenc decode tformat --option model=23-bit

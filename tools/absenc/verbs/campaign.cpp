@@ -115,7 +115,7 @@ std::vector<std::string> campaign_row(const CampaignResult& result) {
           worth ? fmt::format("{:.2g}", worth->taken) : "-"};
 }
 
-std::string rate_text(double rate) { return rate == 0 ? "0" : fmt::format("{:.2g}", rate); }
+std::string share_text(double rate) { return rate == 0 ? "0" : fmt::format("{:.2g}", rate); }
 
 std::vector<std::string> guarded_row(const CampaignResult& result) {
   const Guarded& guarded = *result.guarded;
@@ -123,11 +123,11 @@ std::vector<std::string> guarded_row(const CampaignResult& result) {
   return {result.protocol,
           fmt::format("{:.2g} %", 100 * result.failed.rate()),
           fmt::format("{:.4g} %", 100 * guarded.confirmed.rate()),
-          rate_text(guarded.alone.rate()),
+          share_text(guarded.alone.rate()),
           fmt::format("{}", guarded.wrong.count),
-          rate_text(guarded.wrong.rate()),
+          share_text(guarded.wrong.rate()),
           share_interval(guarded.wrong),
-          rate_text(guarded.let_through / confirmed)};
+          share_text(guarded.let_through / confirmed)};
 }
 
 const std::vector<std::string> campaign_heading{"PROTOCOL", "FAILED",   "RECOVERED",     "GIVEN UP",

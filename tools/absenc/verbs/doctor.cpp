@@ -2,13 +2,17 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <chrono>
+#include <optional>
 #include <string>
 
 #include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/identify/line.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
+#include "tools/absenc/text/identify_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/progress.hpp"
 
@@ -21,14 +25,32 @@ std::string finding_text(const Finding& one) {
                      one.action);
 }
 
+// The likeliest encoder behind a port of which nothing else is known.
+std::string identified(const std::string& port, Progress& progress) {
+  LineSearch search = parse_search(port);
+  search.limit = std::chrono::seconds(60);
+  search.progress = [&](const std::string& what) { progress.show(what); };
+  const LineFindings findings = search_line(search);
+  progress.clear();
+  if (findings.candidates.empty() || !is_found(findings.candidates.front())) {
+    throw Failure(fmt::format("which encoder is on {}? {}", search.place, advice_for(findings, search)));
+  }
+  const std::string address = address_of(findings.candidates.front(), search.place);
+  print_message(fmt::format("{}: this is examined", address));
+  return address;
+}
+
 int run_doctor(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderAddress address = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  Progress progress;
+  const std::string_view written = invocation.text("encoder");
+  const std::optional<std::string> port = bare_port(written);
+  const std::string encoder = port ? identified(*port, progress) : std::string(written);
+  const EncoderAddress address = parse_address(encoder, invocation.texts("--option"));
   const auto seconds = [&](std::string_view name, double fallback, double least) {
     const std::chrono::duration<double> time(invocation.real(name, fallback, least, 3600));
     return std::chrono::duration_cast<Time>(time);
   };
-  Progress progress;
   DoctorChoices choices;
   choices.readings = static_cast<std::size_t>(invocation.number("--readings", 300, 10, 1'000'000));
   choices.limit = seconds("--for", 3, 0.1);
@@ -55,7 +77,8 @@ constexpr std::array<Parameter, 6> doctor_parameters{{
     parameter::option,
 }};
 
-constexpr std::array<Example, 3> doctor_examples{{
+constexpr std::array<Example, 4> doctor_examples{{
+    {"absenc doctor /dev/ttyUSB0", "which encoder is there, and what is wrong with it"},
     {"absenc doctor tformat:/dev/ttyUSB0", "what is wrong with it, or with the way to it"},
     {"absenc doctor tformat:/dev/ttyUSB0 --turn 10", "also while the shaft is turned by hand"},
     {"absenc doctor \"sim:tformat?fault=corrupt=0.1\" --json", "a virtual encoder on a bad line, for programs"},
@@ -66,11 +89,11 @@ constexpr std::array<Example, 3> doctor_examples{{
 const Subcommand doctor_subcommand{
     "doctor",
     "say what is wrong with an encoder, or with the way to it, and what to do",
-    "Looks from the port up: whether it is there, may be opened and is nobody else's; whether the line is\n"
-    "silent until it is asked; whether anything answers, and if not, at another rate, SPI mode or clock;\n"
-    "what damaged replies look like; what the encoder reports; whether the position is quiet and goes no\n"
-    "faster than a shaft can. Each finding has what was seen, what is likely behind it and what to do.\n"
-    "The last line says good, or the first thing to mend. Nothing is ever written to the encoder.\n"
+    "A port without a protocol is identified first. Then looks from the port up: whether it is there, may be\n"
+    "opened and is nobody else's; whether the line is silent until it is asked; whether anything answers, and if\n"
+    "not, at another rate, SPI mode or clock; what damaged replies look like; what the encoder reports; whether the\n"
+    "position is quiet and goes no faster than a shaft can. Each finding has what was seen, what is likely behind it\n"
+    "and what to do. The last line says good, or the first thing to mend. Nothing is ever written to the encoder.\n"
     "Exit status 1 when something is to be mended.",
     doctor_parameters,
     doctor_examples,

@@ -91,25 +91,6 @@ int identify_frames(const Invocation& invocation) {
 
 // ---- A line
 
-std::string advice_for(const LineFindings& findings, const LineSearch& search) {
-  if (findings.heard == 0 && findings.unasked == 0 && findings.only_echo) {
-    return "only what was sent came back (the adapter's echo), and nothing from an encoder\n"
-           "  Try: the encoder's supply and ground; A and B swapped; the wires between adapter and encoder";
-  }
-  if (findings.heard == 0 && findings.unasked == 0) {
-    return fmt::format(
-        "{} requests were sent, and nothing came back\n"
-        "  Try: the encoder's supply and ground; A and B (or TX and RX) swapped; termination; an adapter that can\n"
-        "  send at these rates; more time, as in {}?latency=50",
-        findings.requests, search.place);
-  }
-  return fmt::format(
-      "{} bytes came, but no protocol explains them\n"
-      "  Try: A and B swapped, which makes every byte wrong; the baud rate, as in {}?baud=9600; shielding and\n"
-      "  termination; it may be an encoder that absenc does not know: `absenc crc find` looks into its frames",
-      findings.heard + findings.unasked, search.place);
-}
-
 LineSearch search_of(const Invocation& invocation) {
   LineSearch search = parse_search(invocation.text("where"));
   search.limit =

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a USB adapter says of itself, and how fast its chip is.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace absenc::os {
+
+/// From the descriptors of the USB device; what it does not have is empty.
+struct UsbAdapter {
+  std::uint16_t vendor = 0;     // idVendor
+  std::uint16_t product = 0;    // idProduct
+  std::uint16_t release = 0;    // bcdDevice: tells chips of one product number apart
+  std::string maker{};          // iManufacturer
+  std::string name{};           // iProduct
+  std::string serial_number{};  // iSerialNumber
+};
+
+/// A chip between USB and UART.
+struct AdapterChip {
+  std::string_view name;       // "FT232R"
+  std::uint32_t highest_rate;  // bits a second, by its data sheet
+};
+
+/// Of the terminal ("ttyUSB0"); empty when it is not on USB. `sys` is a parameter for tests.
+[[nodiscard]] std::optional<UsbAdapter> usb_adapter(const std::string& terminal,
+                                                    const std::filesystem::path& sys = "/sys/class/tty");
+
+/// Null when the numbers do not tell the chip.
+[[nodiscard]] const AdapterChip* chip_of(const UsbAdapter& adapter);
+
+}  // namespace absenc::os
