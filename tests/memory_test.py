@@ -98,7 +98,8 @@ class Bytes(MemoryCase):
         result = absenc("memory", "write", address, "5", "1", "3", "--yes", "--json")
         self.assertEqual(json.loads(result.stdout),
                          {"ok": True, "compared": 2, "written": [{"page": 0, "address": 6, "count": 1}],
-                          "differences": [{"page": 0, "address": 6, "encoder": 2, "wanted": 3}]})
+                          "differences": [{"page": 0, "address": 6, "encoder": 2, "wanted": 3}],
+                          "change": "confirmed"})
         result = absenc("memory", "write", address, "5", "1", "3", "--yes")
         self.assertEqual((result.stdout, result.stderr), ("all 2 bytes are so already: nothing to write\n", ""))
 
@@ -459,7 +460,8 @@ class Config(MemoryCase):
         result = absenc("config", "set", address, "overheat-threshold", "0", "--yes", "--json")
         self.assertEqual(json.loads(result.stdout),
                          {"ok": True, "setting": "overheat-threshold",
-                          "old": {"overheat_enabled": True, "overheat_threshold_c": 80}, "new": {"overheat_enabled": False}})
+                          "old": {"overheat_enabled": True, "overheat_threshold_c": 80}, "new": {"overheat_enabled": False},
+                          "change": "confirmed"})
         self.assertEqual(absenc("memory", "read", address, "4", "--page", "7").stdout, "0x04  00  .\n")
 
     def test_a_threshold_of_zero_degrees_is_no_setting(self):

@@ -422,6 +422,9 @@ class WhoMayWhat(ServeCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command(self.name, "memory-read", good, argument=["5"])
         self.assertEqual(status, 200, body)
+        self.assertNotIn("change", body)  # it only reads
+        status, body = server.command(self.name, "memory-write", good, argument=["5", "66"])
+        self.assertEqual((status, body["change"]), (200, "confirmed"))
         for command, argument in (("zerro", []), ("memory-read", ["x"]), ("memory-read", ["5", "6", "7", "8", "9"])):
             status, body = server.command(self.name, command, good, argument=argument)
             self.assertEqual(status, 400, body)

@@ -112,7 +112,10 @@ Reading Encoder::read_alarms() {
 
 Answer Encoder::run(std::string_view name, std::span<const std::int64_t> arguments) {
   const Command& command = require_command(unit(), name);
-  if (!connection_->connected()) connect();
+  if (!connection_->connected()) {
+    if (!command.changes_encoder) connect();
+    if (command.changes_encoder) before_change([this] { connect(); });
+  }
   AnswerSink sink;
   run_into(*connection_, command, complete_arguments(command, arguments), sink);
   return std::move(sink.answer);
@@ -172,6 +175,8 @@ void Encoder::connect() {
   offset_ = ahead_of(*connection_);
   was_there_ = true;
 }
+
+const Change& Encoder::change() const { return connection_->change(); }
 
 void Encoder::forget_position() {
   unwrapper_ = make_unwrapper(connection_->uri());

@@ -129,6 +129,9 @@ class Encoder {
   /// true. Empty: never. Returns what was so before.
   std::function<bool()> end_when(std::function<bool()> over);
 
+  /// What became of the last command that changes the encoder; what it threw says the same (change.hpp).
+  [[nodiscard]] const Change& change() const;
+
   /// The position starts again from the next reading: after a command that moves the zero.
   void forget_position();
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "absenc/client/change.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
@@ -112,6 +113,8 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   [[nodiscard]] const MemoryImage& written() const { return written_; }
   [[nodiscard]] MemoryImage not_written() const;
+  /// What became of the last byte that was to be written; not_sent while there was none.
+  [[nodiscard]] ChangeState state() const { return state_; }
   /// At most one byte, of which nobody knows whether it was written.
   [[nodiscard]] MemoryImage unknown() const;
 
@@ -124,6 +127,7 @@ class MemoryChange {
   MemoryImage written_{};
   MemoryImage left_{};
   std::optional<MemoryAddress> in_flight_{};
+  ChangeState state_ = ChangeState::not_sent;
 };
 
 }  // namespace absenc::client

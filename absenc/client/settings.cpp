@@ -46,14 +46,16 @@ void write(Connection& encoder, const Command& setter, Arguments arguments, Told
   } catch (const os::Failure& failure) {
     AnswerSink left;
     encoder.report_left(left);
-    if (left.answer.columns.empty()) throw;
+    const Change& change = encoder.change();
+    if (left.answer.columns.empty() || change.state != ChangeState::unknown) throw;
     std::string values;
     for (std::size_t i = 0; i < left.answer.columns.size(); ++i) {
       values += fmt::format("\n  {}: {}", left.answer.columns[i].name,
                             to_text(left.answer.columns[i], left.answer.values[i]));
     }
-    throw Failure(fmt::format("{}\n{} was written, but what became of it could not be seen:{}", failure.what(),
-                              setter.name, values));
+    const std::string text = fmt::format("{}\n{} was written, but what became of it could not be seen:{}",
+                                         failure.what(), setter.name, values);
+    throw OfChange<Failure>(Failure(text), text, change);
   }
 }
 
@@ -62,9 +64,10 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
   for (std::size_t i = 0; i < written.columns.size(); ++i) {
     const std::size_t place = place_of(now, written.columns[i].name);
     if (place == now.columns.size() || now.values[place] == written.values[i]) continue;
-    throw Failure(fmt::format("{} was written, but {} reads as {} instead of {}", name, written.columns[i].name,
-                              to_text(now.columns[place], now.values[place]),
-                              to_text(written.columns[i], written.values[i])));
+    const Failure failure(fmt::format("{} was written, but {} reads as {} instead of {}", name, written.columns[i].name,
+                                      to_text(now.columns[place], now.values[place]),
+                                      to_text(written.columns[i], written.values[i])));
+    throw OfChange<Failure>(failure, Change{ChangeState::unknown, "read it once more"});
   }
 }
 
@@ -138,10 +141,15 @@ SettingChange Settings::set(std::string_view name, std::span<const std::int64_t>
   Told told;
   write(*connection_, *setting.setter, values, told);
   const Answer& written = told.sink.answer;
-  SettingChange change{written, told.was_so, note_of(connection_->unit(), before, *setting.setter, values.front())};
+  SettingChange change{written, told.was_so, connection_->change().state,
+                       note_of(connection_->unit(), before, *setting.setter, values.front())};
   if (setting.getter == nullptr) return change;
-  change.now = answer_to(*connection_, *setting.getter);
-  require_same(change.now, written, setting.name());
+  try {
+    change.now = answer_to(*connection_, *setting.getter);
+    require_same(change.now, written, setting.name());
+  } catch (const std::exception&) {
+    rethrow_with(connection_->change());
+  }
   return change;
 }
 

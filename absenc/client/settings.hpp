@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/change.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -37,7 +38,8 @@ struct Setting {
 struct SettingChange {
   Answer now;           // as the encoder tells when it is asked anew; of what cannot be read, as it was written
   bool was_so = false;  // nothing was sent, because it was so already
-  std::string note{};   // "from now on it is reached with address=3", or ""
+  ChangeState state = ChangeState::none;  // not_sent where it was so already
+  std::string note{};                     // "from now on it is reached with address=3", or ""
 };
 
 class Connection;

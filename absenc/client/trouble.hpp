@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "absenc/client/change.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/core/time.hpp"
@@ -19,6 +20,7 @@ struct Trouble {
   std::string advice{};    // what to try
   std::string sent{};      // hexadecimal or as the link's wire text
   std::string received{};
+  Change change{};        // of a command that changes the encoder
   std::string finding{};  // of a reading: which of those of client/doctor.hpp it looks like, "only_echo: ..."
 
   /// Without the finding. Of several lines, without the last line end.

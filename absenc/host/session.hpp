@@ -130,6 +130,11 @@ class Session {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
+  /// What the last conversation sent that changes the encoder, also when its port threw.
+  [[nodiscard]] ChangeSent change_sent() const {
+    return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
+  }
+
   /// What is known of late replies belongs to the line: sessions of encoders on one line share it. It must outlive
   /// them.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }

@@ -35,6 +35,13 @@ struct StreamCounts {
   std::uint64_t discarded = 0;
 };
 
+/// What a conversation has sent that changes the encoder.
+enum class ChangeSent : std::uint8_t {
+  no,
+  yes,      // or it may have been
+  refused,  // and the encoder said, or showed when it was read back, that it is as it was
+};
+
 /// Host side. At `emit` and `done` the accessors describe the result; they stay valid until the next feed.
 template <class Item>
 struct Conversation : Machine<Item> {
@@ -58,6 +65,8 @@ struct Conversation : Machine<Item> {
   /// Asks to end early, from the next step on: a conversation that changes the encoder for its own use leaves it as it
   /// was, ends by itself and returns true. The others ignore it: they may be left at any step.
   virtual bool abort() { return false; }
+  /// Valid at every step, also when the port has thrown.
+  [[nodiscard]] virtual ChangeSent change_sent() const { return ChangeSent::no; }
   /// Puts what such a conversation leaves changed when it cannot go on after this step.
   virtual void report_left(FieldSink&) const {}
 

@@ -253,6 +253,7 @@ void Api::command(Watch& watch, const Request& request, const Reply& reply) {
   order.arguments = arguments_in(request, wanted);
   order.done = [reply](const Done& done) {
     Json json = Json::object().set("ok", done.good).set("text", done.text).set("fields", done.json);
+    if (done.change != ChangeState::none) json.set("change", word_of(done.change));
     reply.send({done.good ? 200U : 502U, "application/json", json.line() + "\n"});
   };
   give(watch, std::move(order), request, reply);

@@ -23,17 +23,21 @@ constexpr std::size_t most_bytes = 4096;  // of memory in one answer
 
 using Between = std::function<void()>;
 
-Done done_well(const Command& command, const Answer& answer, const std::string& note) {
-  return {true, fmt::format("{}: done{}{}", command.name, note.empty() ? "" : "; ", note), to_json(answer.row())};
+Done done_well(const Command& command, const Answer& answer, const std::string& note, ChangeState change) {
+  return {true, fmt::format("{}: done{}{}", command.name, note.empty() ? "" : "; ", note), to_json(answer.row()),
+          change};
 }
 
 // Settings are compared with what is read back.
 Done do_command(Encoder& live, const Order& order) {
   const Command& command = *order.command;
-  if (command.verb != Verb::config_set) return done_well(command, live.run(command.name, order.arguments), "");
+  if (command.verb != Verb::config_set) {
+    const Answer answer = live.run(command.name, order.arguments);
+    return done_well(command, answer, "", command.changes_encoder ? live.change().state : ChangeState::none);
+  }
   const std::string_view setting = command.reads_back.empty() ? command.name : command.reads_back;
   const SettingChange change = live.settings().set(setting, order.arguments);
-  return done_well(command, change.now, change.was_so ? "it was so already" : change.note);
+  return done_well(command, change.now, change.was_so ? "it was so already" : change.note, change.state);
 }
 
 // Asks for one after the other. What this encoder has not, or not with these options, is told in its place; `why` has
@@ -65,8 +69,8 @@ class Questions {
   /// False: with these options there is no such question.
   [[nodiscard]] bool was_asked() const { return was_asked_; }
   [[nodiscard]] Done done(Json json) const {
-    if (answered_) return {true, "read", std::move(json)};
-    return {false, first_, {}};
+    if (answered_) return {true, "read", std::move(json), ChangeState::none};
+    return {false, first_, {}, ChangeState::none};
   }
 
  private:
@@ -166,7 +170,8 @@ Done read_memory(Encoder& live, const MemoryImage& addresses, const Between& bet
         .set("address", run.first.address)
         .set("data", fmt::format("{:02x}", fmt::join(run.bytes, "")));
   });
-  return {true, "read", Json::object().set("ok", true).set("bytes", image.size()).set("memory", parts)};
+  return {true, "read", Json::object().set("ok", true).set("bytes", image.size()).set("memory", parts),
+          ChangeState::none};
 }
 
 }  // namespace

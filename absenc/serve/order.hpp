@@ -19,6 +19,7 @@ struct Done {
   bool good = false;
   std::string text{};
   client::Json json{};  // of a command its fields
+  client::ChangeState change = client::ChangeState::none;
 };
 
 struct Order {

@@ -91,7 +91,8 @@ void Watch::refuse_order(const std::string& why) {
     const std::lock_guard lock(mutex_);
     left = std::exchange(order_, std::nullopt);
   }
-  if (left) left->done({false, why, {}});
+  if (!left) return;
+  left->done({false, why, {}, left->changes_encoder() ? ChangeState::not_sent : ChangeState::none});
 }
 
 State Watch::state_now(Time age) const {
@@ -390,7 +391,11 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   const bool is_examination = order.kind == Order::Kind::examination;
   const bool is_told = is_examination || order.kind == Order::Kind::command;
   Done done;
+  const auto note = [&](const std::exception& failure) {
+    if (const Change* change = change_of(failure)) done.change = change->state;
+  };
   const auto finish = [&] {
+    if (order.changes_encoder() && done.change == ChangeState::none) done.change = ChangeState::not_sent;
     command_runs_ = false;
     take_orders(true);
     if (is_told) tell("command", done.text, order.who);
@@ -406,16 +411,18 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     if (!is_examination && !live.connection().connected()) live.connect();
     done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);
   } catch (const os::Failure& failure) {  // the next reading will find the port lost
-    const std::string_view how =
-        command_runs_ && live.connection().connected() ? "was broken off, read whether it was done" : "was not done";
-    done.text = fmt::format("{} {}: {}", name, how, failure.what());
-  } catch (const os::Interrupted&) {
+    note(failure);
+    done.text = fmt::format("{} was broken off: {}", name, failure.what());
+  } catch (const os::Interrupted& interrupted) {
+    note(interrupted);
     end(command_runs_ ? ": read whether it was done" : "");
     throw;
-  } catch (const os::Ended&) {
+  } catch (const os::Ended& ended) {
+    note(ended);
     end("");
     throw;
   } catch (const std::exception& error) {
+    note(error);
     done.text = fmt::format("{} failed: {}", name, error.what());
   }
   if (order.changes_encoder()) live.forget_position();

@@ -218,6 +218,12 @@ class Encoder:
         return Memory(self._encoder)
 
     @property
+    def change(self) -> Optional[str]:
+        """What became of the last call that was to change the encoder: "not_sent", "confirmed", "refused", or "unknown":
+        it was sent, and nothing good came back. None: there was none. What such a call raises has it too."""
+        return self._encoder.change or None
+
+    @property
     def config(self) -> Config:
         """What it is set to."""
         return Config(self._encoder)

@@ -2,9 +2,15 @@
 """What absenc raises. Everything is an AbsencError; what an encoder did wrong has a class for each kind."""
 from __future__ import annotations
 
+from typing import Optional
+
 
 class AbsencError(Exception):
     """Anything that this package raises by itself."""
+
+    #: Of a call that changes the encoder: "not_sent", "confirmed" (but reading it again failed), "refused", or "unknown":
+    #: it was sent, and nothing good came back. None: the call changes nothing.
+    change: Optional[str] = None
 
 
 class UsageError(AbsencError, ValueError):
@@ -42,7 +48,8 @@ class EncoderError(AbsencError):
         self.received = received  #: "1A 00 45"
 
     def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (str(self), self.message, self.exchange, self.advice, self.sent, self.received)
+        texts = (str(self), self.message, self.exchange, self.advice, self.sent, self.received)
+        return type(self), texts, {"change": self.change}
 
 
 class InvalidArgument(EncoderError):

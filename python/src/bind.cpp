@@ -32,6 +32,14 @@ void raise(const py::object& error) { PyErr_SetObject(py::type::of(error).ptr(),
 
 void raise(const char* name, const std::string& sentence) { raise(errors().attr(name)(sentence)); }
 
+// With the word of what became of a change, where the call was to make one.
+py::object changed(py::object error, const std::exception& failure) {
+  if (const client::Change* change = client::change_of(failure)) {
+    error.attr("change") = py::str(std::string(client::word_of(change->state)));
+  }
+  return error;
+}
+
 std::string_view name_of(os::Failure::Kind kind) {
   using Kind = os::Failure::Kind;
   switch (kind) {
@@ -57,15 +65,15 @@ void translate(std::exception_ptr thrown) {
   try {
     std::rethrow_exception(std::move(thrown));
   } catch (const client::EncoderFailure& failure) {
-    raise(error_object(failure.trouble));
+    raise(changed(error_object(failure.trouble), failure));
   } catch (const client::Failure& failure) {
-    raise("Failure", failure.what());
+    raise(changed(errors().attr("Failure")(failure.what()), failure));
   } catch (const client::UsageError& error) {
     raise("UsageError", error.what());
   } catch (const os::Failure& failure) {
-    raise(errors().attr("PortError")(failure.what(), name_of(failure.kind())));
-  } catch (const client::Cancelled&) {
-    raise("Cancelled", "another thread cancelled it");
+    raise(changed(errors().attr("PortError")(failure.what(), name_of(failure.kind())), failure));
+  } catch (const client::Cancelled& cancelled) {
+    raise(changed(errors().attr("Cancelled")("another thread cancelled it"), cancelled));
   } catch (const os::Interrupted&) {
     PyErr_SetNone(PyExc_KeyboardInterrupt);
   }

@@ -326,6 +326,8 @@ void bind_encoder(py::module_& module) {
       .def("memory_write", &memory_write)
       .def("record", &record)
       .def("counters", &counters_of)
+      .def_property_readonly(
+          "change", [](const PyEncoder& one) { return std::string(client::word_of(one.encoder().change().state)); })
       .def_property_readonly("unit", [](const PyEncoder& one) { return std::string(one.unit().id); })
       .def_property_readonly("model",
                              [](const PyEncoder& one) -> std::optional<std::string> {

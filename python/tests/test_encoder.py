@@ -271,3 +271,21 @@ with absenc.open("sim:tformat") as encoder:
             assert process.returncode == 0
         finally:
             process.kill()
+
+
+def test_what_became_of_a_change() -> None:
+    with absenc.open("sim:tformat") as encoder:
+        assert encoder.change is None
+        encoder.run("memory-write", 5, 0x42)
+        assert encoder.change == "confirmed"
+        with pytest.raises(absenc.errors.InvalidArgument) as refused:
+            encoder.run("memory-write", 127, 1)
+        assert refused.value.change == encoder.change == "not_sent"
+        assert pickle.loads(pickle.dumps(refused.value)).change == "not_sent"
+    with absenc.open("sim:tformat?fault=silence=1") as encoder:
+        with pytest.raises(absenc.errors.Timeout) as read:
+            encoder.read()
+        assert read.value.change is None
+        with pytest.raises(absenc.errors.Timeout) as written:
+            encoder.memory.write(5, b"\x42")
+        assert written.value.change == "not_sent"

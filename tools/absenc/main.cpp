@@ -192,8 +192,10 @@ std::string_view name_of(os::Failure::Kind kind) {
   return names[static_cast<std::size_t>(kind)];
 }
 
-Json failure(std::string_view name, std::string_view message) {
-  return Json::object().set("ok", false).set("error", name).set("message", message);
+Json failure(std::string_view name, const std::exception& failed) {
+  Json json = Json::object().set("ok", false).set("error", name).set("message", failed.what());
+  if (const Change* change = change_of(failed)) set_change(json, *change);
+  return json;
 }
 
 // Whoever reads JSON gets the end in JSON, too.
@@ -206,10 +208,10 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
     print_line(to_json(failed.trouble).line());
   } catch (const os::Failure& failed) {
     if (!json) throw;
-    print_line(failure(name_of(failed.kind()), failed.what()).line());
+    print_line(failure(name_of(failed.kind()), failed).line());
   } catch (const Failure& failed) {
     if (!json) throw;
-    print_line(failure("failed", failed.what()).line());
+    print_line(failure("failed", failed).line());
   }
   return exit_failed;
 }

@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 using FrameList = std::vector<CanFrame>;
 template <class Item>
-using Changes = std::vector<Change<Item>>;
+using Changes = std::vector<ReplyChange<Item>>;
 
 std::size_t bits_of(const ByteList& items) { return items.size() * 8; }
 std::size_t bits_of(const FrameList& items) { return items.empty() ? 0 : 64; }
@@ -227,7 +227,7 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
   }
   // All that are good requests, or one of those that are none.
   if (clause.demand == Demand::foreign_silent) {
-    for (const Change<Item>& change : of_special<Item>(clause)) {
+    for (const ReplyChange<Item>& change : of_special<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {
         change(m);
         m.is_meant = [&address, &m](const List& request) {
@@ -246,7 +246,7 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
     return all;
   }
   constexpr int most_specials = 8;
-  for (const Change<Item>& change : of_special<Item>(clause)) {
+  for (const ReplyChange<Item>& change : of_special<Item>(clause)) {
     for (int special = 0; special < most_specials; ++special) {
       all.push_back({.change = [change = change.change, special](Mutant<Item>& m) {
         change(m);
@@ -279,7 +279,7 @@ void check(const Unit& unit) {
     unsigned alone = 0;
     unsigned broken = 0;
     std::string last;
-    for (const Change<Item>& change : mutants_of<Item>(address, clause)) {
+    for (const ReplyChange<Item>& change : mutants_of<Item>(address, clause)) {
       ++tried;
       const Conformance mutant = conform_mutant<Item>(address, change, {.readings = 8});
       const std::vector<std::string> ids = with_verdict(mutant, Verdict::broken);
@@ -318,7 +318,7 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
     for (const Clause& clause : clauses_of(unit)) {
       if (verdict_of(good, clause.id) != Verdict::kept) continue;
       bool broken = false;
-      for (const Change<Item>& change : mutants_of<Item>(address, clause)) {
+      for (const ReplyChange<Item>& change : mutants_of<Item>(address, clause)) {
         broken = verdict_of(conform_mutant<Item>(address, change, {.readings = 3}), clause.id) == Verdict::broken;
         if (broken) break;
       }

@@ -108,7 +108,7 @@ class Mutant final : public Machine<Item> {
 
 /// A defect of an encoder, and the conditions that cause it.
 template <class Item>
-struct Change {
+struct ReplyChange {
   std::function<void(Mutant<Item>&)> change{};
   std::string condition{};
 };
@@ -123,7 +123,7 @@ Machine<Item>& machine_of(const VirtualDevice& device) {
 }
 
 template <class Item>
-Conformance conform_mutant(EncoderAddress address, const Change<Item>& change, const ConformChoices& choices) {
+Conformance conform_mutant(EncoderAddress address, const ReplyChange<Item>& change, const ConformChoices& choices) {
   if (!change.condition.empty()) address.device.conditions.push_back(change.condition);
   Link link;
   link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);

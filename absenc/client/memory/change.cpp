@@ -22,8 +22,10 @@ MemoryChange::MemoryChange(Memory memory, MemoryImage wanted, Access access)
 }
 
 void MemoryChange::look(const MemoryProgress& progress) {
-  memory_.check_model();
-  found_ = memory_.read(wanted_, progress);
+  before_change([&] {
+    memory_.check_model();
+    found_ = memory_.read(wanted_, progress);
+  });
   left_ = differing_ = client::differing(wanted_, found_);
 }
 
@@ -32,8 +34,16 @@ void MemoryChange::write(const MemoryProgress& progress) {
   while (!left_.empty()) {
     const auto [at, value] = *left_.begin();
     in_flight_ = at;
-    memory_.write(at, value, access_);
+    try {
+      memory_.write(at, value, access_);
+    } catch (const std::exception& failure) {
+      const Change* change = change_of(failure);
+      state_ = change != nullptr ? change->state : ChangeState::not_sent;
+      if (state_ != ChangeState::unknown) in_flight_.reset();
+      throw;
+    }
     in_flight_.reset();
+    state_ = ChangeState::confirmed;
     written_[at] = value;
     left_.erase(at);
     if (progress) progress(written_.size(), all);
@@ -41,13 +51,21 @@ void MemoryChange::write(const MemoryProgress& progress) {
 }
 
 void MemoryChange::verify(const MemoryProgress& progress) {
-  const MemoryImage wrong = client::differing(written_, memory_.read(written_, progress));
+  const MemoryImage wrong = [&] {
+    try {
+      return client::differing(written_, memory_.read(written_, progress));
+    } catch (const std::exception&) {
+      rethrow_with({state_});
+    }
+  }();
   if (wrong.empty()) return;
   for (const auto& [at, value] : wrong) {
     written_.erase(at);
     left_[at] = value;
   }
-  throw Failure("bytes that were written and read back have changed again");
+  state_ = ChangeState::unknown;
+  const Failure failure("bytes that were written and read back have changed again");
+  throw OfChange<Failure>(failure, Change{state_, "the same again writes only what differs now"});
 }
 
 void MemoryChange::settle() {
@@ -58,6 +76,7 @@ void MemoryChange::settle() {
     os::sleep_until(os::now() + settling);
     const bool there = memory_.read({{at, 0}}).at(at) == value;
     in_flight_.reset();
+    state_ = there ? ChangeState::confirmed : ChangeState::refused;
     if (!there) return;
     written_[at] = value;
     left_.erase(at);

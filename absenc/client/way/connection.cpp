@@ -22,6 +22,52 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
+// "baud=57600", as it stands behind an address.
+std::string option_text(const Unit& unit, const Options& options, std::string_view name) {
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const Option& option = unit.options[i];
+    if (option.name != name) continue;
+    const std::int64_t value = options.values[i];
+    const auto choice = static_cast<std::size_t>(value);
+    if (choice < option.choices.size()) return fmt::format("{}={}", name, option.choices[choice]);
+    return fmt::format("{}={}", name, value);
+  }
+  return {};
+}
+
+// "it is reached with baud=57600 now", or "".
+std::string new_way(const EncoderAddress& before, const Command& command, Arguments arguments) {
+  if (command.changes_option.empty()) return {};
+  const Options behind = options_behind(*before.unit, before.options, command, arguments.front());
+  if (behind.values == before.options.values) return {};
+  return fmt::format("it is reached with {} now", option_text(*before.unit, behind, command.changes_option));
+}
+
+// How to see what an encoder is now that may have been changed.
+std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments) {
+  const Unit& unit = *before.unit;
+  const std::string address = address_of(before);
+  if (!command.changes_option.empty()) {
+    const Options behind = options_behind(unit, before.options, command, arguments.front());
+    return fmt::format("try `absenc read {0}` with {1}, then with {2} as before, and only if neither answers search",
+                       address, option_text(unit, behind, command.changes_option),
+                       option_text(unit, before.options, command.changes_option));
+  }
+  if (!command.reads_back.empty()) {
+    return fmt::format("`absenc config get {} {}` shows what it is now", address, command.reads_back);
+  }
+  if (command.verb == Verb::memory_write && find_command(unit, Verb::memory_read) != nullptr) {
+    const auto of_role = [&](Role role) -> std::int64_t {
+      const Argument* argument = find_role(command.arguments, role);
+      return argument != nullptr ? arguments[static_cast<std::size_t>(argument - command.arguments.data())] : 0;
+    };
+    const std::int64_t page = of_role(Role::page);
+    return fmt::format("`absenc memory read {} 0x{:02X}{}` shows what is there now", address, of_role(Role::address),
+                       page != 0 ? fmt::format(" --page {}", page) : "");
+  }
+  return fmt::format("`absenc read {}` shows how the encoder is now; look before you send it again", address);
+}
+
 template <class Item>
 class ConnectionOn final : public Connection {
  public:
@@ -55,21 +101,20 @@ class ConnectionOn final : public Connection {
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
-    if (link_.use_count() > 1) tell_of_company();
-    const Outcome ended = outcome(command, link_->take_turn([&] {
-      return runner_.converse([&](host::Session<Item>& session) {
-        return session.run(command, arguments, [&](const Conversation<Item>& conversation) {
-          last_ = &conversation;
-          if (on_emit) on_emit();
-          return true;
-        });
-      });
-    }));
-    if (ended.error == Error::none && !ended.aborted && !command.changes_option.empty()) {
-      set_options(options_behind(unit(), uri().options, command, arguments.front()));
+    if (!command.changes_encoder) return carry_out(command, arguments, on_emit);
+    change_ = {ChangeState::not_sent};
+    requests_before_ = port_.requests;
+    const EncoderAddress before = uri();
+    try {
+      Outcome ended = carry_out(command, arguments, on_emit);
+      ended.change = change_ = change_after(before, command, arguments, ended.error == Error::none);
+      return ended;
+    } catch (const std::exception&) {
+      change_ = change_after(before, command, arguments, false);
+      rethrow_with(change_);
     }
-    return ended;
   }
+  const Change& change() const override { return change_; }
 
   void set_options(const Options& options) override {
     Connection::set_options(options);
@@ -112,6 +157,13 @@ class ConnectionOn final : public Connection {
   }
 
   Trouble trouble(const Outcome& outcome) const override {
+    Trouble trouble = explained(outcome);
+    trouble.change = outcome.change;
+    return trouble;
+  }
+
+ private:
+  [[nodiscard]] Trouble explained(const Outcome& outcome) const {
     Trouble trouble{.error = outcome.error};
     const bool callers_fault = outcome.error <= Error::buffer_too_small;
     if (callers_fault) {
@@ -132,7 +184,33 @@ class ConnectionOn final : public Connection {
     return trouble;
   }
 
- private:
+  Outcome carry_out(const Command& command, Arguments arguments, const std::function<void()>& on_emit) {
+    if (link_.use_count() > 1) tell_of_company();
+    const Outcome ended = outcome(command, link_->take_turn([&] {
+      return runner_.converse([&](host::Session<Item>& session) {
+        requests_before_ = port_.requests;
+        return session.run(command, arguments, [&](const Conversation<Item>& conversation) {
+          last_ = &conversation;
+          if (on_emit) on_emit();
+          return true;
+        });
+      });
+    }));
+    if (ended.error == Error::none && !ended.aborted && !command.changes_option.empty()) {
+      set_options(options_behind(unit(), uri().options, command, arguments.front()));
+    }
+    return ended;
+  }
+
+  // `before`: how the encoder was reached.
+  Change change_after(const EncoderAddress& before, const Command& command, Arguments arguments, bool good) const {
+    const ChangeSent sent = port_.requests != requests_before_ ? session_.change_sent() : ChangeSent::no;
+    if (sent == ChangeSent::no) return {ChangeState::not_sent};
+    if (good) return {ChangeState::confirmed, new_way(before, command, arguments)};
+    if (sent == ChangeSent::refused) return {ChangeState::refused};
+    return {ChangeState::unknown, advice_to_look(before, command, arguments)};
+  }
+
   // Others have the same line open.
   void tell_of_company() {
     Options options = uri().options;
@@ -145,8 +223,8 @@ class ConnectionOn final : public Connection {
       throw UsageError(fmt::format("{} cannot run {} with these options", unit().id, command.name));
     }
     last_ = conversation;
-    return {conversation->error(), conversation->detail(), conversation->advice(), port_.take_aborted(),
-            conversation->reading()};
+    return {conversation->error(), conversation->detail(),  conversation->advice(),
+            port_.take_aborted(),  conversation->reading(), {}};
   }
 
   // A reply that comes, only too late, is another trouble than one that never comes.
@@ -242,6 +320,8 @@ class ConnectionOn final : public Connection {
   const LineExchange<Item>& line_ = runner_.last();
   host::Statistics<Item> statistics_;
   const Conversation<Item>* last_ = nullptr;
+  Change change_{};
+  std::uint64_t requests_before_ = 0;  // the last command that changes the encoder
 };
 
 }  // namespace
@@ -250,7 +330,7 @@ std::string Trouble::text() const {
   std::string lines = fmt::format("{}: {}", text_of(error).name, message);
   if (!exchange.empty()) lines += fmt::format("\n  {}", exchange);
   if (!advice.empty()) lines += fmt::format("\n  Try: {}", advice);
-  return lines;
+  return with_change(lines, change);
 }
 
 // What the user said of the line stays, but where the encoder has another rate now.

@@ -21,6 +21,7 @@ struct Outcome {
   std::string_view advice{};         // "": that of the error
   bool aborted = false;              // ended early because of a signal, and left the encoder as it was
   const Reading* reading = nullptr;  // null when it failed, or is no position
+  Change change{};                   // of a command that changes the encoder
 };
 
 class Connection {
@@ -46,6 +47,8 @@ class Connection {
   /// `on_emit` is called for each result but the last; `report` then tells of it. What reaches the encoder by what the
   /// command sets reaches it by the new value from now on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
+  /// What became of the last command that changes the encoder, also when it has thrown.
+  [[nodiscard]] virtual const Change& change() const = 0;
   /// The fields of the last outcome, and its reading.
   virtual void report(FieldSink& sink) const = 0;
   /// After `run` threw: what the encoder was left with. Nothing for most commands.

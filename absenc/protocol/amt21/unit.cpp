@@ -55,7 +55,7 @@ Procedure restart(Dialog& dialog, Found& found, Ask act) {
   } else {
     co_await look(dialog, found, request<Ask::position>(dialog.format()));
   }
-  co_await dialog.ask({act, dialog.format().address});
+  co_await dialog.ask({act, dialog.format().address}).changes();
   co_await dialog.rest(restart_time + between_looks);
   const Result<Reply> answer = co_await dialog.attempt(request<Ask::position>(dialog.format()));
   if (!answer) co_return {answer.error(), "it was sent, but whether the encoder obeyed could not be read"};

@@ -50,6 +50,7 @@ class DialogOf<P> : public CanEngine, public Routine {
   [[nodiscard]] Time heard_at() const { return heard_at_; }
   /// Whether it came before what was asked had left: see `overhear`.
   using CanEngine::came_early;
+  [[nodiscard]] ChangeSent change_sent() const final { return change(); }
   /// That frame is the answer.
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 

@@ -132,6 +132,11 @@ class DialogOf : public HostOf<P>, public Routine {
       dialog_.asking_.repeats = attempts - 1;
       return *this;
     }
+    /// It changes the encoder, if it is obeyed.
+    Question& changes() {
+      dialog_.changing_ = true;
+      return *this;
+    }
     /// Its reply is taken only when silence follows, as Manner::ends_by_silence.
     Question& until_silence() {
       dialog_.asking_.ends_by_silence = true;
@@ -205,6 +210,7 @@ class DialogOf : public HostOf<P>, public Routine {
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
+  [[nodiscard]] ChangeSent change_sent() const final { return change(); }
   /// From here on it leaves the encoder as it was when it is asked to end early; `is_aborted` tells.
   void restores(bool yes = true) { restores_ = yes; }
   [[nodiscard]] bool is_aborted() const { return aborted_; }
@@ -223,13 +229,16 @@ class DialogOf : public HostOf<P>, public Routine {
     asking_ = P::manner(this->format(), request);
     earliest_ = {};
     words_ = {};
+    changing_ = false;
   }
   void ask_it(bool must) {
     must_ = must;
+    if (changing_) Routine::changes();
     HostOf<P>::ask(next_, asking_, earliest_);
   }
   void concluded(Error error) final {
     failure_ = error;
+    if (changing_ && error == Error::request_rejected) refused();
     if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
     resume();
   }
@@ -254,6 +263,7 @@ class DialogOf : public HostOf<P>, public Routine {
   Error failure_ = Error::none;
   Heard heard_{};
   bool must_ = false;
+  bool changing_ = false;  // what is asked
   bool restores_ = false;
   bool aborted_ = false;
 };

@@ -14,6 +14,7 @@
 
 #include "absenc/core/result.hpp"
 #include "absenc/core/time.hpp"
+#include "absenc/protocol/conversation.hpp"
 
 // Without optimisation g++ 12 takes the frame's own operators for a pair that does not match, in every coroutine.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
@@ -63,6 +64,12 @@ class Routine {
   /// Bytes of storage that its frames took at the most.
   [[nodiscard]] std::size_t frames_size() const { return most_used_; }
 
+  /// What is sent from here on may change the encoder.
+  void changes() { change_ = ChangeSent::yes; }
+  /// The encoder is as it was before `changes`: it said so, or reading back shows it.
+  void refused() { change_ = ChangeSent::refused; }
+  [[nodiscard]] ChangeSent change() const { return change_; }
+
   /// Ends the procedure from any depth: `co_await dialog.stop({Error::busy, "..."})`.
   [[nodiscard]] auto stop(const Outcome& outcome) {
     struct Stop {
@@ -103,6 +110,7 @@ class Routine {
   std::span<std::byte> arena_;
   std::size_t used_ = 0;
   std::size_t most_used_ = 0;
+  ChangeSent change_ = ChangeSent::no;
   std::coroutine_handle<> current_{};
   std::coroutine_handle<> next_{};
 };

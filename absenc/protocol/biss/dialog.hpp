@@ -35,6 +35,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
+  [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
   /// Each good position is handed out, before the next frame begins.
   void emit_positions() { emits_ = true; }
 

@@ -111,6 +111,15 @@ Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsi
   co_return error != Error::none ? error : Error::cross_check_failed;
 }
 
+/// The same, of what the command was asked for.
+template <class F>
+Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
+  dialog.changes();
+  const Error error = co_await write_register(dialog, master, address, value);
+  if (error == Error::request_rejected) dialog.refused();
+  co_return error;
+}
+
 /// The bank that holds an address, where it is in one.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
@@ -171,7 +180,7 @@ Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments argumen
   error = co_await read_registers(dialog, master, before, address, 1);
   if (error != Error::none) co_return failure_of(error);
   found.written = before[0] != value || force;
-  if (*found.written) error = co_await write_register(dialog, master, address, value);
+  if (*found.written) error = co_await change_register(dialog, master, address, value);
   if (error == Error::cross_check_failed) {
     co_return only(error, "reading back gave another value: the write has failed");
   }
@@ -203,7 +212,7 @@ template <class F>
 Procedure write_bank(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
   ControlMaster master;
   const auto bank = static_cast<std::uint8_t>(arguments[0]);
-  const Error error = co_await write_register(dialog, master, registers::bank_select, bank);
+  const Error error = co_await change_register(dialog, master, registers::bank_select, bank);
   if (error == Error::cross_check_failed) co_return only(error, "another bank is selected still");
   if (error != Error::none) co_return failure_of(error);
   found.slave_id = dialog.format().slave;
@@ -247,8 +256,10 @@ template <class F>
 Procedure send_command(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
   ControlMaster master;
   master.command(static_cast<std::uint8_t>(arguments[0]), static_cast<unsigned>(arguments[1]));
+  dialog.changes();
   const Error error = co_await carry(dialog, master);
   const Result<typename ControlDialog<F>::Reply> last = co_await dialog.frame();
+  if (error == Error::request_rejected) dialog.refused();
   if (error == Error::request_rejected) co_return only(error, "not every encoder acknowledged: nothing was executed");
   if (error != Error::none) co_return failure_of(error);
   if (!last) co_return only(last.error(), "whether the encoders obeyed is not known");

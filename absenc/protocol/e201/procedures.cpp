@@ -66,7 +66,7 @@ namespace {
 
 // `none`, why that could not be done or read back, or cross_check_failed: it is another one.
 Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
-  const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock});
+  const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock}).changes();
   if (!told) co_return told.error();
   const Result<Reply> now = co_await dialog.attempt({letter::clock});
   if (!now) co_return now.error();
@@ -85,7 +85,7 @@ Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments) {
 }
 
 Procedure switch_supply(Dialog& dialog, Found& found, bool on) {
-  co_await dialog.ask({on ? letter::supply_on : letter::supply_off});
+  co_await dialog.ask({on ? letter::supply_on : letter::supply_off}).changes();
   const Reply reply = co_await dialog.ask({letter::supply}).after(supply_time);
   found.supply = reply.text;
   const std::optional<unsigned> voltage = find_milli(reply.text, 'V');
@@ -122,7 +122,7 @@ Procedure set_zero(Dialog& dialog, Found& found) {
     co_return {Error::invalid_argument, "the encoder moves: it must stand still; nothing was changed",
                "stop the shaft, then try again"};
   }
-  co_await dialog.ask({letter::zero});
+  co_await dialog.ask({letter::zero}).changes();
   const Reply now = co_await dialog.ask({letter::decimal});
   if (!is_near(dialog, now.number, 0)) {
     co_return {Error::cross_check_failed, "the position is not zero afterwards",

@@ -94,6 +94,7 @@ Part<Error> send(Dialog& dialog, Found& found) {
     Frames::Request request{Ask::reset};
     if (found.in_step) request = {Ask::position, found.access[sent++]};
     found.was_asked = sent == found.access.size();
+    if (found.was_asked && found.writes) dialog.changes();
     const Error error = co_await ask_frame(dialog, found, request);
     if (damage(found, error) != Error::none) co_return damage(found, error);
   }
@@ -191,12 +192,18 @@ Part<bool> read(Dialog& dialog, Found& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
+// Of a procedure that writes twice only a refusal of the first write leaves the encoder as it was.
+void note_refusal(Dialog& dialog, const Found& found, Fate fate) {
+  if (fate == Fate::refused && found.why.error == Error::request_rejected && !found.changed) dialog.refused();
+}
+
 // A write whose answer is lost is repeated only if reading back shows that it was not executed.
 Part<bool> write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
   constexpr std::string_view in_the_middle =
       "the encoder stopped answering in the middle of a register write: read it to see whether it was written";
   for (unsigned left = write_attempts; left > 0; --left) {
     Fate fate = co_await attempt_write(dialog, found, address, size, value);
+    note_refusal(dialog, found, fate);
     const bool untouched = fate == Fate::gone && !found.was_asked;
     if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
     if (fate != Fate::gone) fate = co_await attempt_read(dialog, found, address, size);
@@ -204,7 +211,10 @@ Part<bool> write(Dialog& dialog, Found& found, std::uint32_t address, std::uint1
     if (fate != Fate::good) {
       co_await dialog.stop({found.why.error, "the register may be written: it could not be read back"});
     }
-    if (load_big_endian(found.data) == value) co_return true;
+    if (load_big_endian(found.data) == value) {
+      found.changed = true;
+      co_return true;
+    }
   }
   co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
                         "look whether the configuration is locked, with `absenc config get ... write-lock`"});
@@ -217,6 +227,7 @@ Part<bool> write(Dialog& dialog, Found& found, RegisterIndex index, std::uint64_
 
 Part<bool> tell(Dialog& dialog, Found& found, std::uint8_t code) {
   const Fate fate = co_await attempt_write(dialog, found, registers[command_register].address, 1, code);
+  note_refusal(dialog, found, fate);
   const bool untouched = fate == Fate::gone && !found.was_asked;
   if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
   if (fate != Fate::good) {
@@ -346,6 +357,7 @@ Procedure zero(Dialog& dialog, Found& found, Arguments arguments) {
   co_await write(dialog, found, position_offset, offset);
   if (!is_near(dialog, 0, author::zero_millidegrees)) {
     co_await write(dialog, found, position_offset, old);
+    dialog.refused();
     co_return {Error::cross_check_failed, "the position did not become zero, the old offset is back",
                "hold the shaft still, or change the option offset_sign or offset_unit"};
   }

@@ -41,6 +41,7 @@ struct Found : Channels {
   AccessBytes access{};                // the register access under way
   bool writes = false;                 // it does
   bool was_asked = false;              // all of it went out: the encoder may have executed it
+  bool changed = false;                // a register was written, and read back
   std::uint16_t length = 0;            // bytes it reads
   ByteBuffer<access_capacity> data{};  // that it has read
   author::Outcome why{};               // it did not go well

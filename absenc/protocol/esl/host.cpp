@@ -125,7 +125,7 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
   if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
   for (unsigned i = 0; i < reset_requests; ++i) {
     const Time pause = i == 0 ? Time{} : pause_between_resets(dialog, id);
-    const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).after(pause);
+    const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).changes().after(pause);
     // When the last reply is lost, the reset may have been done all the same: reading tells.
     if (reply || i + 1 == reset_requests) continue;
     co_return {reply.error(),
@@ -230,11 +230,13 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   if (before == value) co_return done;
   // A lost reply does not tell whether the write was done: reading back does.
   const Request write{DataId::write_memory, dialog.format().address, address, value};
+  dialog.changes();
   static_cast<void>(co_await settled(dialog, write));
   if (!is_immediate(page, address)) co_await dialog.rest(eeprom_write_pause);
   const std::uint8_t now =
       co_await read_byte(dialog, page, address, "the byte was written, but could not be read back");
   if (now == value) co_return done;
+  if (now == before) dialog.refused();
   co_return {Error::cross_check_failed, "reading back gave another value: the write has failed",
              "look at what is there with `absenc memory read` before you write it again", eeprom_read_pause};
 }
@@ -242,6 +244,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
 Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
   const auto page = static_cast<std::uint8_t>(arguments[0]);
   if (!is_page(page)) co_return {Error::invalid_argument, "Table 11 lists no such page; nothing was sent"};
+  dialog.changes();
   co_await turn_to(dialog, page, {});
   found.page = co_await read_byte(dialog, page, page_select_address, {});
   if (found.page == page) co_return done;

@@ -78,7 +78,7 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
 
   // Intervals are counted from the end of the reply: that is 40 us or more however the document means it.
   for (unsigned sent = 1; sent <= reset_requests; ++sent) {
-    const Result<Reply> reply = co_await dialog.attempt({id}).after(reset_interval);
+    const Result<Reply> reply = co_await dialog.attempt({id}).changes().after(reset_interval);
     // When the tenth reply is lost, the reset may have been done all the same: reading tells.
     if (!reply && sent < reset_requests) {
       co_return {reply.error(),
@@ -166,14 +166,19 @@ Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::u
   const std::uint8_t before = co_await insist(dialog, look, "nothing was written");
   found.written = before != value;
   if (before == value) co_return false;
+  dialog.changes();
   const Result<Reply> reply = co_await persist(dialog, {DataId::write_memory, address, value});
-  if (reply.error() == Error::busy) co_await dialog.stop(failure(dialog, Error::busy, ""));
+  if (reply.error() == Error::busy) {
+    dialog.refused();
+    co_await dialog.stop(failure(dialog, Error::busy, ""));
+  }
   // A lost reply does not tell whether the write was done: reading back does, of the EEPROM itself.
   co_await dialog.rest(memory_time);
   constexpr std::string_view lost = "the byte was written, but could not be read back";
   co_await select_page(dialog, found, *found.selected, lost);
   const std::uint8_t now = co_await insist(dialog, look, lost);
   if (now != value) {
+    if (now == before) dialog.refused();
     co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
                           "look at what is there with `absenc memory read` before you write it again"});
   }

@@ -34,9 +34,16 @@ std::string summary(const host::Counters& counters) {
   return text;
 }
 
+void set_change(Json& json, const Change& change) {
+  if (change.state == ChangeState::none) return;
+  json.set("change", word_of(change.state));
+  if (!change.advice.empty()) json.set("change_advice", change.advice);
+}
+
 Json to_json(const Trouble& trouble) {
   Json json = Json::object().set("ok", false).set("error", text_of(trouble.error).name).set("message", trouble.message);
   if (!trouble.advice.empty()) json.set("advice", trouble.advice);
+  set_change(json, trouble.change);
   return json.set("sent", trouble.sent).set("received", trouble.received);
 }
 

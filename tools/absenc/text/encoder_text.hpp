@@ -22,6 +22,9 @@ void print_notes(const Connection& encoder);
 /// {"ok":false,"error":...}
 [[nodiscard]] Json to_json(const Trouble& trouble);
 
+/// Sets "change", the word of its state, and "change_advice" where there is one; nothing of none.
+void set_change(Json& json, const Change& change);
+
 /// What a failed reading looks like, on one line, and who says more: "Looks like only_echo: ...; `absenc doctor ...".
 [[nodiscard]] std::string finding_line(const Trouble& trouble, const EncoderAddress& address);
 

@@ -58,7 +58,7 @@ class Change {
   int run() {
     const bool dry = invocation_.has("--dry-run");
     asks_ = !dry && must_ask(invocation_, uri_, "writing memory", "bytes that differ are overwritten");
-    encoder_ = open_connection(uri_);
+    encoder_ = before_change([&] { return open_connection(uri_); });
     change_.emplace(Memory(*encoder_), wanted_, access_);
     try {
       with_progress("reading", [&](const MemoryProgress& progress) { change_->look(progress); });
@@ -106,6 +106,7 @@ class Change {
                      .set("compared", wanted_.size())
                      .set("differences", differences_json(change_->differing(), change_->found()))
                      .set("written", addresses_json(written))
+                     .set("change", word_of(change_->state()))
                      .line());
     } else if (!written.empty()) {
       print_line(fmt::format("{} {} written and read back", written.size(), noun(written.size())));
@@ -137,7 +138,8 @@ class Change {
     const MemoryImage left = change_->not_written();
     if (json()) {
       answer.set("written", addresses_json(written)).set("not_written", addresses_json(left));
-      print_line(answer.set("unknown", addresses_json(unknown)).line());
+      answer.set("unknown", addresses_json(unknown)).set("change", word_of(change_->state()));
+      print_line(answer.line());
       return exit_failed;
     }
     if (written.empty() && unknown.empty()) print_note("  nothing was written");

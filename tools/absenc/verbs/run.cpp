@@ -44,16 +44,15 @@ Outcome run_watched(Connection& encoder, const Command& command, Arguments argum
     return encoder.run(command, arguments, [&] { show_progress(progress, encoder, command); });
   } catch (const os::Interrupted&) {
     if (!command.changes_encoder) throw;
-    throw Failure(
-        fmt::format("interrupted in the middle of {}: whether it was done is not known, read the encoder "
-                    "before you try again",
-                    command.name));
+    const Failure failure(fmt::format("interrupted in the middle of {}", command.name));
+    throw OfChange<Failure>(failure, encoder.change());
   } catch (const os::Failure& failure) {
     FieldTable left;
     encoder.report_left(left);
     if (left.rows.empty()) throw;
-    throw Failure(
-        fmt::format("{}\n{} was broken off and has left:\n{}", failure.what(), command.name, table(left.rows)));
+    const std::string text =
+        fmt::format("{}\n{} was broken off and has left:\n{}", failure.what(), command.name, table(left.rows));
+    throw OfChange<Failure>(Failure(text), text, encoder.change());
   }
 }
 
@@ -82,14 +81,21 @@ int run_command(const Invocation& invocation, const EncoderAddress& uri, const C
     return exit_failed;
   }
 
-  const std::unique_ptr<Connection> encoder = open_connection(uri);
+  const std::unique_ptr<Connection> encoder =
+      command.changes_encoder ? before_change([&] { return open_connection(uri); }) : open_connection(uri);
   const Outcome outcome = run_watched(*encoder, command, arguments);
   if (outcome.error != Error::none) throw EncoderFailure(encoder->trouble(outcome));
   JsonFields fields;
   FieldTable rows;
   const bool json = invocation.has("--json");
   encoder->report(json ? static_cast<FieldSink&>(fields) : rows);
-  print_line(json ? Json::object().set("ok", !outcome.aborted).set("fields", fields.fields).line() : table(rows.rows));
+  if (json) {
+    Json answer = Json::object().set("ok", !outcome.aborted).set("fields", fields.fields);
+    set_change(answer, outcome.change);
+    print_line(answer.line());
+  } else {
+    print_line(table(rows.rows));
+  }
   if (!outcome.aborted) return exit_good;
   print_message(fmt::format("interrupted: {} ended early, and what it had changed is as it was before", command.name));
   return exit_failed;

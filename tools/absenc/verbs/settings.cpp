@@ -87,9 +87,9 @@ int run_set(const Invocation& invocation) {
   tell_disturbance(uri, *setting.setter);
   const bool asks = must_ask(invocation, uri, name, setting.setter->meaning);
 
-  const std::unique_ptr<Connection> encoder = open_connection(uri);
+  const std::unique_ptr<Connection> encoder = before_change([&] { return open_connection(uri); });
   Settings settings(*encoder);
-  const Answer old = readable ? settings.get(name) : Answer{};
+  const Answer old = readable ? before_change([&] { return settings.get(name); }) : Answer{};
   if (asks) {
     std::string is;
     for (const Column& column : old.columns) {
@@ -105,8 +105,7 @@ int run_set(const Invocation& invocation) {
   try {
     change = settings.set(name, values);
   } catch (const os::Interrupted&) {
-    throw Failure(readable ? fmt::format("interrupted: `absenc config get` says what {} is now", name)
-                           : fmt::format("interrupted: whether {} was written is not known", name));
+    throw OfChange<Failure>(Failure(fmt::format("interrupted while {} was set", name)), encoder->change());
   }
   if (!change.note.empty()) print_message(fmt::format("note: {}", change.note));
   if (change.was_so) print_message("note: nothing was sent, because it is so already");
@@ -116,6 +115,7 @@ int run_set(const Invocation& invocation) {
                    .set("setting", name)
                    .set("old", readable ? to_json(old.row()) : Json())
                    .set("new", to_json(change.now.row()))
+                   .set("change", word_of(change.state))
                    .line());
   } else {
     show_change(name, old, change.now);

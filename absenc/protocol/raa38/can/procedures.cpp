@@ -175,6 +175,7 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
     found.written = !is_near(before.counts, 0, dialog.format().bits);
     if (!*found.written) co_return done;
   }
+  dialog.changes();
   found.answered = co_await is_answered(dialog, order, value);
   const Look first = co_await look(dialog);
   if (first.outcome.error != Error::none) co_return first.outcome;
@@ -206,6 +207,7 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   const unsigned wanted = arguments.empty() ? 0 : static_cast<unsigned>(arguments[0]);
   found.node = dialog.format().node;
   found.readings_per_s = wanted;
+  dialog.changes();
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
   // Whoever hands out frames may be busy: what they were late by at one look they are not at the next.
@@ -327,6 +329,7 @@ Part<bool> write(Dialog& dialog, Surveyed& found, Order order, std::uint8_t valu
   co_await hear_out(dialog);
   found.written = true;
   found.answered = false;
+  dialog.changes();
   dialog.ask_for(encode(order, 0, value), answer_window);
   while (const MaybeFrame frame = co_await dialog.heard()) {
     const Error error = check_configuration_answer(order, *frame);

@@ -190,6 +190,7 @@ Part<Outcome> look_for_it(Dialog& dialog, std::uint8_t address, std::uint32_t ra
                    "switch the encoder off and on, then find it: `absenc config get ... baud`, `absenc scan`; do not "
                    "send it again blindly, its memory wears out");
   }
+  dialog.refused();
   co_return {Error::cross_check_failed, at_the_old_one, "try once more, not often: each time may wear its memory"};
 }
 
@@ -301,7 +302,8 @@ Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
   }
   found.written = true;
   const Result<Reply> answer =
-      co_await dialog.attempt({.function = function::set_address, .address = format.address, .value = address});
+      co_await dialog.attempt({.function = function::set_address, .address = format.address, .value = address})
+          .changes();
   if (!answer && answer.error() == Error::request_rejected) co_return {answer.error()};
   // A lost reply does not tell whether it was done: asking does.
   const Outcome end = co_await look_for_it(dialog, address, format.line().rate,
@@ -323,7 +325,7 @@ Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
   // Its reply may come at the new rate.
-  static_cast<void>(co_await dialog.attempt(setting(format, baud_parameters[*baud])));
+  static_cast<void>(co_await dialog.attempt(setting(format, baud_parameters[*baud])).changes());
   const Outcome end =
       co_await look_for_it(dialog, format.address, bauds[*baud],
                            "the encoder answers at its old baud rate still: it did not take the new one");
@@ -337,7 +339,7 @@ Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
   found.setting = name_of_setting(value);
   const std::uint32_t before = (co_await look_at_it(dialog, found, 3)).singleturn;
   found.written = true;
-  const Result<Reply> echo = co_await dialog.attempt(setting(dialog.format(), value));
+  const Result<Reply> echo = co_await dialog.attempt(setting(dialog.format(), value)).changes();
   if (!echo) {
     co_return only(echo.error(),
                    "the direction was sent, but its echo did not come, and nothing else tells whether it was taken",
@@ -368,7 +370,7 @@ Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;
   static_cast<void>(
-      co_await dialog.attempt(setting(dialog.format(), parameter::zero)));  // perhaps done without a reply
+      co_await dialog.attempt(setting(dialog.format(), parameter::zero)).changes());  // perhaps done without a reply
   co_await dialog.rest(memory_time);
   const Result<Reply> now = co_await look(dialog, dialog.format().address, 3);
   if (!now) co_return {now.error(), "the zero was sent, but then the position could not be read"};

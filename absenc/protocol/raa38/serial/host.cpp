@@ -225,7 +225,7 @@ Procedure set_zero(Dialog& dialog, Values& found) {
                                                 position_reading(second->singleturn, format.bits));
   if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
   const Request by_command{Request::Kind::zero_clear, format.zeroed_unit()};
-  co_await dialog.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command);
+  co_await dialog.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command).changes();
   // It is not told whether that worked.
   const Time give_up_at = dialog.received_at() + zero_limit;
   Result<Position> now = Error::timeout;

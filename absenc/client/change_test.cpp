@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every command that changes an encoder, of every unit, with every fault and with a port that is lost at every step:
+// what it says of the change is compared with the memory of the virtual encoder. In virtual time.
+#include "absenc/client/change.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absenc/client/settings.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/virtual_link_test.hpp"
+#include "absenc/client/way/connection.hpp"
+#include "absenc/protocol/all.hpp"
+#include "tests/cases.hpp"
+
+namespace absenc::client {
+namespace {
+
+using Values = std::vector<std::int64_t>;
+using Stored = std::vector<std::uint8_t>;
+
+/// Throws at the step of this number, as a port does whose adapter is pulled out.
+template <class Item>
+class BreakingPort final : public Port<Item> {
+ public:
+  BreakingPort(Link link, Port<Item>& port, std::size_t left) : link_(std::move(link)), port_(port), left_(left) {}
+  Time now() override { return port_.now(); }
+  void begin(const Step<Item>& step) override {
+    use();
+    port_.begin(step);
+  }
+  Event<Item> wait(const Step<Item>& step) override {
+    use();
+    return port_.wait(step);
+  }
+
+ private:
+  void use() {
+    if (left_ == 0) throw os::Failure(os::Failure::Kind::lost, "the port went away");
+    --left_;
+  }
+  Link link_;  // with the port
+  Port<Item>& port_;
+  std::size_t left_;
+};
+
+Link breaking_link(Link whole, std::size_t steps) {
+  Link link;
+  link.device = std::move(whole.device);
+  link.place = whole.place;
+  if (whole.bytes != nullptr) {
+    Port<std::uint8_t>& port = *whole.bytes;
+    take_port<std::uint8_t>(link, std::make_shared<BreakingPort<std::uint8_t>>(std::move(whole), port, steps));
+  } else {
+    Port<CanFrame>& port = *whole.frames;
+    take_port<CanFrame>(link, std::make_shared<BreakingPort<CanFrame>>(std::move(whole), port, steps));
+  }
+  return link;
+}
+
+struct Ended {
+  Error error = Error::none;
+  bool thrown = false;
+  Change change;
+  Stored before;
+  Stored after;
+};
+
+Stored stored(VirtualDevice& device) {
+  const auto of = [](MutableBytes bytes) { return Stored(bytes.begin(), bytes.end()); };
+  const Any<Device>& one = device.device();
+  return one.bytes != nullptr ? of(one.bytes->memory()) : of(one.frames->memory());
+}
+
+/// `steps`: so many of the port go well.
+Ended run(const std::string& address, const Command& command, const Values& values,
+          std::optional<std::size_t> steps = {}) {
+  VirtualDevice* device = nullptr;
+  const EncoderAddress encoder = parse_address(address);
+  const std::unique_ptr<Connection> connection = Connection::make(encoder, [&](const EncoderAddress& one) {
+    Link link = virtual_link(one);
+    device = link.device.get();
+    return steps ? breaking_link(std::move(link), *steps) : std::move(link);
+  });
+  connection->connect();
+  Ended ended;
+  ended.before = stored(*device);
+  try {
+    const Outcome outcome = connection->run(command, values);
+    ended.error = outcome.error;
+    ended.change = outcome.change;
+    if (outcome.error != Error::none) {
+      EXPECT_EQ(connection->trouble(outcome).change.state, outcome.change.state);
+    }
+  } catch (const os::Failure& failure) {
+    ended.thrown = true;
+    if (const Change* change = change_of(failure)) ended.change = *change;
+    EXPECT_NE(std::string(failure.what()).find(std::string("Change: ")), std::string::npos) << failure.what();
+  }
+  EXPECT_EQ(connection->change().state, ended.change.state);
+  ended.after = stored(*device);
+  return ended;
+}
+
+/// With which it does something on a good line; none: not without options that only its installation knows.
+std::optional<Values> working_values(const Unit& unit, const Command& command) {
+  std::vector<Values> candidates;
+  for (const std::int64_t wanted : {INT64_MAX, std::int64_t{2}, std::int64_t{3}, std::int64_t{90}, INT64_MIN}) {
+    Values values;
+    for (const Argument& argument : command.arguments) {
+      values.push_back(argument.required ? std::clamp(wanted, argument.minimum, argument.maximum)
+                                         : argument.default_value);
+    }
+    candidates.push_back(values);
+  }
+  for (const Option& option : unit.options) {
+    if (option.name != command.changes_option) continue;
+    for (const std::string_view choice : option.choices) {
+      candidates.push_back(candidates.front());
+      candidates.back().front() = std::stoll(std::string(choice));
+    }
+  }
+  if (command.verb == Verb::memory_write) {
+    candidates.clear();
+    for (const MemoryArea& area : unit.memory) {
+      if (!area.writable || !area.protection.empty()) continue;
+      candidates.push_back(role_arguments(
+          command, {{Role::page, area.page}, {Role::address, area.first}, {Role::value, 0x5A}, {Role::force, 0}}));
+    }
+    for (const RegisterInfo& one : unit.registers) {
+      if (!one.writable) continue;
+      candidates.push_back(role_arguments(command, {{Role::address, one.address}, {Role::value, 3}}));
+    }
+  }
+  const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
+  for (const Values& values : candidates) {
+    try {
+      if (run(address, command, values).change.state == ChangeState::confirmed) return values;
+    } catch (const UsageError&) {  // not with these options
+    }
+  }
+  return std::nullopt;
+}
+
+void require_truth(const Ended& ended, const Ended& good, const std::string& what) {
+  SCOPED_TRACE(what);
+  switch (ended.change.state) {
+    case ChangeState::none:
+      ADD_FAILURE() << "nothing is said of the change";
+      break;
+    case ChangeState::not_sent:
+    case ChangeState::refused:
+      EXPECT_EQ(ended.before, ended.after) << "the encoder was changed, though " << ended.change.text();
+      break;
+    case ChangeState::confirmed:
+      EXPECT_TRUE(!ended.thrown && ended.error == Error::none);
+      EXPECT_EQ(ended.after, good.after) << "the encoder was not changed";
+      break;
+    case ChangeState::unknown:
+      EXPECT_TRUE(ended.thrown || ended.error != Error::none);
+      EXPECT_FALSE(ended.change.advice.empty());
+      break;
+  }
+}
+
+// Of the port, until it has ended well.
+std::size_t steps_of(const std::string& address, const Command& command, const Values& values) {
+  std::size_t most = 64;
+  while (run(address, command, values, most).thrown) most *= 2;
+  std::size_t least = most / 2;
+  while (most - least > 1) {
+    const std::size_t middle = (least + most) / 2;
+    (run(address, command, values, middle).thrown ? least : most) = middle;
+  }
+  return most;
+}
+
+using Counts = std::array<std::size_t, 5>;
+
+void count(Counts& counts, const Ended& ended) { ++counts[static_cast<std::size_t>(ended.change.state)]; }
+
+void tell(const Counts& counts) {
+  for (std::size_t i = 1; i < counts.size(); ++i) {
+    testing::Test::RecordProperty(std::string(word_of(static_cast<ChangeState>(i))), static_cast<int>(counts[i]));
+  }
+}
+
+class EveryUnit : public testing::TestWithParam<const Unit*> {
+ protected:
+  template <class Use>
+  void each_command(const Use& use) const {
+    const Unit& unit = *GetParam();
+    for (const Command& command : unit.commands) {
+      if (!command.changes_encoder) continue;
+      const std::optional<Values> values = working_values(unit, command);
+      if (values) use(unit, command, *values);
+    }
+  }
+};
+
+TEST_P(EveryUnit, ChangeWithFaultsIsNamedAsTheEncoderHasIt) {
+  Counts counts{};
+  each_command([&](const Unit& unit, const Command& command, const Values& values) {
+    const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
+    const Ended good = run(address, command, values);
+    for (const std::string_view fault : sim::fault_names) {
+      // A CAN controller drops frames whose CRC is wrong.
+      if (unit.link == LinkKind::can && fault.ends_with("corrupt")) continue;
+      for (const double rate : {0.1, 0.4, 1.0}) {
+        for (unsigned seed = 1; seed <= test_cases(5); ++seed) {
+          const std::string bad = fmt::format("{}&fault={}={}&seed={}", address, fault, rate, seed);
+          try {
+            const Ended ended = run(bad, command, values);
+            count(counts, ended);
+            require_truth(ended, good, fmt::format("{} {}", bad, command.name));
+          } catch (const UsageError&) {  // there are no such faults on this link
+          }
+        }
+      }
+    }
+  });
+  tell(counts);
+}
+
+TEST_P(EveryUnit, ChangeWhosePortIsLostIsNamedAsTheEncoderHasIt) {
+  Counts counts{};
+  each_command([&](const Unit& unit, const Command& command, const Values& values) {
+    const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
+    const Ended good = run(address, command, values);
+    Counts of_command{};
+    const std::size_t all = steps_of(address, command, values);
+    // Each of the last, where the change is, and some of those before it.
+    const std::size_t each = test_cases(60);
+    const std::size_t last = all > each ? all - each : 0;
+    for (std::size_t steps = 0; steps < all; steps = steps < last ? std::min(steps + 1 + all / 12, last) : steps + 1) {
+      const Ended ended = run(address, command, values, steps);
+      count(counts, ended);
+      count(of_command, ended);
+      require_truth(ended, good, fmt::format("{} {} after {} steps", address, command.name, steps));
+    }
+    EXPECT_NE(of_command[static_cast<std::size_t>(ChangeState::unknown)], 0U) << unit.id << ' ' << command.name;
+  });
+  tell(counts);
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, EveryUnit, testing::ValuesIn(all_units().begin(), all_units().end()),
+                         [](const auto& one) {
+                           std::string name(one.param->id);
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+TEST(Change, NamesWhatToTryAfterItsResultWasLost) {
+  const EncoderAddress encoder = parse_address("sim:raa38-modbus?fault=silence=1");
+  const Unit& unit = *encoder.unit;
+  const Command& setter = *require_setting(unit, "baud").setter;
+  std::optional<Change> change;
+  for (std::size_t steps = 0; steps < 100 && !change; ++steps) {
+    const Ended ended =
+        run("sim:raa38-modbus", setter, complete_arguments(setter, std::array<std::int64_t, 1>{57600}), steps);
+    if (ended.change.state == ChangeState::unknown) change = ended.change;
+  }
+  ASSERT_TRUE(change);
+  EXPECT_NE(change->text().find("sent, result unknown"), std::string::npos) << change->text();
+  EXPECT_NE(change->text().find("57600"), std::string::npos) << change->text();
+  EXPECT_NE(change->text().find("as before"), std::string::npos) << change->text();
+}
+
+TEST(Change, IsKeptWhenOnlyReadingItAgainFails) {
+  const std::unique_ptr<Connection> connection = Connection::make(
+      parse_address("sim:tformat"), [](const EncoderAddress& one) { return breaking_link(virtual_link(one), 400); });
+  connection->connect();
+  Settings settings(*connection);
+  bool failed = false;
+  for (std::int64_t degrees = 80; degrees < 100 && !failed; ++degrees) {
+    try {
+      settings.set("overheat-threshold", std::array<std::int64_t, 1>{degrees});
+    } catch (const std::exception& failure) {
+      failed = true;
+      ASSERT_NE(change_of(failure), nullptr) << failure.what();
+    }
+  }
+  EXPECT_TRUE(failed);
+}
+
+}  // namespace
+}  // namespace absenc::client
