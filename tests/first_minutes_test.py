@@ -70,6 +70,40 @@ class FirstMinutes(Case):
             if port["kind"] == "serial" and port["may_open"] and port["in_use_by"] is None:
                 self.assertIn(f"absenc identify {port['port']}", ports.stdout)
 
+    def test_names_that_people_know(self):
+        for word, words in [("tamagawa", ["Tamagawa: the protocol is tformat", "TS5700N8500", "Commands"]),
+                            ("AksIM-2", ["AksIM-2 is a model of encolink and encolink-spi", "full-duplex UART"]),
+                            ("rls", ["RLS: the protocols are encolink, encolink-spi", "e201"]),
+                            ("aksim2", ["AksIM-2 is a model"]), ("qs35", ["QS35: the protocol is esl"])]:
+            with self.subTest(word):
+                listed = absenc("list", word)
+                self.assert_good(listed)
+                for one in words:
+                    self.assertIn(one, listed.stdout)
+        self.assertEqual(len(absenc("list", "AksIM-2", "--json").stdout.splitlines()), 2)
+        for encoder, words in [("TS5700N8500:/dev/ttyUSB0", ["TS5700N8500 is a model of tformat: write tformat;"]),
+                               ("23-bit:/dev/ttyUSB0", ["is a model of tformat: write tformat with model=23-bit"]),
+                               ("qs35:/dev/ttyUSB0", ["QS35: the protocol is esl: write esl"]),
+                               ("sim:rls", ["RLS: the protocols are encolink", "write encolink"])]:
+            with self.subTest(encoder):
+                self.assert_wrong_usage(absenc("read", encoder), *words)
+        self.assert_wrong_usage(absenc("list", "tfromat"), "did you mean tformat?")
+
+    def test_a_capture_without_its_protocol_is_identified(self):
+        capture = self.file("drive.vcd")
+        self.assert_good(absenc("wave", "tformat?motion=rpm=60", capture, "--count", "20"))
+        result = absenc("decode", capture)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("the protocol is missing", result.stderr)
+        self.assertIn(f"go on with: absenc decode tformat {capture}", result.stdout)
+
+    def test_every_model_leads_to_its_protocol(self):
+        for line in absenc("list", "--json").stdout.splitlines():
+            unit = json.loads(line)
+            for model in unit["models"]:
+                named = [json.loads(one)["protocol"] for one in absenc("list", model["name"], "--json").stdout.splitlines()]
+                self.assertIn(unit["protocol"], named)
+
     def test_what_people_type(self):
         self.assertEqual(absenc("version").stdout, absenc("--version").stdout)
         self.assertEqual(absenc("help").stdout, absenc("--help").stdout)

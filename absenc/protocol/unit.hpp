@@ -245,6 +245,8 @@ struct Unit {
   std::string_view id;
   std::string_view name;      // maker and protocol, for people
   std::string_view document;  // the source
+  /// Makers and families by which people look for it: "Tamagawa", "Smart-Abs". Its models stand in `models`.
+  std::span<const std::string_view> known_as{};
   LinkKind link;
   LineSettings line;  // rate 0: the document states none, the user must
   std::span<const Option> options;

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <set>
 #include <vector>
 
 namespace absenc::tool {
@@ -122,6 +123,7 @@ _absenc_value() {
     setting) _absenc_of settings "$3" "$2" ;;
     NAME=VALUE) [[ $2 == model=* ]] && _absenc_model_setting "$3" "$2" ;;
     protocol) _absenc_words "${_absenc_protocols[*]}" "$2" ;;
+    name) _absenc_words "${_absenc_protocols[*]} ${_absenc_names[*]}" "$2" ;;
   esac
 }
 
@@ -241,6 +243,18 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
+// Of makers, families and models, each once. A name of two words would be two.
+std::set<std::string_view> known_names(std::span<const Unit* const> units) {
+  std::set<std::string_view> names;
+  for (const Unit* unit : units) {
+    names.insert(unit->known_as.begin(), unit->known_as.end());
+    const std::vector<std::string_view> models = model_names(*unit);
+    names.insert(models.begin(), models.end());
+  }
+  std::erase_if(names, [](std::string_view name) { return name.find(' ') != std::string_view::npos; });
+  return names;
+}
+
 // As `config get` and `config set` know them.
 std::vector<std::string_view> setting_names(const Unit& unit) {
   std::vector<std::string_view> names;
@@ -268,6 +282,7 @@ std::string bash_completion(std::span<const Subcommand* const> subcommands, std:
   }
   std::string text = "# Completion of absenc in bash, made from the tables of its help.\n\n";
   text += fmt::format("_absenc_protocols=({})\n", fmt::join(protocols, " "));
+  text += fmt::format("_absenc_names=({})\n", fmt::join(known_names(units), " "));
   text += by_protocol("models", units, model_names) + by_protocol("commands", units, command_names) +
           by_protocol("settings", units, setting_names);
   text += fmt::format("_absenc_first_words='{}'\n\n", fmt::join(first_words, " "));

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 
 #include "absenc/client/error.hpp"
@@ -24,6 +25,15 @@ std::vector<std::string_view> names_of(std::span<const Named> all) {
     if (!one.name.empty()) names.push_back(one.name);
   }
   return names;
+}
+
+// In small letters: what people mean when they write a name in another way.
+std::string letters_and_digits(std::string_view name) {
+  std::string text;
+  for (const unsigned char c : name) {
+    if (std::isalnum(c) != 0) text += static_cast<char>(std::tolower(c));
+  }
+  return text;
 }
 
 std::string sentence(const Unit& unit, const OptionError& error, std::span<const std::string_view> extra_names) {
@@ -72,8 +82,46 @@ template <class Given>
 
 }  // namespace
 
+std::string KnownName::sentence() const {
+  std::vector<std::string_view> ids;
+  for (const Unit* unit : units) ids.push_back(unit->id);
+  const std::span<const std::string_view> all(ids);
+  const std::string protocols = ids.size() == 1
+                                    ? std::string(ids.front())
+                                    : fmt::format("{} and {}", fmt::join(all.first(all.size() - 1), ", "), all.back());
+  if (is_model) return fmt::format("{} is a model of {}", name, protocols);
+  return fmt::format("{}: the protocol{} {}", name, ids.size() == 1 ? " is" : "s are", protocols);
+}
+
+std::optional<KnownName> find_known_name(std::string_view word) {
+  const std::string wanted = letters_and_digits(word);
+  if (wanted.empty() || find_unit(word) != nullptr) return std::nullopt;
+  KnownName known;
+  for (const Unit* unit : all_units()) {
+    std::string_view found;
+    for (const std::string_view name : unit->known_as) {
+      if (letters_and_digits(name) == wanted) found = name;
+    }
+    for (const Model& model : unit->models) {
+      if (letters_and_digits(model.name) != wanted) continue;
+      found = model.name;
+      known.is_model = true;
+    }
+    if (found.empty()) continue;
+    known.name = found;
+    known.units.push_back(unit);
+  }
+  return known.units.empty() ? std::nullopt : std::optional(known);
+}
+
 const Unit& require_unit(std::string_view id) {
   if (const Unit* unit = find_unit(id)) return *unit;
+  if (const std::optional<KnownName> known = find_known_name(id)) {
+    const Unit& first = *known->units.front();
+    const bool is_default = !known->is_model || first.models.front().name == known->name;
+    throw UsageError(fmt::format("{}: write {}{}; `absenc list {}` shows it", known->sentence(), first.id,
+                                 is_default ? "" : fmt::format(" with model={}", known->name), first.id));
+  }
   std::vector<std::string_view> names;
   for (const Unit* unit : all_units()) names.push_back(unit->id);
   throw UsageError(fmt::format("there is no protocol \"{}\"{}", id, suggestion(id, names)));

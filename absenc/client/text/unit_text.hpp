@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,7 +14,20 @@
 
 namespace absenc::client {
 
-/// Throws UsageError, which names the nearest.
+/// A maker, a family or a model, and the protocols of its encoders.
+struct KnownName {
+  std::string_view name;
+  bool is_model = false;
+  std::vector<const Unit*> units;
+
+  /// "AksIM-2 is a model of encolink and encolink-spi", "RLS: the protocols are encolink, e201 and biss"
+  [[nodiscard]] std::string sentence() const;
+};
+
+/// Upper and lower case, '-' and spaces make no difference. Empty for a word that is none, also for a protocol.
+[[nodiscard]] std::optional<KnownName> find_known_name(std::string_view word);
+
+/// Throws UsageError, which names the protocols of a maker or model, or else the nearest.
 [[nodiscard]] const Unit& require_unit(std::string_view id);
 [[nodiscard]] const Command& require_command(const Unit& unit, std::string_view name);
 

@@ -221,10 +221,13 @@ constexpr auto vectors = std::array{
 constexpr Result<Request> guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
 constexpr auto conditions = std::array{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
 
+constexpr std::array<std::string_view, 3> known_as{"CUI", "Same Sky", "AMT21"};
+
 constexpr Declaration<Protocol, Encoder> declaration{
     .id = "amt21",
     .name = "CUI AMT21 (RS-485)",
     .document = document,
+    .known_as = known_as,
     .link = LinkKind::half_duplex,
     .options = options.infos,
     .format = format_of<options>,

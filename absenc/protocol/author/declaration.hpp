@@ -26,8 +26,9 @@ struct Declaration {
   using Request = typename P::Request;
 
   std::string_view id{};
-  std::string_view name{};      // maker and protocol, for people
-  std::string_view document{};  // the source
+  std::string_view name{};                       // maker and protocol, for people
+  std::string_view document{};                   // the source
+  std::span<const std::string_view> known_as{};  // makers and families: "Tamagawa", "Smart-Abs"
   LinkKind link{};
   std::span<const Option> options{};           // OptionsOf::infos (option.hpp)
   Format (*format)(const Options&) = nullptr;  // `format_of<options>` where the options are members of the format

@@ -270,6 +270,7 @@ struct Descriptor {
     Unit unit{.id = declared.id,
               .name = declared.name,
               .document = declared.document,
+              .known_as = declared.known_as,
               .link = declared.link,
               .line = line_of(Format{}),
               .options = declared.options,

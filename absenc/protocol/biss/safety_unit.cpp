@@ -186,10 +186,13 @@ bool is_safety_checked(const Options& values, Frame, Frame reply, std::size_t bi
   return made.cpw.check.width != 0 && made.spw.check.width != 0 && is_behind_ack(reply, bit);
 }
 
+constexpr std::array<std::string_view, 2> safety_known_as{"iC-Haus", "Renishaw"};
+
 constexpr Declaration<ProtocolOf<SafetyFormat>, VirtualEncoderOf<SafetyFormat>> safety_declaration{
     .id = "biss-safety",
     .name = "BiSS Safety",
     .document = "BiSS C Protocol Description rev D2, BiSS Safety",
+    .known_as = safety_known_as,
     .link = LinkKind::clocked,
     .options = safety_options.infos,
     .format = safety_format,

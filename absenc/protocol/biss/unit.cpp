@@ -94,10 +94,13 @@ BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& fi
 
 std::uint32_t reportable_by(const Options& values) { return contents_of(format_by(values).word).reported; }
 
+constexpr std::array<std::string_view, 3> known_as{"iC-Haus", "RLS", "Renishaw"};
+
 constexpr Declaration<Protocol, VirtualEncoderOf<Format>> declaration{
     .id = "biss",
     .name = "BiSS-C",
     .document = "RLS E201-9S Decoding the BiSS information",
+    .known_as = known_as,
     .link = LinkKind::clocked,
     .options = options.infos,
     .format = format_by,

@@ -280,10 +280,13 @@ bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
 
 std::uint32_t reportable_by(const Options& values) { return contents_of(format_by(values).word).reported; }
 
+constexpr std::array<std::string_view, 3> known_as{"RLS", "E201-9S", "Renishaw"};
+
 constexpr Declaration<Protocol, VirtualInterface> declaration{
     .id = "e201",
     .name = "RLS E201-9S USB interface",
     .document = "RLS E201-9S Decoding the BiSS information",
+    .known_as = known_as,
     .link = LinkKind::full_duplex,
     .options = options.infos,
     .format = format_by,

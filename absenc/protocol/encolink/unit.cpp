@@ -412,12 +412,15 @@ Follower* make_follower(const Options& values, std::span<std::byte> storage) {
   return new (storage.data()) ChannelFollower(format_of<interface>(values));
 }
 
+constexpr std::array<std::string_view, 2> known_as{"RLS", "AksIM"};
+
 /// What the document says of both interfaces, and of each.
 template <Interface interface>
 constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
     .id = interface == Interface::spi ? "encolink-spi" : "encolink",
     .name = interface == Interface::spi ? "RLS EncoLink (AksIM-2), SPI" : "RLS EncoLink (AksIM-2), UART",
     .document = "Programming AksIM-2 encoders with EncoLink communication protocol, issue 2",
+    .known_as = known_as,
     .link = interface == Interface::spi ? LinkKind::spi : LinkKind::full_duplex,
     .options = options.infos,
     .format = format_of<interface>,

@@ -225,10 +225,13 @@ constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) {
   return refused == Error::none ? asked_by(profile, {}, reply) : Result<Request>(refused);
 }
 
+constexpr std::array<std::string_view, 1> known_as{"QS35"};
+
 constexpr Declaration<Protocol, VirtualEncoder, HostOf<Protocol>> declaration{
     .id = "esl",
     .name = "QS35 ESL (safety encoder, two channels)",
     .document = "QS35 ESL Protocol Specification, rev 1.5",
+    .known_as = known_as,
     .link = LinkKind::half_duplex,
     .options = options.infos,
     .format = format_of<options>,

@@ -413,10 +413,13 @@ constexpr Error answer_to_bad(const Format&, Bytes, Error error, Bytes reply) {
   return refused ? Error::request_rejected : error;
 }
 
+constexpr std::array<std::string_view, 2> known_as{"Tamagawa", "Smart-Abs"};
+
 constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .id = "tformat",
     .name = "Tamagawa T-format (Smart-Abs)",
     .document = "Specification of Smart-Abs TS5700N8500",
+    .known_as = known_as,
     .link = LinkKind::half_duplex,
     .options = options.infos,
     .format = format_of<options>,

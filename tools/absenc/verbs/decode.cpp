@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <filesystem>
 
 #include "absenc/capture/annotate/judge.hpp"
 #include "absenc/client/captures/run.hpp"
@@ -147,13 +148,27 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   return damaged || statistics.errors() != 0 ? exit_failed : exit_good;
 }
 
+// A capture without its protocol is a mistake, but who made it wants to know whose frames these are.
+int identify_instead(std::string_view file) {
+  print_message(fmt::format("the protocol is missing before {}: it is looked for", file));
+  Invocation search;
+  search.add("where", std::string(file));
+  identify_subcommand.run(search);
+  return exit_usage;
+}
+
 int run_decode(const Invocation& invocation) {
   if (invocation.has("file") && find_unit(invocation.text("file")) != nullptr &&
       find_unit(invocation.text("protocol")) == nullptr) {
     throw UsageError(fmt::format("the protocol comes first, then the capture: absenc decode {} {}",
                                  invocation.text("file"), invocation.text("protocol")));
   }
-  const Unit& unit = require_unit(invocation.text("protocol"));
+  const std::string_view first = invocation.text("protocol");
+  std::error_code error;
+  if (!invocation.has("file") && find_unit(first) == nullptr && std::filesystem::exists(first, error)) {
+    return identify_instead(first);
+  }
+  const Unit& unit = require_unit(first);
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
   const bool one = invocation.has("--hex") || invocation.has("--request");
   if (invocation.has("--bits") && unit.bits == nullptr) {

@@ -50,9 +50,9 @@ std::string line_of_model(const Unit& unit, const Model& model) {
   return line_of(unit.link, line_settings(unit, options));
 }
 
-std::string supported_encoders() {
+std::string encoders_of(std::span<const Unit* const> units) {
   Rows rows{{"PROTOCOL", "MODEL", "WHAT", "LINE"}};
-  for (const Unit* unit : all_units()) {
+  for (const Unit* unit : units) {
     for (const Model& model : unit->models) {
       rows.push_back(
           {std::string(unit->id), std::string(model.name), std::string(model.meaning), line_of_model(*unit, model)});
@@ -339,30 +339,32 @@ int list_names(bool json) {
 int run_list(const Invocation& invocation) {
   const bool json = invocation.has("--json");
   if (invocation.has("--names")) {
-    if (invocation.has("protocol")) throw UsageError("--names lists encoders of any protocol: give no protocol");
+    if (invocation.has("name")) throw UsageError("--names lists encoders of any protocol: give no protocol");
     return list_names(json);
   }
-  if (invocation.has("protocol")) {
-    const Unit& unit = require_unit(invocation.text("protocol"));
-    print_line(json ? unit_json(unit).line() : details(unit));
-    return 0;
-  }
-  if (!json) print_line(supported_encoders());
+  const std::string_view word = invocation.text("name");
+  const std::optional<KnownName> known = find_known_name(word);
+  std::vector<const Unit*> units(all_units().begin(), all_units().end());
+  if (!word.empty()) units = known ? known->units : std::vector{&require_unit(word)};
   if (json) {
-    for (const Unit* unit : all_units()) print_line(unit_json(*unit).line());
+    for (const Unit* unit : units) print_line(unit_json(*unit).line());
+    return exit_good;
   }
-  return 0;
+  if (known) print_line(known->sentence() + "\n");
+  print_line(units.size() == 1 ? details(*units.front()) : encoders_of(units));
+  return exit_good;
 }
 
 constexpr std::array<Parameter, 3> list_parameters{{
-    {"protocol", "", "show the models, options, commands and fields of this one"},
+    {"name", "", "a protocol: its models, options, commands and fields; or a maker or model: its protocols"},
     {"--names", "", "show the encoders that absenc.toml gives names to, and check their settings"},
     {"--json", "", "one JSON object a line, one line for each protocol or name"},
 }};
 
-constexpr std::array<Example, 3> list_examples{{
+constexpr std::array<Example, 4> list_examples{{
     {"absenc list", "every supported encoder"},
     {"absenc list tformat", "all about one protocol"},
+    {"absenc list tamagawa", "the protocol of a maker, also of a model"},
     {"absenc list --names", "your own encoders, by the names you gave them"},
 }};
 
