@@ -23,9 +23,9 @@ def content(path):
 
 
 class Documentation(unittest.TestCase):
-    def test_the_readme_counts_the_clauses(self):
+    def test_its_page_counts_the_clauses(self):
         """Of each protocol: those that are tested by reading, those that --changes adds, those of its host."""
-        readme = content(ROOT / "README.md")
+        page = content(ROOT / "docs/test-a-drive.md")
         listed = re.findall(r"Listed\{&(\w+)::(\w+),.*?(\w+)::(\w+)\}", content(ROOT / "absenc/protocol/all.cpp"))
         self.assertGreater(len(listed), 10)
         for folder, unit, host_folder, hosts in listed:
@@ -37,7 +37,7 @@ class Documentation(unittest.TestCase):
             clauses = content(ROOT / f"absenc/protocol/{host_folder}/clauses.hpp")
             count = int(re.search(rf"array<HostClause, (\d+)> {hosts}\b", clauses).group(1))
             cells = [str(number or "") for number in (both, both - reading, count)]
-            self.assertIn("| " + " | ".join([name, *cells]).replace("|  ", "| ").rstrip() + " |", readme)
+            self.assertIn("| " + " | ".join([name, *cells]).replace("|  ", "| ").rstrip() + " |", page)
 
 
 class Conform(EncoderCase):

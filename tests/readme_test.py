@@ -1,63 +1,166 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the README shows is what happens: its table, its commands, its program."""
-
+"""The README and the pages that it names show real output: each example runs, from top to bottom."""
 import os
 import re
-import shlex
+import select
 import subprocess
 import tempfile
 import textwrap
+import time
 import unittest
 from pathlib import Path
 
-ABSENC = os.environ["ABSENC"]
+from command_support import ABSENC, PATIENCE, end
+from mqtt_support import free_port
+from python_support import PACKAGE
+
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
-README = (SOURCE / "README.md").read_text()
+PAGES = ["README.md", *(f"docs/{name}.md" for name in ("read", "set-up", "record", "serve", "decode", "test-a-drive", "doctor", "cpp",
+                                                        "python", "add-an-encoder"))]
+PORT = "/dev/ttyUSB0"
+# Languages of blocks that are not run here: commands that change the computer, texts, programs that other tests run.
+OTHERS = {"sh", "text", "cmake", "cpp", "yaml"}
 
 
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+def blocks(text):
+    """(language, content) of each block, in its order."""
+    return re.findall(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
-def absenc(*arguments, **options):
-    return subprocess.run([ABSENC, *arguments], capture_output=True, text=True, timeout=60, stdin=subprocess.DEVNULL,
-                          **options)
+def commands(block):
+    """(command, lines shown below it) of a block."""
+    found = []
+    for line in block.splitlines():
+        if line.startswith("$ "):
+            found.append((line[2:], []))
+        elif found:
+            found[-1][1].append(line)
+    return found
+
+
+def masked(text):
+    """Numbers differ from run to run, and so does the width of what they stand in."""
+    return [re.sub(r"\s+", " ", re.sub(r"\d+(\.\d+)?", "N", line)).strip() for line in text.splitlines() if line.strip()]
+
+
+class Page:
+    """Runs the examples of a page in a folder of their own, with a virtual encoder in place of the real one."""
+
+    def __init__(self, name, folder):
+        self.text = (SOURCE / name).read_text(encoding="utf-8")
+        self.folder = folder
+        self.running = []
+        self.port = free_port()  # in place of the usual one of `absenc serve`
+        (folder / "bin").mkdir()
+        (folder / "bin" / "absenc").symlink_to(ABSENC)
+        self.environment = {**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}", "PYTHONPATH": str(PACKAGE), "HOME": str(folder),
+                            "XDG_STATE_HOME": str(folder / "state"), "ABSENC_CONFIG": str(folder / "absenc.toml")}
+        (folder / "absenc.toml").touch()
+        for encoder in re.findall(rf"^<!-- tests: {PORT} is (.*) -->$", self.text, re.MULTILINE):
+            self.start(f"absenc emulate {encoder} --pty {PORT}")
+
+    def here(self, text):
+        return text.replace("/tmp/", f"{self.folder}/").replace(PORT, f"{self.folder}/ttyUSB0").replace("127.0.0.1:8420", f"127.0.0.1:{self.port}")
+
+    def start(self, command):
+        """In the background, until the page ends; it says when it is ready."""
+        process = subprocess.Popen(["bash", "-c", "exec " + self.here(command)], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.running.append(process)
+        deadline = time.monotonic() + PATIENCE
+        said = select.select([process.stdout, process.stderr], [], [], deadline - time.monotonic())[0]
+        if not said or not said[0].readline():
+            raise AssertionError(f"{command} did not become ready: {end(process)}")
+
+    def run(self, command):
+        wanted = re.search(r"# exit status (\d+)$", command)
+        if command.endswith("&"):
+            self.start(command.removesuffix("&"))
+            return ""
+        done = subprocess.run(["bash", "-c", self.here(command)], cwd=self.folder, env=self.environment, capture_output=True, text=True,
+                              timeout=PATIENCE * 4, stdin=subprocess.DEVNULL, check=False)
+        if done.returncode != int(wanted[1] if wanted else 0):
+            raise AssertionError(f"{command}: {done.returncode}\n{done.stdout}{done.stderr}")
+        return done.stdout.replace(f"{self.folder}/ttyUSB0", PORT)
+
+    def close(self):
+        for process in self.running:
+            end(process)
 
 
 class Readme(unittest.TestCase):
-    def test_the_table_is_what_list_prints(self):
-        listed = absenc("list").stdout.split("\n\n")[0].strip()
-        self.assertIn("PROTOCOL", listed)
-        self.assertIn(listed, README)
+    maxDiff = None
 
-    def test_every_command_works(self):
-        commands = [line[2:] for block in blocks("console") for line in block.splitlines() if line.startswith("$ ")]
-        self.assertGreater(len(commands), 6)
-        with tempfile.TemporaryDirectory() as folder:
-            config = Path(folder, "absenc.toml")
-            config.write_text("".join(blocks("toml")))
-            for command in commands:
-                words = shlex.split(command.replace("/tmp/", folder + "/"))
-                self.assertEqual(words.pop(0), "absenc", command)
-                if words[0] == "emulate":
-                    words += ["--for", "0.2"]
-                done = absenc(*words, env={**os.environ, "ABSENC_CONFIG": str(config)})
-                self.assertEqual(done.returncode, 0, f"{command}\n{done.stderr}")
-                self.assertTrue(done.stdout, command)
+    def test_each_page_runs_from_top_to_bottom(self):
+        for name in PAGES:
+            with self.subTest(page=name), tempfile.TemporaryDirectory() as folder:
+                page = Page(name, Path(folder))
+                self.addCleanup(page.close)
+                self.run_page(page)
+                page.close()
+
+    def run_page(self, page):
+        for language, block in blocks(page.text):
+            if language == "toml":
+                with open(page.folder / "absenc.toml", "a", encoding="utf-8") as file:
+                    file.write(page.here(block))
+            elif language == "python":
+                done = subprocess.run(["/usr/bin/python3", "-c", block], cwd=page.folder, env=page.environment, capture_output=True, text=True,
+                                      timeout=PATIENCE * 4, check=False)
+                self.assertEqual(done.returncode, 0, done.stderr)
+            elif language == "console":
+                for command, shown in commands(block):
+                    output = page.run(command)
+                    if shown:
+                        self.assertEqual(masked(output), masked("\n".join(shown)), command)
+            elif language == "":
+                self.assertNotRegex(block, r"(?m)^\$? ?absenc ", "a command in a block that nobody runs")
+            else:
+                self.assertIn(language, OTHERS)
+
+    def test_the_readme_is_short_and_shows_pictures_first(self):
+        text = (SOURCE / "README.md").read_text(encoding="utf-8")
+        self.assertLess(len(text.splitlines()), 220)
+        self.assertLess(text.index("docs/pictures/serve-overview.png"), text.index("\n## "))
+        for line in text.splitlines():
+            self.assertTrue(len(line) <= 120 or line.startswith(("|", "!", "warning:")), line)
+
+    def test_the_readme_has_each_protocol(self):
+        listed = {line.split()[0] for line in self.listed().splitlines()[1:]}
+        text = (SOURCE / "README.md").read_text(encoding="utf-8")
+        families = text.split("## Encoders")[1].split("\n## ")[0]
+        self.assertLessEqual(listed, set(re.findall(r"`([\w-]+)`", families)))
+        adapters = text.split("## Adapters")[1].split("\n## ")[0]
+        self.assertLessEqual(listed, set(re.findall(r"[\w-]+", adapters)))
+
+    @staticmethod
+    def listed():
+        done = subprocess.run([ABSENC, "list"], capture_output=True, text=True, timeout=PATIENCE, check=True)
+        return done.stdout.split("\n\n")[0].strip()
+
+    def test_the_table_of_encoders_is_that_of_list(self):
+        self.assertIn(self.listed(), (SOURCE / "docs/encoders.md").read_text(encoding="utf-8"))
 
     def test_the_programs_are_the_examples(self):
+        shown = [block for language, block in blocks((SOURCE / "docs/cpp.md").read_text(encoding="utf-8")) if language == "cpp"]
         examples = ["read_by_name.cpp", "read_position.cpp"]
-        self.assertEqual(len(blocks("cpp")), len(examples))
-        for name, block in zip(examples, blocks("cpp")):
-            example = (SOURCE / "examples" / name).read_text()
-            shown = textwrap.dedent(example.split("// [readme]\n")[1].rsplit("\n", 1)[0]).strip()
-            self.assertEqual(shown, block.strip())
+        self.assertEqual(len(shown), len(examples))
+        for name, block in zip(examples, shown):
+            example = (SOURCE / "examples" / name).read_text(encoding="utf-8")
+            self.assertEqual(textwrap.dedent(example.split("// [readme]\n")[1].rsplit("\n", 1)[0]).strip(), block.strip())
 
-    def test_files_it_points_to_are_there(self):
-        links = re.findall(r"\]\(([^)#]+)\)", README)
-        self.assertTrue(links)
-        for link in links:
-            self.assertTrue((SOURCE / link).exists(), link)
+    def test_links_lead_to_files_and_headings(self):
+        for name in [*PAGES, "docs/encoders.md"]:
+            text = (SOURCE / name).read_text(encoding="utf-8")
+            links = re.findall(r"\]\((?!https?:)([^)]+)\)", text)
+            for link in links:
+                with self.subTest(page=name, link=link):
+                    path, _, anchor = link.partition("#")
+                    target = (SOURCE / name).parent / path if path else SOURCE / name
+                    self.assertTrue(target.exists())
+                    if anchor:
+                        headings = re.findall(r"^#+ (.+)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+                        self.assertIn(anchor, [re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings])
 
 
 if __name__ == "__main__":
