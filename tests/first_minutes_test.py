@@ -104,6 +104,32 @@ class FirstMinutes(Case):
                 named = [json.loads(one)["protocol"] for one in absenc("list", model["name"], "--json").stdout.splitlines()]
                 self.assertIn(unit["protocol"], named)
 
+    def test_one_spelling_in_every_verb(self):
+        """What stands behind ? of an encoder means the same in each verb that takes a protocol or an encoder."""
+        settings = "model=23-bit"
+        capture = self.file("capture.vcd")
+        for arguments in [["read", f"sim:tformat?{settings}"], ["wave", f"tformat?{settings}", capture],
+                          ["wave", f"sim:tformat?{settings}", self.file("other.vcd")],
+                          ["decode", f"tformat?{settings}", capture], ["decode", f"sim:tformat?{settings}", capture],
+                          ["encode", f"tformat?{settings}", "position"],
+                          ["emulate", f"tformat?{settings}&motion=rpm=60&alarm=battery_alarm", "--for", "0.01"],
+                          ["emulate", f"sim:tformat?{settings}", "--for", "0.01"],
+                          ["info", f"sim:tformat?{settings}"], ["doctor", f"sim:tformat?{settings}", "--for", "0.2"]]:
+            with self.subTest(arguments):
+                self.assert_good(absenc(*arguments))
+        turning = absenc("wave", f"tformat?{settings}&singleturn=5000000", self.file("high.vcd"), "--count", "1")
+        self.assert_good(turning)
+        self.assertIn("5000000", absenc("decode", f"tformat?{settings}", self.file("high.vcd")).stdout)
+        with Emulator(self.directory, protocol=f"tformat?{settings}&singleturn=5000000") as emulator:
+            reading = absenc("read", f"tformat:{emulator.path}?{settings}", "--json")
+            self.assertEqual(json.loads(reading.stdout)["singleturn"], 5000000)
+        for arguments, words in [(["emulate", "tformat?baud=9600"], "no option \"baud\""),
+                                 (["emulate", "tformat?motoin=still"], "motoin"),
+                                 (["emulate", "tformat?motion=still", "--motion", "still"], "--motion is given 2 times"),
+                                 (["decode", "tformat?motion=still", capture], "no option \"motion\"")]:
+            with self.subTest(arguments):
+                self.assert_wrong_usage(absenc(*arguments), words)
+
     def test_what_people_type(self):
         self.assertEqual(absenc("version").stdout, absenc("--version").stdout)
         self.assertEqual(absenc("help").stdout, absenc("--help").stdout)

@@ -12,11 +12,13 @@
 #include <vector>
 
 #include "absenc/client/text/nearest.hpp"
+#include "absenc/client/way/address.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/help.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/text/encoder_text.hpp"
 #include "tools/absenc/text/output.hpp"
@@ -64,9 +66,8 @@ class Parser {
   void take_option(std::string_view word, std::span<char* const>& words) {
     const std::size_t equals = word.find('=');
     const std::string_view name = word.substr(0, equals);
-    const auto& all = subcommand_->parameters;
-    const auto parameter = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.name == name; });
-    if (parameter == all.end()) refuse_option(name);
+    const Parameter* parameter = find_parameter(name);
+    if (parameter == nullptr) refuse_option(name);
     const bool has_value = equals != std::string_view::npos;
     const bool is_flag = parameter->value.empty();
     if (has_value && is_flag) valued_flag_ = name;
@@ -83,8 +84,50 @@ class Parser {
       if (!extra_) extra_ = word;
       return;
     }
-    invocation_.add(arguments_[taken_]->name, std::string(word));
-    if (!arguments_[taken_]->repeatable) ++taken_;
+    const Parameter& parameter = *arguments_[taken_];
+    if (parameter.name == parameter::protocol.name) {
+      take_protocol(word);
+    } else {
+      invocation_.add(parameter.name, std::string(word));
+    }
+    if (!parameter.repeatable) ++taken_;
+  }
+
+  // "tformat?model=23-bit&motion=rpm=60", as behind sim: in other verbs: each setting is the option of its name, if the
+  // verb has it, or else one of the protocol.
+  void take_protocol(std::string_view word) {
+    constexpr std::string_view sim = "sim:";
+    if (word.starts_with(sim)) word.remove_prefix(sim.size());
+    const std::size_t question = std::min(word.find('?'), word.size());
+    invocation_.add(parameter::protocol.name, std::string(word.substr(0, question)));
+    for (std::string_view rest = word.substr(std::min(question + 1, word.size())); !rest.empty();) {
+      const std::size_t end = std::min(rest.find('&'), rest.size());
+      take_setting(rest.substr(0, end));
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+  }
+
+  void take_setting(std::string_view setting) {
+    const std::size_t equals = std::min(setting.find('='), setting.size());
+    const std::string_view name = setting.substr(0, equals);
+    const client::LinkParameter* known = client::find_link_parameter(name);
+    const bool of_virtual_encoder = known != nullptr && known->places == "sim";
+    if (of_virtual_encoder || name == "model") {
+      if (const Parameter* own = find_parameter(fmt::format("--{}", name))) {
+        return invocation_.add(own->name, std::string(setting.substr(std::min(equals + 1, setting.size()))));
+      }
+    }
+    const Parameter* option = find_parameter(parameter::option.name);
+    if (option == nullptr) {
+      throw UsageError(fmt::format("{} takes no settings behind the protocol: \"{}\"", subcommand_->name, setting));
+    }
+    invocation_.add(option->name, std::string(setting));
+  }
+
+  [[nodiscard]] const Parameter* find_parameter(std::string_view name) const {
+    const auto& all = subcommand_->parameters;
+    const auto found = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.name == name; });
+    return found == all.end() ? nullptr : &*found;
   }
 
   [[noreturn]] void refuse_option(std::string_view name) const {

@@ -29,6 +29,7 @@ class PositionTrace {
     }
     if (turns_ && !reading.multiturn_valid) return;
     ++count_;
+    last_ = std::max(tick, first_);
     const std::uint64_t since = tick - std::min(tick, first_);
     while (since >> shift_ >= columns) halve();
     Column& column = columns_[static_cast<std::size_t>(since >> shift_)];
@@ -41,9 +42,9 @@ class PositionTrace {
   [[nodiscard]] std::uint64_t count() const { return count_; }
   /// A small plot with its scale; "" when there was no valid position.
   [[nodiscard]] std::string plot() const;
-  /// Ticks from the left end of the plot to its right end.
-  [[nodiscard]] std::uint64_t ticks() const { return columns << shift_; }
+  /// Ticks of the first and the last valid position.
   [[nodiscard]] std::uint64_t first() const { return first_; }
+  [[nodiscard]] std::uint64_t last() const { return last_; }
 
  private:
   struct Column {
@@ -61,6 +62,7 @@ class PositionTrace {
   std::array<Column, columns> columns_{};
   unsigned shift_ = 0;  // a column has 2^shift_ ticks
   std::uint64_t first_ = 0;
+  std::uint64_t last_ = 0;
   std::uint64_t count_ = 0;
   unsigned bits_ = 1;
   bool signed_ = false;

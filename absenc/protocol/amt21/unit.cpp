@@ -221,7 +221,7 @@ constexpr auto vectors = std::array{
 constexpr Result<Request> guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
 constexpr auto conditions = std::array{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
 
-constexpr std::array<std::string_view, 3> known_as{"CUI", "Same Sky", "AMT21"};
+constexpr auto known_as = std::array<std::string_view, 3>{"CUI", "Same Sky", "AMT21"};
 
 constexpr Declaration<Protocol, Encoder> declaration{
     .id = "amt21",

@@ -186,7 +186,7 @@ bool is_safety_checked(const Options& values, Frame, Frame reply, std::size_t bi
   return made.cpw.check.width != 0 && made.spw.check.width != 0 && is_behind_ack(reply, bit);
 }
 
-constexpr std::array<std::string_view, 2> safety_known_as{"iC-Haus", "Renishaw"};
+constexpr auto safety_known_as = std::array<std::string_view, 2>{"iC-Haus", "Renishaw"};
 
 constexpr Declaration<ProtocolOf<SafetyFormat>, VirtualEncoderOf<SafetyFormat>> safety_declaration{
     .id = "biss-safety",

@@ -94,7 +94,7 @@ BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& fi
 
 std::uint32_t reportable_by(const Options& values) { return contents_of(format_by(values).word).reported; }
 
-constexpr std::array<std::string_view, 3> known_as{"iC-Haus", "RLS", "Renishaw"};
+constexpr auto known_as = std::array<std::string_view, 3>{"iC-Haus", "RLS", "Renishaw"};
 
 constexpr Declaration<Protocol, VirtualEncoderOf<Format>> declaration{
     .id = "biss",

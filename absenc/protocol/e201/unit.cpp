@@ -280,7 +280,7 @@ bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
 
 std::uint32_t reportable_by(const Options& values) { return contents_of(format_by(values).word).reported; }
 
-constexpr std::array<std::string_view, 3> known_as{"RLS", "E201-9S", "Renishaw"};
+constexpr auto known_as = std::array<std::string_view, 3>{"RLS", "E201-9S", "Renishaw"};
 
 constexpr Declaration<Protocol, VirtualInterface> declaration{
     .id = "e201",

@@ -412,7 +412,7 @@ Follower* make_follower(const Options& values, std::span<std::byte> storage) {
   return new (storage.data()) ChannelFollower(format_of<interface>(values));
 }
 
-constexpr std::array<std::string_view, 2> known_as{"RLS", "AksIM"};
+constexpr auto known_as = std::array<std::string_view, 2>{"RLS", "AksIM"};
 
 /// What the document says of both interfaces, and of each.
 template <Interface interface>

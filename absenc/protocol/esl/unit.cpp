@@ -225,7 +225,7 @@ constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) {
   return refused == Error::none ? asked_by(profile, {}, reply) : Result<Request>(refused);
 }
 
-constexpr std::array<std::string_view, 1> known_as{"QS35"};
+constexpr auto known_as = std::array<std::string_view, 1>{"QS35"};
 
 constexpr Declaration<Protocol, VirtualEncoder, HostOf<Protocol>> declaration{
     .id = "esl",

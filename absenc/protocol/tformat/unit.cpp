@@ -413,7 +413,7 @@ constexpr Error answer_to_bad(const Format&, Bytes, Error error, Bytes reply) {
   return refused ? Error::request_rejected : error;
 }
 
-constexpr std::array<std::string_view, 2> known_as{"Tamagawa", "Smart-Abs"};
+constexpr auto known_as = std::array<std::string_view, 2>{"Tamagawa", "Smart-Abs"};
 
 constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .id = "tformat",

@@ -121,8 +121,7 @@ std::string CaptureStatistics::text(const CaptureOutcome& outcome) const {
   if (const std::string plot = trace_.plot(); !plot.empty()) {
     text += fmt::format("\nposition, {} valid", trace_.count());
     if (clock_.has_time()) {
-      text += fmt::format(", from {} s on, {} wide", clock_.text(trace_.first()),
-                          tool::to_text(clock_.time(trace_.ticks())));
+      text += fmt::format(", from {} s to {} s", clock_.text(trace_.first()), clock_.text(trace_.last()));
     }
     text += fmt::format("\n{}", plot);
   }

@@ -91,7 +91,8 @@ int run_serve(const Invocation& invocation) {
 
   serve::Server server(choices);
   print_line(server.url());
-  print_message(fmt::format("{} encoders; Ctrl-C ends, SIGHUP reads absenc.toml again", server.encoders()));
+  print_message(fmt::format("{} encoder{}; Ctrl-C ends, SIGHUP reads absenc.toml again", server.encoders(),
+                            server.encoders() == 1 ? "" : "s"));
   try {
     while (!os::interrupted()) {
       pollfd watched{hangups.get(), POLLIN, 0};
