@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of `absenc serve` in Debian's chromium: what somebody sees, does by keyboard and is told."""
 import os
+import subprocess
 import time
 import unittest
 import urllib.parse
@@ -341,6 +342,64 @@ class Page(ServeCase):
         asked = self.browser.execute_script("return performance.getEntriesByType('resource').map((one) => one.name.split('/').pop().split('?')[0])")
         self.assertIn("points", asked)
         self.assertNotIn("minute", asked)
+
+    def test_an_alarm_is_acknowledged_by_a_token_and_stays(self):
+        name = "sim:tformat?alarm=over_heat&fault=corrupt=0.2"
+        self.window.go(self.served.url, encoder=name)
+        button = "document.querySelector('[data-acknowledge=over_heat]')"
+        wait_until(lambda: self.browser.execute_script(f"return Boolean({button})"), "it can be acknowledged")
+        self.browser.execute_script(f"{button}.click()")
+        self.wait_for("The alarm stays raised", "dialog")
+        self.browser.find_element(By.ID, "dialog-token").send_keys(TOKEN)
+        self.browser.find_element(By.ID, "dialog-yes").click()
+        self.wait_for("Acknowledged by anna", ".side.bad")
+        wait_until(lambda: not self.browser.execute_script(f"return Boolean({button})"), "once is enough")
+        self.assertEqual(self.text(".now-box .state"), "▲ alarm, seen")
+        wait_until(lambda: "acknowledged" in self.text("#panel-history"), "the history has it")
+        self.assertIn("anna from 127.0.0.1", self.text("#panel-history"))
+        self.browser.get("about:blank")
+        self.open()  # another page
+        self.wait_for("Acknowledged by anna", self.card(name) + " .words")
+        self.assertEqual(self.text(self.card(name) + " .state"), "▲ alarm, seen")
+        self.assert_no_errors()
+
+    def test_the_browser_notifies_where_it_is_allowed(self):
+        recorder = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": """
+            window.told = [];
+            window.Notification = class {
+              static permission = "default";
+              static async requestPermission() { return this.permission = "granted"; }
+              constructor(title, {body, tag}) { told.push([title, body, tag]); }
+              close() {}
+            };"""})
+        self.addCleanup(self.browser.execute_cdp_cmd, "Page.removeScriptToEvaluateOnNewDocument", recorder)
+        emulator = Emulator(self.directory, name="another", stdin=subprocess.PIPE)
+        self.addCleanup(lambda: emulator.end())
+        name = f"tformat:{emulator.path}?latency=300"
+        served = self.without_history(name)
+        self.browser.get(served.url)
+        self.wait_for("good", ".pill")
+        told = "return told"
+
+        def order(line):
+            emulator.process.stdin.write(line)
+            self.assertTrue(emulator.line().startswith("ok"))
+        order(b"alarm over_speed\n")
+        self.wait_for("1 alarm", ".pill")
+        self.assertEqual(self.browser.execute_script(told), [])  # nobody has allowed it
+        self.browser.find_element(By.ID, "notify").click()
+        wait_until(lambda: self.browser.find_element(By.ID, "notify").get_attribute("aria-pressed") == "true", "it is on")
+        order(b"alarm over_heat\n")
+        wait_until(lambda: self.browser.execute_script(told), "it is told")
+        title, body, tag = self.browser.execute_script(told)[0]
+        self.assertEqual(title, f"{name}: over heat")
+        self.assertIn("let it cool", body)
+        self.assertEqual(tag, f"{name} alarm over_heat")
+        emulator.kill()
+        wait_until(lambda: [one for one in self.browser.execute_script(told) if one[0] == f"{name}: lost"], "a loss is told")
+        self.browser.find_element(By.ID, "notify").click()
+        wait_until(lambda: self.browser.find_element(By.ID, "notify").get_attribute("aria-pressed") == "false", "it is off")
+        self.assert_no_errors()
 
     def test_without_tokens_the_page_says_how_to_get_some(self):
         served = self.without_history("sim:tformat")

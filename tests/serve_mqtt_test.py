@@ -16,7 +16,7 @@ import jsonschema
 
 from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
 from mqtt_support import Broker, Receiver, free_port, now, numbers, twice
-from serve_support import BUSY, ServeCase, of, wait_until
+from serve_support import BUSY, TOKEN, ServeCase, of, wait_until
 
 SOURCE = pathlib.Path(os.environ.get("ABSENC_SOURCE_DIR", pathlib.Path(__file__).resolve().parent.parent))
 SCHEMA = json.loads((SOURCE / "docs/mqtt-schema.json").read_text(encoding="utf-8"))
@@ -117,6 +117,20 @@ class What(MqttCase):
         told = receiver.until("event", lambda one: one["kind"] == "lost")
         state = receiver.until("state", lambda one: one.get("encoder") and one["state"] == "lost")
         self.assertEqual(told["text"], state["message"])
+
+
+    def test_who_has_seen_an_alarm_is_not_sent(self):
+        broker = self.broker()
+        receiver = self.receiver(broker)
+        name = "sim:tformat?alarm=over_heat"
+        server = self.sender(broker.url, name, "--token-file", self.tokens())
+        receiver.until("state", lambda one: one.get("alarms"))
+        good = {"Authorization": f"Bearer {TOKEN}"}
+        self.assertEqual(server.ask(of(name, "acknowledge"), "POST", good, alarm="over_heat")[0], 200)
+        server.command(name, "position", good)
+        receiver.until("event", lambda one: one["kind"] == "command")  # it was told later
+        self.assertNotIn("acknowledged", [one["kind"] for one in receiver.all("event")])
+        self.assertNotIn("acknowledged", [one for state in receiver.all("state") for alarm in state.get("alarms") or [] for one in alarm])
 
 
 class State(MqttCase):

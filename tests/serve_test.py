@@ -241,7 +241,8 @@ class Described(ServeCase):
     """openapi.json against what is answered."""
     NAME = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.1&seed=1"
     # What a route must be asked with.
-    VALUES = {"/api/encoders/{encoder}/command": {"command": "position"}}
+    VALUES = {"/api/encoders/{encoder}/command": {"command": "position"},
+              "/api/encoders/{encoder}/acknowledge": {"alarm": "over_heat"}}
 
     def schema(self, schema, components):
         """As jsonschema takes it: OpenAPI 3.0 has a word of its own for null."""
@@ -283,6 +284,67 @@ class Described(ServeCase):
         status, got, body = server.answer(path, method, {"Authorization": f"Bearer {TOKEN}"}, **values)
         self.assertEqual((status, got.split(";")[0]), (200, kind), body)
         jsonschema.validate(json.loads(body) if kind == "application/json" else body, schema)
+
+
+class Acknowledged(ServeCase):
+    GOOD = {"Authorization": f"Bearer {TOKEN}"}
+
+    def acknowledge(self, server, name, headers, **values):
+        status, body = server.ask(of(name, "acknowledge"), "POST", headers, **values)
+        return status, json.loads(body)
+
+    @staticmethod
+    def alarms(server):
+        return server.encoder()["alarms"] or []
+
+    def test_it_is_kept_with_the_name_of_the_token_and_clears_nothing(self):
+        name = "sim:tformat?alarm=over_heat&alarm=battery_alarm"
+        server = self.server(name, "--history", self.file("history"), "--token-file", self.tokens())
+        wait_until(lambda: len(self.alarms(server)) == 2, "both are raised")
+        self.assertEqual([one["acknowledged"] for one in self.alarms(server)], [None, None])
+        self.assertEqual(self.acknowledge(server, name, {}, alarm="over_heat")[0], 401)
+        self.assertEqual(self.acknowledge(server, name, self.GOOD)[0], 400)
+        status, body = self.acknowledge(server, name, self.GOOD, alarm="overheat")
+        self.assertEqual(status, 409)
+        self.assertIn("did you mean over_heat?", body["error"])
+        stream = self.stream(server)
+        stream.state()
+        self.assertEqual(self.acknowledge(server, name, self.GOOD, alarm="over_heat"), (200, {"ok": True, "alarm": "over_heat", "who": "anna"}))
+        told = stream.until(lambda event, data: event == "happening" and data["kind"] == "acknowledged")
+        self.assertEqual((told["encoder"], told["text"], told["who"]), (name, "over_heat", "anna from 127.0.0.1"))
+        seen = {one["name"]: one["acknowledged"] for one in stream.state()["alarms"]}
+        self.assertEqual(seen["over_heat"]["who"], "anna")
+        self.assertIsNone(seen["battery_alarm"])
+        self.assertIn(told, server.json(of(name, "events"))["events"])
+        self.assertIn('alarm="over_heat"} 1', server.ask("/metrics")[1])
+
+    def test_it_ends_with_the_alarm(self):
+        emulator = Emulator(self.directory, stdin=subprocess.PIPE)
+        self.addCleanup(emulator.end)
+        name = f"tformat:{emulator.path}?latency=300"
+        server = self.without_history(name, "--token-file", self.tokens())
+        wait_until(lambda: server.encoder()["state"] == "live", "it is read")
+
+        def order(line):
+            emulator.process.stdin.write(line)
+            self.assertTrue(emulator.line().startswith("ok"))
+        order(b"alarm over_speed\n")
+        wait_until(lambda: self.alarms(server), "it is raised")
+        self.assertEqual(self.acknowledge(server, name, self.GOOD, alarm="over_speed")[0], 200)
+        self.assertEqual(self.alarms(server)[0]["acknowledged"]["who"], "anna")
+        order(b"clear over_speed\n")
+        self.assertEqual(server.command(name, "clear-alarms", self.GOOD)[0], 200)
+        wait_until(lambda: server.encoder()["alarms"] == [], "it is over")
+        self.assertEqual(self.acknowledge(server, name, self.GOOD, alarm="over_speed")[0], 409)
+        order(b"alarm over_speed\n")
+        wait_until(lambda: self.alarms(server), "it is raised again")
+        self.assertIsNone(self.alarms(server)[0]["acknowledged"])
+
+    def test_without_tokens_nobody_can(self):
+        name = "sim:tformat?alarm=over_heat"
+        server = self.without_history(name)
+        wait_until(lambda: self.alarms(server), "it is raised")
+        self.assertEqual(self.acknowledge(server, name, {}, alarm="over_heat")[0], 403)
 
 
 class Losses(ServeCase):

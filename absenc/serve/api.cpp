@@ -63,8 +63,8 @@ Range range_in(const Request& request) {
 }
 
 constexpr std::string_view encoders_path = "/api/encoders/";
-constexpr std::array<std::string_view, 9> parts_of_encoder{"command", "doctor", "events",   "history", "history.csv",
-                                                           "memory",  "points", "settings", "stream"};
+constexpr std::array<std::string_view, 10> parts_of_encoder{"acknowledge", "command", "doctor", "events",   "history",
+                                                            "history.csv", "memory",  "points", "settings", "stream"};
 
 /// A path /api/encoders/NAME/PART. The name may contain slashes; the part is empty for the encoder itself.
 struct Target {
@@ -189,10 +189,11 @@ void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, con
   if (part == "history" || part == "events") return past(watch->name(), part == "events", request, reply);
   if (part == "points") return reply.send(json_response(points(*watch, watch->recent_points())));
   if (part == "history.csv") return past_as_csv(watch->name(), request, reply);
-  if (part == "command" || part == "doctor" || request.method == "HEAD") {
-    Response response = error_response(
-        405, fmt::format("{} is asked for with {}", part, part == "command" || part == "doctor" ? "POST" : "GET"));
-    response.headers.emplace_back("Allow", part == "command" || part == "doctor" ? "POST" : "GET");
+  const bool needs_post = part == "command" || part == "doctor" || part == "acknowledge";
+  if (needs_post || request.method == "HEAD") {
+    const std::string_view method = needs_post ? "POST" : "GET";
+    Response response = error_response(405, fmt::format("{} is asked for with {}", part, method));
+    response.headers.emplace_back("Allow", method);
     return reply.send(response);
   }
   if (part == "stream") return stream(watch->name(), reply);
@@ -210,7 +211,8 @@ void Api::post(const Request& request, const Reply& reply) {
   const std::shared_ptr<Watch> watch = require_encoder(*fleet_, target.name);
   if (target.part == "doctor") return doctor(*watch, request, reply);
   if (target.part == "command") return command(*watch, request, reply);
-  Response response = error_response(405, "only command and doctor are asked for with POST");
+  if (target.part == "acknowledge") return acknowledge(*watch, request, reply);
+  Response response = error_response(405, "only command, doctor and acknowledge are asked for with POST");
   response.headers.emplace_back("Allow", "GET, HEAD");
   reply.send(response);
 }
@@ -257,6 +259,20 @@ void Api::command(Watch& watch, const Request& request, const Reply& reply) {
     reply.send({done.good ? 200U : 502U, "application/json", json.line() + "\n"});
   };
   give(watch, std::move(order), request, reply);
+}
+
+// The alarm stays raised: only the encoder clears it.
+void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) {
+  const std::string alarm = request.value("alarm");
+  if (alarm.empty()) throw BadRequest("alarm must name the alarm that is acknowledged");
+  const std::string token = access_->who(request);
+  const std::string refused = watch.acknowledge(alarm, token, fmt::format("{} from {}", token, request.peer));
+  if (!refused.empty()) return reply.send(error_response(409, refused));
+  const auto answer = [reply, alarm, token] {
+    reply.send(json_response(Json::object().set("ok", true).set("alarm", alarm).set("who", token)));
+  };
+  if (chronicler_ == nullptr) return answer();
+  chronicler_->when_written(happenings_->added(), answer);
 }
 
 // It opens the port anew, with other settings too: others on the line would lose it.

@@ -36,6 +36,7 @@ class Api {
   void get_of(const std::shared_ptr<Watch>& watch, std::string_view part, const Request& request, const Reply& reply);
   void stream(const std::string& trace, const Reply& reply);
   void command(Watch& watch, const Request& request, const Reply& reply);
+  void acknowledge(Watch& watch, const Request& request, const Reply& reply);
   void doctor(Watch& watch, const Request& request, const Reply& reply);
   void give(Watch& watch, Order order, const Request& request, const Reply& reply);
   void past(const std::string& encoder, bool events, const Request& request, const Reply& reply);

@@ -24,7 +24,8 @@ namespace absenc::serve {
 struct Happening {
   std::int64_t at_ms = 0;
   std::string encoder{};  // "": of the server itself
-  // alarm, alarm_over, failing, silent, lost, back, restarted, ended, examined, command, change, history, mqtt, access
+  // alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined, command, change, history,
+  // mqtt, access
   std::string kind{};
   std::string text{};
   std::string who{};  // of commands: who gave it

@@ -39,7 +39,9 @@ MqttCollector::~MqttCollector() {
 
 void MqttCollector::add(const std::vector<Happening>& happenings) {
   const std::lock_guard lock(mutex_);
-  waiting_.insert(waiting_.end(), happenings.begin(), happenings.end());
+  // Who has seen an alarm is for the page: subscribers get the alarms themselves.
+  std::copy_if(happenings.begin(), happenings.end(), std::back_inserter(waiting_),
+               [](const Happening& one) { return one.kind != "acknowledged"; });
 }
 
 MqttCollector::Figures MqttCollector::figures() const {

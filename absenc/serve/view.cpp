@@ -17,8 +17,24 @@ namespace {
 
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
-// Null: not all of them are reported, and of those that are none is raised.
-Json alarms_json(const Unit& unit, const Reading& reading) {
+// Since when the alarm is raised, and who has acknowledged it.
+void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const FieldInfo& field,
+                      const FlagInfo& flag) {
+  const auto known = std::find_if(raised.begin(), raised.end(), [&](const RaisedAlarm& one) {
+    return one.channel == field.name && one.name == flag.name;
+  });
+  const bool is_known = known != raised.end();
+  json.set("since_ms", is_known ? Json(known->since_ms) : Json());
+  Json acknowledged;
+  if (is_known && known->acknowledged_ms != 0) {
+    acknowledged = Json::object().set("who", known->acknowledged_by).set("at_ms", known->acknowledged_ms);
+  }
+  json.set("acknowledged", acknowledged);
+}
+
+// Null: not all of them are reported, and of those that are none is raised. `known`: null leaves out who has
+// acknowledged them.
+Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<RaisedAlarm>* known = nullptr) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
   const std::optional<Flags> joined = joined_alarms(unit, reading);
@@ -27,6 +43,7 @@ Json alarms_json(const Unit& unit, const Reading& reading) {
     for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
       Json one = flag_to_json(flag);
       if (channels.size() > 1) one.set("channel", flags.field->name);
+      if (known != nullptr) set_acknowledged(one, *known, *flags.field, *flag);
       all.append(one);
     }
   }
@@ -194,7 +211,7 @@ Json overview(const Watch& watch, const Snapshot& snapshot) {
   json.set("continued_position", live && last.position_valid && snapshot.place ? Json(*snapshot.place) : Json());
   json.set("speed", live && last.speed_valid ? Json(last.speed) : Json());
   json.set("speed_unit", is_linear(watch) ? "mm/s" : "rpm");
-  json.set("alarms", live ? alarms_json(unit, last.reading) : Json());
+  json.set("alarms", live ? alarms_json(unit, last.reading, &snapshot.raised) : Json());
   json.set("status", live ? status_json(unit, last.reading) : Json());
   json.set("errors_last_minute", snapshot.errors_last_minute).set("rate_hz", snapshot.rate);
   json.set("last_reading", !live && snapshot.has_reading ? last_reading_json(last) : Json());

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/connection.hpp"
@@ -160,6 +161,24 @@ std::vector<Second> Watch::take_seconds() {
   std::vector<Second> taken(seconds_.begin(), seconds_.end());
   seconds_.clear();
   return taken;
+}
+
+std::string Watch::acknowledge(std::string_view alarm, const std::string& token, const std::string& who) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::vector<std::string_view> names;
+    bool is_raised = false;
+    for (RaisedAlarm& one : known_.raised) {
+      names.push_back(one.name);
+      if (one.name != alarm) continue;
+      is_raised = true;
+      one.acknowledged_by = token;
+      one.acknowledged_ms = calendar_ms();
+    }
+    if (!is_raised) return fmt::format("the alarm \"{}\" is not raised{}", alarm, suggestion(alarm, names));
+  }
+  tell("acknowledged", std::string(alarm), who);
+  return "";
 }
 
 std::string_view Watch::give(Order order) {
@@ -379,6 +398,12 @@ void Watch::tell_alarms(const Reading& reading) {
       std::string words =
           fmt::format("{}{}: {}", now.size() > 1 ? fmt::format("{} ", field.name) : "", flag.name, flag.meaning);
       if (raised && !flag.action.empty()) words += fmt::format(". What to do: {}", flag.action);
+      {
+        const std::lock_guard lock(mutex_);
+        std::erase_if(known_.raised,
+                      [&](const RaisedAlarm& one) { return one.channel == field.name && one.name == flag.name; });
+        if (raised) known_.raised.push_back({field.name, flag.name, calendar_ms(), {}, 0});
+      }
       tell(raised ? "alarm" : "alarm_over", words);
     }
   }

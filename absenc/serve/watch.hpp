@@ -55,6 +55,15 @@ struct LatencyFigures {
   Time sum{};
 };
 
+/// An alarm that is raised, and who has seen it. Acknowledged is not cleared.
+struct RaisedAlarm {
+  std::string_view channel{};  // name of the field with the alarms of a channel
+  std::string_view name{};
+  std::int64_t since_ms = 0;      // calendar
+  std::string acknowledged_by{};  // "": by nobody
+  std::int64_t acknowledged_ms = 0;
+};
+
 /// What is known of an encoder at a moment.
 struct Snapshot {
   State state = State::opening;
@@ -68,6 +77,7 @@ struct Snapshot {
   std::uint64_t losses = 0;
   std::uint64_t restarts = 0;  // of the position
   std::uint64_t errors_last_minute = 0;
+  std::vector<RaisedAlarm> raised{};
   double rate = 0;           // readings a second
   LatencyFigures latency{};  // at most a second old
 };
@@ -136,6 +146,10 @@ class Watch {
   [[nodiscard]] std::vector<Second> last_minute() const;
   /// "", or why it is not taken: another waits, an examination runs, or it has ended.
   [[nodiscard]] std::string_view give(Order order);
+
+  /// Keeps who has seen the alarm of this name, in all channels, until it is over. `who` stands in the history. Returns
+  /// "", or why it is refused: the alarm is not raised.
+  [[nodiscard]] std::string acknowledge(std::string_view alarm, const std::string& token, const std::string& who);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const client::EncoderAddress& address() const { return address_; }

@@ -3,6 +3,7 @@
 import {askToken} from "./dialog.js";
 import {setText} from "./dom.js";
 import {One} from "./encoder.js";
+import {notify, notifyLoss} from "./notify.js";
 import {Overview} from "./overview.js";
 import {Events, tokenInfo} from "./server.js";
 import {clock, sentence} from "./words.js";
@@ -21,6 +22,7 @@ let shown;  // the encoder whose page it is; null: all
 
 /** `refused`: the server is there and says why it sends nothing. */
 function lose(why, refused = false) {
+  if (connection.hidden && !refused) notifyLoss(why);
   connection.hidden = false;
   setText(connection, refused ? sentence(why) : `No connection to the server: ${why}. Nothing on this page is live.`);
   setText(time, "not live");
@@ -43,7 +45,10 @@ function take(event, data) {
     setText(historyTrouble, trouble === "" ? "" : `The history is not being written: ${trouble}. Rows lost so far: ${data.history.lost}.`);
     view.show(data);
   }
-  if (event === "happening") setText(announcements, `${data.encoder} ${data.kind}: ${data.text}`);
+  if (event === "happening") {
+    setText(announcements, `${data.encoder} ${data.kind}: ${data.text}`);
+    notify(data);
+  }
   view.take(event, data);
 }
 

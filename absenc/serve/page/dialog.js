@@ -55,6 +55,15 @@ export async function askToken() {
   await ask("Token", "Use it", [tokenLabel(input)], () => tryToken(input.value.trim()));
 }
 
+/** Whether the alarm is to be acknowledged, by the token of this tab or one that is given now. */
+export async function askAcknowledge(name, alarm) {
+  const {name: who} = await tokenInfo();
+  const token = tokenField();
+  const nodes = [element("p", {}, "The alarm stays raised until the encoder clears it. All pages and the history show who has acknowledged it."),
+                 terms([["named", who ?? "the name of the token below"]]), ...(who === null ? [tokenLabel(token)] : [])];
+  return ask(`Acknowledge ${plain(alarm)}: ${name}`, "Acknowledge", nodes, async () => (who === null ? tryToken(token.value.trim()) : ""));
+}
+
 /**
  * Whether `command` is to be run. `now(values)`: what is so now, or "" where that says nothing; `then(values)`: what
  * will be. Returns the arguments, or null.

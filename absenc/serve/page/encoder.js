@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One encoder: what it does, what is wrong, what can be done; the rest in tabs.
-import {askCommand} from "./dialog.js";
+import {askAcknowledge, askCommand} from "./dialog.js";
 import {breakable, choice, dial, element, histogram, rich, scale, setChildren, setText, table, terms} from "./dom.js";
 import {Examine} from "./examine.js";
 import {figureNode, showParts, showState, stateNode} from "./overview.js";
@@ -230,16 +230,24 @@ export class One {
     if (changed || one.state !== "live") this.changed = true;
   }
 
-  sinceOf(name) {
-    const event = this.events.find((other) => other.kind === "alarm" && other.text.split(/[: ]/)[0] === name);
-    return event === undefined ? "" : `Since ${clock(event.at_ms)}.`;
+  /** Who has seen an alarm is kept by the server; the alarm stays. */
+  async acknowledge(alarm) {
+    try {
+      if (!await askAcknowledge(this.name, alarm)) return;
+      const {status, body} = await request(pathOf(this.name, "acknowledge"), {alarm}, "POST");
+      setText(this.outcome, status === 200 ? `${sentence(plain(alarm))} Acknowledged by ${body.who}.` : sentence(body.error));
+      this.outcome.className = `status ${status === 200 ? "good" : "bad"}`;
+    } catch (error) {
+      setText(this.outcome, `The alarm was not acknowledged: ${error.message}`);
+    }
   }
 
   showWrong() {
     const one = this.one;
     const list = wrongs(one).map(([kind, strong, text], i) => {
-      const since = one.alarms?.[i] ? this.sinceOf(one.alarms[i].name) : "";
-      return [kind, strong, [since, text].filter((part) => part !== "").join(" ")];
+      const alarm = one.alarms?.[i];
+      const since = alarm?.since_ms ? `Since ${clock(alarm.since_ms)}. ` : "";
+      return [kind, strong, since + text, this.mayChange && alarm && !alarm.acknowledged ? alarm.name : null];
     });
     if (one.state !== "live" && one.state !== "examined" && one.last_reading !== null) {
       list.push(["bad", "No reading", `since ${clock(one.last_reading.at_ms)}${lastText(one.last_reading) && `: then it was at ${lastText(one.last_reading)}`}.`]);
@@ -250,7 +258,8 @@ export class One {
     if (text === this.shownWrong) return;
     this.shownWrong = text;
     this.wrongBox.className = `box side ${this.condition.kind}`;
-    this.wrong.replaceChildren(...list.map(([kind, strong, words]) => element("p", {class: kind}, element("strong", {}, strong), strong && words ? " " : "", ...rich(words))));
+    this.wrong.replaceChildren(...list.map(([kind, strong, words, alarm]) => element("div", {}, element("p", {class: kind}, element("strong", {}, strong), strong && words ? " " : "", ...rich(words)),
+      ...(alarm ? [element("button", {type: "button", class: "acknowledge", "data-acknowledge": alarm, onclick: () => this.acknowledge(alarm)}, "Acknowledge…")] : []))));
   }
 
   lose(why = "no connection to the server") {
@@ -395,6 +404,8 @@ export class One {
       this.offered = undefined;
       return;
     }
+    this.mayChange = info.tokens;
+    this.showWrong();
     if (!info.tokens) {
       this.commands.replaceChildren(this.doctorButton, element("p", {class: "faint"}, "Nothing can be changed here: the server has no tokens. To change encoders, start it with ",
         element("code", {}, "--token-file FILE"), ", a file of lines NAME TOKEN."));

@@ -236,7 +236,7 @@ export class Overview {
   arrange(now) {
     if (!now && performance.now() - this.arranged < ORDER_MS) return;
     this.arranged = performance.now();
-    const rank = (card) => GROUPS.indexOf(card.condition.group);
+    const rank = (card) => GROUPS.indexOf(card.condition.group) + (card.condition.isSeen ? .5 : 0);
     const cards = [...this.cards.values()];
     if (this.order.value === "ill") cards.sort((a, b) => rank(a) - rank(b));
     if (this.order.value === "name") cards.sort((a, b) => a.name.localeCompare(b.name, "en", {numeric: true}));

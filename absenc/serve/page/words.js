@@ -85,7 +85,8 @@ export function condition(one) {
   if (one.state === "opening") return {group: "waiting", kind: "warn", word: "port not there"};
   if (one.state === "examined") return {group: "waiting", kind: "warn", word: "examined"};
   const count = one.alarms?.length ?? 0;
-  if (count > 0) return {group: "alarm", kind: "bad", word: count === 1 ? "alarm" : `${count} alarms`};
+  const isSeen = count > 0 && one.alarms.every((alarm) => alarm.acknowledged);
+  if (count > 0) return {group: "alarm", kind: "bad", isSeen, word: `${count === 1 ? "alarm" : `${count} alarms`}${isSeen ? ", seen" : ""}`};
   if (one.singleturn_valid === false || one.multiturn_valid === false) return {group: "alarm", kind: "bad", word: "invalid"};
   if (one.alarms === null && one.status?.length) return {group: "alarm", kind: "bad", word: "warning"};
   if (one.errors_last_minute > 0) return {group: "errors", kind: "warn", word: "errors"};
@@ -105,7 +106,8 @@ export const MORE_WORDS = {live: ", alarms not reported"};
 export function wrongs(one) {
   const list = [];
   for (const alarm of one.alarms ?? []) {
-    list.push(["bad", sentence(plain((alarm.channel ? alarm.channel + " " : "") + alarm.name)), `${sentence(alarm.meaning)}${alarm.action ? " " + sentence(alarm.action) : ""}`]);
+    const seen = alarm.acknowledged ? `Acknowledged by ${alarm.acknowledged.who}, ${clock(alarm.acknowledged.at_ms)}. ` : "";
+    list.push(["bad", sentence(plain((alarm.channel ? alarm.channel + " " : "") + alarm.name)), `${seen}${sentence(alarm.meaning)}${alarm.action ? " " + sentence(alarm.action) : ""}`]);
   }
   if (one.state === "live") {
     if (one.singleturn_valid === false && one.alarms?.length !== undefined) list.push(["bad", "Position invalid.", "The encoder says that its position does not hold."]);
@@ -124,7 +126,7 @@ export function fieldText(value, missing = "INVALID") {
 
 /** What happened, as [kind, words]. */
 const HAPPENED = {
-  alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
+  alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
   failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],
   examined: ["plain", "examined"], command: ["plain", "command"], change: ["plain", "change"],
 };

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Notifications of the browser: of alarms and losses, where the user allows them.
+import {setText} from "./dom.js";
+import {happened, plain} from "./words.js";
+
+const button = document.getElementById("notify");
+const KINDS = ["alarm", "lost", "ended"];
+// A browser has them only for this computer's own pages and those behind TLS.
+const isPossible = "Notification" in window && isSecureContext;
+
+const isWanted = () => isPossible && localStorage.getItem("notify") === "on" && Notification.permission === "granted";
+
+function show() {
+  button.hidden = !isPossible;
+  if (!isPossible) return;
+  const isDenied = Notification.permission === "denied";
+  button.disabled = isDenied;
+  button.setAttribute("aria-pressed", String(isWanted()));
+  button.title = isDenied ? "This browser does not allow notifications of this page: change that in its settings." : "Notifications of alarms and of encoders that are lost";
+  setText(button, "Notify");
+}
+
+async function toggle() {
+  const on = !isWanted() && await Notification.requestPermission() === "granted";
+  localStorage.setItem("notify", on ? "on" : "off");
+  show();
+}
+
+function tell(title, body, tag, hash) {
+  if (!isWanted()) return;
+  const note = new Notification(title, {body, tag, icon: "icon.svg"});
+  note.onclick = () => {
+    focus();
+    location.hash = hash;
+    note.close();
+  };
+}
+
+/** Of what happened: the first sentence is the title. */
+export function notify({kind, encoder, text}) {
+  if (!KINDS.includes(kind)) return;
+  const [name, ...rest] = kind === "alarm" ? text.split(": ") : [happened(kind)[1], text];
+  tell(`${encoder}: ${plain(name)}`, rest.join(": "), `${encoder} ${kind} ${name}`, `#encoder=${encodeURIComponent(encoder)}`);
+}
+
+export const notifyLoss = (why) => tell("absenc: no connection to the server", why, "server", "#");
+
+button.addEventListener("click", toggle);
+show();
