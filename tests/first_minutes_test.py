@@ -130,6 +130,15 @@ class FirstMinutes(Case):
             with self.subTest(arguments):
                 self.assert_wrong_usage(absenc(*arguments), words)
 
+    def test_a_turning_encoder_was_switched_on_at_rest(self):
+        for line in absenc("list", "--json").stdout.splitlines():
+            unit = json.loads(line)["protocol"]
+            with self.subTest(unit):
+                read = absenc("read", f"sim:{unit}?motion=rpm=3000", "--json", "--count", "3", "--rate", "100")
+                self.assert_good(read)
+                for one in read.stdout.splitlines():
+                    self.assertNotEqual(json.loads(one).get("singleturn_valid"), False, one)
+
     def test_what_people_type(self):
         self.assertEqual(absenc("version").stdout, absenc("--version").stdout)
         self.assertEqual(absenc("help").stdout, absenc("--help").stdout)

@@ -138,7 +138,10 @@ Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name
 }
 
 ShaftState Motion::at(Time time) const {
-  ShaftState state = std::visit([&](const auto& kind) { return offset_at(kind, time - begin_); }, kind_);
+  const bool rests = rests_before_ && time <= begin_;
+  const Time since = rests ? Time{} : time - begin_;
+  ShaftState state = std::visit([&](const auto& kind) { return offset_at(kind, since); }, kind_);
+  if (rests) state.speed_millirpm = state.acceleration = 0;
   state.position =
       static_cast<std::int64_t>(static_cast<std::uint64_t>(start_) + static_cast<std::uint64_t>(state.position));
   return state;

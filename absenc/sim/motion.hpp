@@ -33,8 +33,12 @@ class Motion final : public Shaft {
   /// with `name` and the line that is wrong.
   [[nodiscard]] static Motion path(std::int64_t start, std::istream& csv, std::string_view name);
 
-  /// Lets the motion begin at another time than 0.
-  void begin_at(Time time) { begin_ = time; }
+  /// Lets the shaft stand at its start until then, and move behind it; 0 if this is not called, before which it moves
+  /// too.
+  void begin_at(Time time) {
+    begin_ = time;
+    rests_before_ = true;
+  }
 
   [[nodiscard]] ShaftState at(Time time) const override;
 
@@ -60,6 +64,7 @@ class Motion final : public Shaft {
 
   std::int64_t start_;
   Time begin_{};
+  bool rests_before_ = false;
   Kind kind_;
 };
 

@@ -58,8 +58,11 @@ TEST(Motion, ConstantSpeedWrapsInsteadOfOverflowing) {
 TEST(Motion, BeginsWhenItIsTold) {
   Motion motion = Motion::constant_speed(0, 60);
   motion.begin_at(5s);
+  EXPECT_EQ(motion.at(3s).position, 0);
   EXPECT_EQ(motion.at(5s).position, 0);
+  EXPECT_EQ(motion.at(5s).speed_millirpm, 0);  // an encoder that is switched on then is switched on at rest
   EXPECT_EQ(motion.at(6s).position, revolution);
+  EXPECT_EQ(motion.at(6s).speed_millirpm, 60'000);
 }
 
 TEST(Motion, SineHasExactPhaseAndDerivatives) {

@@ -303,7 +303,9 @@ constexpr std::array<Parameter, 20> emulate_parameters{{
      "one more encoder on the line: what stands behind sim:PROTOCOL? to set it; --model and --option are for all", "",
      false, true},
     {"--memory", "FILE", "keep the encoder's memory in this file, which it locks; it is made if missing"},
-    {"--power-on", "real|skip", "whether the encoder takes its time to start", "skip"},
+    {"--power-on", "real|skip",
+     "whether the encoder takes its time to start, while the shaft moves already; skip: it is switched on at rest",
+     "skip"},
     {"--for", "SECONDS", "end by itself", "until Ctrl-C"},
 }};
 
