@@ -5,6 +5,7 @@ import os
 import pathlib
 import re
 import socket
+import subprocess
 import unittest
 import urllib.error
 import urllib.parse
@@ -94,6 +95,19 @@ class PlotJuggler(ServeCase):
         self.assertIn("HOST:PORT", result.stderr)
 
 
+class Metrics(ServeCase):
+    def test_names_and_units_follow_the_conventions_of_prometheus(self):
+        server = self.without_history(ONE, "--mqtt", f"mqtt://127.0.0.1:{free_port()}", "--mqtt-spool",
+                                      os.path.join(self.directory, "spool"))
+        wait_until(lambda: 'alarm="' in server.ask("/metrics")[1], "it is live")
+        page = server.ask("/metrics")[1]
+        done = subprocess.run(["promtool", "check", "metrics"], input=page, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        self.assertEqual((done.returncode, done.stdout + done.stderr), (0, ""))
+        for name, kind in re.findall(r"^# TYPE (\w+) (\w+)$", page, re.MULTILINE):
+            self.assertEqual(name.endswith("_total"), kind == "counter", name)
+            self.assertNotRegex(name, r"_(ms|us|millis\w+|micros\w+|hz|pct|percent)$")
+
+
 class Dashboard(ServeCase):
     def test_each_metric_is_one_of_ours(self):
         text = (SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8")
@@ -134,6 +148,17 @@ class Prometheus(ServeCase):
                 self.assertEqual(refused.code, 503)  # it is not ready yet
                 return []
         wait_until(lambda: [one for one in ask('up{job="absenc"}') if one["value"][1] == "1"], "it is scraped")
+        dashboard = json.loads((SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8"))
+        for panel in dashboard["panels"]:
+            for target in panel["targets"]:
+                query = target["expr"].replace("$encoder", ".*").replace("$__range", "5m")  # as Grafana does
+                self.assertNotIn("$", query)
+                found = wait_until(lambda q=query: ask(q), f"{panel['title']}: {query} has values")
+                for label in re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]):
+                    self.assertIn(label, found[0]["metric"], query)
+        variable = next(one["query"]["query"] for one in dashboard["templating"]["list"] if one["name"] == "encoder")
+        metric, label = re.fullmatch(r"label_values\((\w+), (\w+)\)", variable).groups()
+        self.assertEqual([one["metric"][label] for one in ask(metric)], [ONE])
         for query in ("absenc_up == 1", 'absenc_alarm{alarm="over_heat"} == 1', 'absenc_alarm{alarm="over_speed"} == 0',
                       "absenc_readings_total > 10", 'absenc_errors_total{error="unsupported"} == 0',
                       "histogram_quantile(0.99, absenc_latency_seconds_bucket) > 0",

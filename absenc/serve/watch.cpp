@@ -416,6 +416,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   const bool is_examination = order.kind == Order::Kind::examination;
   const bool is_told = is_examination || order.kind == Order::Kind::command;
   Done done;
+  bool has_begun = false;
   const auto note = [&](const std::exception& failure) {
     if (const Change* change = change_of(failure)) done.change = change->state;
   };
@@ -434,10 +435,11 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   take_orders(!is_examination);
   try {
     if (!is_examination && !live.connection().connected()) live.connect();
+    has_begun = true;
     done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);
   } catch (const os::Failure& failure) {  // the next reading will find the port lost
     note(failure);
-    done.text = fmt::format("{} was broken off: {}", name, failure.what());
+    done.text = fmt::format("{} {}: {}", name, has_begun ? "was broken off" : "was not done", failure.what());
   } catch (const os::Interrupted& interrupted) {
     note(interrupted);
     end(command_runs_ ? ": read whether it was done" : "");
