@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the page of `absenc serve` looks, measured in Chromium: no text is broken, cut or covered, at six widths in both
-themes. With ABSENC_SCREENSHOTS=FOLDER each scene becomes a contact sheet to look at."""
+themes; axe-core finds nothing at any. With ABSENC_SCREENSHOTS=FOLDER each scene becomes a contact sheet to look at."""
 import os
 import unittest
 
@@ -8,11 +8,11 @@ from page_scenes import KINDS, Browser, config, hundred  # first: it looks for s
 from selenium.webdriver.common.by import By
 
 from command_support import Emulator
+from npm_support import tool
 from serve_support import ServeCase, wait_until
 
 WIDTHS = (390, 768, 1280, 1400, 1920, 3840)
 SCREENSHOTS = os.environ.get("ABSENC_SCREENSHOTS")
-AXE = os.environ.get("ABSENC_AXE")  # axe.min.js of npm's axe-core: npm pack axe-core
 
 # What is wrong with the page as it is drawn now, as sentences.
 MEASURE = """
@@ -128,9 +128,8 @@ class Look(ServeCase):
                 if SCREENSHOTS:
                     path = os.path.join(SCREENSHOTS, f"{name}-{width}-{'dark' if dark else 'light'}.png")
                     shots.append(self.browser.shot(path))
-            if AXE:
-                with self.subTest(name, axe=True, dark=dark):
-                    self.assertEqual(self.axe(), [])
+            with self.subTest(name, axe=True, dark=dark):
+                self.assertEqual(self.axe(), [])
             if SCREENSHOTS:
                 sheet(shots, os.path.join(SCREENSHOTS, f"sheet-{name}-{'dark' if dark else 'light'}.png"))
                 shots = []
@@ -139,7 +138,7 @@ class Look(ServeCase):
         self.assertEqual(errors, [])
 
     def axe(self):
-        with open(AXE, encoding="utf-8") as file:
+        with open(tool("axe-core/axe.min.js"), encoding="utf-8") as file:
             self.browser.ask(file.read())
         return self.browser.driver.execute_async_script("""
             const done = arguments[0];

@@ -16,6 +16,7 @@ import urllib.parse
 import jsonschema
 
 from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
+from npm_support import SOURCE
 from serve_support import BUSY, TOKEN, ServeCase, Server, SilentLine, of, wait_until
 
 
@@ -254,6 +255,14 @@ class Described(ServeCase):
             return self.schema(components[schema["$ref"].rsplit("/", 1)[1]], components)
         made = {key: self.schema(value, components) for key, value in schema.items() if key != "nullable"}
         return {"anyOf": [made, {"type": "null"}]} if schema.get("nullable") is True else made
+
+    def test_every_path_of_the_server_is_described(self):
+        source = (SOURCE / "absenc/serve/api.cpp").read_text(encoding="utf-8")
+        parts = re.search(r"parts_of_encoder\{(.*?)\};", source, re.DOTALL)[1]
+        there = {"/api/encoders/{encoder}/" + part for part in re.findall(r'"([\w.]+)"', parts)}
+        there |= set(re.findall(r'path == "(/[\w/]+)"', source)) | {"/api/encoders/{encoder}", "/openapi.json"}
+        described = json.loads((SOURCE / "absenc/serve/page/openapi.json").read_text(encoding="utf-8"))
+        self.assertEqual(set(described["paths"]), there)
 
     def test_every_route(self):
         server = self.server(self.NAME, "--history", self.file("history"), "--token-file", self.tokens())
