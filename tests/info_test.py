@@ -24,7 +24,7 @@ def questions():
 
 class Info(EncoderCase):
     def test_words(self):
-        result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
+        result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"), "--all")
         self.assert_good(result)
         self.assertEqual(result.stderr, "")
         self.assertNotIn("FAILED", result.stdout)
@@ -37,6 +37,32 @@ class Info(EncoderCase):
             self.assertRegex(result.stdout, "(?m)" + row)
         places = [result.stdout.index(f"\n{name} ") for name in questions()]
         self.assertEqual(places, sorted(places))
+
+    def test_a_card(self):
+        """Who, what, how, and nothing else: no option at its default, no raw field, no setting."""
+        result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
+        self.assert_good(result)
+        for row in [r"^model +TS5700N8500: ", r"^options +all at their defaults$", r"^encoder id +0x11$",
+                    r"^temperature +35 degC$", r"^position +204\.799 deg +74565 counts +4660 turns +no alarms$"]:
+            self.assertRegex(result.stdout, "(?m)" + row)
+        for word in ["data_id", "strict", "overheat", "_c "]:
+            self.assertNotIn(word, result.stdout)
+        for unit in ["tformat", "esl", "encolink", "biss", "e201", "raa38-modbus", "raa38-can", "amt21"]:
+            with self.subTest(unit):
+                card = absenc("info", f"sim:{unit}")
+                self.assert_good(card)
+                self.assertLess(len(card.stdout.splitlines()), 15)
+                self.assertRegex(card.stdout, r"(?m)^position +\d")
+        self.assertRegex(absenc("info", "sim:tformat?singleturn_bits=20").stdout, r"(?m)^options +singleturn_bits=20 ")
+
+    def test_two_channels_are_named_where_they_differ(self):
+        for verb in ("read", "info"):
+            well = absenc(verb, "sim:esl")
+            self.assertIn("0 turns   both channels ready   no alarms", well.stdout)
+            for setting in ("alarm=overspeed", "alarm=led_error", "condition=ch2_status_set=4"):
+                with self.subTest((verb, setting)):
+                    ill = absenc(verb, f"sim:esl?{setting}")
+                    self.assertNotIn("both channels ready", ill.stdout)
 
     def test_json(self):
         address = self.encoder("--model", "23-bit", "--singleturn", "5", "--alarm", "over_heat",
@@ -69,7 +95,7 @@ class Info(EncoderCase):
 
     def test_silence(self):
         address = self.encoder("--fault", "silence=1", latency=1)
-        result = absenc("info", address)
+        result = absenc("info", address, "--all")
         self.assert_failed(result, "timeout: the encoder did not answer", "Try: ")
         self.assertEqual(result.stderr.count("timeout"), 1)
         self.assertEqual(result.stdout.count("FAILED  timeout: "), len(questions()))
@@ -82,7 +108,7 @@ class Info(EncoderCase):
 
     def test_what_fails_does_not_stop_the_rest(self):
         # The encoder id is not the one that was assumed; memory does not carry it.
-        result = absenc("info", self.encoder(more="&encoder_id=23"))
+        result = absenc("info", self.encoder(more="&encoder_id=23"), "--all")
         self.assert_failed(result, "unexpected_reply", "set model=TS5700N8500")
         self.assertRegex(result.stdout, r"(?m)^encoder-id +FAILED +unexpected_reply: ")
         self.assertRegex(result.stdout, r"(?m)^  temperature_c +35 degC ")
@@ -130,9 +156,9 @@ class Alarms(EncoderCase):
 
     def test_an_encoder_id_is_shown_as_documents_name_it(self):
         address = self.encoder()
-        for shown in (absenc("run", address, "encoder-id"), absenc("info", address)):
+        for shown in (absenc("run", address, "encoder-id"), absenc("info", address, "--all")):
             self.assertRegex(shown.stdout, r"encoder_id +0x11 ")
-        self.assertIn("encoder_id=0x11\n", absenc("info", address).stdout)
+        self.assertIn("encoder_id=0x11\n", absenc("info", address, "--all").stdout)
         fields = json.loads(absenc("run", address, "encoder-id", "--json").stdout)["fields"]
         self.assertEqual(fields["encoder_id"], 0x11)
         self.assertRegex(absenc("list", "tformat").stdout, r"encoder_id +-1 to 0xFF +default -1 ")

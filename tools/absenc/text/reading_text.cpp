@@ -79,6 +79,17 @@ std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   return flags_of(unit, reading);
 }
 
+// Two channels of which each reports all and neither an ailment: they are named where they differ.
+bool both_channels_are_well(const Unit& unit, const Reading& reading) {
+  if (unit.second_status == nullptr || unit.second_alarms == nullptr || !reading.ready) return false;
+  const std::vector<Flags> all = flags_of(unit, reading);
+  return all.size() == 4 && std::all_of(all.begin(), all.end(), [](const Flags& flags) {
+           const std::vector<const FlagInfo*> set = raised(*flags.field, flags.bits);
+           return flags.is_complete() &&
+                  std::all_of(set.begin(), set.end(), [](const auto* one) { return one->action.empty(); });
+         });
+}
+
 }  // namespace
 
 std::string place_text(const Reading& reading, Doubt doubt) {
@@ -105,6 +116,7 @@ std::string flags_text(const Unit& unit, const Flags& flags) {
 
 std::string reading_text(const Unit& unit, const Reading& reading, Doubt doubt) {
   std::string text = place_text(reading, doubt);
+  if (both_channels_are_well(unit, reading)) return text + "   both channels ready   no alarms";
   for (const Flags& flags : flags_in_line(unit, reading)) {
     text += (text.empty() ? "" : "   ") + flags_text(unit, flags);
   }

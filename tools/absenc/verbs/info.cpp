@@ -7,6 +7,7 @@
 #include <iterator>
 #include <utility>
 
+#include "absenc/client/identify/candidate.hpp"
 #include "absenc/client/reading_columns.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/row_text.hpp"
@@ -35,13 +36,23 @@ std::string resolution_text(const Resolution& resolution) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-Rows identity_rows(const EncoderAddress& uri) {
+// Of the options only those that are not at their defaults.
+std::string options_in_short(const EncoderAddress& uri) {
+  const std::vector<std::string> settings = settings_for(*uri.unit, uri.options);
+  return settings.empty() ? "all at their defaults" : fmt::format("{}", fmt::join(settings, " "));
+}
+
+Rows identity_rows(const EncoderAddress& uri, bool all) {
   const Unit& unit = *uri.unit;
   const Model* model = uri.options.model;
   Rows rows{{"encoder", address_of(uri)}, {"protocol", std::string(unit.name)}};
   rows.push_back(
       {"model", model == nullptr ? "none with these options" : fmt::format("{}: {}", model->name, model->meaning)});
   rows.push_back({"line", line_of(unit.link, uri.line)});
+  if (!all) {
+    rows.push_back({"options", options_in_short(uri)});
+    return rows;
+  }
   std::string_view heading = "options";
   for (const std::string& option : option_texts(unit, uri.options)) {
     rows.push_back({std::string(heading), option});
@@ -65,11 +76,34 @@ Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
       .set("options", options_to_json(unit, uri.options));
 }
 
+/// A card has what tells one encoder from another, and its temperature.
+class CardRows final : public FieldSink {
+ public:
+  explicit CardRows(const Command& command) : command_(command) {}
+
+  void put(const FieldValue& value) override {
+    const FieldInfo& info = *value.info;
+    if (command_.verb == Verb::temperature && info.unit == "degC") {
+      rows.push_back({std::string(command_.name), fmt::format("{} degC", to_text(value))});
+    } else if (info.role == Role::identity && info.unit.empty()) {
+      std::string name(info.name);
+      std::replace(name.begin(), name.end(), '_', ' ');
+      rows.push_back({name, to_text(value)});
+    }
+  }
+
+  Rows rows;
+
+ private:
+  const Command& command_;
+};
+
 /// Asks the encoder and keeps what it says, for people and for programs.
 class Survey {
  public:
-  explicit Survey(const EncoderAddress& uri)
-      : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)) {}
+  /// `all`: every field and every setting; else a card.
+  Survey(const EncoderAddress& uri, bool all)
+      : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)), all_(all) {}
 
   void ask(const Command& command) {
     const Outcome outcome = encoder_->run(command, require_arguments(command, {}));
@@ -78,6 +112,11 @@ class Survey {
     JsonFields fields;
     encoder_->report(fields);
     answers.set(command.name, Json::object().set("ok", true).set("fields", fields.fields));
+    if (!all_) {
+      CardRows card(command);
+      encoder_->report(card);
+      return add_new(std::move(card.rows));
+    }
     FieldTable table;
     encoder_->report(table);
     for (std::vector<std::string>& row : table.rows) row.front().insert(0, "  ");
@@ -103,13 +142,17 @@ class Survey {
     columns.fill(reading, values);
     Json json = to_json(Row{columns.columns(), std::move(values)});
     answers.set(command.name, json.set("confirmed", encoder_->confirmed()).set("ok", true));
-    add_heading(command);
     const bool is_doubtful = reading.singleturn_valid() != outcome.reading->singleturn_valid();
-    position = "  " + reading_text(unit, reading, is_doubtful ? Doubt::unconfirmed : Doubt::none);
-    if (const std::string alarms = alarms_in_words(unit, reading); !alarms.empty()) position += '\n' + alarms;
-    if (is_doubtful) {
-      position += "\n  no two readings in a row agree as well as the fastest shaft allows";
+    const std::string place = reading_text(unit, reading, is_doubtful ? Doubt::unconfirmed : Doubt::none);
+    if (all_) {
+      add_heading(command);
+      below = "  " + place;
+    } else {
+      rows.push_back({std::string(command.name), place.substr(std::min(place.find_first_not_of(' '), place.size()))});
     }
+    const auto add_line = [this](const std::string& line) { below += (below.empty() ? "" : "\n") + line; };
+    if (const std::string alarms = alarms_in_words(unit, reading); !alarms.empty()) add_line(alarms);
+    if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
   /// What the encoder's answers show; before them, what it was told to be.
@@ -117,10 +160,17 @@ class Survey {
 
   Json answers = Json::object();
   Rows rows;
-  std::string position;           // below the rows; "" when it could not be read
+  std::string below;              // the rows: alarms in words, and why a position is doubtful
   std::vector<Trouble> troubles;  // one of each kind
 
  private:
+  // Several commands may tell the same of the encoder.
+  void add_new(Rows more) {
+    for (std::vector<std::string>& row : more) {
+      if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(std::move(row));
+    }
+  }
+
   void add_heading(const Command& command) {
     rows.push_back({std::string(command.name), "", std::string(command.meaning)});
   }
@@ -158,6 +208,7 @@ class Survey {
 
   std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
+  bool all_;
   bool heard_ = false;          // from the encoder
   std::string failed_setting_;  // why the last one was not told
 };
@@ -166,29 +217,36 @@ int run_info(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   const bool json = invocation.has("--json");
-  if (!json) print_line(table(identity_rows(uri)) + '\n');
-  Survey survey(uri);
-  for (const Command* command : questions(*uri.unit, uri.options)) survey.ask(*command);
+  const bool all = json || invocation.has("--all");
+  if (!json) print_line(table(identity_rows(uri, all)) + '\n');
+  Survey survey(uri, all);
+  for (const Command* command : questions(*uri.unit, uri.options)) {
+    if (all || command->verb != Verb::config_get) survey.ask(*command);
+  }
   if (find_command(*uri.unit, Verb::read) != nullptr) survey.read();
   const bool good = survey.troubles.empty();
   if (json) {
     print_line(identity_json(uri, survey.resolution()).set("answers", survey.answers).set("ok", good).line());
   } else {
-    print_line(table(Rows{{"resolution", resolution_text(survey.resolution())}}) + '\n' + table(survey.rows) +
-               survey.position);
+    Rows rows{{"resolution", resolution_text(survey.resolution())}};
+    if (all) print_line(table(std::exchange(rows, {})) + '\n');
+    rows.insert(rows.end(), survey.rows.begin(), survey.rows.end());
+    print_line(table(rows) + survey.below);
     for (const Trouble& trouble : survey.troubles) print_message(trouble.text());
   }
   return good ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 3> info_parameters{{
+constexpr std::array<Parameter, 4> info_parameters{{
     parameter::encoder,
+    {"--all", "", "every option, every field of every reply, and the settings"},
     parameter::json,
     parameter::option,
 }};
 
-constexpr std::array<Example, 2> info_examples{{
-    {"absenc info tformat:/dev/ttyUSB0", "who is there"},
+constexpr std::array<Example, 3> info_examples{{
+    {"absenc info tformat:/dev/ttyUSB0", "who is there, and how it is"},
+    {"absenc info tformat:/dev/ttyUSB0 --all", "all that it says of itself"},
     {"absenc info sim:tformat --json", "the same of a virtual encoder, for programs"},
 }};
 
@@ -197,9 +255,9 @@ constexpr std::array<Example, 2> info_examples{{
 const Subcommand info_subcommand{
     "info",
     "show who is there: the protocol, the model, and all that the encoder says of itself",
-    "First what absenc was told or assumes, then what the encoder answers: its identity, temperature,\n"
-    "settings, position and alarms. What fails is shown in its place and the rest goes on; of settings that\n"
-    "fail for the same reason the first is shown.\n"
+    "First what absenc was told or assumes, then what the encoder answers: its identity, temperature, position and\n"
+    "alarms; with --all also each field of these replies, and the settings. What fails is shown in its place and the\n"
+    "rest goes on; of settings that fail for the same reason the first is shown.\n"
     "Exit status 1 when anything failed.",
     info_parameters,
     info_examples,
