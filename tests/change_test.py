@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changes an encoder says what became of the change, in words and as one word."""
 import json
+import os
+import shlex
 import unittest
 
-from command_support import Case, Emulator, absenc
+from command_support import Case, Emulator, absenc, end, json_lines
+from serve_support import Server
 
 STATES = ("not_sent", "confirmed", "refused", "unknown")
 
@@ -58,6 +61,117 @@ class States(Case):
                 if answer["change"] in ("confirmed", "unknown") and not answer["ok"]:
                     self.assertIn("57600", answer["change_advice"])
         self.assertTrue({"not_sent", "confirmed"} <= seen, seen)
+
+
+class Journal(Case):
+    """In $XDG_STATE_HOME, as it is for who sets nothing else."""
+
+    def setUp(self):
+        super().setUp()
+        self.environment = {name: value for name, value in os.environ.items()
+                            if name not in ("ABSENC_CHANGES", "STATE_DIRECTORY")}
+        self.environment["XDG_STATE_HOME"] = self.file("state")
+        self.journal = self.file("state/absenc/changes.tsv")
+
+    def absenc(self, *arguments, **more):
+        return absenc(*arguments, env={**self.environment, **more})
+
+    def changes(self, *arguments):
+        result = self.absenc("changes", *arguments, "--json")
+        self.assert_good(result)
+        return json_lines(result.stdout)
+
+    def put_back(self, entry):
+        return self.absenc(*shlex.split(entry["put_back"])[1:], "--yes")
+
+    def test_nothing_yet(self):
+        result = self.absenc("changes")
+        self.assert_good(result)
+        self.assertIn("no changes are in " + self.journal, result.stdout)
+        self.assert_good(self.absenc("zero", "sim:tformat"))  # gone with its encoder
+        self.assertEqual(self.changes(), [])
+
+    def test_every_way_and_back(self):
+        with Emulator(self.directory) as encoder:
+            address = f"tformat:{encoder.path}?latency=300"
+            self.assert_good(self.absenc("config", "set", address, "overheat-threshold", "80", "--yes"))
+            self.assert_good(self.absenc("memory", "write", address, "5", "0x42", "--page", "2", "--yes"))
+            self.assert_good(self.absenc("run", address, "memory-write", "6", "0x17", "--yes"))
+            self.assert_good(self.absenc("zero", address, "--yes"))
+            self.assert_good(self.absenc("read", address))
+            entries = self.changes()
+            self.assertEqual([(one["encoder"], one["what"], one["before"], one["after"], one["change"]) for one in entries],
+                             [(address, "config set overheat-threshold", "90", "80", "confirmed"),
+                              (address, "memory write 0x05 --page 2", "0x00", "0x42", "confirmed"),
+                              (address, "memory write 0x06", "0x00", "0x17", "confirmed"),
+                              (address, "zero", None, None, "confirmed")])
+            for one in entries[:3]:
+                self.assert_good(self.put_back(one))
+            self.assertIn("90 degC", self.absenc("config", "get", address, "overheat-threshold").stdout)
+            self.assertIn("00", self.absenc("memory", "read", address, "5", "--page", "2").stdout)
+            self.assertEqual(len(self.changes()), 7)
+            self.assertEqual(len(self.changes(f"tformat:{encoder.path}")), 7)
+            self.assertEqual(self.changes("tformat:/dev/other"), [])
+            text = self.absenc("changes").stdout
+            self.assertIn("absenc config set", text)
+            self.assertRegex(text, r"overheat-threshold +90 +80 +confirmed")
+
+    def test_a_rate_is_put_back_at_the_new_rate(self):
+        with Emulator(self.directory, protocol="raa38-modbus") as encoder:
+            address = f"raa38-modbus:{encoder.path}?latency=300"
+            self.assert_good(self.absenc("config", "set", address, "baud", "57600", "--yes"))
+            entry, = self.changes()
+            self.assertEqual((entry["before"], entry["after"]), ("19200", "57600"))
+            self.assert_good(self.put_back(entry))
+            self.assert_good(self.absenc("read", address))
+
+    def test_a_result_that_is_not_known(self):
+        for seed in range(1, 60):
+            with Emulator(self.directory, "--fault", "silence=0.3", "--seed", str(seed), name=f"line{seed}") as encoder:
+                told = json.loads(self.absenc("run", f"tformat:{encoder.path}", "memory-write", "5", str(seed), "--yes",
+                                              "--json").stdout)
+            if told["change"] == "unknown":
+                break
+        self.assertEqual(self.changes()[-1]["change"], "unknown")
+        self.assertEqual(self.changes()[-1]["after"], f"0x{seed:02X}")
+
+    def test_serve(self):
+        tokens = self.file("tokens", "anna a-secret-of-hers-0123456789\n")
+        os.chmod(tokens, 0o600)
+        with Emulator(self.directory) as encoder:
+            address = f"tformat:{encoder.path}?latency=300"
+            server = Server(address, "--history", "none", "--token-file", tokens, ABSENC_CHANGES=self.journal)
+            self.addCleanup(end, server.process)
+            status, body = server.command(address, "memory-write", {"Authorization": "Bearer a-secret-of-hers-0123456789"},
+                                          argument=["5", "66"])
+            self.assertEqual((status, body["change"]), (200, "confirmed"), body)
+            entry, = self.changes()
+            self.assertEqual((entry["encoder"], entry["what"], entry["before"], entry["after"]),
+                             (address, "memory write 0x05", "0x00", "0x42"))
+
+    def test_a_full_disk_does_not_lose_the_result(self):
+        with Emulator(self.directory) as encoder:
+            for journal in ("/dev/full", self.file("no")):
+                if journal != "/dev/full":
+                    os.mkdir(journal)  # no file can be there
+                result = self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", ABSENC_CHANGES=journal)
+                self.assertEqual(result.returncode, 0)
+                self.assertIn("singleturn", result.stdout)
+                self.assertIn(f"note: the change is not in the journal {journal}: ", result.stderr)
+                told = json.loads(self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", "--json",
+                                              ABSENC_CHANGES=journal).stdout)
+                self.assertEqual((told["ok"], told["change"]), (True, "confirmed"))
+                self.assertIn("is not in the journal", told["change_note"])
+
+    def test_a_cut_line_takes_no_other_with_it(self):
+        os.makedirs(os.path.dirname(self.journal))
+        with open(self.journal, "w", encoding="utf-8") as file:
+            file.write("2026-01-01T00:00:00.000Z\ttformat:/dev/x\tmemory wr")
+        with Emulator(self.directory) as encoder:
+            self.assert_good(self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes"))
+        result = self.absenc("changes", "--json")
+        self.assertEqual([one["what"] for one in json_lines(result.stdout)], ["zero"])
+        self.assertIn("1 line", result.stderr)
 
 
 if __name__ == "__main__":

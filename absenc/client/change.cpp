@@ -31,7 +31,9 @@ std::string_view word_of(ChangeState state) { return words_of(state).word; }
 
 std::string Change::text() const {
   const std::string_view sentence = words_of(state).sentence;
-  return advice.empty() ? std::string(sentence) : fmt::format("{}: {}", sentence, advice);
+  std::string text = advice.empty() ? std::string(sentence) : fmt::format("{}: {}", sentence, advice);
+  if (!note.empty()) text += fmt::format("; {}", note);
+  return text;
 }
 
 std::string with_change(std::string_view what, const Change& change) {

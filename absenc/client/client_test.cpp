@@ -359,12 +359,10 @@ TEST(ClientMemory, WhateverBecomesOfItSaysWhatIsWritten) {
                EncoderFailure);
   change.settle();
   EXPECT_EQ(change.written(), some_bytes(3));
-  EXPECT_EQ(change.unknown().begin()->first, (MemoryAddress{0, 13}));
-  EXPECT_EQ(change.not_written().size(), 2u);
-  emulation.power_on();
-  change.settle();
-  EXPECT_EQ(change.unknown(), MemoryImage{});
+  EXPECT_EQ(change.unknown(), MemoryImage{});  // the request that writes the fourth byte did not go out
+  EXPECT_EQ(change.state(), ChangeState::not_sent);
   EXPECT_EQ(change.not_written().size(), 3u);
+  emulation.power_on();
   change.write();
   change.verify();
   EXPECT_EQ(change.written(), some_bytes(6));

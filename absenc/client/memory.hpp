@@ -81,8 +81,8 @@ class Memory {
   /// that cannot be read.
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
-  /// Returns when it was read back.
-  void write(MemoryAddress at, std::uint8_t value, Access access);
+  /// Returns when it was read back. `before`: what is there, where that is known.
+  void write(MemoryAddress at, std::uint8_t value, Access access, std::optional<std::uint8_t> before = {});
 
  private:
   [[nodiscard]] std::vector<std::uint8_t> read_run(MemoryAddress at, std::size_t count);

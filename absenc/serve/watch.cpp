@@ -422,6 +422,9 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   };
   const auto finish = [&] {
     if (order.changes_encoder() && done.change == ChangeState::none) done.change = ChangeState::not_sent;
+    if (done.good && done.change != ChangeState::none && !live.change().note.empty()) {
+      done.text += fmt::format("; {}", live.change().note);
+    }
     command_runs_ = false;
     take_orders(true);
     if (is_told) tell("command", done.text, order.who);

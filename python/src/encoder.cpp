@@ -242,7 +242,6 @@ std::size_t memory_write(PyEncoder& encoder, std::uint32_t address, const py::by
   return encoder.use([&](client::Encoder& one) {
     const client::Access access = force ? client::Access::force : client::Access::write;
     client::require_memory(one.unit(), access);
-    one.memory().check_model();
     client::MemoryChange change(one.memory(), wanted, access);
     change.look();
     change.write();

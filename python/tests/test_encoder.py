@@ -278,8 +278,8 @@ def test_what_became_of_a_change() -> None:
         assert encoder.change is None
         encoder.run("memory-write", 5, 0x42)
         assert encoder.change == "confirmed"
-        with pytest.raises(absenc.errors.InvalidArgument) as refused:
-            encoder.run("memory-write", 127, 1)
+        with pytest.raises(absenc.errors.EncoderError) as refused:
+            encoder.run("memory-write", 0, 1, page=6)
         assert refused.value.change == encoder.change == "not_sent"
         assert pickle.loads(pickle.dumps(refused.value)).change == "not_sent"
     with absenc.open("sim:tformat?fault=silence=1") as encoder:
@@ -289,3 +289,14 @@ def test_what_became_of_a_change() -> None:
         with pytest.raises(absenc.errors.Timeout) as written:
             encoder.memory.write(5, b"\x42")
         assert written.value.change == "not_sent"
+
+
+def test_changes_are_kept(absenc_emulate, monkeypatch, tmp_path) -> None:
+    journal = tmp_path / "changes.tsv"
+    monkeypatch.setenv("ABSENC_CHANGES", str(journal))
+    with absenc.open(absenc_emulate("tformat").address, latency=PATIENCE_MS) as encoder:
+        encoder.memory.write(5, b"\x42")
+        encoder.config.set("overheat-threshold", 80)
+    entries = [line.split("\t")[2:6] for line in journal.read_text().splitlines()]
+    assert entries == [["memory write 0x05", "0x00", "0x42", "confirmed"],
+                       ["config set overheat-threshold", "90", "80", "confirmed"]]

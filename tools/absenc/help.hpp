@@ -28,14 +28,18 @@ inline constexpr std::array<Example, 4> general_examples{{
     {"absenc decode tformat --request 1A --hex \"1A 00 45 23 01 11 34 12 00 00 4A\"", "what a captured frame says"},
 }};
 
-inline constexpr std::array<Example, 2> files{{
+inline constexpr std::array<Example, 3> files{{
     {"./absenc.toml", "names for encoders; `absenc list --help` shows how to write it"},
     {"~/.config/absenc/absenc.toml", "the same, where there is none in the working directory"},
+    {"~/.local/state/absenc/changes.tsv", "what was changed in encoders: `absenc changes` shows it"},
 }};
 
-inline constexpr std::array<Example, 3> environment{{
+inline constexpr std::array<Example, 6> environment{{
     {"ABSENC_CONFIG", "the only absenc.toml to look at"},
     {"XDG_CONFIG_HOME", "instead of ~/.config"},
+    {"XDG_STATE_HOME", "instead of ~/.local/state"},
+    {"STATE_DIRECTORY", "of a service of systemd: in place of $XDG_STATE_HOME/absenc"},
+    {"ABSENC_CHANGES", "the file of the journal of changes; none: no journal is kept"},
     {"NO_COLOR", "if not empty, `absenc monitor` does without colours"},
 }};
 

@@ -34,6 +34,7 @@ std::span<const Subcommand* const> all_subcommands() {
       &memory_verify_subcommand,
       &config_get_subcommand,
       &config_set_subcommand,
+      &changes_subcommand,
       &run_subcommand,
       &scan_subcommand,
       &emulate_subcommand,

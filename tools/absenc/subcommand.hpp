@@ -96,6 +96,7 @@ extern const Subcommand conform_subcommand;
 extern const Subcommand conform_host_subcommand;
 extern const Subcommand crc_find_subcommand;
 extern const Subcommand vectors_subcommand;
+extern const Subcommand changes_subcommand;
 extern const Subcommand campaign_subcommand;
 extern const Subcommand bench_subcommand;
 

@@ -35,7 +35,7 @@ void MemoryChange::write(const MemoryProgress& progress) {
     const auto [at, value] = *left_.begin();
     in_flight_ = at;
     try {
-      memory_.write(at, value, access_);
+      memory_.write(at, value, access_, found_.at(at));
     } catch (const std::exception& failure) {
       const Change* change = change_of(failure);
       state_ = change != nullptr ? change->state : ChangeState::not_sent;

@@ -73,7 +73,8 @@ std::vector<std::uint8_t> Memory::read_run(MemoryAddress at, std::size_t count) 
       fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(unit(), at), bytes.data.size()));
 }
 
-void Memory::write(MemoryAddress at, std::uint8_t value, Access access) {
+void Memory::write(MemoryAddress at, std::uint8_t value, Access access, std::optional<std::uint8_t> before) {
+  if (before) connection_->know_before(*before);
   const Command& command = *find_command(unit(), Verb::memory_write);
   ReadBytes ignored;
   run_into(*connection_, command,

@@ -380,18 +380,29 @@ EncoderAddress parse_address(std::string_view text, std::span<const std::string>
   }
   for (const std::string& setting : more) settings.push_back(split_setting(setting));
   require_once(settings);
+  std::string written(address);
+  for (const OptionText& one : settings) {
+    written += fmt::format("{}{}={}", written.size() == address.size() ? '?' : '&', one.name, one.value);
+  }
   if (is_name(address) && !bare_port(address)) {
-    return parse_named(address, settings,
-                       require_names(fmt::format("\"{}\" is no PROTOCOL:PORT, so it would have to be "
-                                                 "a name of absenc.toml",
-                                                 address)));
+    EncoderAddress uri = parse_named(address, settings,
+                                     require_names(fmt::format("\"{}\" is no PROTOCOL:PORT, so it would have to be "
+                                                               "a name of absenc.toml",
+                                                               address)));
+    uri.written = std::move(written);
+    return uri;
   }
   EncoderAddress uri = parse_place(address);
   take_settings(uri, settings);
+  uri.written = std::move(written);
   return uri;
 }
 
-EncoderAddress parse_address(std::string_view name, const NamedEncoders& names) { return parse_named(name, {}, names); }
+EncoderAddress parse_address(std::string_view name, const NamedEncoders& names) {
+  EncoderAddress uri = parse_named(name, {}, names);
+  uri.written = name;
+  return uri;
+}
 
 host::SpeedLimit speed_limit(const EncoderAddress& uri) {
   host::SpeedLimit limit = host::speed_limit(uri.options);

@@ -98,6 +98,7 @@ struct EncoderAddress {
   std::uint32_t maximum_mm_s = 0;  // of linear encoders; 0: as is usual
   const Command* reads = nullptr;  // what is read again and again; null: the first command with Verb::read
   DeviceSettings device;
+  std::string written;  // as the user wrote it, with all settings: "elbow?baud=57600"
 };
 
 /// How fast the encoder may be taken to move: what the user says, or else as host::speed_limit.

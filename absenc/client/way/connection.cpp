@@ -9,6 +9,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/client/way/change_record.hpp"
 #include "absenc/client/way/diagnosis.hpp"
 #include "absenc/client/way/runner.hpp"
 #include "absenc/client/way/shared_link.hpp"
@@ -72,7 +73,10 @@ template <class Item>
 class ConnectionOn final : public Connection {
  public:
   ConnectionOn(const EncoderAddress& uri, OpenLink open)
-      : Connection(uri), open_(std::move(open)), runner_(uri, attempts) {
+      : Connection(uri),
+        is_journaled_(!open && uri.place != Place::sim),
+        open_(open ? std::move(open) : open_link),
+        runner_(uri, attempts) {
     session_.set_speed_limit(speed_limit(uri));
     session_.observe(&statistics_);
   }
@@ -103,14 +107,22 @@ class ConnectionOn final : public Connection {
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
     if (!command.changes_encoder) return carry_out(command, arguments, on_emit);
     change_ = {ChangeState::not_sent};
+    const EncoderAddress way = uri();
+    const std::optional<std::int64_t> known = take_known_before();
+    std::optional<ChangeRecord> record;
+    if (is_journaled_) before_change([&] { record.emplace(*this, command, arguments, known); });
     requests_before_ = port_.requests;
-    const EncoderAddress before = uri();
+    const auto note = [&](bool good) {
+      change_ = change_after(way, command, arguments, good);
+      if (record) change_.note = record->keep(way, change_);
+    };
     try {
       Outcome ended = carry_out(command, arguments, on_emit);
-      ended.change = change_ = change_after(before, command, arguments, ended.error == Error::none);
+      note(ended.error == Error::none);
+      ended.change = change_;
       return ended;
     } catch (const std::exception&) {
-      change_ = change_after(before, command, arguments, false);
+      note(false);
       rethrow_with(change_);
     }
   }
@@ -312,6 +324,7 @@ class ConnectionOn final : public Connection {
 
   static constexpr unsigned attempts = 3;
 
+  bool is_journaled_;
   OpenLink open_;
   std::shared_ptr<SharedLink> link_;
   Runner<Item> runner_;

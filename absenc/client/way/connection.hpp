@@ -4,8 +4,10 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "absenc/client/trouble.hpp"
@@ -27,7 +29,8 @@ struct Outcome {
 class Connection {
  public:
   /// Not connected yet.
-  [[nodiscard]] static std::unique_ptr<Connection> make(const EncoderAddress& uri, OpenLink open = open_link);
+  /// Without `open`: over its own way, and its changes are kept in the journal (journal.hpp), but for those of sim:.
+  [[nodiscard]] static std::unique_ptr<Connection> make(const EncoderAddress& uri, OpenLink open = {});
   /// Connected. Throws as `connect`.
   [[nodiscard]] static std::unique_ptr<Connection> open(const EncoderAddress& uri);
   virtual ~Connection() = default;
@@ -47,6 +50,8 @@ class Connection {
   /// `on_emit` is called for each result but the last; `report` then tells of it. What reaches the encoder by what the
   /// command sets reaches it by the new value from now on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
+  /// For the journal: what the next command that changes the encoder will overwrite, so that it is not read again.
+  void know_before(std::int64_t value) { known_before_ = value; }
   /// What became of the last command that changes the encoder, also when it has thrown.
   [[nodiscard]] virtual const Change& change() const = 0;
   /// The fields of the last outcome, and its reading.
@@ -80,8 +85,10 @@ class Connection {
 
  protected:
   explicit Connection(const EncoderAddress& uri) : uri_(uri) {}
+  [[nodiscard]] std::optional<std::int64_t> take_known_before() { return std::exchange(known_before_, std::nullopt); }
 
  private:
+  std::optional<std::int64_t> known_before_{};
   EncoderAddress uri_;
 };
 

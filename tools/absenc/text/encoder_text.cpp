@@ -38,6 +38,7 @@ void set_change(Json& json, const Change& change) {
   if (change.state == ChangeState::none) return;
   json.set("change", word_of(change.state));
   if (!change.advice.empty()) json.set("change_advice", change.advice);
+  if (!change.note.empty()) json.set("change_note", change.note);
 }
 
 Json to_json(const Trouble& trouble) {

@@ -100,6 +100,8 @@ class Change {
 
   int finish() const {
     const MemoryImage& written = change_->written();
+    const std::string& note = encoder_->change().note;
+    if (!note.empty()) print_message(fmt::format("note: {}", note));
     if (json()) {
       print_line(Json::object()
                      .set("ok", true)

@@ -107,6 +107,9 @@ int run_set(const Invocation& invocation) {
   } catch (const os::Interrupted&) {
     throw OfChange<Failure>(Failure(fmt::format("interrupted while {} was set", name)), encoder->change());
   }
+  if (const std::string& journal = encoder->change().note; !journal.empty()) {
+    print_message(fmt::format("note: {}", journal));
+  }
   if (!change.note.empty()) print_message(fmt::format("note: {}", change.note));
   if (change.was_so) print_message("note: nothing was sent, because it is so already");
   if (invocation.has("--json")) {
