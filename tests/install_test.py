@@ -47,6 +47,76 @@ int main() {
 """
 FIRMWARE_SAYS = "90.0000 degrees, 7 turns\n"
 
+# Whatever ends a call is a std::exception, as the examples catch it; each line is printed behind such a catch.
+ENDINGS = r"""
+#include <cstdio>
+#include <chrono>
+#include <exception>
+#include <thread>
+
+#include "absenc/client/emulate.hpp"
+#include "absenc/client/encoder.hpp"
+
+using namespace absenc;
+using namespace std::chrono_literals;
+
+template <class Work>
+void attempt(const char* name, const Work& work) try {
+  work();
+  std::printf("%s: good\n", name);
+} catch (const std::exception& failure) {
+  const client::Change* change = client::change_of(failure);
+  std::printf("%s: %s%s\n", name, change != nullptr ? client::word_of(change->state).data() : "",
+              change != nullptr ? "" : failure.what());
+}
+
+int main() try {
+  client::Encoder encoder = client::open("sim:tformat");
+  encoder.cancel();
+  attempt("cancelled", [&] { static_cast<void>(encoder.read()); });
+  attempt("a change that was cancelled", [&] { encoder.run("memory-write", {5, 1}); });
+  encoder.resume();
+  attempt("resumed", [&] { static_cast<void>(encoder.read()); });
+  std::thread other([&] {
+    std::this_thread::sleep_for(30ms);
+    encoder.cancel();
+  });
+  for (const client::Sample& sample : encoder.samples({.rate_hz = 0.1})) {
+    std::printf("%s\n", client::text_of(sample.position_state()).data());
+  }
+  other.join();
+  std::printf("samples ended\n");
+
+  client::Emulation emulation = client::emulate("tformat");
+  client::Encoder silent = client::open(emulation.address() + "?latency=60000");
+  emulation.power_off();
+  const auto soon = [] { return std::chrono::steady_clock::now().time_since_epoch() + 50ms; };
+  attempt("silent", [&] { static_cast<void>(silent.read(soon())); });
+  for (const client::Sample& sample : silent.samples({.deadline = soon()})) std::printf("%s\n", sample.text().c_str());
+  std::printf("samples ended\n");
+
+  client::Encoder starting = client::open("sim:tformat?alarm=counting_error");
+  for (const client::Sample& sample : starting.samples({.count = 1})) {
+    std::printf("%s\n", client::text_of(sample.position_state()).data());
+  }
+  attempt("a change that is not possible", [&] { client::open("sim:tformat?motion=rpm=60").run("zero"); });
+} catch (const std::exception& failure) {
+  std::fprintf(stderr, "%s\n", failure.what());
+  return 1;
+}
+"""
+ENDINGS_SAY = """\
+cancelled: cancelled
+a change that was cancelled: not_sent
+resumed: good
+the position is good: a second one agreed, and nothing that was reported is against it
+samples ended
+silent: the deadline passed before there was a reading
+samples ended
+an alarm or a state that the encoder reports says that the position does not hold: look at its alarms
+a change that is not possible: not_sent
+"""
+
 PROJECT = f"""
 cmake_minimum_required(VERSION 3.25)
 project(outside LANGUAGES CXX)
@@ -186,6 +256,9 @@ class Installed(Case):
         firmware.write_text(FIRMWARE)
         self.assertEqual(run(self.program("by_name", BY_NAME, "absenc-client"), "sim:tformat"), BY_NAME_SAYS)
         self.assertEqual(run(self.program("firmware", firmware, "absenc")), FIRMWARE_SAYS)
+        endings = self.folder / "endings.cpp"
+        endings.write_text(ENDINGS)
+        self.assertEqual(run(self.program("endings", endings, "absenc-client")), ENDINGS_SAY)
         for library in ("absenc", "absenc-client"):
             self.assertEqual(pkg_config(self.root, "--modversion", library), [VERSION])
         self.assertEqual({flag for flag in pkg_config(self.root, "--libs", "absenc") if flag.startswith("-l")},
