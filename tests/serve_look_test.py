@@ -196,6 +196,40 @@ class Look(ServeCase):
         self.open(server, "document.querySelectorAll('.card .digits').length === 100")
         self.look("hundred")
 
+    def test_a_drawing_writes_only_what_has_changed(self):
+        """A write of the same has the browser compute styles and places anew: of a hundred encoders that was most of its work."""
+        server = self.served(hundred())
+        self.open(server, "document.querySelectorAll('.card .digits').length === 100")
+        same, often = self.browser.driver.execute_async_script("""
+            const done = arguments[0];
+            (async () => {
+              const {Overview} = await import("./overview.js");
+              const state = await (await fetch("api/encoders")).json();
+              const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+              const main = document.createElement("div");
+              const view = new Overview(main, document.createElement("div"));
+              view.show(state);
+              await pause(500);  // the last minute has come
+              view.draw(state);
+              let changes = 0;
+              new MutationObserver((list) => changes += list.length).observe(main, {subtree: true, childList: true, attributes: true, characterData: true});
+              view.draw(state);
+              await pause(0);
+              const same = changes;
+              let drawings = 0;
+              const draw = view.draw;
+              view.draw = function(...values) { drawings += 1; draw.apply(this, values); };
+              const begun = performance.now();
+              while (performance.now() - begun < 2000) {
+                view.show(state);
+                await pause(33);
+              }
+              view.close();
+              done([same, drawings]);
+            })();""")
+        self.assertEqual(same, 0)
+        self.assertIn(often, range(1, 6))  # twice a second, of 60 states
+
     def test_one_and_none(self):
         path = self.file("absenc.toml", config({"elbow": ("tformat", "motion=rpm=60")}))
         server = self.without_history(ABSENC_CONFIG=path)

@@ -14,7 +14,23 @@ export function element(name, attributes = {}, ...children) {
 
 /** Changes the text only if it is another, so that screen readers and selections are not disturbed. */
 export function setText(node, text) {
-  if (node.textContent !== text) node.textContent = text;
+  const only = node.firstChild;
+  if (only === null || only !== node.lastChild || only.nodeType !== Node.TEXT_NODE) {
+    if (node.textContent !== text) node.textContent = text;
+  } else if (only.data !== text) {
+    only.data = text;
+  }
+}
+
+/** Sets a property or an attribute only if it is another: each write has the browser compute styles anew. */
+export function setClass(node, name) {
+  if (node.className !== name) node.className = name;
+}
+export function toggleClass(node, name, on) {
+  if (node.classList.contains(name) !== on) node.classList.toggle(name, on);
+}
+export function setHidden(node, on) {
+  if (node.hasAttribute("hidden") !== on) node.toggleAttribute("hidden", on);
 }
 
 /** Replaces the children only if they would be others, and keeps the focus on the region of the same name. */
@@ -50,11 +66,14 @@ export function dial() {
   const ticks = Array.from({length: 12}, (_, i) => drawing("line", {class: "tick", y1: -46, y2: -40, transform: `rotate(${30 * i})`}));
   const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},  // the number stands beside it
                        drawing("circle", {r: 46}), ...ticks, needle, drawing("circle", {class: "hub", r: 5}));
+  let shown;
   return {
     node,
     turn(angle) {
-      node.classList.toggle("off", angle === null);
-      if (angle !== null) needle.setAttribute("transform", `rotate(${angle})`);
+      toggleClass(node, "off", angle === null);
+      const turned = angle === null ? shown : angle.toFixed(1);
+      if (turned !== shown) needle.setAttribute("transform", `rotate(${turned})`);
+      shown = turned;
     },
   };
 }
@@ -66,13 +85,15 @@ export function scale() {
   const end = element("span");
   const node = element("div", {class: "scale off", "aria-hidden": "true"}, element("div", {class: "track"}, filled, mark),
                        element("div", {class: "ends"}, element("span", {}, "0 mm"), end));
+  let shown;
   return {
     node,
     move(share, length) {
-      node.classList.toggle("off", share === null);
+      toggleClass(node, "off", share === null);
       setText(end, length);
-      if (share === null) return;
-      filled.style.width = mark.style.left = `${100 * share}%`;
+      const moved = share === null ? shown : (100 * share).toFixed(2);
+      if (moved !== shown) filled.style.width = mark.style.left = `${moved}%`;
+      shown = moved;
     },
   };
 }

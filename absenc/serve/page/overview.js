@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // All encoders: a card for each, the ill first, and the bar above them.
-import {breakable, dial, element, rich, scale, setText, spark} from "./dom.js";
+import {breakable, dial, element, rich, scale, setClass, setHidden, setText, spark, toggleClass} from "./dom.js";
 import {request} from "./server.js";
 import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, wrongs} from "./words.js";
 
 const MANY = 30;           // beyond it cards are small
 const FEW = 3;
+const DRAW_MS = 5;         // for each encoder of many, between two drawings: so many more cost no more
 const ORDER_MS = 2000;     // cards change places no faster
 const MINUTE_S = 60;
 const MOST_WORDS = 2;
@@ -16,17 +17,21 @@ export function figureNode() {
   const widest = element("span", {class: "widest", "aria-hidden": "true"});  // keeps the place of the widest value so far
   const unit = element("span", {class: "unit"});
   const node = element("p", {class: "figure"}, element("span", {class: "number"}, widest, digits), unit);
+  let sizes;
+  let most = 0;
   return {
     node,
     show(one) {
       const {text, unit: name, width} = figure(one);
       setText(digits, text);
       setText(unit, name);
-      node.style.setProperty("--digits", width);
-      node.style.setProperty("--beside", one.linear ? "0rem" : "var(--dial)");
-      const ghost = name === "" ? "" : text.replace(/\d/g, "0");
-      if (ghost.length > widest.textContent.length) widest.textContent = ghost;
-      node.classList.toggle("word", name === "");
+      const wanted = `--digits: ${width}; --beside: ${one.linear ? "0rem" : "var(--dial)"}`;
+      if (wanted !== sizes) node.setAttribute("style", sizes = wanted);
+      if (name !== "" && text.length > most) {
+        most = text.length;
+        widest.textContent = text.replace(/\d/g, "0");
+      }
+      toggleClass(node, "word", name === "");
     },
   };
 }
@@ -41,12 +46,16 @@ export function sparkColumn(points, linear) {
 
 /** Shows the parts, each on one line. */
 export function showParts(node, parts) {
-  if (node.textContent === parts.join("")) return;
-  node.replaceChildren(...parts.map((part) => element("span", {class: /INVALID/.test(part) ? "bad" : ""}, part)));
+  while (node.childElementCount > parts.length) node.lastChild.remove();
+  while (node.childElementCount < parts.length) node.append(element("span"));
+  parts.forEach((part, i) => {
+    setText(node.children[i], part);
+    setClass(node.children[i], /INVALID/.test(part) ? "bad" : "");
+  });
 }
 
 export function showState(node, {kind, word}) {
-  node.className = `state ${kind}`;
+  setClass(node, `state ${kind}`);
   setText(node.firstChild, SHAPES[kind]);
   setText(node.lastChild, word);
 }
@@ -79,14 +88,14 @@ class Card {
   show(one, at_ms) {
     this.one = one;
     this.condition = condition(one);
-    this.node.className = `card ${this.condition.kind}`;
-    this.node.dataset.state = one.state;
+    setClass(this.node, `card ${this.condition.kind}`);
+    if (this.node.dataset.state !== one.state) this.node.dataset.state = one.state;
     showState(this.state, this.condition);
     setText(this.kindName, one.protocol_name);
     this.figure.show(one);
-    this.dial.node.toggleAttribute("hidden", one.linear);
+    setHidden(this.dial.node, one.linear);
     this.dial.turn(one.angle_deg);
-    this.scale.node.toggleAttribute("hidden", !one.linear || one.length_mm === null);
+    setHidden(this.scale.node, !one.linear || one.length_mm === null);
     if (one.linear && one.length_mm !== null) {
       this.scale.move(one.position_mm === null ? null : one.position_mm / one.length_mm, `${numberText(one.length_mm)} mm`);
     }
@@ -95,7 +104,7 @@ class Card {
     const live = one.state === "live";
     setText(this.rate, live ? `${numberText(one.rate_hz, one.rate_hz < 10 ? 1 : 0)} readings/s` : "0 readings/s");
     setText(this.errors, one.errors_last_minute === null ? "" : `${numberText(one.errors_last_minute)} ${one.errors_last_minute === 1 ? "error" : "errors"}/min`);
-    this.errors.className = one.errors_last_minute > 0 ? "warn" : "";
+    setClass(this.errors, one.errors_last_minute > 0 ? "warn" : "");
     const second = Math.floor(at_ms / 1000);
     if (second === this.second) return;
     this.second = second;
@@ -188,7 +197,16 @@ export class Overview {
     card.seed(seconds);
   }
 
+  /** Many are drawn less often than the server may say something: nobody reads a hundred figures thirty times a second. */
   show(state) {
+    const wait = state.encoders.length > MANY && this.cards.size > 0 ? this.drawn + DRAW_MS * state.encoders.length - performance.now() : 0;
+    clearTimeout(this.later);
+    if (wait > 0) this.later = setTimeout(() => this.draw(state), wait);
+    else this.draw(state);
+  }
+
+  draw(state) {
+    this.drawn = performance.now();
     this.given = state.encoders.map((one) => one.encoder);
     const changed = this.given.join("\n") !== [...this.cards.keys()].join("\n");
     if (changed) {
@@ -214,7 +232,7 @@ export class Overview {
       node.toggleAttribute("hidden", count === 0);
       if (count === 0) continue;
       const {kind} = first.condition;
-      node.className = `pill ${kind}`;
+      setClass(node, `pill ${kind}`);
       node.setAttribute("aria-pressed", String(this.group === group));
       setText(shape, `${SHAPES[kind]} `);
       setText(words, group === "good" && count === total ? (total === 1 ? "good" : `all ${total} good`) : GROUP_WORDS[group](count));
@@ -258,6 +276,7 @@ export class Overview {
 
   /** Nothing is known any more: no value is shown as the present one. */
   lose() {
+    clearTimeout(this.later);
     for (const card of this.cards.values()) {
       const last = card.one.state === "live" ? {...card.one, at_ms: Date.now() - card.one.age_s * 1000} : card.one.last_reading;
       card.show({...card.one, state: "unknown", angle_deg: null, position_mm: null, turns: null, speed: null, alarms: null, status: null,
@@ -267,5 +286,7 @@ export class Overview {
   }
 
   take() {}
-  close() {}
+  close() {
+    clearTimeout(this.later);
+  }
 }
