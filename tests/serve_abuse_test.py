@@ -2,6 +2,7 @@
 """Clients of `absenc serve` that ask for too much, too slowly or for nothing at all: others are answered all the same."""
 import contextlib
 import os
+import resource
 import socket
 import time
 import unittest
@@ -104,6 +105,21 @@ class Abuse(ServeCase):
                     stack.enter_context(socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE))
         self.assert_well()
         self.assertLess(self.memory_kb() - before, 64_000)
+
+    def test_connections_of_one_address_shut_nobody_else_out(self):
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        for _ in range(2000):
+            self.connect()
+        longest = 0.0
+        for _ in range(20):
+            begin = time.monotonic()
+            with socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, ("127.0.0.2", 0)) as other:
+                other.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                self.assertIn(b"200", other.recv(100))
+            longest = max(longest, time.monotonic() - begin)
+        self.assertLess(longest, 1.0)  # 3 ms on a machine of its own
 
     def test_more_streams_than_there_may_be(self):
         statuses = []

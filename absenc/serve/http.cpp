@@ -23,6 +23,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr unsigned most_connections = 512;
+constexpr unsigned most_of_an_address = 384;        // so that one client, or one proxy, leaves room for others
 constexpr std::size_t memory_for_each = 64 * 1024;  // headers and what waits to be written; more is refused with 431
 constexpr std::uint64_t most_body = 4096;           // nothing here takes one
 constexpr std::uint64_t most_read = 1 << 20;        // of a body of unknown length, until it is answered at its end
@@ -371,11 +372,12 @@ struct HttpServer::Daemon {
   }
 
   void start() {
-    daemon = ::MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, listener.port, nullptr, nullptr, &access, this,
-        MHD_OPTION_LISTEN_SOCKET, listener.socket.get(), MHD_OPTION_CONNECTION_LIMIT, most_connections,
-        MHD_OPTION_CONNECTION_MEMORY_LIMIT, memory_for_each, MHD_OPTION_CONNECTION_TIMEOUT, idle_seconds,
-        MHD_OPTION_NOTIFY_COMPLETED, &completed, this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
+    daemon = ::MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, listener.port, nullptr,
+                                nullptr, &access, this, MHD_OPTION_LISTEN_SOCKET, listener.socket.get(),
+                                MHD_OPTION_CONNECTION_LIMIT, most_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
+                                most_of_an_address, MHD_OPTION_CONNECTION_MEMORY_LIMIT, memory_for_each,
+                                MHD_OPTION_CONNECTION_TIMEOUT, idle_seconds, MHD_OPTION_NOTIFY_COMPLETED, &completed,
+                                this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
     if (daemon == nullptr)
       throw client::Failure("the web server cannot be started: too many files are open, or no memory");
     static_cast<void>(listener.socket.release());  // the daemon closes it
