@@ -188,6 +188,11 @@ class Page(ServeCase):
         self.window.go(served.url, encoder="sim:tfornat")
         self.wait_for('There is no encoder "sim:tfornat" here; did you mean sim:tformat?', "#connection")
 
+    def test_a_link_that_is_no_address_is_an_unknown_encoder(self):
+        served = self.without_history("sim:tformat")
+        self.browser.get(served.url + "#encoder=%")
+        self.wait_for('There is no encoder "%" here', "#connection")
+
     def test_the_server_is_lost(self):
         self.open()
         self.wait_for("°", ".unit")

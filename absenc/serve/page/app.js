@@ -52,12 +52,21 @@ function take(event, data) {
   view.take(event, data);
 }
 
+// What is not written as an address writes it is what it says: nobody has an encoder of that name.
+function decoded(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
 /** {encoder, tab, range, unit} of the address: a link to it can be shared. */
 function place() {
   const values = new URLSearchParams();
   for (const part of location.hash.slice(1).split("&")) {
     const [name, ...rest] = part.split("=");
-    if (name !== "") values.set(name, decodeURIComponent(rest.join("=")));
+    if (name !== "") values.set(name, decoded(rest.join("=")));
   }
   return values;
 }
