@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/serve/chronicler.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::serve {
@@ -13,6 +17,18 @@ namespace {
 constexpr Time between_trims = std::chrono::seconds(60);
 
 }  // namespace
+
+std::int64_t ClockWatch::look(std::int64_t calendar, Time now) {
+  if (!looked_) trusted_at_ = now + doubt;  // it may begin with a clock that is not set yet
+  const std::int64_t passed = std::chrono::duration_cast<std::chrono::milliseconds>(now - at_).count();
+  const std::int64_t jump = looked_ ? calendar - calendar_ - passed : 0;
+  looked_ = true;
+  calendar_ = calendar;
+  at_ = now;
+  if (std::abs(jump) < smallest_jump_ms) return 0;
+  trusted_at_ = now + doubt;
+  return jump;
+}
 
 Chronicler::Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet)
     : writer_(path, limits), fleet_(&fleet), thread_([this](const std::stop_token& stop) { work(stop); }) {}
@@ -49,14 +65,26 @@ Chronicler::Health Chronicler::health() const {
 void Chronicler::work(const std::stop_token& stop) {
   Time next_trim = os::now() + between_trims;
   while (!stop.stop_requested()) {
+    look_at_clock();
     write();
     if (os::now() >= next_trim) {
-      writer_.trim();
+      if (clock_.is_trusted(os::now())) writer_.trim();
       next_trim = os::now() + between_trims;
     }
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, stop, std::chrono::seconds(1), [this] { return is_awaited(); });
   }
+}
+
+void Chronicler::look_at_clock() {
+  const std::int64_t at_ms = calendar_ms();
+  const std::int64_t jump = clock_.look(at_ms, os::now());
+  if (jump == 0) return;
+  const Time size = std::chrono::milliseconds(std::abs(jump));
+  const std::lock_guard lock(mutex_);
+  happenings_.push_back({at_ms, "", "history",
+                         fmt::format("the clock went {} by {}: nothing is deleted for its age within the next hour",
+                                     jump > 0 ? "forward" : "back", client::to_text(size))});
 }
 
 void Chronicler::write() {

@@ -2,6 +2,7 @@
 // Writes the history once a second, in a thread of its own: a slow disk delays nobody else.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -15,6 +16,24 @@
 #include "absenc/serve/history.hpp"
 
 namespace absenc::serve {
+
+/// Whether what the calendar's clock says of age may delete anything: a clock that is wrong for a minute must not cost
+/// the history.
+class ClockWatch {
+ public:
+  static constexpr Time doubt = std::chrono::hours(1);      // after the start, and after each jump
+  static constexpr std::int64_t smallest_jump_ms = 10'000;  // NTP moves it by less
+
+  /// Returns by how much it has jumped since the last look, in milliseconds; 0: it has not. `now`: of os::now.
+  std::int64_t look(std::int64_t calendar_ms, Time now);
+  [[nodiscard]] bool is_trusted(Time now) const { return looked_ && now >= trusted_at_; }
+
+ private:
+  bool looked_ = false;
+  std::int64_t calendar_ = 0;
+  Time at_{};
+  Time trusted_at_{};
+};
 
 class Chronicler {
  public:
@@ -37,11 +56,13 @@ class Chronicler {
 
  private:
   void work(const std::stop_token& stop);
+  void look_at_clock();
   void write();
   [[nodiscard]] bool is_awaited() const;
 
   HistoryWriter writer_;
   const Fleet* fleet_;
+  ClockWatch clock_;
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;
   std::vector<Happening> happenings_;

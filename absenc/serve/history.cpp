@@ -31,6 +31,21 @@ CREATE TABLE IF NOT EXISTS happening (
 CREATE INDEX IF NOT EXISTS happening_at ON happening (at_ms);
 )";
 
+// A second comes twice when the clock was set back, or the server began anew within it: it has the readings of both.
+constexpr const char* add_second = R"(
+INSERT INTO second SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM encoder WHERE name = ?
+ON CONFLICT (encoder, at) DO UPDATE SET
+  readings = readings + excluded.readings, errors = errors + excluded.errors,
+  least = coalesce(min(least, excluded.least), least, excluded.least),
+  greatest = coalesce(max(greatest, excluded.greatest), greatest, excluded.greatest),
+  mean = coalesce((mean * readings + excluded.mean * excluded.readings) / (readings + excluded.readings),
+                  mean, excluded.mean),
+  speed_least = coalesce(min(speed_least, excluded.speed_least), speed_least, excluded.speed_least),
+  speed_greatest = coalesce(max(speed_greatest, excluded.speed_greatest), speed_greatest, excluded.speed_greatest),
+  speed_mean = coalesce((speed_mean * readings + excluded.speed_mean * excluded.readings)
+                        / (readings + excluded.readings), speed_mean, excluded.speed_mean)
+)";
+
 void bind_spread(Statement& statement, int first, const Spread& spread) {
   if (spread.count == 0) {
     for (int i = 0; i < 3; ++i) statement.bind_null(first + i);
@@ -87,8 +102,7 @@ bool HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<H
   try {
     sqlite.run("BEGIN IMMEDIATE");
     Statement name(sqlite, "INSERT OR IGNORE INTO encoder (name) VALUES (?)");
-    Statement second(sqlite,
-                     "INSERT OR REPLACE INTO second SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM encoder WHERE name = ?");
+    Statement second(sqlite, add_second);
     for (const Entry& entry : seconds) {
       name.bind(1, entry.encoder).run();
       second.bind(1, entry.second.at_s).bind(2, static_cast<std::int64_t>(entry.second.readings));
