@@ -509,7 +509,7 @@ class Run(EncoderCase):
         result = absenc("run", self.encoder("--motion", "rpm=60"), "zero", "--yes", "--json")
         self.assertEqual(result.returncode, 1)
         answer = json.loads(result.stdout)
-        self.assertEqual((answer["ok"], answer["error"]), (False, "invalid_argument"))
+        self.assertEqual((answer["ok"], answer["error"]), (False, "not_still"))
         self.assertIn("the shaft is turning", answer["message"])
 
     def test_nobody_to_ask(self):
@@ -542,6 +542,7 @@ class Run(EncoderCase):
                 status, shown = self.ask(address, answer)
                 self.assertEqual(status, 1)
                 self.assertIn("make this the zero of the turn", shown)
+                self.assertRegex(shown, r"(?s)now: 2\.747 deg +1000 counts .*This changes the encoder")
                 self.assertIn("nothing was changed", shown)
         self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 1000)
         for answer in (b"y\n", b"yes\n", b"Y\n", b"Yes\n", b"YES\n", b" y \n"):

@@ -32,6 +32,8 @@ enum class Error : std::uint8_t {
   // the encoder refused
   busy,
   request_rejected,
+  // the shaft
+  not_still,
 };
 
 struct ErrorText {
@@ -41,7 +43,7 @@ struct ErrorText {
 };
 
 /// Indexed by the enumerator.
-inline constexpr std::array<ErrorText, 16> error_texts{{
+inline constexpr std::array<ErrorText, 17> error_texts{{
     {"none", "no error", ""},
     {"invalid_argument", "this cannot be done as it was asked", "check the value against its range"},
     {"unsupported", "this encoder or model does not have that", "`absenc list` shows what each one supports"},
@@ -61,6 +63,7 @@ inline constexpr std::array<ErrorText, 16> error_texts{{
     {"busy", "the encoder stayed busy", "wait and try again"},
     {"request_rejected", "the encoder refused the request",
      "check that this encoder allows the request, and does in its present state"},
+    {"not_still", "the shaft is turning, and this needs it standing still", "stop the shaft, then try again"},
 }};
 
 /// Whether the bytes themselves are wrong. With any other error a whole frame with a right checksum came: what it says

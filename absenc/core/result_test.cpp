@@ -30,7 +30,7 @@ static_assert(text_of(Error::timeout).name == "timeout" && text_of(Error::trunca
 static_assert(text_of(Error::wrong_length).name == "wrong_length");
 static_assert(text_of(Error::cross_check_failed).name == "cross_check_failed");
 static_assert(text_of(Error::busy).name == "busy" && text_of(Error::request_rejected).name == "request_rejected");
-static_assert(static_cast<std::size_t>(Error::request_rejected) + 1 == error_texts.size());
+static_assert(static_cast<std::size_t>(Error::not_still) + 1 == error_texts.size());
 
 TEST(ErrorTexts, HaveDistinctNamesOfOneWordAndSayWhatToTry) {
   std::set<std::string_view> names;

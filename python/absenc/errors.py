@@ -142,5 +142,11 @@ class RequestRejected(EncoderError):
     name = "request_rejected"
 
 
+class NotStill(EncoderError):
+    """The shaft is turning, and this needs it standing still."""
+
+    name = "not_still"
+
+
 #: The classes by the names of the errors.
 by_name: dict[str, type[EncoderError]] = {one.name: one for one in EncoderError.__subclasses__()}

@@ -41,7 +41,7 @@ TEST(Amt21, ZeroIsWhereTheShaftStandsStill) {
   bench.tampered.replies({});
   bench.shaft.spin(60, bench.line.now());
   const author::testing::Told refused = bench.run("zero");
-  EXPECT_EQ(refused.error, Error::invalid_argument);
+  EXPECT_EQ(refused.error, Error::not_still);
   EXPECT_EQ(refused.frames, 2u);
 }
 TEST(Amt21, TurnsAreLostWithoutABatteryAndCannotBeZeroed) {

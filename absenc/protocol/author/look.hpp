@@ -49,8 +49,8 @@ Part<bool> may_set_zero(DialogOf<P>& dialog, Looked<P>& found, typename P::Reque
   const Reading first = found.reading;
   co_await dialog.rest(between_looks);
   co_await look(dialog, found, request);
-  const Explanation why_not = objection_to_zero(first, found.reading);
-  if (!why_not.detail.empty()) co_await dialog.stop({Error::invalid_argument, why_not.detail, why_not.advice});
+  const Outcome why_not = objection_to_zero(first, found.reading);
+  if (why_not.error != Error::none) co_await dialog.stop(why_not);
   co_return true;
 }
 

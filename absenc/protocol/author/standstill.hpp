@@ -7,7 +7,7 @@
 
 #include "absenc/core/angle.hpp"
 #include "absenc/core/time.hpp"
-#include "absenc/protocol/conversation.hpp"
+#include "absenc/protocol/author/routine.hpp"
 
 namespace absenc::author {
 
@@ -34,23 +34,24 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return apart <= limit && -apart <= limit;
 }
 
-/// Why a command that needs the shaft to stand still must not be sent after these two looks, `between_looks` apart; no
-/// detail: it may.
-[[nodiscard]] constexpr Explanation objection_to_moving(const Reading& first, const Reading& second) {
+/// Why a command that needs the shaft to stand still must not be sent after these two looks, `between_looks` apart:
+/// not_still; no error: it may.
+[[nodiscard]] constexpr Outcome objection_to_moving(const Reading& first, const Reading& second) {
   if (is_near(second.singleturn, first.singleturn, second.singleturn_bits)) return {};
-  return {"the shaft is turning, and this needs it standing still; nothing was changed",
-          "stop the shaft, then try again"};
+  return {Error::not_still, "nothing was changed"};
 }
 
-/// The same of a zero, which is wrong for ever where the position that it is made of does not hold.
-[[nodiscard]] constexpr Explanation objection_to_zero(const Reading& first, const Reading& second) {
+/// The same of a zero, which is wrong for ever where the position that it is made of does not hold: invalid_argument.
+[[nodiscard]] constexpr Outcome objection_to_zero(const Reading& first, const Reading& second) {
   for (const Reading& look : {first, second}) {
     if (!look.ready) {
-      return {"the encoder is still starting, and its position does not hold yet; nothing was changed",
+      return {Error::invalid_argument,
+              "the encoder is still starting, and its position does not hold yet; nothing was changed",
               "wait until it has started, then try again"};
     }
     if (look.singleturn_validity() == Validity::invalid) {
-      return {"the position does not hold, and a zero made of it would be wrong; nothing was changed",
+      return {Error::invalid_argument,
+              "the position does not hold, and a zero made of it would be wrong; nothing was changed",
               "mend what `absenc alarms` names, then try again"};
     }
   }

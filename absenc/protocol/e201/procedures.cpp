@@ -113,14 +113,13 @@ Procedure set_zero(Dialog& dialog, Found& found) {
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
     const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);
-    const Explanation why_not = author::objection_to_zero(look, look);
-    if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
+    const Outcome why_not = author::objection_to_zero(look, look);
+    if (why_not.error != Error::none) co_return why_not;
   }
   const Reply first = co_await dialog.ask({letter::decimal});
   const Reply second = co_await dialog.ask({letter::decimal}).after(author::between_looks);
   if (!is_near(dialog, second.number, first.number)) {
-    co_return {Error::invalid_argument, "the encoder moves: it must stand still; nothing was changed",
-               "stop the shaft, then try again"};
+    co_return {Error::not_still, "nothing was changed"};
   }
   co_await dialog.ask({letter::zero}).changes();
   const Reply now = co_await dialog.ask({letter::decimal});

@@ -248,9 +248,8 @@ Part<bool> may_set_zero(Dialog& dialog, Found& found) {
   const Reading first = to_reading(dialog.format(), dialog.last(), found.status);
   const Time looked = dialog.received_at();
   while (dialog.received_at() - looked < author::between_looks) co_await next_frame(dialog, found);
-  const Explanation why_not =
-      author::objection_to_zero(first, to_reading(dialog.format(), dialog.last(), found.status));
-  if (!why_not.detail.empty()) co_await dialog.stop({Error::invalid_argument, why_not.detail, why_not.advice});
+  const Outcome why_not = author::objection_to_zero(first, to_reading(dialog.format(), dialog.last(), found.status));
+  if (why_not.error != Error::none) co_await dialog.stop(why_not);
   co_return true;
 }
 

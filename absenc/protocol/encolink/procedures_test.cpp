@@ -63,7 +63,7 @@ TEST_P(EncolinkProcedure, ZeroNeedsAShaftAtRestAndAPosition) {
   Bench bench(testing::single, interface);
   for (const std::int32_t rpm : {600, 1, -1}) {
     bench.shaft.spin(rpm, bench.line.now());
-    EXPECT_EQ(bench.run("zero").error, Error::invalid_argument) << rpm;
+    EXPECT_EQ(bench.run("zero").error, Error::not_still) << rpm;
   }
   bench.shaft.spin(0, bench.line.now());
   bench.device.raise_alarms(status::signal_lost);

@@ -120,9 +120,10 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
   if (!to_reading(before).ready) {
     co_return {Error::invalid_argument, "the encoder is not ready yet; nothing was changed", "wait, then try again"};
   }
-  const Explanation why_not = id == DataId::zero ? author::objection_to_zero(to_reading(first), to_reading(before))
-                                                 : author::objection_to_moving(to_reading(first), to_reading(before));
-  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
+  const author::Outcome why_not = id == DataId::zero
+                                      ? author::objection_to_zero(to_reading(first), to_reading(before))
+                                      : author::objection_to_moving(to_reading(first), to_reading(before));
+  if (why_not.error != Error::none) co_return why_not;
   for (unsigned i = 0; i < reset_requests; ++i) {
     const Time pause = i == 0 ? Time{} : pause_between_resets(dialog, id);
     const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).changes().after(pause);

@@ -109,7 +109,7 @@ TEST(EslReset, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
     Bench bench;
     bench.shaft.spin(rpm, Time{});
     const Told zero = bench.run("zero");
-    EXPECT_EQ(zero.error, Error::invalid_argument);
+    EXPECT_EQ(zero.error, Error::not_still);
     EXPECT_TRUE(zero.says("nothing was changed"));
     EXPECT_EQ(bench.encoder.answer_count(), 2u);  // it only looked
   }

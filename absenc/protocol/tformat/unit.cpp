@@ -30,21 +30,22 @@ struct Found : Values {
 // ---- Resets (10)
 
 // Why this reset must not be sent; empty: it may.
-Explanation objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
+Outcome objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
   const Reading before = to_reading(format, first);
   const Reading now = to_reading(format, second);
   // The position is too coarse then to show a movement.
   if ((second.alarms & alarms::full_absolute_status) != 0) {
-    return {
-        "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
-        "since; nothing was sent",
-        "let the shaft stand still, then try again"};
+    return {Error::invalid_argument,
+            "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
+            "since; nothing was sent",
+            "let the shaft stand still, then try again"};
   }
-  const Explanation moves = id == DataId::zero ? objection_to_zero(before, now) : objection_to_moving(before, now);
-  if (!moves.detail.empty()) return moves;
+  const Outcome moves = id == DataId::zero ? objection_to_zero(before, now) : objection_to_moving(before, now);
+  if (moves.error != Error::none) return moves;
   const bool turns_lost = format.battery && (second.alarms & alarms::battery_error) != 0;
   if (id == DataId::clear_alarms && turns_lost) {
-    return {"battery_error says that the turns are lost, and clearing it alone would hide that; nothing was sent",
+    return {Error::invalid_argument,
+            "battery_error says that the turns are lost, and clearing it alone would hide that; nothing was sent",
             "replace the battery, return to the origin, then `absenc reset-multiturn`"};
   }
   return {};
@@ -73,8 +74,8 @@ Explanation missed(DataId id, const Reply& now, unsigned bits) {
 Procedure reset(Dialog& dialog, Found& found, DataId id) {
   const Reply first = co_await dialog.ask({DataId::everything});
   const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
-  const Explanation why_not = objection(dialog.format(), id, first, second);
-  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
+  const Outcome why_not = objection(dialog.format(), id, first, second);
+  if (why_not.error != Error::none) co_return why_not;
 
   // Intervals are counted from the end of the reply: that is 40 us or more however the document means it.
   for (unsigned sent = 1; sent <= reset_requests; ++sent) {

@@ -14,6 +14,7 @@
 #include "tools/absenc/text/field_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/text/progress.hpp"
+#include "tools/absenc/text/reading_text.hpp"
 #include "tools/absenc/verbs/run.hpp"
 
 namespace absenc::tool {
@@ -36,6 +37,19 @@ void show_progress(Progress& progress, const Connection& encoder, const Command&
   if (so_far.rows.empty()) return;
   const std::vector<std::string>& newest = so_far.rows.back();
   progress.show(fmt::format("{}: {}: {}", command.name, newest[0], newest[1]));
+}
+
+// What is there before somebody is asked whether to change it: that it is the right encoder, and where it stands.
+void show_before(Connection& encoder) {
+  if (find_command(encoder.unit(), Verb::read) == nullptr) return;
+  const Outcome outcome = encoder.read();
+  if (outcome.error != Error::none) {
+    const Trouble trouble = encoder.trouble(outcome);
+    return print_note(fmt::format("now: not known: {}: {}", text_of(trouble.error).name, trouble.message));
+  }
+  if (outcome.reading == nullptr) return;
+  const std::string text = reading_text(encoder.unit(), *outcome.reading);
+  print_note(fmt::format("now: {}", text.substr(std::min(text.find_first_not_of(' '), text.size()))));
 }
 
 Outcome run_watched(Connection& encoder, const Command& command, Arguments arguments) {
@@ -75,14 +89,16 @@ constexpr std::array<Example, 2> run_examples{{
 int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments) {
   os::catch_interrupts();
   tell_disturbance(uri, command);
-  if (command.changes_encoder && must_ask(invocation, uri, command.name, command.meaning) &&
-      !confirmed(uri, command.meaning)) {
-    print_message("nothing was changed");
-    return exit_failed;
-  }
-
+  const bool asks = command.changes_encoder && must_ask(invocation, uri, command.name, command.meaning);
   const std::unique_ptr<Connection> encoder =
       command.changes_encoder ? before_change([&] { return open_connection(uri); }) : open_connection(uri);
+  if (asks) {
+    show_before(*encoder);
+    if (!confirmed(uri, command.meaning)) {
+      print_message("nothing was changed");
+      return exit_failed;
+    }
+  }
   const Outcome outcome = run_watched(*encoder, command, arguments);
   if (outcome.error != Error::none) throw EncoderFailure(encoder->trouble(outcome));
   JsonFields fields;

@@ -163,7 +163,7 @@ TEST(CanZero, AShaftThatTurns) {
   Bench bench;
   bench.put(5000);
   bench.shaft.spin(600, bench.line.now());
-  EXPECT_TRUE(ended(bench.does("zero"), Error::invalid_argument, "turning"));
+  EXPECT_TRUE(ended(bench.does("zero"), Error::not_still, "nothing was changed"));
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 

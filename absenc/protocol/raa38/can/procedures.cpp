@@ -131,10 +131,10 @@ Part<Look> look_twice(Dialog& dialog) {
   if (first.outcome.error != Error::none) co_return first;
   Look second = co_await look(dialog, between_looks);
   const unsigned bits = dialog.format().bits;
-  const Explanation why_not =
+  const Outcome why_not =
       objection_to_zero(position_reading(first.counts, bits), position_reading(second.counts, bits));
-  if (second.outcome.error == Error::none && !why_not.detail.empty()) {
-    second.outcome = only(Error::invalid_argument, why_not.detail, why_not.advice);
+  if (second.outcome.error == Error::none && why_not.error != Error::none) {
+    second.outcome = only(why_not.error, why_not.detail, why_not.advice);
   }
   co_return second;
 }

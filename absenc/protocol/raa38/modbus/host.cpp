@@ -363,9 +363,9 @@ Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
   const Reply first = co_await look_at_it(dialog, found, 3);
   co_await dialog.rest(between_looks);
   const Reply second = co_await look_at_it(dialog, found, 3);
-  const Explanation why_not =
+  const Outcome why_not =
       objection_to_zero(position_reading(first.singleturn, bits), position_reading(second.singleturn, bits));
-  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
+  if (why_not.error != Error::none) co_return why_not;
   show_position(dialog, found);
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;

@@ -341,7 +341,7 @@ TEST(Raa38ModbusSettings, ZeroIsHere) {
   EXPECT_EQ(bench.does("zero").fields, "singleturn=0 written=1 ");
   EXPECT_EQ(bench.does("zero").fields, "singleturn=0 written=0 ");
   bench.shaft.spin(60, bench.line.now());
-  EXPECT_TRUE(ended(bench.does("zero"), Error::invalid_argument, "turning"));
+  EXPECT_TRUE(ended(bench.does("zero"), Error::not_still, "nothing was changed"));
   EXPECT_EQ(bench.encoder().settings().writes(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }

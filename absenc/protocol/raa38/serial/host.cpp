@@ -221,9 +221,9 @@ Procedure set_zero(Dialog& dialog, Values& found) {
   co_await dialog.rest(between_looks);
   const Result<Position> second = co_await look(dialog);
   if (!second) co_return {second.error()};
-  const Explanation why_not = objection_to_zero(position_reading(first->singleturn, format.bits),
+  const Outcome why_not = objection_to_zero(position_reading(first->singleturn, format.bits),
                                                 position_reading(second->singleturn, format.bits));
-  if (!why_not.detail.empty()) co_return {Error::invalid_argument, why_not.detail, why_not.advice};
+  if (why_not.error != Error::none) co_return why_not;
   const Request by_command{Request::Kind::zero_clear, format.zeroed_unit()};
   co_await dialog.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command).changes();
   // It is not told whether that worked.
