@@ -356,6 +356,18 @@ class Acknowledged(ServeCase):
         self.assertEqual(self.acknowledge(server, name, {}, alarm="over_heat")[0], 403)
 
 
+class HeldPort(ServeCase):
+    def test_nobody_is_told_to_end_the_server_that_holds_a_port(self):
+        with Emulator(self.directory) as emulator:
+            served = self.without_history(f"tformat:{emulator.path}")
+            wait_until(lambda: served.encoder()["state"] == "live", "it is read")
+            refused = absenc("read", f"tformat:{emulator.path}")
+            self.assertEqual(refused.returncode, 1)
+            self.assertIn(f"in use by absenc serve (process {served.process.pid})", refused.stderr)
+            self.assertIn("its page and its API", refused.stderr)
+            self.assertNotIn("end it", refused.stderr)
+
+
 class Losses(ServeCase):
     def test_an_encoder_goes_and_comes_back(self):
         emulator = Emulator(self.directory)

@@ -48,9 +48,15 @@ std::string link_to(const fs::path& file, const fs::path& folder) {
   return {};
 }
 
-// "sleep (process 4711)"
+// "sleep (process 4711)"; of absenc with its verb, "absenc serve (process 4711)".
 std::string program(const std::string& process) {
-  const std::string name = first_line(fs::path("/proc") / process / "comm");
+  std::string name = first_line(fs::path("/proc") / process / "comm");
+  if (name == "absenc") {
+    std::ifstream words(fs::path("/proc") / process / "cmdline");
+    std::string verb;
+    std::getline(words, verb, '\0');
+    if (std::getline(words, verb, '\0')) name += " " + verb;
+  }
   return (name.empty() ? "a program" : name) + " (process " + process + ")";
 }
 
@@ -85,6 +91,12 @@ std::string opener(const fs::path& file) {
 
 Failure in_use(const std::string& path) {
   std::string holder = holder_of(path);
+  // A server reads for many: who ended it would take the encoder from all of them.
+  if (holder.starts_with("absenc serve ")) {
+    return {Failure::Kind::in_use,
+            "the port " + path + " is in use by " + holder +
+                ": its page and its API (/api/encoders) show what it reads; or use another port"};
+  }
   if (holder.empty()) holder = "another program";
   return {Failure::Kind::in_use, "the port " + path + " is in use by " + holder + ": end it, or use another port"};
 }
