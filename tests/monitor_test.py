@@ -319,6 +319,10 @@ class Lines(MonitorCase):
             if condition(line):
                 return line
 
+    def test_a_reading_that_is_not_new_has_its_age(self):
+        result = absenc("monitor", "sim:tformat", "--rate", "1", "--for", "3", "--interval", "0.4")
+        self.assertRegex(result.stdout, r"rpm   \(0\.[2-9] s old\)")
+
     def test_head(self):
         result = subprocess.run(["sh", "-c", '"$0" monitor sim:tformat sim:tformat --interval 0.1 | head -1', ABSENC],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)

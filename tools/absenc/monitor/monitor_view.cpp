@@ -40,6 +40,12 @@ bool has_position(const Snapshot& snapshot) {
   return is_live(snapshot) && reading.ready && reading.singleturn_valid();
 }
 
+// Of a reading that is no longer quite new: " (0.3 s old)".
+std::string age(const Snapshot& snapshot) {
+  if (snapshot.age < std::chrono::milliseconds(100)) return {};
+  return fmt::format("   ({:.1f} s old)", std::chrono::duration<double>(snapshot.age).count());
+}
+
 double unit_um(const Shown& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   return uri.unit->resolution(uri.options).unit_um;
@@ -184,7 +190,8 @@ void draw_position(Screen& screen, int row, const Shown& shown) {
     const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;  // or else they are below
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
-    const std::string text = has_room ? reading_text(unit, reading, doubt) : place_text(reading, doubt);
+    const std::string text =
+        (has_room ? reading_text(unit, reading, doubt) : place_text(reading, doubt)) + age(snapshot);
     const bool good = has_position(snapshot);
     return screen.put(row, 2, text, good ? Style::bold : Style::bad);
   }
@@ -369,9 +376,9 @@ std::string to_line(const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   std::string text = fmt::format("{}: ", shown.watch->name());
   if (is_live(snapshot)) {
-    text += fmt::format("{}   {} {}",
+    text += fmt::format("{}   {} {}{}",
                         reading_text(*shown.watch->uri().unit, snapshot.last.reading, doubt_of(snapshot.last)),
-                        speed_text(snapshot), speed_unit(snapshot.last.reading));
+                        speed_text(snapshot), speed_unit(snapshot.last.reading), age(snapshot));
   } else {
     text += fmt::format("{}, no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   }
